@@ -1,0 +1,41 @@
+"""What all bodies share: checked parameters, the speed, the fingerprint."""
+
+import math
+from dataclasses import fields
+from typing import Any
+
+from scatterers.speed import as_speed
+
+
+def finite(**values: float) -> None:
+    """Raise ValueError unless every named value is a finite number."""
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ValueError(f"{name} = {value!r} is not a finite number")
+
+
+def positive(**values: float) -> None:
+    """Raise ValueError unless every named value is a positive finite number."""
+    finite(**values)
+    for name, value in values.items():
+        if value <= 0:
+            raise ValueError(f"{name} = {value!r} is not positive; give a length > 0")
+
+
+class Body:
+    """Base of the dataclass bodies; each lists its parameters as fields, ``speed`` last."""
+
+    def _set_speed(self) -> None:
+        object.__setattr__(self, "speed", as_speed(getattr(self, "speed", None)))
+
+    @property
+    def fingerprint(self) -> str | None:
+        """Text that changes with the shape or the speed; None if the speed cannot be named."""
+        values = [f"{f.name}={float(getattr(self, f.name)).hex()}" for f in fields(self) if f.name != "speed"]  # type: ignore[arg-type]
+        speed: Any = getattr(self, "speed", None)
+        if speed is not None:
+            named = getattr(speed, "fingerprint", None)
+            if named is None:
+                return None
+            values.append(f"speed={named}")
+        return f"{type(self).__name__}({', '.join(values)})"

@@ -1,0 +1,53 @@
+"""Block evaluators of the bodies, compiled to functions that kernels call by address.
+
+A *level evaluator* fills, for a block of n points, F, grad F and the six Hessian entries
+(xx, yy, zz, yz, xz, xy); a *locator* fills chart number, chart variables and the isometric frame
+(rows e1x, e1y, e1z, e2x, e2y, e2z). Parameters arrive in an array, so one compiled function serves
+every body of its class and is cached on disk. numba is imported at the first use, for a quick start.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """A block function, compiled when first asked for, and the parameters to call it with.
+
+    Attributes
+    ----------
+    source : callable
+        Plain Python of the function, with the arguments
+        ``(points (3, n), values (n,), gradients (3, n), hessians (6, n), parameters)`` for a level or a speed,
+        ``(points (3, n), chart (n,), uv (2, n), frame (6, n), parameters)`` for a locator.
+    kind : {"level", "locator"}
+    parameters : (k,) float64
+    """
+
+    source: Callable[..., None]
+    kind: Literal["level", "locator"]
+    parameters: NDArray[np.float64]
+
+    @property
+    def function(self) -> Any:
+        """The compiled function, a numba CFunc."""
+        return _compile(self.source, self.kind)
+
+
+@cache
+def _compile(source: Callable[..., None], kind: str) -> Any:
+    from numba import cfunc, types
+
+    row, rows = types.float64[::1], types.float64[:, ::1]
+    if kind == "level":
+        signature = types.void(rows, row, rows, rows, row)
+    else:
+        signature = types.void(rows, types.int64[::1], rows, rows, row)
+    # code made from an expression has no file that numba could cache beside
+    in_file = not source.__code__.co_filename.startswith("<")
+    return cfunc(signature, cache=in_file, error_model="numpy")(source)

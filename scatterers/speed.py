@@ -1,0 +1,88 @@
+"""Speed c(x) > 0 of the weighted flow, from an expression in x, y, z or from a user's object.
+
+Expressions are differentiated symbolically (sympy) and compiled; they never pass through ``eval`` as written.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers._compile import Compiled
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ExpressionSpeed:
+    """Speed given by an expression such as ``"1 + x"``.
+
+    Parameters
+    ----------
+    expression : str
+        Numbers, x, y, z, pi, + - * / **, parentheses and sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh.
+
+    Raises
+    ------
+    ValueError
+        If the expression contains anything else.
+    """
+
+    expression: str
+
+    def __post_init__(self) -> None:
+        _ = self._functions
+
+    @cached_property
+    def _functions(self) -> Any:
+        from scatterers._expressions import differentiate
+
+        return differentiate(self.expression)
+
+    @property
+    def fingerprint(self) -> str:
+        """Text that changes with the speed."""
+        return repr(self.expression)
+
+    @property
+    def compiled(self) -> Compiled:
+        """Compiled evaluator of c, grad c and its Hessian."""
+        return Compiled(self._functions.block, "level", np.zeros(1))
+
+    def value(self, points: FloatArray) -> FloatArray:
+        """c: (..., 3) -> (...)."""
+        return _stacked(self._functions.value, points)[..., 0]
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """grad c: (..., 3) -> (..., 3)."""
+        return _stacked(self._functions.gradient, points)
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of c: (..., 3) -> (..., 3, 3)."""
+        xx, yy, zz, yz, xz, xy = np.moveaxis(_stacked(self._functions.hessian, points), -1, 0)
+        rows = [np.stack(row, axis=-1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
+        return np.stack(rows, axis=-2)
+
+
+def _stacked(function: Callable[..., Any], points: FloatArray) -> FloatArray:
+    """Call with x, y, z and stack the results along a last axis."""
+    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+    return np.stack([np.broadcast_to(np.asarray(v, dtype=float), x.shape) for v in function(x, y, z)], axis=-1)
+
+
+def as_speed(speed: Any) -> Any:
+    """Accept None, an expression, or an object with ``value`` and ``gradient``.
+
+    Raises
+    ------
+    TypeError
+        If it is none of these.
+    """
+    if speed is None or all(callable(getattr(speed, name, None)) for name in ("value", "gradient")):
+        return speed
+    if isinstance(speed, str):
+        return ExpressionSpeed(speed)
+    raise TypeError(f"speed {speed!r} is neither an expression nor an object with value(points) and gradient(points)")

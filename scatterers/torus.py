@@ -1,0 +1,151 @@
+"""Torus about z: F = ((sqrt(x^2 + y^2) - R)^2 + z^2)/r^2 - 1.
+
+x = (R + r cos theta)(cos psi, sin psi), z = r sin theta; chart variables u = psi/2 pi, v = theta/2 pi. The coordinate
+lines are orthogonal, so the isometric frame is the pair of their unit tangents. The inner half is not convex.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers._body import Body, positive
+from scatterers._charts import PeriodicAtlas, PeriodicChart
+from scatterers._compile import Compiled
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Torus(Body):
+    """Torus about the z axis.
+
+    Parameters
+    ----------
+    R : float
+        Radius of the centre circle, L.
+    r : float
+        Radius of the tube, L; 0 < r < R.
+    speed : str or object with ``value`` and ``gradient``, optional
+        Speed c(x) of the weighted flow.
+
+    Raises
+    ------
+    ValueError
+        If a radius is not a positive finite number, r >= R, or the speed is not usable.
+    """
+
+    R: float = 1.0
+    r: float = 0.5
+    speed: Any = None
+
+    def __post_init__(self) -> None:
+        positive(R=self.R, r=self.r)
+        if self.r >= self.R:
+            raise ValueError(f"r = {self.r!r} >= R = {self.R!r}: the torus meets itself; give r < R")
+        self._set_speed()
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Box (2, 3) that contains the body, L."""
+        half = np.array([self.R + self.r, self.R + self.r, self.r])
+        return np.stack([-half, half])
+
+    def level(self, points: FloatArray) -> FloatArray:
+        """F, positive outside: (..., 3) -> (...)."""
+        x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        return np.asarray(((np.hypot(x, y) - self.R) ** 2 + z**2) / self.r**2 - 1)
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of F: (..., 3) -> (..., 3); on the axis, far from the body, its radial part is set to 0."""
+        x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        rho = np.hypot(x, y)
+        radial = np.where(rho > 0, 1 - self.R / np.where(rho > 0, rho, 1.0), 0.0)
+        return np.stack([radial * x, radial * y, z], axis=-1) * (2 / self.r**2)
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        x, y, _ = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        rho = np.hypot(x, y)
+        rho = np.where(rho > 0, rho, 1.0)
+        h = np.zeros((*x.shape, 3, 3))
+        h[..., 0, 0] = 1 - self.R * y**2 / rho**3
+        h[..., 1, 1] = 1 - self.R * x**2 / rho**3
+        h[..., 0, 1] = h[..., 1, 0] = self.R * x * y / rho**3
+        h[..., 2, 2] = 1.0
+        return h * (2 / self.r**2)
+
+    def parameters(self, points: FloatArray) -> FloatArray:
+        """Angles (theta, psi), both in (-pi, pi]: (..., 3) -> (..., 2)."""
+        x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        return np.stack([np.arctan2(z, np.hypot(x, y) - self.R), np.arctan2(y, x)], axis=-1)
+
+    def _point(self, uv: FloatArray) -> FloatArray:
+        psi, theta = 2 * np.pi * uv[..., 0], 2 * np.pi * uv[..., 1]
+        rho = self.R + self.r * np.cos(theta)
+        return np.stack([rho * np.cos(psi), rho * np.sin(psi), self.r * np.sin(theta)], axis=-1)
+
+    def _tangents(self, uv: FloatArray) -> FloatArray:
+        psi, theta = 2 * np.pi * uv[..., 0], 2 * np.pi * uv[..., 1]
+        rho = self.R + self.r * np.cos(theta)
+        x_u = np.stack([-rho * np.sin(psi), rho * np.cos(psi), np.zeros_like(psi)], axis=-1)
+        sin = self.r * np.sin(theta)
+        x_v = np.stack([-sin * np.cos(psi), -sin * np.sin(psi), self.r * np.cos(theta)], axis=-1)
+        return 2 * np.pi * np.stack([x_u, x_v], axis=-1)
+
+    def _coordinates(self, points: FloatArray) -> FloatArray:
+        return self.parameters(points)[..., ::-1] / (2 * np.pi)
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled level evaluator."""
+        return Compiled(_evaluate, "level", np.array([self.R, self.r]))
+
+    @cached_property
+    def atlas(self) -> PeriodicAtlas:
+        """One doubly periodic chart."""
+        chart = PeriodicChart(self._point, self._tangents)
+        locator = Compiled(_locate, "locator", np.array([self.R, self.r]))
+        return PeriodicAtlas(chart, self._coordinates, locator)
+
+
+def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
+    """F, grad F and Hessian of a block; the compiled twin of level, gradient and hessian."""
+    major, scale = parameters[0], 2 / parameters[1] ** 2
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        rho = max(math.sqrt(x * x + y * y), 1e-300)
+        ratio = major / rho
+        x1, y1 = x / rho, y / rho
+        values[i] = 0.5 * scale * ((rho - major) * (rho - major) + z * z) - 1.0
+        gradients[0, i] = scale * (1 - ratio) * x
+        gradients[1, i] = scale * (1 - ratio) * y
+        gradients[2, i] = scale * z
+        hessians[0, i] = scale * (1 - ratio * y1 * y1)
+        hessians[1, i] = scale * (1 - ratio * x1 * x1)
+        hessians[2, i] = scale
+        hessians[3, i] = 0.0
+        hessians[4, i] = 0.0
+        hessians[5, i] = scale * ratio * x1 * y1
+
+
+def _locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
+    """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame."""
+    turn = 1 / (2 * math.pi)
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        rho = math.sqrt(x * x + y * y)
+        radial = rho - parameters[0]
+        u, v = math.atan2(y, x) * turn, math.atan2(z, radial) * turn
+        chart[i] = 0
+        u, v = u - math.floor(u), v - math.floor(v)
+        uv[0, i] = 0.0 if u >= 1.0 else u
+        uv[1, i] = 0.0 if v >= 1.0 else v
+        tube = math.sqrt(radial * radial + z * z)
+        cos_psi, sin_psi = x / rho, y / rho
+        cos_theta, sin_theta = radial / tube, z / tube
+        frame[0, i], frame[1, i], frame[2, i] = -sin_psi, cos_psi, 0.0
+        frame[3, i], frame[4, i], frame[5, i] = -sin_theta * cos_psi, -sin_theta * sin_psi, cos_theta

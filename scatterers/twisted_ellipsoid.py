@@ -1,0 +1,44 @@
+"""Twisted ellipsoid: F = x^2/a^2 + (y - d cos(pi z))^2/b^2 + z^2/c^2 - 1.
+
+psi(s) = (a s_1, b s_2 + d cos(pi c s_3), c s_3). Not convex: near z = 0, y < 0 the profile has
+y'' = -pi^2 d + b/c^2 on the default body, negative, so kappa_n < 0 along z there.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from scatterers._quadrics import BentEllipsoid, finite, positive
+
+
+@dataclass(frozen=True)
+class TwistedEllipsoid(BentEllipsoid):
+    """Ellipsoid whose y is shifted by d cos(pi z); the body of Figure 5 of Ying and Candes 2006.
+
+    Parameters
+    ----------
+    a, b, c : float
+        Semi-axes along x, y, z, L; positive.
+    d : float
+        Amplitude of the shift, L.
+    speed : str or object with ``value`` and ``gradient``, optional
+        Speed c(x) of the weighted flow.
+
+    Raises
+    ------
+    ValueError
+        If a semi-axis is not a positive finite number, d is not finite, or the speed is not usable.
+    """
+
+    a: float = 0.5
+    b: float = 0.5
+    c: float = 1.0
+    d: float = 0.2
+    speed: Any = None
+
+    def __post_init__(self) -> None:
+        positive(a=self.a, b=self.b, c=self.c)
+        finite(d=self.d)
+        self._set_speed()
+
+    def _shape(self) -> tuple[float, float, float, float]:
+        return self.a, self.b, self.c, self.d
