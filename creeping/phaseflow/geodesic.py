@@ -1,0 +1,138 @@
+"""The geodesic flow of a body, plain and weighted, and the curvatures along it.
+
+With n = grad F/|grad F|, H the Hessian of F, p (u when weighted) the unit tangent [YC06b, sec. 2]:
+
+    plain      x' = p,    p' = -(p.Hp)/|grad F|^2 grad F
+    weighted   x' = c u,  u' = -grad c + (grad c.n) n + (grad c.u) u - c (u.Hu)/|grad F| n
+
+The weighted flow is that of the metric ds/c, time being travel time. Neighbouring rays part by J, with
+J = c I and I'' + G I = 0; G is the Gaussian curvature of that metric,
+
+    K = (grad F.adj(H) grad F)/|grad F|^4,    G = c^2 K + c Lap c - |grad_Q c|^2,
+
+Lap the Laplacian on Q, Lap c = tr(P Hess c) - (kappa_1 + kappa_2) n.grad c with P = 1 - n n^T.
+Normal curvature kappa_n = p.Hp/|grad F| is positive where the body is convex along p.
+"""
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, FloatArray
+from creeping.surface import Surface, size
+
+
+def speed_of(body: Surface) -> Any:
+    """Speed c of the body's weighted flow, or None."""
+    return getattr(body, "speed", None)
+
+
+def speed_values(body: Surface, points: FloatArray) -> FloatArray:
+    """Speed c, 1 without a weight: (..., 3) -> (...)."""
+    speed = speed_of(body)
+    return np.ones(np.shape(points)[:-1]) if speed is None else np.asarray(speed.value(points), dtype=float)
+
+
+def speed_hessian(body: Surface, points: FloatArray) -> FloatArray:
+    """Hessian of c: (..., 3) -> (..., 3, 3), by central differences where the speed offers none."""
+    speed = speed_of(body)
+    if hasattr(speed, "hessian"):
+        return np.asarray(speed.hessian(points), dtype=float)
+    # rounding and truncation balance near eps^(1/3): relative error about 1e-10
+    step = 6e-6 * size(body)
+    columns = [(speed.gradient(points + step * e) - speed.gradient(points - step * e)) / (2 * step) for e in np.eye(3)]
+    hessian = np.stack(columns, axis=-1)
+    return np.asarray(0.5 * (hessian + np.swapaxes(hessian, -1, -2)))
+
+
+def normal_curvature(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:
+    """kappa_n = p.Hp/|grad F| along unit tangents p, 1/L: (..., 3), (..., 3) -> (...)."""
+    bent = np.einsum("...i,...ij,...j->...", directions, body.hessian(points), directions)
+    return np.asarray(bent / np.linalg.norm(body.gradient(points), axis=-1))
+
+
+def gaussian_curvature(body: Surface, points: FloatArray) -> FloatArray:
+    """K = (g.adj(H) g)/|g|^4 with g = grad F, 1/L^2: (..., 3) -> (...)."""
+    g, h = body.gradient(points), body.hessian(points)
+    # the columns of the adjugate of a symmetric matrix are cross products of its rows
+    adjugate = np.stack([np.cross(h[..., (k + 1) % 3, :], h[..., (k + 2) % 3, :]) for k in range(3)], axis=-2)
+    return np.asarray(np.einsum("...i,...ij,...j->...", g, adjugate, g) / np.sum(g * g, axis=-1) ** 2)
+
+
+def principal_curvature_bound(body: Surface, points: FloatArray) -> float:
+    """Largest |kappa_1| or |kappa_2| over the points, 1/L."""
+    g, h = body.gradient(points), body.hessian(points)
+    norm = np.linalg.norm(g, axis=-1)
+    n = g / norm[..., None]
+    tangential = np.eye(3) - n[..., :, None] * n[..., None, :]
+    shape = tangential @ h @ tangential / norm[..., None, None]
+    return float(np.max(np.abs(np.linalg.eigvalsh(shape))))
+
+
+def metric_curvature(body: Surface, points: FloatArray) -> FloatArray:
+    """Curvature G of the metric ds/c, 1/time^2; the Gaussian K without a weight: (..., 3) -> (...)."""
+    gauss = gaussian_curvature(body, points)
+    speed = speed_of(body)
+    if speed is None:
+        return gauss
+    g, h = body.gradient(points), body.hessian(points)
+    norm = np.linalg.norm(g, axis=-1)
+    n = g / norm[..., None]
+    c, dc, ddc = speed.value(points), speed.gradient(points), speed_hessian(body, points)
+    along_n = np.sum(n * dc, axis=-1)
+    mean = (np.trace(h, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, h, n)) / norm
+    laplacian = np.trace(ddc, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, ddc, n) - mean * along_n
+    return np.asarray(c**2 * gauss + c * laplacian - (np.sum(dc * dc, axis=-1) - along_n**2))
+
+
+def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Right-hand sides (x', p') of the flow: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    g, h = body.gradient(points), body.hessian(points)
+    bent = np.einsum("...i,...ij,...j->...", directions, h, directions)
+    turning = -(bent / np.sum(g * g, axis=-1))[..., None] * g
+    speed = speed_of(body)
+    if speed is None:
+        return directions, turning
+    c, dc = speed.value(points)[..., None], speed.gradient(points)
+    n = g / np.linalg.norm(g, axis=-1, keepdims=True)
+    along_n = np.sum(dc * n, axis=-1, keepdims=True)
+    along_u = np.sum(dc * directions, axis=-1, keepdims=True)
+    return c * directions, -dc + along_n * n + along_u * directions + c * turning
+
+
+def launch_spreading(body: Surface, points: FloatArray, directions: FloatArray, along: FloatArray) -> FloatArray:
+    """Initial (J, J') of rays launched with the constant direction d from a line: (n, 3) x 3 -> (n, 2).
+
+    J = b.dx/dsigma with b = n x p and sigma measured across the ray, so J(0) = 1. Differentiating b.dx along the ray
+    with dp/dsigma = 0 leaves J'(0) = (b.grad c)(p.dx/dsigma): zero without a weight, whatever the line's obliquity.
+    ``along`` holds the tangents of the line.
+    """
+    spreading = np.zeros((len(points), 2))
+    spreading[:, 0] = 1.0
+    speed = speed_of(body)
+    if speed is not None:
+        g = body.gradient(points)
+        b = np.cross(g / np.linalg.norm(g, axis=-1, keepdims=True), directions)
+        across = np.sum(b * along, axis=-1)
+        oblique = np.divide(np.sum(directions * along, axis=-1), across, out=np.zeros_like(across), where=across != 0)
+        spreading[:, 1] = np.sum(b * speed.gradient(points), axis=-1) * oblique
+    return spreading
+
+
+def check_speed(body: Surface, points: FloatArray) -> None:
+    """Raise unless the speed is finite and not negative at the points.
+
+    Raises
+    ------
+    InvalidInputError
+        Names how many points fail and the worst.
+    """
+    if speed_of(body) is None:
+        return
+    c = speed_values(body, points)
+    bad = ~(np.isfinite(c) & (c >= 0))
+    if bad.any():
+        worst = points[bad][np.argmin(np.nan_to_num(c[bad], nan=-np.inf))]
+        raise InvalidInputError(
+            f"the speed is negative or not finite at {int(bad.sum())} of {len(c)} points of the body "
+            f"(worst {c[bad].min():.3g} at {np.round(worst, 4).tolist()}); give a speed > 0 there"
+        )
