@@ -12,6 +12,8 @@ import math
 import numpy as np
 from numba import njit
 
+from creeping.phaseflow._contraction import contraction
+
 BLOCK = 32
 
 _options = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
@@ -219,42 +221,25 @@ def _cell(t, cells, degree, w):
     return i
 
 
-@njit(**_options)
-def _contract_state(table, degree, chart, iu, iv, ia, wu, wv, wa, out):
-    """Sum the stencil of the eight state lanes."""
-    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
-    for i in range(degree + 1):
-        for j in range(degree + 1):
-            wij = wu[i] * wv[j]
-            row = table[chart, iu + i, iv + j]
-            for k in range(degree + 1):
-                w = wij * wa[k]
-                s0 += w * row[ia + k, 0]
-                s1 += w * row[ia + k, 1]
-                s2 += w * row[ia + k, 2]
-                s3 += w * row[ia + k, 3]
-                s4 += w * row[ia + k, 4]
-                s5 += w * row[ia + k, 5]
-                s6 += w * row[ia + k, 6]
-                s7 += w * row[ia + k, 7]
-    out[0], out[1], out[2], out[3], out[4], out[5] = s0, s1, s2, s3, s4, s5
+_state_3, _state_5 = contraction(3, 8), contraction(5, 8)
+_jacobi_3, _jacobi_5 = contraction(3, 4), contraction(5, 4)
 
 
 @njit(**_options)
-def _contract_jacobi(table, degree, chart, iu, iv, ia, wu, wv, wa, out):
-    """Sum the stencil of the four Jacobi lanes."""
-    s0 = s1 = s2 = s3 = 0.0
-    for i in range(degree + 1):
-        for j in range(degree + 1):
-            wij = wu[i] * wv[j]
-            row = table[chart, iu + i, iv + j]
-            for k in range(degree + 1):
-                w = wij * wa[k]
-                s0 += w * row[ia + k, 0]
-                s1 += w * row[ia + k, 1]
-                s2 += w * row[ia + k, 2]
-                s3 += w * row[ia + k, 3]
-    out[6], out[7], out[8], out[9] = s0, s1, s2, s3
+def _stencil(table, jacobi, ride_along, degree, chart, iu, iv, ia, wu, wv, wa, out):
+    """Interpolate the state lanes into out[:8] and, on the ride-along, the Jacobi lanes into out[8:12]."""
+    row = table.shape[3]
+    plane = row * table.shape[2]
+    first = (chart * table.shape[1] + iu) * plane + iv * row + ia
+    if degree == 3:
+        _state_3(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, out)
+    else:
+        _state_5(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, out)
+    if ride_along:
+        if degree == 3:
+            _jacobi_3(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, out[8:])
+        else:
+            _jacobi_5(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, out[8:])
 
 
 @njit(**_options)
@@ -270,7 +255,7 @@ def leap(
     y = np.empty((6, BLOCK))
     value, grad, hess = np.empty(BLOCK), np.empty((3, BLOCK)), np.empty((6, BLOCK))
     chart, uv, frame = np.empty(BLOCK, np.int64), np.empty((2, BLOCK)), np.empty((6, BLOCK))
-    wu, wv, wa, d = np.empty(8), np.empty(8), np.empty(8), np.empty(10)
+    wu, wv, wa, d = np.empty(8), np.empty(8), np.empty(8), np.empty(12)
     last_u = table.shape[1] - degree
     last_v = table.shape[2] - degree
     turns = cells[2] / (2 * math.pi)
@@ -291,7 +276,7 @@ def leap(
                 ia = _cell(angle, int(cells[2]), degree, wa)
                 iu = _cell(origin[0] + cells[0] * uv[0, i], last_u, degree, wu)
                 iv = _cell(origin[1] + cells[1] * uv[1, i], last_v, degree, wv)
-                _contract_state(table, degree, chart[i], iu, iv, ia, wu, wv, wa, d)
+                _stencil(table, jacobi, lanes > 6, degree, chart[i], iu, iv, ia, wu, wv, wa, d)
                 y[0, i] += horizon * px + d[0]
                 y[1, i] += horizon * py + d[1]
                 y[2, i] += horizon * pz + d[2]
@@ -299,9 +284,8 @@ def leap(
                 y[4, i] += d[4]
                 y[5, i] += d[5]
                 if lanes > 6:
-                    _contract_jacobi(jacobi, degree, chart[i], iu, iv, ia, wu, wv, wa, d)
                     state = states[start + i]
-                    m11, m21, m12, m22 = 1.0 + d[6], d[7], horizon + d[8], 1.0 + d[9]
+                    m11, m21, m12, m22 = 1.0 + d[8], d[9], horizon + d[10], 1.0 + d[11]
                     i1, j1, i2, j2 = state[6], state[7], state[8], state[9]
                     state[6], state[7] = m11 * i1 + m12 * j1, m21 * i1 + m22 * j1
                     state[8], state[9] = m11 * i2 + m12 * j2, m21 * i2 + m22 * j2
