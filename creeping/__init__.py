@@ -1,0 +1,68 @@
+"""Creeping rays on smooth bodies by the phase flow method.
+
+Public names are imported when first used, so that ``import creeping`` costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "CreepingError": "creeping._errors",
+    "DirectFlow": "creeping.phaseflow.tracing",
+    "IsoPhaseCurve": "creeping.rays.isophase",
+    "MapError": "creeping.phaseflow.phase_map",
+    "PhaseMap": "creeping.phaseflow.phase_map",
+    "RayFan": "creeping.rays.fan",
+    "RayStatus": "creeping.rays.fan",
+    "ShadowLine": "creeping.rays.shadow",
+    "build_phase_map": "creeping.phaseflow.building",
+    "check_surface": "creeping.surface",
+    "iso_phase_curves": "creeping.rays.isophase",
+    "launch": "creeping.rays.fan",
+    "load_phase_map": "creeping.phaseflow.storing",
+    "shadow_line": "creeping.rays.shadow",
+    "trace": "creeping.phaseflow.tracing",
+}
+
+__all__ = [
+    "CreepingError",
+    "DirectFlow",
+    "IsoPhaseCurve",
+    "MapError",
+    "PhaseMap",
+    "RayFan",
+    "RayStatus",
+    "ShadowLine",
+    "build_phase_map",
+    "check_surface",
+    "iso_phase_curves",
+    "launch",
+    "load_phase_map",
+    "shadow_line",
+    "trace",
+]
+
+if TYPE_CHECKING:
+    from creeping._errors import CreepingError
+    from creeping.phaseflow.building import build_phase_map
+    from creeping.phaseflow.phase_map import MapError, PhaseMap
+    from creeping.phaseflow.storing import load_phase_map
+    from creeping.phaseflow.tracing import DirectFlow, trace
+    from creeping.rays.fan import RayFan, RayStatus, launch
+    from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
+    from creeping.rays.shadow import ShadowLine, shadow_line
+    from creeping.surface import check_surface
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'creeping' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -13,11 +13,11 @@ import numpy as np
 from creeping._errors import InvalidInputError, SurfaceError, ToleranceError
 from creeping._typing import Any, FloatArray
 from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.geodesic import check_speed, principal_curvature_bound
+from creeping.phaseflow.geodesic import principal_curvature_bound, speed_values
 from creeping.phaseflow.phase_map import Grid, Leap, MapError, PhaseMap
 from creeping.phaseflow.splines import interpolation_operator, prefilter, uniform_weights
 from creeping.phaseflow.tracing import pack, runge_kutta_4, trace_states
-from creeping.surface import Surface, polar_frame
+from creeping.surface import Surface, check_surface, polar_frame
 
 Progress = Callable[[str], None]
 MAX_NODES = 6_000_000
@@ -134,7 +134,7 @@ class _Request:
 
     def build(self, say: Progress) -> PhaseMap:
         """Build with the parameters given, choosing the missing ones."""
-        check_speed(self.body, _sample_points(self.body))
+        check_surface(self.body).require()
         horizon = self.horizon or _natural_horizon(self.body)
         if self.nodes is not None:
             result = self._build_one(Grid(self.nodes, self.order, self.periodic), horizon, say)
@@ -297,8 +297,6 @@ def _rounded(nodes: tuple[int, ...], factors: FloatArray) -> tuple[int, int, int
 
 def _natural_horizon(body: Surface) -> float:
     """Power of two next to the time a ray takes over the smallest radius of curvature."""
-    from creeping.phaseflow.geodesic import speed_values
-
     points = _sample_points(body)
     fastest = float(np.max(speed_values(body, points)))
     return float(2.0 ** np.round(np.log2(1 / (principal_curvature_bound(body, points) * fastest))))
@@ -326,7 +324,7 @@ def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool]) -> t
         nodes, whole = (), False
     if len(nodes) == 2:
         nodes = (nodes[0], *nodes)
-    least = [degree + 1 if wraps else degree + 6 for wraps in periodic] + [degree + 1]
+    least = [degree + 1 if wraps else degree + 5 for wraps in periodic] + [degree + 1]
     if len(nodes) != 3 or not whole or any(n < m for n, m in zip(nodes, least, strict=True)):
         raise InvalidInputError(f"grid = {grid!r}: give two or three whole numbers of at least {least} for order {degree}")
     return nodes

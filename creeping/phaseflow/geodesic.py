@@ -16,7 +16,6 @@ Normal curvature kappa_n = p.Hp/|grad F| is positive where the body is convex al
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import Any, FloatArray
 from creeping.surface import Surface, size
 
@@ -117,22 +116,3 @@ def launch_spreading(body: Surface, points: FloatArray, directions: FloatArray, 
         spreading[:, 1] = np.sum(b * speed.gradient(points), axis=-1) * oblique
     return spreading
 
-
-def check_speed(body: Surface, points: FloatArray) -> None:
-    """Raise unless the speed is finite and not negative at the points.
-
-    Raises
-    ------
-    InvalidInputError
-        Names how many points fail and the worst.
-    """
-    if speed_of(body) is None:
-        return
-    c = speed_values(body, points)
-    bad = ~(np.isfinite(c) & (c >= 0))
-    if bad.any():
-        worst = points[bad][np.argmin(np.nan_to_num(c[bad], nan=-np.inf))]
-        raise InvalidInputError(
-            f"the speed is negative or not finite at {int(bad.sum())} of {len(c)} points of the body "
-            f"(worst {c[bad].min():.3g} at {np.round(worst, 4).tolist()}); give a speed > 0 there"
-        )

@@ -21,6 +21,8 @@ from creeping.phaseflow.splines import evaluate
 from creeping.phaseflow.tracing import as_times, compiled_parts, pack, trace_states
 from creeping.surface import Surface, polar_frame, size
 
+MARGIN = 2
+"""Nodes of a chart beyond each edge of its unit square: every point finds a chart two grid points from the edge."""
 PROJECTION = 1e-13
 """Distance from the body, in units of its size, at which a composed ray counts as on it."""
 
@@ -44,26 +46,21 @@ class MapError:
 
 @dataclass(frozen=True)
 class Grid:
-    """Nodes of a map: ``nodes`` along u, v and the angle, ``margin`` nodes outside the unit square on each side."""
+    """Nodes of a map along u, v and the angle; MARGIN of them lie outside the unit square on each side."""
 
     nodes: tuple[int, int, int]
     degree: int
     periodic: tuple[bool, bool]
 
     @property
-    def margin(self) -> int:
-        """Nodes beyond each edge: two grid points, and one more for the wider quintic stencil."""
-        return 2 if self.degree <= 3 else 3
-
-    @property
     def origin(self) -> FloatArray:
         """Grid coordinates of u = v = 0."""
-        return np.array([0.0 if wraps else float(self.margin) for wraps in self.periodic])
+        return np.array([0.0 if wraps else float(MARGIN) for wraps in self.periodic])
 
     @property
     def cells(self) -> FloatArray:
         """Cells per unit of u, v and per turn of the angle."""
-        sides = [n if wraps else n - 1 - 2 * self.margin for n, wraps in zip(self.nodes[:2], self.periodic, strict=True)]
+        sides = [n if wraps else n - 1 - 2 * MARGIN for n, wraps in zip(self.nodes[:2], self.periodic, strict=True)]
         return np.array([*sides, self.nodes[2]], dtype=float)
 
     def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -82,6 +79,11 @@ class Leap:
     time: float
     state: FloatArray
     jacobi: FloatArray
+
+    def __post_init__(self) -> None:
+        # read-only like the arrays of a stored map: kernels are compiled for one kind of array
+        for table in (self.state, self.jacobi):
+            table.flags.writeable = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)

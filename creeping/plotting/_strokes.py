@@ -1,0 +1,190 @@
+"""What a 3-D picture is made of: polylines on the body with their colours, the same for every drawing library."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, BoolArray, FloatArray
+from creeping.plotting._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.surface import size
+
+BODY_COLOUR = "#dfe5ea"
+RAY_COLOUR = "#55606b"
+ARROW_COLOUR = "#1b1b1b"
+# apart in lightness as well as in hue, and apart from the map of the iso-phase levels
+STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#c2185b"}
+LEVEL_NAMES = {"travel_time": "travel time", "eikonal": "eikonal"}
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Polylines drawn alike.
+
+    Attributes
+    ----------
+    lines : list of (k, 3), L
+    colour : str
+        Hexadecimal.
+    width : float
+        Points of 1/72 inch.
+    alpha : float
+        Opacity where the line is visible.
+    label : str
+        Entry of the legend, empty for none.
+    rank : int
+        Strokes of higher rank are drawn over those of lower.
+    """
+
+    lines: list[FloatArray] = field(repr=False)
+    colour: str
+    width: float
+    alpha: float = 1.0
+    label: str = ""
+    rank: int = 0
+
+
+def strokes(
+    line: ShadowLineLike,
+    fan: RayFanLike | None,
+    curves: Sequence[IsoPhaseCurveLike],
+    *,
+    rays: int,
+    until: float | None = None,
+) -> list[Stroke]:
+    """Everything to be drawn on the body, lowest rank first.
+
+    Parameters
+    ----------
+    line, fan, curves
+        Shadow line, fan of rays or None, iso-phase curves.
+    rays : int
+        Rays drawn at most, evenly chosen; all of them would cover the body.
+    until : float, optional
+        Travel time up to which rays are drawn; by default to their end.
+    """
+    found: list[Stroke] = []
+    if fan is not None:
+        found += ray_strokes(fan, rays, np.inf if until is None else until)
+    colours = LevelColours.of(curves)
+    for curve in curves:
+        points = closed(np.asarray(curve.points)) if curve.closed else np.asarray(curve.points)
+        found.append(Stroke([points], colours(curve.level), 0.9, rank=1))
+    for status in LINE_STATUSES:
+        pieces = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
+        if pieces:
+            found.append(Stroke(pieces, STATUS_COLOURS[status], 1.8, label=f"shadow line, {status}", rank=2))
+    return found
+
+
+def chosen_rays(fan: RayFanLike, rays: int) -> list[int]:
+    """Numbers of at most ``rays`` rays, evenly spread over the fan."""
+    if rays < 1:
+        raise InvalidInputError(f"rays = {rays}: draw at least one ray")
+    total = len(fan.points)
+    return sorted({int(k) for k in np.linspace(0, total, min(rays, total), endpoint=False)})
+
+
+def ray_strokes(fan: RayFanLike, rays: int, until: float) -> list[Stroke]:
+    """Chosen rays up to detachment, and faint beyond it, where they are geodesics but no creeping rays."""
+    bound, free = [], []
+    times = np.asarray(fan.travel_time)
+    for k in chosen_rays(fan, rays):
+        points, detachment = np.asarray(fan.points[k]), float(fan.detachment[k])
+        fine, fine_times = refined(points, np.asarray(fan.directions[k]), times, 0.015 * size(fan.body))
+        ok = np.all(np.isfinite(fine), axis=-1) & (fine_times <= until)
+        bound += list(runs(fine, ok & (fine_times <= detachment)))
+        # one point more, so that the two parts join
+        free += list(runs(fine, ok & (fine_times >= detachment - np.max(np.diff(fine_times), initial=0.0))))
+    found = [Stroke(free, RAY_COLOUR, 0.45, alpha=0.3, label="ray after detachment")] if free else []
+    return found + ([Stroke(bound, RAY_COLOUR, 0.6, label="creeping ray")] if bound else [])
+
+
+def refined(
+    points: FloatArray, tangents: FloatArray, times: FloatArray, spacing: float
+) -> tuple[FloatArray, FloatArray]:
+    """Cubic Hermite points between those of one ray, so that a coarse ray is drawn round: (steps, 3) -> (k, 3)."""
+    chord = np.linalg.norm(np.diff(points, axis=0), axis=-1)
+    longest = np.max(chord[np.isfinite(chord)], initial=0.0)
+    parts = int(np.clip(np.ceil(longest / spacing), 1, 16))
+    if parts == 1:
+        return points, times
+    s = (np.arange(parts) / parts)[:, None]
+    p0, p1 = points[:-1, None], points[1:, None]
+    # the unit tangent times the chord stands for dx/ds whatever the speed along the ray
+    m0, m1 = chord[:, None, None] * tangents[:-1, None], chord[:, None, None] * tangents[1:, None]
+    # the Hermite basis in Horner form
+    fine = p0 + s * (m0 + s * (3 * (p1 - p0) - 2 * m0 - m1 + s * (2 * (p0 - p1) + m0 + m1)))
+    fine_times = times[:-1, None] + s[:, 0] * np.diff(times)[:, None]
+    return np.concatenate([fine.reshape(-1, 3), points[-1:]]), np.append(fine_times.ravel(), times[-1])
+
+
+def runs(points: FloatArray, mask: BoolArray) -> Iterator[FloatArray]:
+    """Polylines of the consecutive points where ``mask`` holds, two points at least."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if stop - start > 1:
+            yield points[start:stop]
+
+
+def closed(points: FloatArray) -> FloatArray:
+    """Repeat the first point at the end."""
+    return np.concatenate([points, points[:1]])
+
+
+def status_pieces(points: FloatArray, status: Any, wanted: str) -> Iterator[FloatArray]:
+    """Pieces of a closed curve with one status; each runs on to the next point, so that no gap is left."""
+    mask = np.asarray(status) == wanted
+    if mask.all():
+        yield closed(points)
+        return
+    # start where the status changes, so that no piece is cut at the curve's first point
+    start = int(np.argmax(mask & ~np.roll(mask, 1)))
+    mask, points = np.roll(mask, -start), np.roll(points, -start, axis=0)
+    mask, points = np.append(mask, False), closed(points)
+    mask[1:] |= mask[:-1].copy()
+    yield from runs(points, mask)
+
+
+@dataclass(frozen=True)
+class LevelColours:
+    """Colours of the iso-phase levels.
+
+    Attributes
+    ----------
+    low, high : float
+        Range of the levels.
+    name : str
+        What they are levels of.
+    """
+
+    low: float
+    high: float
+    name: str
+
+    @classmethod
+    def of(cls, curves: Sequence[IsoPhaseCurveLike]) -> "LevelColours":
+        """Colours for these curves."""
+        levels = [float(curve.level) for curve in curves] or [0.0]
+        names = {curve.of for curve in curves}
+        if len(names) > 1:
+            raise InvalidInputError(f"the curves mix levels of {' and '.join(sorted(names))}; draw them apart")
+        return cls(min(levels), max(levels), LEVEL_NAMES.get("".join(names), "".join(names)))
+
+    @property
+    def mappable(self) -> Any:
+        """A matplotlib ``ScalarMappable`` for a colour bar; the palest tenth of the map is left out."""
+        from matplotlib import colormaps
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import ListedColormap, Normalize
+
+        high = self.high if self.high > self.low else self.low + 1.0
+        part = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
+        return ScalarMappable(Normalize(self.low, high), part)
+
+    def __call__(self, level: float) -> str:
+        """Hexadecimal colour of a level."""
+        from matplotlib.colors import to_hex
+
+        return str(to_hex(self.mappable.to_rgba(level)))

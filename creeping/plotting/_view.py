@@ -1,0 +1,95 @@
+"""The camera of the 3-D pictures: parallel projection, from the shadow side, and what it can see.
+
+toward = (cos e cos a, cos e sin a, sin e) points from the body to the camera (azimuth a, elevation e), and
+(right, up, toward) is a right-handed frame, up the picture of z.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from creeping._typing import ArrayLike, BoolArray, FloatArray
+from creeping.surface import Surface, normal, size, unit_direction
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection.
+
+    Attributes
+    ----------
+    azimuth, elevation : float
+        Where the camera stands, radians; |elevation| < pi/2.
+    """
+
+    azimuth: float
+    elevation: float
+
+    @cached_property
+    def toward(self) -> FloatArray:
+        """Unit vector (3,) from the body to the camera."""
+        a, e = self.azimuth, self.elevation
+        return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+    @cached_property
+    def right(self) -> FloatArray:
+        """Unit vector (3,) to the right of the picture."""
+        return np.array([-np.sin(self.azimuth), np.cos(self.azimuth), 0.0])
+
+    @cached_property
+    def up(self) -> FloatArray:
+        """Unit vector (3,) to the top of the picture."""
+        return np.cross(self.toward, self.right)
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Coordinates (right, up) of points: (..., 3) -> (..., 2), L."""
+        return np.asarray(points @ np.stack([self.right, self.up], axis=-1))
+
+    def visible(self, body: Surface, points: FloatArray) -> BoolArray:
+        """Whether nothing of the body stands between points of it and the camera: (..., 3) -> (...)."""
+        seen = np.zeros(points.shape[:-1], dtype=bool)
+        finite = np.all(np.isfinite(points), axis=-1)
+        seen[finite] = normal(body, points[finite]) @ self.toward > 0
+        front = points[seen]
+        # the first step clears the sag of curves drawn as polylines
+        reach = size(body) * np.linspace(0.01, 2.0, 100)
+        box = np.asarray(body.bounds)
+        clear = np.ones(len(front), dtype=bool)
+        for distance in reach:
+            at = front + distance * self.toward
+            inside = clear & np.all((at >= box[0]) & (at <= box[1]), axis=-1)
+            if inside.any():
+                clear[inside] = ~(body.level(at[inside]) < 0)
+        seen[seen] = clear
+        return seen
+
+
+def shadow_view(direction: ArrayLike) -> View:
+    """View of the shadow side: along the direction the wave travels, turned and raised so that the shadow line shows."""
+    d = unit_direction(direction)
+    # straight up or down every azimuth is as good; this one is the custom of 3-D plots
+    azimuth = np.radians(-60.0) if np.hypot(d[0], d[1]) < 1e-6 else np.arctan2(d[1], d[0]) + np.radians(35.0)
+    # pulled to the horizon, so that z stays up: -42 to 66 degrees
+    elevation = 0.6 * np.arcsin(np.clip(d[2], -1, 1)) + np.radians(12.0)
+    return View(float(azimuth), float(elevation))
+
+
+def arrow(view: View, direction: FloatArray, vertices: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Tail (3,) and head (3,) of an arrow along ``direction`` beside the picture of the body.
+
+    In space it stands where the wave comes from; in the picture that is behind the body, so it is moved across the
+    direction, to the left, until it is clear of the body's outline.
+    """
+    flat = view.project(vertices)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    extent = float(np.max(high - low))
+    length = 0.38 * extent
+    along = view.project(direction) * length
+    # its middle: left of the box of the outline, by half its own width and a gap
+    middle = np.array([low[0] - 0.5 * abs(along[0]) - 0.1 * extent, low[1] + 0.5 * abs(along[1]) + 0.12 * extent])
+    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    centre = centre - (centre @ view.toward) * view.toward
+    offset = middle - view.project(centre)
+    middle_3d = centre + offset[0] * view.right + offset[1] * view.up
+    return middle_3d - 0.5 * length * direction, middle_3d + 0.5 * length * direction
