@@ -6,7 +6,7 @@ Public names are imported when first used, so that ``import creeping`` costs nex
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from creeping._version import __version__
 
 _HOMES = {
     "CreepingError": "creeping._errors",
@@ -21,7 +21,7 @@ _HOMES = {
     "check_surface": "creeping.surface",
     "iso_phase_curves": "creeping.rays.isophase",
     "launch": "creeping.rays.fan",
-    "load_phase_map": "creeping.phaseflow.storing",
+    "load_phase_map": "creeping.phaseflow.caching",
     "shadow_line": "creeping.rays.shadow",
     "trace": "creeping.phaseflow.tracing",
 }
@@ -35,6 +35,7 @@ __all__ = [
     "RayFan",
     "RayStatus",
     "ShadowLine",
+    "__version__",
     "build_phase_map",
     "check_surface",
     "iso_phase_curves",
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
     from creeping._errors import CreepingError
     from creeping.phaseflow.building import build_phase_map
     from creeping.phaseflow.phase_map import MapError, PhaseMap
-    from creeping.phaseflow.storing import load_phase_map
+    from creeping.phaseflow.caching import load_phase_map
     from creeping.phaseflow.tracing import DirectFlow, trace
     from creeping.rays.fan import RayFan, RayStatus, launch
     from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves

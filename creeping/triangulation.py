@@ -13,6 +13,9 @@ import numpy as np
 from creeping._errors import SurfaceError
 from creeping._typing import BoolArray, FloatArray, IntArray
 
+MAX_POINTS = 12_000_000
+"""Grid points of the finest triangulation."""
+
 
 @dataclass(frozen=True, repr=False)
 class Triangulation:
@@ -69,7 +72,7 @@ def triangulate(
     bounds : (2, 3), L
         Box that contains the body; it is widened by two cells.
     cells : int
-        Cells along each side of the box.
+        Cells along the side of a cube of the box's volume; raised by half where that does not resolve the topology.
 
     Returns
     -------
@@ -78,30 +81,52 @@ def triangulate(
     Raises
     ------
     SurfaceError
-        If F has no zero in the box, reaches its faces, or the grid is too coarse for its topology.
+        If F has no zero in the box, reaches its faces, or no grid of at most MAX_POINTS resolves its topology.
     """
     box = np.asarray(bounds, dtype=float)
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
         raise SurfaceError(f"bounds {box.tolist()} are not two corners of a box; give [[xmin, ...], [xmax, ...]]")
-    spacing = (box[1] - box[0]) / cells
+    while True:
+        axes = _grid_axes(box, cells)
+        values = _grid_values(level, axes)
+        vertices, number = _cell_vertices(values, values < 0, axes)
+        triangles = _quadrilaterals(values < 0, number)
+        if _closed(triangles):
+            break
+        finer = cells + cells // 2
+        if np.prod([len(axis) for axis in _grid_axes(box, finer)]) > MAX_POINTS:
+            raise SurfaceError(f"{values.size} grid points do not resolve the surface; it is too thin, or crosses itself")
+        cells = finer
+    reach = max(float(axis[1] - axis[0]) for axis in axes)
+    return Triangulation(_onto_surface(level, gradient, vertices, reach), triangles)
+
+
+def _grid_axes(box: FloatArray, cells: int) -> list[FloatArray]:
+    """Grid coordinates per axis, two cells beyond the box: cubic cells, but at least 24 across each side.
+
+    Cells much flatter than long would miss the topology of a ring, hence cubes.
+    """
+    side = box[1] - box[0]
+    count = np.clip(np.round(side / (np.prod(side) ** (1 / 3) / cells)), 24, 1000).astype(int)
+    spacing = side / count
     # an irrational shift keeps grid points off the symmetry planes, where F is often exactly 0
     low = box[0] - (2 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing
-    axes = [low[k] + spacing[k] * np.arange(cells + 6) for k in range(3)]
+    return [low[k] + spacing[k] * np.arange(count[k] + 6) for k in range(3)]
+
+
+def _grid_values(level: Callable[[FloatArray], FloatArray], axes: list[FloatArray]) -> FloatArray:
+    """F on the grid, checked: finite, negative somewhere, positive on the faces."""
     values = np.asarray(level(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)), dtype=float)
     if not np.all(np.isfinite(values)):
         count = int(np.sum(~np.isfinite(values)))
         raise SurfaceError(f"F is not finite at {count} of {values.size} grid points of its box; check the expression")
     inside = values < 0
     if not inside.any():
-        raise SurfaceError(f"F has no negative value in its box ({values.size} points tried): no body; check bounds and sign")
-    faces = np.concatenate([inside.take([0, -1], axis=k).ravel() for k in range(3)])
-    if faces.any():
-        raise SurfaceError(f"F < 0 at {int(faces.sum())} points on the faces of its box: the body is open, inverted or larger than its bounds")
-    vertices, number = _cell_vertices(values, inside, axes)
-    triangles = _quadrilaterals(inside, number)
-    if not _closed(triangles):
-        raise SurfaceError(f"the surface is not resolved by {cells} cells a side; raise cells")
-    return Triangulation(_onto_surface(level, gradient, vertices, float(spacing.max())), triangles)
+        raise SurfaceError(f"F has no negative value in its box ({values.size} points): no body; check bounds and sign")
+    faces = int(sum(inside.take([0, -1], axis=k).sum() for k in range(3)))
+    if faces:
+        raise SurfaceError(f"F < 0 at {faces} points on the faces of its box: open, inverted or larger than its bounds")
+    return values
 
 
 def _cell_vertices(values: FloatArray, inside: BoolArray, axes: list[FloatArray]) -> tuple[FloatArray, IntArray]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from creeping._errors import InvalidInputError, SurfaceError, ToleranceError
 from creeping._typing import Any, FloatArray
+from creeping.phaseflow.caching import cached_phase_map
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.geodesic import principal_curvature_bound, speed_values
 from creeping.phaseflow.phase_map import Grid, Leap, MapError, PhaseMap
@@ -20,7 +21,7 @@ from creeping.phaseflow.tracing import pack, runge_kutta_4, trace_states
 from creeping.surface import Surface, check_surface, polar_frame
 
 Progress = Callable[[str], None]
-MAX_NODES = 6_000_000
+MAX_NODES = 4_000_000
 """Nodes of the largest grid that the choice from a tolerance will build; 12 float64 each."""
 SAMPLES = 500
 """Random points of T1Q at which a finished map is measured."""
@@ -82,8 +83,6 @@ def build_phase_map(
     say = progress or (lambda _: None)
     if cache is False:
         return request.build(say)
-    from creeping.phaseflow.storing import cached_phase_map
-
     return cached_phase_map(body, request.key(), lambda: request.build(say), folder=cache, progress=say)
 
 
@@ -158,9 +157,10 @@ class _Request:
     def _choose(self, horizon: float, say: Progress) -> PhaseMap:
         """Refine each axis by its own interpolation error until the measured error meets the tolerance."""
         assert self.tolerance is not None
-        nodes = (20, 20, 32) if not any(self.periodic) else (32, 32, 32)
+        first = (32, 32, 32) if any(self.periodic) else (20, 20, 32)
+        nodes, charts = first, len(self.body.atlas.charts)
         best: PhaseMap | None = None
-        for _ in range(8):
+        for _ in range(10):
             grid = Grid(nodes, self.order, self.periodic)
             values = direct_values(self.body, grid, horizon, say)
             result = _finish(self.body, grid, (_leap(values, grid, horizon),), {"method": "direct"})
@@ -168,15 +168,13 @@ class _Request:
                 best = result
             if result.error.rms <= 0.8 * self.tolerance:
                 return result
-            factors = _refinement(values, grid, result.error.rms, 0.5 * self.tolerance)
-            finer = _rounded(nodes, factors)
-            if len(values) * int(np.prod(finer)) > MAX_NODES:
+            nodes = _finer(nodes, _refinement(values, grid, result.error.rms, 0.5 * self.tolerance))
+            if charts * int(np.prod(nodes)) > MAX_NODES:
                 if self.horizon is not None:
                     break
-                horizon, nodes = horizon / 2, (20, 20, 32) if not any(self.periodic) else (32, 32, 32)
-                say(f"the grid would grow to {finer}: shortening the horizon to {horizon:g}")
-                continue
-            nodes = finer
+                horizon, nodes = horizon / 2, first
+                say(f"the grid would grow too large: shortening the horizon to {horizon:g}")
+        assert best is not None
         raise ToleranceError(
             f"no map of at most {MAX_NODES} nodes reached rms {self.tolerance:.1e}: the best is {best.error.rms:.1e} "
             f"with horizon {best.horizon:g} and grid {best.grid.nodes}; "
@@ -284,13 +282,14 @@ def _midpoints(values: FloatArray, degree: int, wraps: bool) -> FloatArray:
     return np.asarray(sum(w[j] * coefficients[j : j + cells] for j in range(degree + 1)))
 
 
-def _rounded(nodes: tuple[int, ...], factors: FloatArray) -> tuple[int, int, int]:
-    """Finer grid: u and v alike, each axis grown by its factor and the whole by at least 5 %."""
-    chart = max(factors[0], factors[1], 1.0)
-    circle = max(factors[2], 1.0)
+def _finer(nodes: tuple[int, ...], factors: FloatArray) -> tuple[int, int, int]:
+    """Finer grid: u and v alike, each axis grown by its factor, the whole by at least a tenth."""
+    chart, circle = max(factors[0], factors[1], 1.0), max(factors[2], 1.0)
     if max(chart, circle) < 1.05:
         chart, circle = 1.1, 1.1
-    chart, circle = min(chart, 2.0), min(circle, 2.0)
+    # far from convergence the factors overshoot, but factors beyond 4 say that this horizon is hopeless
+    if max(chart, circle) <= 4:
+        chart, circle = min(chart, 2.0), min(circle, 2.0)
     side = 2 * int(np.ceil(nodes[0] * chart / 2))
     return side, side, 4 * int(np.ceil(nodes[2] * circle / 4))
 

@@ -16,8 +16,10 @@ import numpy as np
 
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, FloatArray
+from creeping._version import __version__
 from creeping.phaseflow.bundle import bundle_points, project_bundle
 from creeping.phaseflow.splines import evaluate
+from creeping.phaseflow.storing import fingerprint, write_folder
 from creeping.phaseflow.tracing import as_times, compiled_parts, pack, trace_states
 from creeping.surface import Surface, polar_frame, size
 
@@ -252,7 +254,23 @@ class PhaseMap:
         return chart, grid
 
     def save(self, folder: str | Path) -> Path:
-        """Store the map in a new folder of .npy files with a manifest; see `load_phase_map`."""
-        from creeping.phaseflow.storing import save_phase_map
+        """Store the map in a new folder of .npy files with a manifest; `load_phase_map` opens it.
 
-        return save_phase_map(self, folder)
+        Raises
+        ------
+        StoredMapError
+            If the folder exists or cannot be written.
+        """
+        content = {
+            "version": __version__,
+            "body": fingerprint(self.body),
+            "nodes": list(self.grid.nodes),
+            "degree": self.grid.degree,
+            "periodic": list(self.grid.periodic),
+            "times": [leap.time for leap in self.leaps],
+            "error": [self.error.rms, self.error.max, self.error.samples],
+            "parameters": self.parameters,
+        }
+        states = {f"state-{k}.npy": leap.state for k, leap in enumerate(self.leaps)}
+        jacobis = {f"jacobi-{k}.npy": leap.jacobi for k, leap in enumerate(self.leaps)}
+        return write_folder(folder, content, states | jacobis)

@@ -1,35 +1,24 @@
-"""Phase maps on disk: a folder of .npy files with manifest.json, and the cache of such folders.
+"""Arrays on disk: a folder of .npy files with manifest.json, for phase maps.
 
-A stored map is data only: arrays are opened without pickle, after their size, shape and blake2b digest agree with the
-manifest, and the manifest names the body it belongs to. Folders are written aside and renamed under a lock.
+What is stored is data only: arrays are opened without pickle, after their size, shape and blake2b digest agree with the
+manifest, whose own digest is checked first. Folders are written aside and renamed under a lock.
 """
 
 import hashlib
 import json
-import os
 import shutil
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from creeping._errors import CreepingError, StoredMapError
 from creeping._typing import Any, FloatArray
-from creeping.phaseflow.phase_map import Grid, Leap, MapError, PhaseMap
 from creeping.surface import Surface
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
 _MAX_MANIFEST = 1_000_000
-
-
-def cache_folder() -> Path:
-    """Folder of cached maps: $CREEPING_CACHE, or ``maps`` in the user's cache folder."""
-    import platformdirs
-
-    named = os.environ.get("CREEPING_CACHE")
-    return Path(named) if named else platformdirs.user_cache_path("creeping") / "maps"
 
 
 def fingerprint(body: Surface) -> str:
@@ -50,8 +39,8 @@ def fingerprint(body: Surface) -> str:
     return f"{type(body).__name__}:{digest.hexdigest()}"
 
 
-def save_phase_map(phase_map: PhaseMap, folder: str | Path) -> Path:
-    """Write a map to a new folder.
+def write_folder(folder: str | Path, content: dict[str, Any], arrays: dict[str, FloatArray]) -> Path:
+    """Write arrays and the content of their manifest to a new folder.
 
     Raises
     ------
@@ -68,88 +57,32 @@ def save_phase_map(phase_map: PhaseMap, folder: str | Path) -> Path:
             if folder.exists():
                 raise StoredMapError(f"{folder} exists; choose another folder or remove it")
             aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-            _write(phase_map, aside)
+            files = {}
+            for name, array in arrays.items():
+                np.save(aside / name, array, allow_pickle=False)
+                files[name] = {"shape": list(array.shape), "blake2b": _digest(aside / name)}
+            signed = {"schema": SCHEMA, **content, "files": files}
+            text = json.dumps({"content": signed, "blake2b": content_digest(signed)}, indent=1)
+            (aside / MANIFEST).write_text(text)
             aside.rename(folder)
         Path(f"{folder}.lock").unlink(missing_ok=True)
     except OSError as error:
         if aside is not None:
             shutil.rmtree(aside, ignore_errors=True)
-        need = f"{phase_map.nbytes / 1e6:.0f} MB"
+        need = f"{sum(a.nbytes for a in arrays.values()) / 1e6:.0f} MB"
         raise StoredMapError(f"cannot write {folder}: {error}; it needs {need} of space and write permission") from error
     return folder
 
 
-def _write(phase_map: PhaseMap, folder: Path) -> None:
-    from creeping import __version__
-
-    files = {}
-    for k, leap in enumerate(phase_map.leaps):
-        for name, table in ((f"state-{k}.npy", leap.state), (f"jacobi-{k}.npy", leap.jacobi)):
-            np.save(folder / name, table, allow_pickle=False)
-            files[name] = {"shape": list(table.shape), "blake2b": _digest(folder / name)}
-    content = {
-        "schema": SCHEMA,
-        "version": __version__,
-        "body": fingerprint(phase_map.body),
-        "nodes": list(phase_map.grid.nodes),
-        "degree": phase_map.grid.degree,
-        "periodic": list(phase_map.grid.periodic),
-        "times": [leap.time for leap in phase_map.leaps],
-        "error": [phase_map.error.rms, phase_map.error.max, phase_map.error.samples],
-        "parameters": phase_map.parameters,
-        "files": files,
-    }
-    text = json.dumps({"content": content, "blake2b": _content_digest(content)}, indent=1)
-    (folder / MANIFEST).write_text(text)
-
-
-def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
-    """Open a stored map of a body.
-
-    Parameters
-    ----------
-    folder : path
-    body : Surface
-        The body the map was built for; it is compared with the stored fingerprint.
-
-    Returns
-    -------
-    PhaseMap
-        Its arrays are mapped from the files, read-only.
-
-    Raises
-    ------
-    StoredMapError
-        If the folder is no map, is damaged, of another version or of another body.
-    """
-    folder = Path(folder)
-    content = read_manifest(folder)
-    if content["body"] != fingerprint(body):
-        raise StoredMapError(f"{folder} is a map of {content['body']}, not of {fingerprint(body)}; rebuild it")
-    try:
-        grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
-        error = MapError(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
-        leaps = tuple(
-            Leap(float(time), _open(folder, f"state-{k}.npy", content), _open(folder, f"jacobi-{k}.npy", content))
-            for k, time in enumerate(content["times"])
-        )
-    except (KeyError, TypeError, IndexError, ValueError) as reason:
-        if isinstance(reason, CreepingError):
-            raise
-        raise StoredMapError(f"{folder}: the manifest is incomplete ({reason!r}); rebuild the map") from reason
-    _check_shapes(folder, grid, leaps, len(body.atlas.charts))
-    return PhaseMap(body, grid, leaps, error, content["parameters"])
-
-
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Content of a map's manifest, its own digest checked."""
+    """Content of a folder's manifest, its own digest checked."""
     path = folder / MANIFEST
     try:
         if path.stat().st_size > _MAX_MANIFEST:
             raise StoredMapError(f"{path} is larger than a manifest can be; rebuild the map")
         document = json.loads(path.read_text())
         content = document["content"]
-        intact = document["blake2b"] == _content_digest(content)
+        intact = document["blake2b"] == content_digest(content)
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         if isinstance(error, CreepingError):
             raise
@@ -165,11 +98,11 @@ def verify_files(folder: Path) -> dict[str, Any]:
     """Check every file of a stored map against the manifest, and return the manifest's content."""
     content = read_manifest(folder)
     for name in content["files"]:
-        _open(folder, name, content)
+        open_array(folder, name, content)
     return content
 
 
-def _open(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
+def open_array(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
     """Map one array after checking size, digest, header and shape."""
     path, entry = folder / name, content["files"][name]
     shape = tuple(int(n) for n in entry["shape"])
@@ -190,60 +123,11 @@ def _open(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
     return array
 
 
-def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], charts: int) -> None:
-    """Kernels trust the shapes, so they must follow from the grid."""
-    p = grid.degree
-    sides = [n + p if wraps else n + p - 1 for n, wraps in zip(grid.nodes, (*grid.periodic, True), strict=True)]
-    for leap in leaps:
-        for table, lanes in ((leap.state, 8), (leap.jacobi, 4)):
-            if table.shape != (charts, *sides, lanes) or p not in (3, 5):
-                raise StoredMapError(f"{folder}: table {table.shape} does not fit grid {grid.nodes}; rebuild the map")
-
-
-def cached_phase_map(
-    body: Surface,
-    key: dict[str, Any],
-    build: Callable[[], PhaseMap],
-    *,
-    folder: bool | str | Path,
-    progress: Callable[[str], None],
-) -> PhaseMap:
-    """Open the map from the cache, or build it and store it; a second process waits for the first."""
-    from filelock import FileLock
-
-    from creeping import __version__
-
-    root = cache_folder() if folder is True else Path(str(folder))
-    digest = _content_digest({"schema": SCHEMA, "version": __version__, "body": fingerprint(body), **key})
-    place = root / f"{type(body).__name__.lower()}-{digest[:24]}"
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(root / f".{place.name}.lock")
-        lock.acquire()
-    except OSError as error:
-        progress(f"no cache in {root} ({error}); building without it")
-        return build()
-    try:
-        if place.exists():
-            try:
-                return load_phase_map(place, body)
-            except StoredMapError as error:
-                progress(f"rebuilding: {error}")
-                shutil.rmtree(place, ignore_errors=True)
-        result = build()
-        try:
-            save_phase_map(result, place)
-        except StoredMapError as error:
-            progress(f"not cached: {error}")
-        return result
-    finally:
-        lock.release()
-
-
 def _digest(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=32)).hexdigest()
 
 
-def _content_digest(content: Any) -> str:
+def content_digest(content: Any) -> str:
+    """Digest of what json makes of the content."""
     return hashlib.blake2b(json.dumps(content, sort_keys=True).encode(), digest_size=32).hexdigest()

@@ -9,11 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from creeping.plotting.display import GLProbe, gl_available
-    from creeping.plotting.export import write_csv, write_vtp
+    from creeping.plotting.export import write_csv, write_text, write_vtp
     from creeping.plotting.parameter_plane import plot_parameters
     from creeping.plotting.pictures import parameter_picture, picture
 
-__all__ = ["GLProbe", "gl_available", "parameter_picture", "picture", "plot_parameters", "write_csv", "write_vtp"]
+__all__ = [
+    "GLProbe",
+    "gl_available",
+    "parameter_picture",
+    "picture",
+    "plot_parameters",
+    "write_csv",
+    "write_text",
+    "write_vtp",
+]
 
 _HOMES = {
     "GLProbe": "display",
@@ -22,6 +31,7 @@ _HOMES = {
     "picture": "pictures",
     "plot_parameters": "parameter_plane",
     "write_csv": "export",
+    "write_text": "export",
     "write_vtp": "export",
 }
 

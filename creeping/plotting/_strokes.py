@@ -13,6 +13,7 @@ from creeping.surface import size
 BODY_COLOUR = "#dfe5ea"
 RAY_COLOUR = "#55606b"
 ARROW_COLOUR = "#1b1b1b"
+HIDDEN = 0.22  # share of its ink that a line behind the body keeps
 # apart in lightness as well as in hue, and apart from the map of the iso-phase levels
 STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#c2185b"}
 LEVEL_NAMES = {"travel_time": "travel time", "eikonal": "eikonal"}
@@ -70,7 +71,9 @@ def strokes(
     colours = LevelColours.of(curves)
     for curve in curves:
         points = closed(np.asarray(curve.points)) if curve.closed else np.asarray(curve.points)
-        found.append(Stroke([points], colours(curve.level), 0.9, rank=1))
+        # levels are read off the colour bar; a single one has none
+        label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
+        found.append(Stroke([points], colours(curve.level), 0.9, label=label, rank=1))
     for status in LINE_STATUSES:
         pieces = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
         if pieces:
@@ -79,20 +82,35 @@ def strokes(
 
 
 def chosen_rays(fan: RayFanLike, rays: int) -> list[int]:
-    """Numbers of at most ``rays`` rays, evenly spread over the fan."""
+    """Numbers of at most ``rays`` rays, evenly spread along the shadow line.
+
+    Not evenly by number: a fan has more rays where they part fast.
+    """
     if rays < 1:
         raise InvalidInputError(f"rays = {rays}: draw at least one ray")
     total = len(fan.points)
-    return sorted({int(k) for k in np.linspace(0, total, min(rays, total), endpoint=False)})
+    if total <= rays:
+        return list(range(total))
+    gap = np.linalg.norm(np.diff(np.asarray(fan.points[:, 0]), axis=0), axis=-1)
+    # from one curve to the next there is no shadow line
+    gap[np.diff(fan.curve_index) != 0] = 0.0
+    along = np.concatenate([[0.0], np.cumsum(np.nan_to_num(gap))])
+    wanted = along[-1] * np.arange(rays) / rays
+    after = np.searchsorted(along, wanted).clip(1, total - 1)
+    nearer_before = wanted - along[after - 1] < along[after] - wanted
+    return sorted({int(k) for k in after - nearer_before})
 
 
-def ray_strokes(fan: RayFanLike, rays: int, until: float) -> list[Stroke]:
-    """Chosen rays up to detachment, and faint beyond it, where they are geodesics but no creeping rays."""
+def ray_strokes(fan: RayFanLike, rays: int, until: float, *, spacing: float = 0.015) -> list[Stroke]:
+    """Chosen rays up to detachment, and faint beyond it, where they are geodesics but no creeping rays.
+
+    ``spacing`` of the points is relative to the size of the body.
+    """
     bound, free = [], []
     times = np.asarray(fan.travel_time)
     for k in chosen_rays(fan, rays):
         points, detachment = np.asarray(fan.points[k]), float(fan.detachment[k])
-        fine, fine_times = refined(points, np.asarray(fan.directions[k]), times, 0.015 * size(fan.body))
+        fine, fine_times = refined(points, np.asarray(fan.directions[k]), times, spacing * size(fan.body))
         ok = np.all(np.isfinite(fine), axis=-1) & (fine_times <= until)
         bound += list(runs(fine, ok & (fine_times <= detachment)))
         # one point more, so that the two parts join
@@ -188,3 +206,11 @@ class LevelColours:
         from matplotlib.colors import to_hex
 
         return str(to_hex(self.mappable.to_rgba(level)))
+
+    def add_bar(self, figure: Any, **place: Any) -> None:
+        """Colour bar, where there are two levels at least; ``place`` as for ``Figure.colorbar``."""
+        if self.high > self.low:
+            bar = figure.colorbar(self.mappable, **place)
+            bar.set_label(f"iso-phase curves: {self.name}", fontsize=8)
+            bar.ax.tick_params(labelsize=8, width=0.5)
+            bar.outline.set_linewidth(0.5)

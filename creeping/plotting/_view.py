@@ -46,6 +46,13 @@ class View:
         """Coordinates (right, up) of points: (..., 3) -> (..., 2), L."""
         return np.asarray(points @ np.stack([self.right, self.up], axis=-1))
 
+    def frame(self, points: FloatArray, *, margin: float = 0.04) -> tuple[FloatArray, FloatArray]:
+        """Lower left and upper right corner (2,) of the picture of points (n, 3), with a margin, L."""
+        flat = self.project(points)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        pad = margin * float(np.max(high - low))
+        return low - pad, high + pad
+
     def visible(self, body: Surface, points: FloatArray) -> BoolArray:
         """Whether nothing of the body stands between points of it and the camera: (..., 3) -> (...)."""
         seen = np.zeros(points.shape[:-1], dtype=bool)
@@ -66,30 +73,10 @@ class View:
 
 
 def shadow_view(direction: ArrayLike) -> View:
-    """View of the shadow side: along the direction the wave travels, turned and raised so that the shadow line shows."""
+    """View of the shadow side: along the direction of the wave, turned and raised so that the shadow line shows."""
     d = unit_direction(direction)
     # straight up or down every azimuth is as good; this one is the custom of 3-D plots
     azimuth = np.radians(-60.0) if np.hypot(d[0], d[1]) < 1e-6 else np.arctan2(d[1], d[0]) + np.radians(35.0)
     # pulled to the horizon, so that z stays up: -42 to 66 degrees
     elevation = 0.6 * np.arcsin(np.clip(d[2], -1, 1)) + np.radians(12.0)
     return View(float(azimuth), float(elevation))
-
-
-def arrow(view: View, direction: FloatArray, vertices: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Tail (3,) and head (3,) of an arrow along ``direction`` beside the picture of the body.
-
-    In space it stands where the wave comes from; in the picture that is behind the body, so it is moved across the
-    direction, to the left, until it is clear of the body's outline.
-    """
-    flat = view.project(vertices)
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    extent = float(np.max(high - low))
-    length = 0.38 * extent
-    along = view.project(direction) * length
-    # its middle: left of the box of the outline, by half its own width and a gap
-    middle = np.array([low[0] - 0.5 * abs(along[0]) - 0.1 * extent, low[1] + 0.5 * abs(along[1]) + 0.12 * extent])
-    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    centre = centre - (centre @ view.toward) * view.toward
-    offset = middle - view.project(centre)
-    middle_3d = centre + offset[0] * view.right + offset[1] * view.up
-    return middle_3d - 0.5 * length * direction, middle_3d + 0.5 * length * direction

@@ -9,13 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, LevelColours, Stroke, runs, strokes
-from creeping.plotting._view import View, arrow, shadow_view
-from creeping.surface import Surface, normal
-from creeping.triangulation import Triangulation, triangulate
-
-HIDDEN = 0.16  # opacity of a hidden line, times that of the line
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
+from creeping.plotting._view import View
+from creeping.surface import normal
 
 
 def plot_rays_3d(
@@ -25,9 +23,8 @@ def plot_rays_3d(
     *,
     ax: Any = None,
     view: View | None = None,
-    rays: int = 64,
+    rays: int = 48,
     until: float | None = None,
-    cells: int = 72,
     legend: bool = True,
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves on matplotlib axes.
@@ -45,8 +42,6 @@ def plot_rays_3d(
         Rays drawn at most.
     until : float, optional
         Travel time up to which rays are drawn; by default to their end.
-    cells : int
-        Fineness of the body's picture, cells along each side of its box.
     legend : bool
         Whether to add a legend and the colour bar of the levels.
 
@@ -57,32 +52,36 @@ def plot_rays_3d(
     if ax is None:
         from matplotlib import pyplot
 
-        ax = pyplot.figure(figsize=(6.4, 5.0), dpi=150).add_subplot(projection="3d")
-    view = shadow_view(line.direction) if view is None else view
-    mesh = triangulate(line.body.level, line.body.gradient, line.body.bounds, cells=cells)
-    everything = strokes(line, fan, curves, rays=rays, until=until)
-    ax.computed_zorder = False
-    _draw_body(ax, line.body, mesh, view)
-    for stroke in everything:
-        _draw_stroke(ax, line.body, stroke, view)
-    ends = arrow(view, np.asarray(line.direction), mesh.vertices)
-    _draw_arrow(ax, ends, view)
-    _frame(ax, np.concatenate([mesh.vertices, np.stack(ends)]), view)
+        ax = pyplot.figure(figsize=(6.4, 5.2), dpi=150).add_subplot(projection="3d")
+    drawing = compose(line, fan, curves, view=view, rays=rays, until=until)
+    draw(ax, drawing)
     if legend:
-        from creeping.plotting._legend import add_colour_bar, add_legend
-
-        add_legend(ax.figure, everything)
-        add_colour_bar(ax.figure, LevelColours.of(curves), ax)
+        drawing.add_legend(ax.figure)
+        drawing.colours.add_bar(ax.figure, ax=ax, shrink=0.6, aspect=24, pad=0.02)
     return ax
 
 
-def _draw_body(ax: Any, body: Surface, mesh: Triangulation, view: View) -> None:
-    """The triangles that face the camera, lit from it; the others are behind them."""
-    from matplotlib.colors import to_rgb
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+def draw(ax: Any, drawing: Drawing) -> None:
+    """Draw a composed picture on 3-D axes, without legend."""
+    # the order of drawing is ours: the body, hidden lines, visible lines by rank, arrows
+    ax.computed_zorder = False
+    _draw_body(ax, drawing)
+    for stroke in drawing.strokes:
+        _draw_stroke(ax, drawing, stroke)
+    _draw_marks(ax, drawing)
+    # 3-D axes are square; a wide body may use all of the place they were given
+    for artist in ax.collections:
+        artist.set_clip_on(False)
+    _frame(ax, drawing)
 
-    corners = mesh.vertices[mesh.triangles]
-    facing = normal(body, corners.mean(axis=1)) @ view.toward
+
+def _draw_body(ax: Any, drawing: Drawing) -> None:
+    """Draw the triangles that face the camera, lit from it; the others are behind them."""
+    from matplotlib.colors import to_rgb
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+    corners = drawing.mesh.vertices[drawing.mesh.triangles]
+    facing = normal(drawing.body, corners.mean(axis=1)) @ drawing.view.toward
     front = facing > -0.05
     shade = brightness(facing[front])[:, None] * np.array(to_rgb(BODY_COLOUR))
     # edges in the colour of the face close the hairlines between triangles
@@ -91,52 +90,77 @@ def _draw_body(ax: Any, body: Surface, mesh: Triangulation, view: View) -> None:
 
 def brightness(facing: FloatArray) -> FloatArray:
     """Brightness of a surface lit from the camera, by n.toward: dark at the rim, so that the outline shows on white."""
-    return np.asarray(0.62 + 0.40 * np.clip(facing, 0, 1) ** 0.7).clip(0, 1)
+    return np.asarray(0.62 + 0.38 * np.clip(facing, 0, 1))
 
 
-def _draw_stroke(ax: Any, body: Surface, stroke: Stroke, view: View) -> None:
+def _draw_stroke(ax: Any, drawing: Drawing, stroke: Stroke) -> None:
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     # one call for all lines: the march to the camera is vectorised over points
     lengths = np.cumsum([len(points) for points in stroke.lines])[:-1]
-    seen = np.split(view.visible(body, np.concatenate(stroke.lines)), lengths)
-    for hidden in (True, False):
-        # a segment is hidden if either of its ends is, so the two parts share the points where they meet
-        pieces = []
-        for points, mask in zip(stroke.lines, seen, strict=True):
-            part = ~mask if hidden else mask
-            if hidden:
-                part = part | np.append(part[1:], False) | np.append(False, part[:-1])
-            pieces += list(runs(points, part))
+    seen = np.split(drawing.view.visible(drawing.body, np.concatenate(stroke.lines)), lengths)
+    visible = [piece for points, mask in zip(stroke.lines, seen, strict=True) for piece in runs(points, mask)]
+    # a segment is hidden if either of its ends is, so the hidden runs reach one point into the visible ones
+    hidden = [
+        piece
+        for points, mask in zip(stroke.lines, seen, strict=True)
+        for piece in runs(points, ~mask | np.append(~mask[1:], False) | np.append(False, ~mask[:-1]))
+    ]
+    for pieces, share, above in ((hidden, HIDDEN, 0), (visible, 1.0, 10)):
         if pieces:
-            ax.add_collection3d(
-                Line3DCollection(
-                    pieces,
-                    colors=stroke.colour,
-                    linewidths=stroke.width,
-                    alpha=stroke.alpha * (HIDDEN if hidden else 1.0),
-                    capstyle="round",
-                    joinstyle="round",
-                    zorder=2 + stroke.rank + (0 if hidden else 10),
-                )
+            lines = Line3DCollection(
+                pieces,
+                colors=stroke.colour,
+                linewidths=stroke.width,
+                alpha=stroke.alpha * share,
+                capstyle="butt",
+                joinstyle="round",
+                zorder=2 + stroke.rank + above,
             )
+            ax.add_collection3d(lines)
 
 
-def _draw_arrow(ax: Any, ends: tuple[FloatArray, FloatArray], view: View) -> None:
-    tail, head = ends
-    ax.quiver(*tail, *(head - tail), color=ARROW_COLOUR, linewidth=1.6, arrow_length_ratio=0.25, zorder=30)
-    beside = tail - 0.12 * np.linalg.norm(head - tail) * view.up
-    ax.text(*beside, "d", ha="center", va="top", fontsize=10, fontweight="bold", color=ARROW_COLOUR, zorder=30)
+def _draw_marks(ax: Any, drawing: Drawing) -> None:
+    """Draw the arrow of incidence and the triad of the coordinate axes."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    marks = (drawing.incidence, *drawing.triad)
+    # not quiver: its heads are flat in space and vanish when seen from the side
+    outlines = [mark.outline(drawing.view) for mark in marks]
+    ax.add_collection3d(Poly3DCollection(outlines, facecolors=ARROW_COLOUR, linewidths=0, zorder=30))
+    for mark in marks:
+        ax.text(*mark.label(drawing.view), mark.name, zorder=30, **mark.text)
 
 
-def _frame(ax: Any, points: FloatArray, view: View) -> None:
-    """Equal aspect, no axes, everything in the picture."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    flat = view.project(points)
+def _frame(ax: Any, drawing: Drawing) -> None:
+    """Equal aspect, no axes, everything in the picture and nothing wasted."""
+    low, high = drawing.frame
     half = 0.5 * float(np.max(high - low))
-    for axis, centre in zip("xyz", 0.5 * (low + high), strict=True):
-        getattr(ax, f"set_{axis}lim")(centre - half, centre + half)
-    ax.set_box_aspect((1, 1, 1), zoom=1.35 * 2 * half / float(np.max(np.ptp(flat, axis=0))))
-    ax.set_proj_type("ortho")
-    ax.view_init(elev=np.degrees(view.elevation), azim=np.degrees(view.azimuth))
     ax.set_axis_off()
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=np.degrees(drawing.view.elevation), azim=np.degrees(drawing.view.azimuth))
+    _limits(ax, drawing.centre, half)
+    ax.set_box_aspect((1, 1, 1), zoom=1.0)
+    # mplot3d does not say how large it draws nor where: measure, correct the size, measure, correct the place
+    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
+    _, unit = _measure(ax, drawing)
+    ax.set_box_aspect((1, 1, 1), zoom=float(np.min(np.array([place.width, place.height]) / (unit * (high - low)))))
+    centre, unit = _measure(ax, drawing)
+    off = (centre - 0.5 * (place.min + place.max)) / unit
+    _limits(ax, drawing.centre + off[0] * drawing.view.right + off[1] * drawing.view.up, half)
+
+
+def _limits(ax: Any, centre: FloatArray, half: float) -> None:
+    for axis, value in zip("xyz", centre, strict=True):
+        getattr(ax, f"set_{axis}lim")(value - half, value + half)
+
+
+def _measure(ax: Any, drawing: Drawing) -> tuple[FloatArray, FloatArray]:
+    """Where the centre of the picture lies (2,), pixels, and how many pixels one L takes, across and up (2,)."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
+
+    ax.apply_aspect()
+    centre, view = drawing.centre, drawing.view
+    ends = np.stack([centre, centre + view.right, centre + view.up])
+    pixels = ax.transData.transform(np.stack(proj_transform(*ends.T, ax.get_proj())[:2], axis=-1))
+    return pixels[0], np.linalg.norm(pixels[1:] - pixels[0], axis=-1)

@@ -1,19 +1,23 @@
-"""The 3-D picture with pyvista: a body that lets the lines behind it through faintly, by a true depth buffer."""
+"""The 3-D picture with pyvista: a true depth buffer hides what is behind the body."""
 
+import os
+import sys
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from creeping._errors import CreepingError
 from creeping._typing import Any, FloatArray
+from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, LevelColours, Stroke, strokes
-from creeping.plotting._view import View, arrow, shadow_view
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
+from creeping.plotting._view import View
 from creeping.plotting.display import gl_available
-from creeping.surface import Surface, normal, size
-from creeping.triangulation import Triangulation, triangulate
+from creeping.surface import Surface, normal
+from creeping.triangulation import Triangulation
 
-OPACITY = 0.8  # of the body: what is behind it keeps a fifth of its strength
+DEPTH_UNITS = 40.0  # of 1/65000 of the depth of the scene
 
 
 def plot_rays_3d(
@@ -23,11 +27,9 @@ def plot_rays_3d(
     *,
     plotter: Any = None,
     view: View | None = None,
-    rays: int = 64,
+    rays: int = 48,
     until: float | None = None,
-    cells: int = 96,
     legend: bool = True,
-    scale: float = 2.0,
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves with pyvista.
 
@@ -44,12 +46,8 @@ def plot_rays_3d(
         Rays drawn at most.
     until : float, optional
         Travel time up to which rays are drawn; by default to their end.
-    cells : int
-        Fineness of the body's picture, cells along each side of its box.
     legend : bool
         Whether to add a legend, the colour bar of the levels and the axes.
-    scale : float
-        Pixels per point of line width.
 
     Returns
     -------
@@ -60,26 +58,69 @@ def plot_rays_3d(
     CreepingError
         If there is no OpenGL on this machine.
     """
-    probe = gl_available()
-    if not probe.ok:
-        raise CreepingError(f"pyvista cannot draw here: {probe.reason}; or draw with creeping.plotting.axes3d")
+    require_gl()
     import pyvista
 
-    view = shadow_view(line.direction) if view is None else view
-    mesh = triangulate(line.body.level, line.body.gradient, line.body.bounds, cells=cells)
-    everything = strokes(line, fan, curves, rays=rays, until=until)
+    drawing = compose(line, fan, curves, view=view, rays=rays, until=until)
     if plotter is None:
         plotter = pyvista.Plotter(window_size=(1200, 1000))
-    plotter.set_background("white")
-    _add_body(plotter, line.body, mesh)
-    for stroke in everything:
-        _add_stroke(plotter, line.body, stroke, scale)
-    ends = arrow(view, np.asarray(line.direction), mesh.vertices)
-    _add_arrow(plotter, ends)
-    _aim(plotter, view, np.concatenate([mesh.vertices, np.stack(ends)]))
+    draw(plotter, drawing)
+    _add_incidence(plotter, drawing)
     if legend:
-        _add_legend(plotter, everything, LevelColours.of(curves))
+        _add_legend(plotter, drawing)
     return plotter
+
+
+def require_gl() -> None:
+    """Raise a CreepingError with the remedy where pyvista cannot draw; to be called before pyvista is imported."""
+    probe = gl_available()
+    if not probe.ok:
+        raise CreepingError(f"pyvista cannot draw here: {probe.reason}; or draw with matplotlib")
+    _prefer_egl()
+
+
+def draw(plotter: Any, drawing: Drawing, *, scale: float = 2.0) -> None:
+    """Draw a composed picture without arrow and legend; ``scale`` is the number of pixels per point of line width."""
+    plotter.set_background("white")
+    _add_body(plotter, drawing.body, drawing.mesh)
+    for stroke in drawing.strokes:
+        _add_stroke(plotter, stroke, scale)
+    _aim(plotter, drawing)
+
+
+def render(drawing: Drawing, pixels: tuple[int, int], *, scale: float) -> NDArray[np.float32]:
+    """Image (height, width, 3) in 0..1 in which lines behind the body keep a share of their ink.
+
+    Two renderings, with the body and without it, multiplied like inks: a translucent body would need its layers
+    sorted, which software renderers do badly, and would mix its own far side in.
+    """
+    require_gl()
+    import pyvista
+
+    plotter = pyvista.Plotter(off_screen=True, window_size=pixels)
+    try:
+        draw(plotter, drawing, scale=scale)
+        with_body = _image(plotter)
+        plotter.actors["body"].visibility = False
+        without = _image(plotter)
+    finally:
+        plotter.close()
+    # where a line is in front both images agree, and it must not be inked twice
+    behind = np.any(np.abs(with_body - without) > 1.5 / 255, axis=-1, keepdims=True)
+    return np.where(behind, with_body * (1 - np.float32(HIDDEN) * (1 - without)), with_body)
+
+
+def _image(plotter: Any) -> NDArray[np.float32]:
+    # the plotter keeps its last image unless told to draw again
+    plotter.render()
+    # single precision: a picture for print has ten million pixels
+    return np.asarray(plotter.screenshot(return_img=True), dtype=np.float32)[..., :3] / np.float32(255)
+
+
+def _prefer_egl() -> None:
+    """Without an X server VTK tries one first and complains before it takes EGL; tell it what it will find."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def _add_body(plotter: Any, body: Surface, mesh: Triangulation) -> None:
@@ -94,7 +135,6 @@ def _add_body(plotter: Any, body: Surface, mesh: Triangulation) -> None:
     plotter.add_mesh(
         surface,
         color=BODY_COLOUR,
-        opacity=OPACITY,
         smooth_shading=True,
         ambient=0.60,
         diffuse=0.42,
@@ -102,19 +142,20 @@ def _add_body(plotter: Any, body: Surface, mesh: Triangulation) -> None:
         culling="back",
         name="body",
     )
-    plotter.enable_depth_peeling(8)
 
 
-def _add_stroke(plotter: Any, body: Surface, stroke: Stroke, scale: float) -> None:
-    # a little off the body, by rank: the mesh and the polylines both sag by about the square of their spacing
-    lift = size(body) * (0.004 + 0.001 * stroke.rank)
-    plotter.add_mesh(
-        polylines([points + lift * normal(body, points) for points in stroke.lines]),
+def _add_stroke(plotter: Any, stroke: Stroke, scale: float) -> None:
+    actor = plotter.add_mesh(
+        polylines(stroke.lines),
         color=stroke.colour,
         line_width=stroke.width * scale,
         opacity=stroke.alpha,
         lighting=False,
     )
+    # the mesh and the polylines both sag by about the square of their spacing, so lines are drawn a little nearer
+    # to the camera, by rank; in depth only: lifting them off the body would bulge its outline
+    actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -DEPTH_UNITS * (3 + stroke.rank))
 
 
 def polylines(lines: Sequence[FloatArray]) -> Any:
@@ -127,57 +168,49 @@ def polylines(lines: Sequence[FloatArray]) -> Any:
     return pyvista.PolyData(np.concatenate(lines), lines=np.concatenate(cells))
 
 
-def _add_arrow(plotter: Any, ends: tuple[FloatArray, FloatArray]) -> None:
+def _add_incidence(plotter: Any, drawing: Drawing) -> None:
     import pyvista
 
-    tail, head = ends
-    length = float(np.linalg.norm(head - tail))
+    tail, head = drawing.incidence.foot, drawing.incidence.tip
     shape = pyvista.Arrow(
         start=tail,
         direction=head - tail,
-        scale=length,
+        scale=float(np.linalg.norm(head - tail)),
         tip_length=0.25,
-        tip_radius=0.06,
-        shaft_radius=0.015,
+        tip_radius=0.05,
+        shaft_radius=0.011,
         tip_resolution=48,
         shaft_resolution=24,
     )
     plotter.add_mesh(shape, color=ARROW_COLOUR, lighting=False, name="incidence")
 
 
-def _aim(plotter: Any, view: View, points: FloatArray) -> None:
+def _aim(plotter: Any, drawing: Drawing) -> None:
     """Parallel projection, everything in the picture."""
-    flat = view.project(points)
-    middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
-    centre = middle[0] * view.right + middle[1] * view.up + np.mean(points @ view.toward) * view.toward
-    half = 0.5 * np.ptp(flat, axis=0)
+    low, high = drawing.frame
+    half, centre = 0.5 * (high - low), drawing.centre
     width, height = plotter.window_size
     camera = plotter.camera
     camera.focal_point = tuple(centre)
-    camera.position = tuple(centre + 10 * float(np.max(half)) * view.toward)
-    camera.up = tuple(view.up)
+    camera.position = tuple(centre + 10 * float(np.max(half)) * drawing.view.toward)
+    camera.up = tuple(drawing.view.up)
     camera.parallel_projection = True
-    camera.parallel_scale = 1.04 * max(half[1], half[0] * height / width)
+    camera.parallel_scale = max(half[1], half[0] * height / width)
     plotter.renderer.reset_camera_clipping_range()
 
 
-def _add_legend(plotter: Any, everything: Sequence[Stroke], colours: LevelColours) -> None:
-    from matplotlib.colors import ListedColormap
-
-    entries = [(stroke.label, stroke.colour) for stroke in reversed(everything) if stroke.label]
-    plotter.add_legend(entries, face="line", bcolor=None, size=(0.28, 0.045 * len(entries)), loc="lower right")
-    plotter.add_axes(line_width=3)
-    if colours.high > colours.low:
-        import pyvista
-
-        # the bar belongs to a mesh with the levels as scalars; a point on the arrow's tail will do
-        table = pyvista.LookupTable(ListedColormap(colours.mappable.cmap.colors), scalar_range=(colours.low, colours.high))
-        plotter.add_scalar_bar(mapper=_mapper(table), title=colours.name, vertical=True, n_labels=5, color="black")
-
-
-def _mapper(table: Any) -> Any:
+def _add_legend(plotter: Any, drawing: Drawing) -> None:
     import pyvista
 
-    mapper = pyvista.DataSetMapper()
-    mapper.lookup_table = table
-    return mapper
+    entries = [(stroke.label, stroke.colour) for stroke in reversed(drawing.strokes) if stroke.label]
+    # not add_legend: its box does not grow with the text, which is then cut off at the window's edge
+    for k, (label, colour) in enumerate(entries):
+        place = (16, plotter.window_size[1] - 28 * (k + 1))
+        plotter.add_text(f"- {label}", position=place, font_size=9, color=colour, name=f"legend {k}")
+    plotter.add_axes(line_width=3)
+    colours = drawing.colours
+    if colours.high > colours.low:
+        mapper = pyvista.DataSetMapper()
+        mapper.lookup_table = pyvista.LookupTable(colours.mappable.cmap, scalar_range=(colours.low, colours.high))
+        bar = {"vertical": True, "position_x": 0.88, "position_y": 0.3, "width": 0.06, "height": 0.4}
+        plotter.add_scalar_bar(mapper=mapper, title=colours.name, n_labels=5, color="black", **bar)

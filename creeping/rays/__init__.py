@@ -1,0 +1,1 @@
+"""Shadow lines, fans of creeping rays and their iso-phase curves; knows nothing of wavenumbers."""

@@ -1,0 +1,393 @@
+"""The ``creeping`` command: the only place that joins creeping and scatterers.
+
+Exit codes: 0 done, 2 usage, 3 bad input, 130 interrupted. Libraries are imported inside the commands, so that
+``creeping --help`` answers at once.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import App, Group, Parameter
+
+from creeping._version import __version__
+
+BODIES = {
+    "sphere": "Sphere",
+    "ellipsoid": "Ellipsoid",
+    "torus": "Torus",
+    "twisted-ellipsoid": "TwistedEllipsoid",
+}
+
+app = App(
+    name="creeping",
+    version=__version__,
+    help="Creeping rays on smooth bodies by the phase flow method. Angles are in degrees.",
+    result_action="return_value",
+)
+cache_app = App(name="cache", help="Stored phase maps: list, verify, clear.")
+app.command(cache_app)
+
+_output = Group("Output")
+Body = Annotated[str, Parameter(help="Name with parameters, e.g. torus or ellipsoid:a=1.2,b=0.8,c=0.8.")]
+Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
+Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
+SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    from creeping._errors import CreepingError
+
+    try:
+        code = app()
+    except CreepingError as error:
+        print(f"creeping: {error}", file=sys.stderr)
+        code = 3
+    except KeyboardInterrupt:
+        print("creeping: interrupted", file=sys.stderr)
+        code = 130
+    except BrokenPipeError:
+        code = 0
+    raise SystemExit(code if isinstance(code, int) else 0)
+
+
+@app.command
+def run(
+    body: Body,
+    *,
+    direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels; need not be unit.")],
+    output: Folder,
+    length: Annotated[float | None, Parameter(help="Travel time of the rays; 2.5 body sizes if not given.")] = None,
+    rays: Annotated[int, Parameter(help="Rays at the start; more are inserted where neighbours part.")] = 256,
+    spacing: Annotated[float | None, Parameter(help="Spacing of iso-phase curves; length/16 if not given.")] = None,
+    of: Annotated[Literal["travel_time", "eikonal"], Parameter(help="What is constant on an iso-phase curve.")] = "travel_time",
+    launch_from: Annotated[Literal["attached", "all"], Parameter(help="Points of the shadow line that launch.")] = "attached",
+    tolerance: Annotated[float, Parameter(help="Rms error of one step of the phase map.")] = 1e-6,
+    flow: Annotated[Literal["map", "direct"], Parameter(help="Phase map or direct integration.")] = "map",
+    speed: SpeedOption = None,
+    cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
+    backend: Annotated[Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")] = "auto",
+    json_: Json = False,
+) -> int:
+    """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
+    import numpy as np
+
+    import creeping as cr
+    from creeping.surface import size
+
+    started = time.perf_counter()
+    shape = parse_body(body, speed)
+    for name, value in (("length", length), ("spacing", spacing)):
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
+    with _Progress(quiet=json_) as say:
+        say("shadow line")
+        line = cr.shadow_line(shape, direction)
+        say("phase map")
+        carrier: Any = (
+            cr.build_phase_map(shape, tolerance=tolerance, cache=cache, progress=say) if flow == "map" else cr.DirectFlow(shape)
+        )
+        say("creeping rays")
+        fan = cr.launch(carrier, line, length=length or 2.5 * size(shape), n_rays=rays, status=launch_from)
+        step = spacing or fan.length / 16
+        curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
+        summary = _summary(body, speed, line, carrier, fan, curves, flow)
+        say("pictures and files")
+        summary["files"], summary["drawn_by"] = _write_results(output, line, fan, curves, backend)
+        summary["seconds"] = round(time.perf_counter() - started, 2)
+        from creeping.plotting import write_text
+
+        write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+    print(json.dumps(summary, indent=1) if json_ else _readable(summary, output))
+    return 0
+
+
+def levels_of(fan: Any, step: float, of: str) -> Any:
+    """Multiples of the step that rays of the fan meet, at most 1000."""
+    import numpy as np
+
+    from creeping._errors import InvalidInputError
+
+    values = fan.travel_time if of == "travel_time" else fan.eikonal
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+    if last - first > 1000:
+        raise InvalidInputError(f"spacing {step:g} makes {last - first + 1} iso-phase levels; give one above {(high - low) / 1000:g}")
+    return step * np.arange(first, last + 1)
+
+
+def parse_body(text: str, speed: str | None = None) -> Any:
+    """Make a body from ``name`` or ``name:key=value,...``.
+
+    Raises
+    ------
+    InvalidInputError
+        Names the unknown body, parameter or value, and what is known.
+    """
+    import scatterers
+    from creeping._errors import InvalidInputError
+
+    name, _, rest = text.partition(":")
+    if name not in BODIES:
+        raise InvalidInputError(f"unknown body {name!r}; known are {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8")
+    values: dict[str, Any] = {}
+    for item in filter(None, rest.split(",")):
+        key, equals, number = item.partition("=")
+        try:
+            values[key.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise InvalidInputError(f"body parameter {item!r} is not of the form name=number")
+    if speed is not None:
+        values["speed"] = speed
+    try:
+        return getattr(scatterers, BODIES[name])(**values)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"{name}: {error}") from error
+    except ModuleNotFoundError as error:
+        raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
+
+
+def _summary(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any], flow: str) -> dict[str, Any]:
+    import numpy as np
+
+    from creeping.rays.fan import RayStatus
+
+    summary: dict[str, Any] = {
+        "body": body,
+        "speed": speed,
+        "version": __version__,
+        "direction": line.direction.tolist(),
+        "shadow_line": [{"length": c.length, "fractions": c.fractions} for c in line.curves],
+        "flow": flow,
+        "rays": len(fan.points),
+        "steps": len(fan.travel_time),
+        "length": fan.length,
+        "ray_status": {s.name: int(np.sum(fan.status == s)) for s in RayStatus},
+        "earliest_detachment": float(fan.detachment.min()) if np.isfinite(fan.detachment).any() else None,
+        "caustics_passed": int(fan.caustic_index.max(initial=0)),
+        "iso_phase_curves": len(curves),
+        "error_of_rays": {"rms": fan.error.rms, "max": fan.error.max, "rays_traced": fan.error.samples},
+    }
+    if flow == "map":
+        summary["phase_map"] = {
+            "horizon": carrier.horizon,
+            "charts": len(carrier.leaps[-1].state),
+            "nodes": list(carrier.grid.nodes),
+            "degree": carrier.grid.degree,
+            "megabytes": round(carrier.nbytes / 1e6, 1),
+            "rms": carrier.error.rms,
+            "max": carrier.error.max,
+            "samples": carrier.error.samples,
+        }
+    return summary
+
+
+def _write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend: str) -> tuple[list[str], str]:
+    from creeping import plotting
+    from creeping._errors import InvalidInputError
+
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
+    drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend)
+    plotting.parameter_picture(output / "parameters.png", line, fan, curves)
+    plotting.write_vtp(output / "line.vtp", line=line)
+    plotting.write_vtp(output / "rays.vtp", fan=fan)
+    plotting.write_vtp(output / "curves.vtp", curves=curves)
+    plotting.write_csv(output / "line.csv", line=line)
+    plotting.write_csv(output / "rays.csv", fan=fan)
+    plotting.write_csv(output / "curves.csv", curves=curves)
+    names = ["rays.png", "parameters.png"] + [f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")]
+    return [*names, "summary.json"], str(drawn_by)
+
+
+def _readable(summary: dict[str, Any], output: Path) -> str:
+    rows = [f"{summary['body']}, d = ({', '.join(f'{v:.4f}' for v in summary['direction'])})"]
+    for k, curve in enumerate(summary["shadow_line"]):
+        shares = ", ".join(f"{100 * v:.1f} % {name}" for name, v in curve["fractions"].items() if v > 0)
+        rows.append(f"shadow line {k + 1}: length {curve['length']:.10f}, {shares}")
+    if "phase_map" in summary:
+        m = summary["phase_map"]
+        grid = " x ".join(map(str, [m["charts"], *m["nodes"]]))
+        rows.append(f"phase map: T0 = {m['horizon']:g}, {grid} nodes, degree {m['degree']}; rms error of one step {m['rms']:.1e}")
+    statuses = ", ".join(f"{n} {name}" for name, n in summary["ray_status"].items() if n)
+    rows.append(f"rays: {summary['rays']} of length {summary['length']:g} ({statuses or 'none launched'})")
+    error = summary["error_of_rays"]
+    rows.append(f"error at their ends against direct integration: rms {error['rms']:.1e}, max {error['max']:.1e}")
+    rows.append(f"{summary['iso_phase_curves']} iso-phase curves; 3-D picture by {summary['drawn_by']}")
+    rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
+    return "\n".join(rows)
+
+
+@app.command
+def check(body: Body, *, speed: SpeedOption = None, json_: Json = False) -> int:
+    """Verify a body: derivatives, closedness, orientation, cover and overlap of its charts."""
+    from dataclasses import asdict
+
+    from creeping import check_surface
+
+    report = check_surface(parse_body(body, speed))
+    if json_:
+        rows = [asdict(c) | {"ok": c.ok} for c in report.checks]
+        print(json.dumps({"ok": report.ok, "genus": report.genus, "area": report.area, "checks": rows}, indent=1))
+    else:
+        print(report)
+    return 0 if report.ok else 3
+
+
+@app.command
+def figure(
+    name: Annotated[str | None, Parameter(help="Name of the figure; see --list.")] = None,
+    /,
+    *,
+    output: Folder = Path("out"),
+    all_: Annotated[bool, Parameter(name="--all", negative="", help="Draw every figure.")] = False,
+    list_: Annotated[bool, Parameter(name="--list", negative="", help="List the figures.")] = False,
+    quick: Annotated[bool, Parameter(negative="", help="Coarser and faster.")] = False,
+    json_: Json = False,
+) -> int:
+    """Draw figures of the paper, each with a sidecar of its parameters, error and seconds."""
+    import studies
+    from creeping._errors import InvalidInputError
+
+    if list_:
+        print("\n".join(f"{key:16} {title}" for key, title in studies.titles().items()))
+        return 0
+    if all_ == (name is not None):
+        raise InvalidInputError(f"give one figure or --all; figures are {', '.join(studies.FIGURES)}")
+    if name is not None and name not in studies.FIGURES:
+        raise InvalidInputError(f"unknown figure {name!r}; figures are {', '.join(studies.FIGURES)}")
+    cards = []
+    with _Progress(quiet=json_) as say:
+        for key in studies.FIGURES if name is None else [name]:
+            say(f"figure {key}")
+            cards.append(studies.draw(key, output, quick=quick))
+    if json_:
+        print(json.dumps(cards, indent=1))
+    else:
+        for card in cards:
+            print(f"{output / card['file']}  {card['seconds']:.1f} s  {card['headline']}")
+    return 0
+
+
+@cache_app.command(name="ls")
+def cache_list(*, json_: Json = False) -> int:
+    """List the stored maps."""
+    from creeping._errors import CreepingError
+    from creeping.phaseflow import caching, storing
+
+    rows = []
+    for folder in _stored():
+        size = sum(f.stat().st_size for f in folder.iterdir())
+        try:
+            content = storing.read_manifest(folder)
+            rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": content["body"], "error": content["error"][0]})
+        except CreepingError as error:
+            rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": f"unreadable: {error}", "error": None})
+    if json_:
+        print(json.dumps(rows, indent=1))
+    else:
+        print(f"{caching.cache_folder()}: {len(rows)} maps, {sum(r['MB'] for r in rows):.1f} MB")
+        for row in rows:
+            print(f"  {row['map']}  {row['MB']:8.1f} MB  {row['body']}")
+    return 0
+
+
+@cache_app.command(name="verify")
+def cache_verify() -> int:
+    """Check every stored map against its digests; exit code 3 if one is damaged."""
+    from creeping._errors import CreepingError
+    from creeping.phaseflow import storing
+
+    damaged = 0
+    for folder in _stored():
+        try:
+            storing.verify_files(folder)
+            print(f"ok       {folder.name}")
+        except CreepingError as error:
+            damaged += 1
+            print(f"DAMAGED  {folder.name}: {error}")
+    return 3 if damaged else 0
+
+
+@cache_app.command(name="clear")
+def cache_clear() -> int:
+    """Remove every stored map."""
+    import shutil
+
+    folders = _stored()
+    for folder in folders:
+        shutil.rmtree(folder)
+    print(f"removed {len(folders)} maps")
+    return 0
+
+
+def _stored() -> list[Path]:
+    from creeping.phaseflow import caching, storing
+
+    root = caching.cache_folder()
+    return sorted(p.parent for p in root.glob(f"*/{storing.MANIFEST}")) if root.is_dir() else []
+
+
+@app.command
+def doctor() -> int:
+    """Report versions, compiled kernels, graphics and the cache folder; exit code 3 if something is missing."""
+    import os
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    from creeping.phaseflow.caching import cache_folder
+    from creeping.plotting import gl_available
+
+    print(f"creeping {__version__}, Python {platform.python_version()}, {os.cpu_count()} cores")
+    missing = 0
+    for name in ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "sympy"):
+        try:
+            print(f"  {name} {version(name)}")
+        except PackageNotFoundError:
+            missing += name != "sympy"
+            print(f"  {name} is not installed" + (" (needed for expressions)" if name == "sympy" else ""))
+    started = time.perf_counter()
+    import creeping.phaseflow._kernels  # noqa: F401
+
+    print(f"  compiled kernels: import {time.perf_counter() - started:.1f} s")
+    probe = gl_available()
+    print(f"  3-D graphics: {'pyvista' if probe.ok else f'matplotlib, because {probe.reason}'}")
+    root = cache_folder()
+    nearest = next(p for p in [root, *root.parents] if p.exists())
+    print(f"  cache: {root} ({'writable' if os.access(nearest, os.W_OK) else 'NOT writable: maps are rebuilt each time'})")
+    return 3 if missing else 0
+
+
+class _Progress:
+    """What is being done, on standard error: a spinner on a terminal, plain lines elsewhere."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self.quiet = quiet
+        self._status: Any = None
+
+    def __enter__(self) -> Callable[[str], None]:
+        if not self.quiet and sys.stderr.isatty():
+            from rich.console import Console
+
+            self._status = Console(stderr=True).status("starting")
+            self._status.start()
+        return self.say
+
+    def say(self, text: str) -> None:
+        """Show what is being done now."""
+        if self._status is not None:
+            self._status.update(text)
+        elif not self.quiet:
+            print(f"creeping: {text} ...", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._status is not None:
+            self._status.stop()

@@ -1,0 +1,164 @@
+"""One 3-D picture before any library draws it: camera, body, polylines, and the arrows beside the body."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.plotting._strokes import LevelColours, Stroke, strokes
+from creeping.plotting._view import View, shadow_view
+from creeping.surface import Surface
+from creeping.triangulation import Triangulation, triangulate
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An arrow beside the body: the incidence "d", or an axis "x", "y", "z".
+
+    Attributes
+    ----------
+    name : str
+    foot, tip : (3,), L
+    """
+
+    name: str
+    foot: FloatArray
+    tip: FloatArray
+
+    @property
+    def text(self) -> dict[str, Any]:
+        """How matplotlib writes the name."""
+        style = {"fontsize": 9, "weight": "bold"} if self.name == "d" else {"fontsize": 7, "style": "italic"}
+        return {"ha": "center", "va": "center", **style}
+
+    def label(self, view: View) -> FloatArray:
+        """Where to write the name (3,): behind the incidence's foot, before an axis' tip."""
+        along = self.tip - self.foot
+        flat = float(np.linalg.norm(view.project(along))) or 1.0
+        # a fixed distance in the picture, however foreshortened the arrow is
+        if self.name == "d":
+            return np.asarray(self.foot - 0.1 * float(np.linalg.norm(along)) / flat * along)
+        return np.asarray(self.tip + 0.22 * float(np.linalg.norm(along)) / flat * along)
+
+    def outline(self, view: View) -> FloatArray:
+        """Flat arrow (7, 3) that faces the camera: a thin shaft and a filled head."""
+        along = self.tip - self.foot
+        flat = view.project(along)
+        length = float(np.linalg.norm(flat)) or 1.0
+        across = (-flat[1] * view.right + flat[0] * view.up) / length
+        thick = float(np.linalg.norm(along)) * (0.008 if self.name == "d" else 0.011)
+        head = min(14 * thick, 0.6 * length)
+        neck = self.tip - head / length * along
+        sides = [self.foot - thick * across, neck - thick * across, neck - 0.32 * head * across, self.tip]
+        return np.stack([*sides, neck + 0.32 * head * across, neck + thick * across, self.foot + thick * across])
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Everything that is drawn.
+
+    Attributes
+    ----------
+    body : Surface
+    direction : (3,)
+        Incidence.
+    view : View
+    mesh : Triangulation
+    strokes : list of Stroke
+    colours : LevelColours
+    """
+
+    body: Surface
+    direction: FloatArray
+    view: View
+    mesh: Triangulation
+    strokes: list[Stroke]
+    colours: LevelColours
+
+    @cached_property
+    def incidence(self) -> Mark:
+        """Arrow along the direction of the wave.
+
+        In space it stands where the wave comes from; in the picture that is behind the body, so it is moved across
+        the direction, to the left, until it is clear of the body's outline.
+        """
+        low, high = self.view.frame(self.mesh.vertices, margin=0.0)
+        extent = float(np.max(high - low))
+        along = 0.38 * extent * self.direction
+        left = low[0] - 0.08 * extent - 0.5 * abs(along @ self.view.right)
+        middle = self._at(left, 0.5 * (low[1] + high[1]))
+        return Mark("d", middle - 0.5 * along, middle + 0.5 * along)
+
+    @cached_property
+    def triad(self) -> list[Mark]:
+        """Coordinate axes at the lower left of the body."""
+        low, high = self.view.frame(self.mesh.vertices, margin=0.0)
+        extent = float(np.max(high - low))
+        length = 0.13 * extent
+        flat = self.view.project(length * np.eye(3))
+        # the foot where the tips stay clear of the outline's box
+        foot = self._at(
+            low[0] - 0.10 * extent - max(0.0, float(flat[:, 0].max())),
+            low[1] + 0.03 * extent - min(0.0, float(flat[:, 1].min())),
+        )
+        return [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
+
+    @cached_property
+    def frame(self) -> tuple[FloatArray, FloatArray]:
+        """Lower left and upper right corner (2,) of the picture, L."""
+        ends = [point for mark in (self.incidence, *self.triad) for point in (mark.foot, mark.tip)]
+        return self.view.frame(np.concatenate([self.mesh.vertices, np.stack(ends)]))
+
+    @property
+    def centre(self) -> FloatArray:
+        """Point (3,) in the middle of the frame, at the depth of the body."""
+        low, high = self.frame
+        return self._at(*(0.5 * (low + high)))
+
+    def add_legend(self, figure: Any) -> None:
+        """Add a legend under a matplotlib figure, the shadow line first."""
+        from matplotlib.lines import Line2D
+
+        named = sorted((stroke for stroke in self.strokes if stroke.label), key=lambda stroke: -stroke.rank)
+        handles = [
+            Line2D([], [], color=stroke.colour, lw=max(stroke.width, 0.9), alpha=stroke.alpha, label=stroke.label)
+            for stroke in named
+        ]
+        figure.legend(handles=handles, loc="lower center", ncols=min(3, len(handles)), frameon=False, fontsize=8)
+
+    def _at(self, right: float, up: float) -> FloatArray:
+        """Point (3,) with the given place in the picture, at the depth of the body's middle."""
+        depth = float(np.mean(self.mesh.vertices @ self.view.toward))
+        return np.asarray(right * self.view.right + up * self.view.up + depth * self.view.toward)
+
+
+def compose(
+    line: ShadowLineLike,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] = (),
+    *,
+    view: View | None = None,
+    rays: int = 48,
+    until: float | None = None,
+    cells: int = 80,
+) -> Drawing:
+    """Compose the picture of a shadow line, its rays and iso-phase curves; for the arguments see `picture`.
+
+    Parameters
+    ----------
+    cells : int
+        Fineness of the body, cells along each side of its box.
+    """
+    direction = np.asarray(line.direction, dtype=float)
+    body = line.body
+    return Drawing(
+        body,
+        direction,
+        shadow_view(direction) if view is None else view,
+        triangulate(body.level, body.gradient, body.bounds, cells=cells),
+        strokes(line, fan, curves, rays=rays, until=until),
+        LevelColours.of(curves),
+    )

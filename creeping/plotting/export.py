@@ -1,0 +1,208 @@
+"""Files of shadow lines, fans and iso-phase curves for other programs: VTK PolyData (.vtp) and CSV.
+
+Numbers keep all 17 digits, so that what is read back is what was written. Nothing here imports VTK.
+"""
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import TextIO
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.plotting import _vtp
+from creeping.plotting._files import written_aside
+from creeping.plotting._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+
+KINDS = ("shadow line", "ray", "iso-phase curve")
+_RAY_ARRAYS = ("eikonal", "spreading", "spreading_rate", "curvature")
+_ABSENT = -1  # of an integer array, where NaN stands in one of floats
+
+
+class _Collector:
+    """Polylines with their arrays; what a line does not have is NaN or -1."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.points: list[FloatArray] = []
+        self.lines: list[IntArray] = []
+        self.point_data: dict[str, list[Any]] = {name: [] for name in ("travel_time", *_RAY_ARRAYS)}
+        self.point_data |= {"caustic_index": [], "line_status": []}
+        self.cell_data: dict[str, list[Any]] = {name: [] for name in ("kind", "status", "curve_index", "level")}
+
+    def add(self, kind: str, points: FloatArray, closed: bool, at_points: dict[str, Any], **of_line: Any) -> None:
+        start = self.count
+        self.count += len(points)
+        numbers = np.arange(start, start + len(points), dtype=np.int64)
+        self.points.append(np.asarray(points, dtype=float))
+        self.lines.append(np.append(numbers, start) if closed else numbers)
+        integers = ("caustic_index", "line_status")
+        for name, parts in self.point_data.items():
+            absent = np.full(len(points), _ABSENT) if name in integers else np.full(len(points), np.nan)
+            parts.append(np.asarray(at_points.get(name, absent)))
+        of_line["kind"] = KINDS.index(kind)
+        for name, values in self.cell_data.items():
+            values.append(of_line.get(name, np.nan if name == "level" else _ABSENT))
+
+    def document(self) -> str:
+        points = np.concatenate(self.points) if self.points else np.zeros((0, 3))
+        point_data = {name: np.concatenate([np.zeros(0), *parts]) for name, parts in self.point_data.items()}
+        for name in ("caustic_index", "line_status"):
+            point_data[name] = point_data[name].astype(np.int64)
+        cell_data = {
+            name: np.array(v, dtype=float if name == "level" else np.int64) for name, v in self.cell_data.items()
+        }
+        return _vtp.document(points, self.lines, point_data, cell_data)
+
+
+def write_vtp(
+    path: str | os.PathLike[str],
+    line: ShadowLineLike | None = None,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] = (),
+) -> None:
+    """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
+
+    One polyline per curve of the shadow line, ray and iso-phase curve. Point arrays: travel_time, eikonal, spreading,
+    spreading_rate, curvature, caustic_index, line_status (0 attached, 1 occluded, 2 concave). Cell arrays: kind
+    (0 shadow line, 1 ray, 2 iso-phase curve), status, curve_index, level. Where an array does not apply it is NaN,
+    or -1 if of integers.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write; replaced at once when complete.
+    line, fan, curves
+        What to write; leave out what is not wanted.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    collector = _Collector()
+    for number, shadow in enumerate(line.curves if line is not None else ()):
+        status = np.array([LINE_STATUSES.index(str(name)) for name in shadow.status], dtype=np.int64)
+        collector.add("shadow line", shadow.points, True, {"line_status": status}, curve_index=number)
+    if fan is not None:
+        for k in range(len(fan.points)):
+            arrays = {name: getattr(fan, name)[k] for name in (*_RAY_ARRAYS, "caustic_index")}
+            arrays["travel_time"] = fan.travel_time
+            numbers = {"status": int(fan.status[k]), "curve_index": int(fan.curve_index[k])}
+            collector.add("ray", fan.points[k], False, arrays, **numbers)
+    for curve in curves:
+        levels = {curve.of: np.full(len(curve.points), float(curve.level))}
+        collector.add("iso-phase curve", curve.points, bool(curve.closed), levels, level=float(curve.level))
+    with written_aside(path) as aside:
+        aside.write_text(collector.document(), encoding="ascii")
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text file in UTF-8, replaced at once when complete.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    with written_aside(path) as aside:
+        aside.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_csv(
+    path: str | os.PathLike[str],
+    *,
+    line: ShadowLineLike | None = None,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] | None = None,
+) -> None:
+    """Write one table as CSV, one row per point, its columns explained in lines that begin with ``#``.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write; replaced at once when complete.
+    line, fan, curves
+        Exactly one of them: they have different columns.
+
+    Raises
+    ------
+    InvalidInputError
+        If not exactly one is given.
+    CreepingError
+        If the file cannot be written.
+    """
+    given = [name for name, value in (("line", line), ("fan", fan), ("curves", curves)) if value is not None]
+    if len(given) != 1:
+        raise InvalidInputError(
+            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of line, fan, curves, a file for each"
+        )
+    with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+        if line is not None:
+            _write_table(stream, _LINE_NOTES, _line_rows(line))
+        elif fan is not None:
+            _write_table(stream, _FAN_NOTES, _fan_rows(fan))
+        elif curves is not None:
+            _write_table(stream, _CURVE_NOTES, _curve_rows(curves))
+
+
+_POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}
+_LINE_NOTES = {
+    "curve": "number of the closed curve",
+    "s": "arclength along it, L",
+    **_POSITION,
+    "status": "attached, occluded or concave",
+}
+_FAN_NOTES = {
+    "ray": "number of the ray",
+    "step": "number of the point on it",
+    "t": "travel time; L where the speed is 1",
+    **_POSITION,
+    "px": "unit tangent",
+    "py": "unit tangent",
+    "pz": "unit tangent",
+    "eikonal": "as t",
+    "J": "spreading, 1 on the shadow line",
+    "dJ": "its rate along the ray",
+    "kappa_n": "normal curvature along the ray, 1/L, positive where convex",
+    "caustic_index": "zeros of J passed",
+    "status": "status code of the ray",
+}
+_CURVE_NOTES = {
+    "curve": "number of the curve",
+    "of": "travel_time or eikonal",
+    "level": "its constant value",
+    "closed": "1 if the last point joins the first",
+    **_POSITION,
+}
+
+
+def _write_table(stream: TextIO, notes: dict[str, str], rows: Iterable[tuple[Any, ...]]) -> None:
+    stream.writelines(f"# {name}: {note}\n" for name, note in notes.items())
+    stream.write(",".join(notes) + "\n")
+    # str of a Python float is its repr: the shortest text that reads back to the same number
+    stream.writelines(",".join(map(str, row)) + "\n" for row in rows)
+
+
+def _line_rows(line: ShadowLineLike) -> Iterable[tuple[Any, ...]]:
+    for number, curve in enumerate(line.curves):
+        arclength, points = np.asarray(curve.arclength).tolist(), np.asarray(curve.points).tolist()
+        for s, point, status in zip(arclength, points, curve.status, strict=True):
+            yield (number, s, *point, status)
+
+
+def _fan_rows(fan: RayFanLike) -> Iterable[tuple[Any, ...]]:
+    times = np.asarray(fan.travel_time).tolist()
+    for ray in range(len(fan.points)):
+        status = int(fan.status[ray])
+        columns = (fan.points, fan.directions, *(getattr(fan, name) for name in (*_RAY_ARRAYS, "caustic_index")))
+        values = zip(times, *(np.asarray(column[ray]).tolist() for column in columns), strict=True)
+        for step, (t, point, direction, *carried) in enumerate(values):
+            yield (ray, step, t, *point, *direction, *carried, status)
+
+
+def _curve_rows(curves: Sequence[IsoPhaseCurveLike]) -> Iterable[tuple[Any, ...]]:
+    for number, curve in enumerate(curves):
+        for point in np.asarray(curve.points).tolist():
+            yield (number, curve.of, float(curve.level), int(curve.closed), *point)

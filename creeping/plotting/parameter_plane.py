@@ -1,0 +1,138 @@
+"""The picture in the plane of the body's parameters: (theta, phi), or (theta, psi) on a torus, in degrees."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.plotting._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.plotting._strokes import STATUS_COLOURS, LevelColours, ray_strokes, status_pieces
+
+
+def plot_parameters(
+    line: ShadowLineLike,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] = (),
+    *,
+    ax: Any = None,
+    rays: int = 48,
+    until: float | None = None,
+    legend: bool = True,
+) -> Any:
+    """Draw the shadow line, creeping rays and iso-phase curves over (phi, theta) in degrees.
+
+    Parameters
+    ----------
+    line : ShadowLine
+    fan : RayFan, optional
+    curves : sequence of IsoPhaseCurve
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; by default those of a new figure.
+    rays : int
+        Rays drawn at most.
+    until : float, optional
+        Travel time up to which rays are drawn; by default to their end.
+    legend : bool
+        Whether to add a legend and the colour bar of the levels.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.figure(figsize=(6.4, 4.4), dpi=150, layout="constrained").add_subplot()
+    body = line.body
+    if fan is not None:
+        # finer than in space: near a pole phi turns fast
+        for stroke in ray_strokes(fan, rays, np.inf if until is None else until, spacing=0.005):
+            pieces = [piece for points in stroke.lines for piece in unwrapped_pieces(body.parameters(points))]
+            _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
+    colours = LevelColours.of(curves)
+    for curve in curves:
+        # levels are read off the colour bar; a single one has none
+        label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
+        _add(ax, curve.parameter_pieces, color=colours(curve.level), linewidth=1.0, label=label, zorder=3)
+    for status in LINE_STATUSES:
+        lines = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
+        pieces = [piece for points in lines for piece in unwrapped_pieces(body.parameters(points))]
+        _add(ax, pieces, color=STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
+    _frame(ax, torus=is_torus(line))
+    if legend:
+        _add_legend(ax, colours)
+    return ax
+
+
+def unwrapped_pieces(parameters: FloatArray) -> Iterator[FloatArray]:
+    """Split a curve (n, 2) where a parameter jumps by more than pi, and carry both ends on to the seam.
+
+    A jump is read as the shorter way round: the ends are joined by a straight line across the seam at +-pi.
+    """
+    start = 0
+    first: FloatArray | None = None
+    steps = np.diff(parameters, axis=0)
+    for k in np.flatnonzero(np.any(np.abs(steps) > np.pi, axis=1)):
+        turns = np.where(np.abs(steps[k]) > np.pi, -2 * np.pi * np.sign(steps[k]), 0.0)
+        way = steps[k] + turns
+        # only the seam crossed first counts where both parameters jump at once
+        crossed = turns != 0
+        reach = (np.where(way > 0, np.pi, -np.pi) - parameters[k])[crossed] / way[crossed]
+        fraction = float(np.clip(np.min(reach), 0.0, 1.0))
+        edge = parameters[k] + fraction * way
+        yield _joined(first, parameters[start : k + 1], edge)
+        first, start = edge - turns, int(k) + 1
+    piece = _joined(first, parameters[start:], None)
+    if len(piece) > 1:
+        yield piece
+
+
+def _joined(first: FloatArray | None, middle: FloatArray, last: FloatArray | None) -> FloatArray:
+    ends = [[] if first is None else [first], middle, [] if last is None else [last]]
+    return np.concatenate([np.reshape(np.asarray(part), (-1, 2)) for part in ends])
+
+
+def is_torus(line: ShadowLineLike) -> bool:
+    """Whether theta runs all the way round, as on a torus, rather than from pole to pole.
+
+    A polar angle is never negative, while the shadow line of a torus, n.d = 0, meets both signs of theta.
+    """
+    return any(float(np.min(line.body.parameters(curve.points)[..., 0])) < 0 for curve in line.curves)
+
+
+def _add(ax: Any, pieces: Sequence[FloatArray], *, label: str = "", **style: Any) -> None:
+    """Add the pieces (k, 2) as one artist, phi to the right and theta upwards or downwards."""
+    from matplotlib.collections import LineCollection
+
+    if pieces:
+        lines = [np.degrees(piece[:, ::-1]) for piece in pieces]
+        ax.add_collection(LineCollection(lines, label=label or "_hidden", capstyle="round", **style))
+
+
+def _frame(ax: Any, *, torus: bool) -> None:
+    name = "psi" if torus else "phi"
+    ax.set_xlim(-180, 180)
+    ax.set_xticks(range(-180, 181, 60))
+    # a polar angle grows from the upper pole down, like the picture of the body
+    ax.set_ylim(*((-180, 180) if torus else (180, 0)))
+    ax.set_yticks(range(-180, 181, 60) if torus else range(0, 181, 30))
+    ax.set_xlabel(rf"$\{name}$ (degrees)", fontsize=9)
+    ax.set_ylabel(r"$\theta$ (degrees)", fontsize=9)
+    ax.set_aspect("equal")
+    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
+    for spine in ax.spines.values():
+        spine.set_linewidth(0.5)
+
+
+def _add_legend(ax: Any, colours: LevelColours) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda k: not labels[k].startswith("shadow"))
+    ax.figure.legend(
+        [handles[k] for k in order],
+        [labels[k] for k in order],
+        loc="outside lower center" if ax.figure.get_layout_engine() is not None else "lower center",
+        ncols=min(3, max(1, len(labels))),
+        frameon=False,
+        fontsize=8,
+    )
+    colours.add_bar(ax.figure, cax=ax.inset_axes((1.03, 0.0, 0.025, 1.0)))

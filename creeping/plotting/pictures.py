@@ -1,0 +1,159 @@
+"""Whole figures as PNG files: the body in space, by pyvista or matplotlib, and the parameter plane."""
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any
+from creeping.plotting._drawing import Drawing, compose
+from creeping.plotting._files import written_aside
+from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.plotting._strokes import ARROW_COLOUR
+from creeping.plotting._view import View
+from creeping.plotting.display import gl_available
+
+BACKENDS = ("auto", "pyvista", "matplotlib")
+WIDTH = 6.4  # inches
+Place = tuple[float, float, float, float]  # left, bottom, width, height, as shares of the figure
+
+
+def picture(
+    path: str | os.PathLike[str],
+    line: ShadowLineLike,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] = (),
+    *,
+    backend: str = "auto",
+    view: View | None = None,
+    rays: int = 48,
+    until: float | None = None,
+    dpi: int = 300,
+) -> str:
+    """Write a PNG of the body with its shadow line, creeping rays and iso-phase curves.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write.
+    line : ShadowLine
+    fan : RayFan, optional
+    curves : sequence of IsoPhaseCurve
+    backend : str
+        "pyvista", "matplotlib", or "auto": pyvista where there is OpenGL.
+    view : View, optional
+        Camera; by default on the shadow side.
+    rays : int
+        Rays drawn at most.
+    until : float, optional
+        Travel time up to which rays are drawn; by default to their end.
+    dpi : int
+        Pixels per inch; the figure is 6.4 inches wide, its height follows the body.
+
+    Returns
+    -------
+    str
+        "pyvista" or "matplotlib", whichever drew it.
+
+    Raises
+    ------
+    InvalidInputError
+        If the backend is not one of the three.
+    CreepingError
+        If pyvista is asked for and cannot draw here, or the file cannot be written.
+    """
+    if backend not in BACKENDS:
+        raise InvalidInputError(f"backend {backend!r} is unknown; give one of {', '.join(BACKENDS)}")
+    if backend == "auto":
+        backend = "pyvista" if gl_available().ok else "matplotlib"
+    drawing = compose(line, fan, curves, view=view, rays=rays, until=until)
+    figure, place = _page(drawing)
+    draw = _draw_pyvista if backend == "pyvista" else _draw_matplotlib
+    draw(figure, place, drawing, dpi)
+    drawing.add_legend(figure)
+    left, bottom, width, height = place
+    if drawing.colours.high > drawing.colours.low:
+        cax = figure.add_axes((left + width + 0.03, bottom + 0.12 * height, 0.022, 0.76 * height))
+        drawing.colours.add_bar(figure, cax=cax)
+    _save(figure, path, dpi)
+    return backend
+
+
+def parameter_picture(
+    path: str | os.PathLike[str],
+    line: ShadowLineLike,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] = (),
+    *,
+    rays: int = 48,
+    until: float | None = None,
+    dpi: int = 300,
+) -> None:
+    """Write a PNG of the same in the plane of the body's parameters; see `plot_parameters`.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    from creeping.plotting.parameter_plane import plot_parameters
+
+    figure = _figure((6.4, 4.4))
+    figure.set_layout_engine("constrained")
+    plot_parameters(line, fan, curves, ax=figure.add_subplot(), rays=rays, until=until)
+    _save(figure, path, dpi)
+
+
+def _figure(inches: tuple[float, float]) -> Any:
+    """Return a figure outside pyplot: no window, no global state, whatever the user's backend."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=inches, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _save(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
+    with written_aside(path) as aside:
+        figure.savefig(aside, dpi=dpi, format="png")
+
+
+def _page(drawing: Drawing) -> tuple[Any, Place]:
+    """Figure with room for the body's picture, the legend below and the colour bar at the right."""
+    low, high = drawing.frame
+    width = 0.82 * WIDTH
+    # neither a strip nor a tower: the rest of the room stays white
+    body = float(np.clip(width * (high[1] - low[1]) / (high[0] - low[0]), 2.4, 4.6))
+    legend = 0.55 if len({stroke.label for stroke in drawing.strokes} - {""}) > 3 else 0.38
+    height = body + legend + 0.05
+    return _figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
+
+
+def _draw_matplotlib(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
+    from creeping.plotting import axes3d
+
+    axes3d.draw(figure.add_axes(place, projection="3d"), drawing)
+
+
+def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
+    """Render the scene without any text, which matplotlib then sets, sharper and as in the other backend."""
+    from creeping.plotting import scene
+
+    ax = figure.add_axes(place)
+    # twice the pixels of the file: reduced on saving, which smooths every edge
+    inches = figure.get_size_inches()
+    width, height = (round(2 * dpi * float(size) * share) for size, share in zip(inches, place[2:], strict=True))
+    image = scene.render(drawing, (width, height), scale=2 * dpi / 72)
+    low, high = drawing.frame
+    middle = 0.5 * (low + high)
+    half_height = max(0.5 * float(high[1] - low[1]), 0.5 * float(high[0] - low[0]) * height / width)
+    half_width = half_height * width / height
+    extent = (middle[0] - half_width, middle[0] + half_width, middle[1] - half_height, middle[1] + half_height)
+    ax.imshow(image, extent=extent, interpolation="antialiased")
+    ax.set_axis_off()
+    ax.set_autoscale_on(False)
+    for mark in (drawing.incidence, *drawing.triad):
+        ax.fill(*drawing.view.project(mark.outline(drawing.view)).T, color=ARROW_COLOUR, linewidth=0)
+        ax.text(*drawing.view.project(mark.label(drawing.view)), mark.name, **mark.text)

@@ -1,0 +1,327 @@
+"""The fan of creeping rays: geodesics launched from the shadow line with initial tangent d.
+
+Ray sigma starts at x0(sigma) with p = d; on a plain body t is arclength. Neighbouring rays part by J = c I,
+
+    I(t) = I(0) M11(t) + I'(0) M12(t),   I(0) = 1/c,   I'(0) = (J'(0) - (p.grad c))/c,
+
+M the Jacobi matrix that the flow carries along, sigma measured across the ray, J(0) = 1 and J'(0) as in
+`creeping.phaseflow.geodesic.launch_spreading`. Every zero of J passed is a caustic. A creeping ray needs kappa_n > 0:
+where kappa_n first falls to 0 it is detached; its geometry goes on, its field does not.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.phaseflow.geodesic import (
+    gaussian_curvature,
+    launch_spreading,
+    normal_curvature,
+    speed_of,
+    speed_values,
+)
+from creeping.phaseflow.phase_map import MapError
+from creeping.phaseflow.storing import fingerprint
+from creeping.phaseflow.tracing import pack, trace_states
+from creeping.rays.detachment import detachment_times
+from creeping.rays.launch_points import (
+    Arc,
+    launch_positions,
+    launching_arcs,
+    line_tangents,
+    parting_positions,
+)
+from creeping.rays.shadow import ShadowLine
+from creeping.surface import Surface, size
+
+MAX_RAYS = 200_000
+"""Rays beyond which refinement stops."""
+ARC_STATUS = {"attached": "OK", "occluded": "OCCLUDED", "concave": "CONCAVE"}
+CHECKED_RAYS = 16
+"""Rays that are traced directly to measure the error of a fan."""
+
+
+class Flow(Protocol):
+    """What carries the rays: a `PhaseMap` or a `DirectFlow`."""
+
+    @property
+    def body(self) -> Surface: ...
+    @property
+    def horizon(self) -> float: ...
+    @property
+    def error(self) -> MapError | None: ...
+    def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
+        """Advance states (n, 10) to ascending times (m,): (n, m, 10)."""
+        ...
+
+
+class RayStatus(IntEnum):
+    """What became of a ray."""
+
+    OK = 0
+    DETACHED = 1
+    """kappa_n fell to 0 at ``RayFan.detachment``; the field ends there."""
+    OCCLUDED = 2
+    """Launched on request from a point that the incident wave does not reach."""
+    CONCAVE = 3
+    """Launched on request from a point where kappa_n(d) <= 0: no creeping ray."""
+    STALLED = 4
+    """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RayFan:
+    """Creeping rays of one incidence, all at the same travel times.
+
+    Rays of one arc of the shadow line are consecutive and in its order.
+
+    Attributes
+    ----------
+    body, line : Surface, ShadowLine
+    points, directions : (rays, steps, 3), L and 1
+    travel_time : (steps,), L (time for a weighted body)
+    eikonal : (rays, steps), L
+        d.x0 + travel_time.
+    spreading, spreading_rate : (rays, steps), 1 and 1/L
+        J and J'.
+    curvature : (rays, steps), 1/L
+        kappa_n.
+    caustic_index : (rays, steps)
+        Zeros of J passed.
+    status : (rays,)
+        Codes of `RayStatus`.
+    detachment : (rays,), L
+        Travel time at which kappa_n first falls to 0, inf if it does not.
+    curve_index, arc_index : (rays,)
+        Curve of the shadow line, and arc: rays of one arc are neighbours.
+    arclength : (rays,), L
+        Of the launch point along its curve.
+    closed_arcs : tuple of bool
+        Whether the first and last ray of each arc are neighbours too.
+    error : MapError
+        Of (x, p) at the end, measured on some rays against direct integration.
+    flow_error : MapError or None
+        Of one step of the map that carried the rays; None for direct integration.
+    """
+
+    body: Surface
+    line: ShadowLine
+    points: FloatArray
+    directions: FloatArray
+    travel_time: FloatArray
+    eikonal: FloatArray
+    spreading: FloatArray
+    spreading_rate: FloatArray
+    curvature: FloatArray
+    caustic_index: IntArray
+    status: IntArray
+    detachment: FloatArray
+    curve_index: IntArray
+    arc_index: IntArray
+    arclength: FloatArray
+    closed_arcs: tuple[bool, ...]
+    error: MapError
+    flow_error: MapError | None
+
+    @property
+    def length(self) -> float:
+        """Travel time of the last step."""
+        return float(self.travel_time[-1])
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{int(np.sum(self.status == s))} {s.name}" for s in RayStatus if np.any(self.status == s))
+        return (
+            f"RayFan({len(self.points)} rays x {len(self.travel_time)} steps to {self.length:g}, {len(self.closed_arcs)} arcs)\n"
+            f"  {counts or 'no rays'}; caustics passed: up to {int(self.caustic_index.max(initial=0))}\n"
+            f"  error at the end: rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
+        )
+
+
+def launch(
+    flow: Flow,
+    line: ShadowLine,
+    *,
+    length: float,
+    n_rays: int | None = None,
+    n_steps: int | None = None,
+    status: str = "attached",
+    max_gap: float | None = None,
+) -> RayFan:
+    """Launch the fan of creeping rays of an incidence.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+        Of the body of the line.
+    line : ShadowLine
+    length : float, L (travel time for a weighted body)
+    n_rays : int, optional
+        Rays, shared among the arcs by length; one per point of the line if not given.
+    n_steps : int, optional
+        Equal steps of travel time; at least 64 and enough to count caustics if not given.
+    status : {"attached", "all"}
+        "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
+    max_gap : float, optional
+        Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none.
+
+    Returns
+    -------
+    RayFan
+        Empty (0 rays) if no point of the line launches.
+
+    Raises
+    ------
+    InvalidInputError
+        If the flow is of another body, or a number is out of range.
+    """
+    body = line.body
+    if flow.body is not body and fingerprint(flow.body) != fingerprint(body):
+        raise InvalidInputError(f"the flow is of {flow.body!r}, the line of {body!r}; use one body for both")
+    if not (np.isfinite(length) and length > 0):
+        raise InvalidInputError(f"length = {length!r} is not a positive finite number")
+    if status not in ("attached", "all"):
+        raise InvalidInputError(f"status = {status!r} is neither 'attached' nor 'all'")
+    for name, number in (("n_rays", n_rays), ("n_steps", n_steps)):
+        if number is not None and (not isinstance(number, (int, np.integer)) or number < 1):
+            raise InvalidInputError(f"{name} = {number!r} is not a whole number >= 1")
+    gap = 0.1 * size(body) if max_gap is None else float(max_gap)
+    if not gap > 0:
+        raise InvalidInputError(f"max_gap = {max_gap!r} is not positive; give inf for no refinement")
+    times = np.linspace(0.0, length, (n_steps or _enough_steps(body, line, length)) + 1)
+    arcs = launching_arcs(line, every=status == "all")
+    arc, arclength = launch_positions(line, arcs, n_rays)
+    starts = _starts(line, arcs, arc, arclength)
+    states = _carry(flow, line, starts[:, :3], times)
+    while True:
+        new_arc, new_arclength = parting_positions(states[..., :3], arcs, arc, arclength, gap)
+        if not len(new_arc) or len(arc) + len(new_arc) > MAX_RAYS:
+            break
+        new_starts = _starts(line, arcs, new_arc, new_arclength)
+        arc, arclength = np.concatenate([arc, new_arc]), np.concatenate([arclength, new_arclength])
+        order = np.lexsort((arclength, arc))
+        arc, arclength = arc[order], arclength[order]
+        starts = np.concatenate([starts, new_starts])[order]
+        states = np.concatenate([states, _carry(flow, line, new_starts[:, :3], times)])[order]
+    return _assemble(flow, line, arcs, arc, arclength, starts, states, times)
+
+
+def _enough_steps(body: Surface, line: ShadowLine, length: float) -> int:
+    """At least 64, and four between two zeros of J (they are at least pi/sqrt(max K) apart)."""
+    coarse = np.concatenate([curve.points for curve in line.curves] or [np.zeros((0, 3))])
+    uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 17)] * 2), axis=-1).reshape(-1, 2)
+    points = np.concatenate([coarse, *(chart.point(uv) for chart in body.atlas.charts)])
+    fastest = float(np.max(speed_values(body, points)))
+    curved = float(np.sqrt(np.max(np.abs(gaussian_curvature(body, points))))) * fastest
+    return int(max(64, np.ceil(4 * length * curved / np.pi)))
+
+
+def _starts(line: ShadowLine, arcs: list[Arc], arc: IntArray, arclength: FloatArray) -> FloatArray:
+    """Points and tangents of the line at the positions: (n, 6)."""
+    starts = np.empty((len(arc), 6))
+    curve_of = np.array([a.curve for a in arcs], dtype=int)
+    for index, curve in enumerate(line.curves):
+        mine = curve_of[arc] == index if len(arc) else np.zeros(0, dtype=bool)
+        if np.any(mine):
+            points = curve.at(arclength[mine] % curve.length)
+            starts[mine] = np.concatenate([points, line_tangents(line.body, points, line.direction)], axis=1)
+    return starts
+
+
+def _carry(flow: Flow, line: ShadowLine, points: FloatArray, times: FloatArray) -> FloatArray:
+    """States with Jacobi matrices along the rays: (rays, steps, 10)."""
+    if not len(points):
+        return np.empty((0, len(times), 10))
+    directions = np.broadcast_to(line.direction, points.shape)
+    return flow.transport(pack(points, directions, jacobi=True), times)
+
+
+def _assemble(
+    flow: Flow,
+    line: ShadowLine,
+    arcs: list[Arc],
+    arc: IntArray,
+    arclength: FloatArray,
+    starts: FloatArray,
+    states: FloatArray,
+    times: FloatArray,
+) -> RayFan:
+    body = line.body
+    points, directions = states[..., :3].copy(), states[..., 3:6].copy()
+    spreading, rate, stalled = _spreading(body, line, starts, states)
+    curvature = normal_curvature(body, points, directions)
+    detachment = detachment_times(body, points, directions, curvature, times)
+    status = np.array([RayStatus[ARC_STATUS[arcs[k].status]] for k in arc], dtype=np.int64)
+    # a ray that never was a creeping ray keeps the reason
+    status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
+    status[stalled] = RayStatus.STALLED
+    curve_index = np.array([arcs[k].curve for k in arc], dtype=np.int64)
+    lengths = np.array([curve.length for curve in line.curves])
+    return RayFan(
+        body=body,
+        line=line,
+        points=points,
+        directions=directions,
+        travel_time=times,
+        eikonal=(starts[:, :3] @ line.direction)[:, None] + times,
+        spreading=spreading,
+        spreading_rate=rate,
+        curvature=curvature,
+        caustic_index=_zeros_passed(spreading),
+        status=status,
+        detachment=detachment,
+        curve_index=curve_index,
+        arc_index=arc,
+        arclength=arclength % lengths[curve_index] if len(arc) else arclength,
+        closed_arcs=tuple(a.closed for a in arcs),
+        error=_measure(body, starts, line, states, times),
+        flow_error=flow.error,
+    )
+
+
+def _spreading(
+    body: Surface, line: ShadowLine, starts: FloatArray, states: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """J, J' (rays, steps) and the rays whose launch point has no speed."""
+    first = launch_spreading(body, starts[:, :3], np.broadcast_to(line.direction, (len(starts), 3)), starts[:, 3:])
+    i, j = first[:, 0], first[:, 1]
+    x, p = states[..., :3], states[..., 3:6]
+    c = speed_values(body, x)
+    rate = np.zeros_like(c)
+    stalled = np.zeros(len(starts), dtype=bool)
+    if speed_of(body) is not None:
+        rate = np.sum(speed_of(body).gradient(x) * p, axis=-1)
+        stalled = c[:, 0] < 1e-12 * float(np.max(c, initial=0.0))
+        c0 = np.where(stalled, np.nan, c[:, 0])
+        i = i / c0
+        j = (j - rate[:, 0]) / c0
+    reduced = i[:, None] * states[..., 6] + j[:, None] * states[..., 8]
+    reduced_rate = i[:, None] * states[..., 7] + j[:, None] * states[..., 9]
+    # J' = c I' + (dc/dt) I with dc/dt = c grad c.p
+    return c * reduced, c * reduced_rate + c * rate * reduced, stalled
+
+
+def _zeros_passed(spreading: FloatArray) -> IntArray:
+    """Sign changes of J up to each step; a step that lands on a zero counts once it is passed."""
+    sign = np.sign(spreading)
+    count = np.zeros(sign.shape, dtype=np.int64)
+    last = sign[:, 0].copy() if sign.shape[1] else np.zeros(0)
+    for k in range(1, sign.shape[1]):
+        flipped = sign[:, k] * last < 0
+        count[:, k] = count[:, k - 1] + flipped
+        last = np.where(sign[:, k] != 0, sign[:, k], last)
+    return count
+
+
+def _measure(body: Surface, starts: FloatArray, line: ShadowLine, states: FloatArray, times: FloatArray) -> MapError:
+    """Error of (x, p) at the end against direct integration of evenly chosen rays."""
+    if not len(starts):
+        return MapError(0.0, 0.0, 0)
+    chosen = np.unique(np.linspace(0, len(starts) - 1, CHECKED_RAYS).astype(int))
+    direct = pack(starts[chosen, :3], np.broadcast_to(line.direction, (len(chosen), 3)))
+    exact = trace_states(body, direct, times[-1:], rtol=1e-12)[:, 0]
+    error = np.linalg.norm(states[chosen, -1, :6] - exact, axis=1)
+    return MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))

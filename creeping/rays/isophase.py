@@ -1,0 +1,171 @@
+"""Iso-phase curves of a fan: where travel time, or the eikonal d.x0 + t, has one value.
+
+Ray sigma meets the level at t(sigma) = level, or level - d.x0(sigma). Between two steps the ray is the quintic
+polynomial with the positions, velocities x' and accelerations x'' of both ends, put back on the body.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import ArrayLike, FloatArray, IntArray
+from creeping.phaseflow.geodesic import speed_of, speed_values, vector_field
+from creeping.rays.fan import RayFan
+from creeping.surface import project
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IsoPhaseCurve:
+    """One connected curve of a level; a level may have several.
+
+    Attributes
+    ----------
+    level : float
+    of : {"travel_time", "eikonal"}
+    points : (m, 3), L
+        In the order of the rays.
+    closed : bool
+        Whether the last point is joined to the first.
+    parameters : (m, 2)
+        (theta, phi) of the points, radians; not unwrapped.
+    rays : (m,)
+        The ray of the fan that each point lies on.
+    """
+
+    level: float
+    of: str
+    points: FloatArray
+    closed: bool
+    parameters: FloatArray
+    rays: IntArray
+
+    @property
+    def parameter_pieces(self) -> list[FloatArray]:
+        """The curve in the parameter plane, split where an angle jumps across its seam at +-pi: list of (k, 2)."""
+        return split_at_seam(self.parameters, closed=self.closed)
+
+    def __repr__(self) -> str:
+        shape = "closed" if self.closed else "open"
+        return f"IsoPhaseCurve({self.of} = {self.level:g}, {len(self.points)} points, {shape})"
+
+
+def iso_phase_curves(
+    fan: RayFan, levels: ArrayLike, *, of: str = "travel_time", beyond_detachment: bool = True
+) -> list[IsoPhaseCurve]:
+    """Iso-phase curves of a fan.
+
+    Parameters
+    ----------
+    fan : RayFan
+    levels : scalar or (m,), L (time for a weighted body)
+    of : {"travel_time", "eikonal"}
+        Time since the shadow line (the definition of Ying and Candes 2006), or the phase of the wave.
+    beyond_detachment : bool
+        Whether curves go on where rays are detached: geodesics still, but no creeping rays.
+
+    Returns
+    -------
+    list of IsoPhaseCurve
+        By level, then by arc. Levels that no two neighbouring rays meet give none.
+
+    Raises
+    ------
+    InvalidInputError
+        On an unknown quantity or a level that is not finite.
+    """
+    if of not in ("travel_time", "eikonal"):
+        raise InvalidInputError(f"of = {of!r} is neither 'travel_time' nor 'eikonal'")
+    values = np.atleast_1d(np.asarray(levels, dtype=float))
+    if values.ndim != 1 or not np.all(np.isfinite(values)):
+        raise InvalidInputError("levels must be finite numbers, one or a list of them")
+    if not len(fan.points):
+        return []
+    hermite = _Hermite(fan)
+    offset = fan.eikonal[:, 0] - fan.travel_time[0] if of == "eikonal" else np.zeros(len(fan.points))
+    last = np.full(len(fan.points), fan.length)
+    if not beyond_detachment:
+        last = np.minimum(last, fan.detachment)
+    curves = []
+    for level in values:
+        time = level - offset
+        met = np.flatnonzero((time >= 0) & (time <= last))
+        for run, closed in _runs(fan, met):
+            points = hermite.at(run, time[run])
+            curves.append(IsoPhaseCurve(float(level), of, points, closed, fan.body.parameters(points), run))
+    return curves
+
+
+def _runs(fan: RayFan, met: IntArray) -> Iterable[tuple[IntArray, bool]]:
+    """Groups of neighbouring rays among those that meet the level, and whether the group closes."""
+    for arc, closes in enumerate(fan.closed_arcs):
+        rays = np.flatnonzero(fan.arc_index == arc)
+        here = met[fan.arc_index[met] == arc]
+        if not len(here):
+            continue
+        if len(here) == len(rays):
+            if len(rays) > 1:
+                yield here, closes and len(rays) > 2
+            continue
+        groups = np.split(here, np.flatnonzero(np.diff(here) > 1) + 1)
+        if closes and len(groups) > 1 and here[0] == rays[0] and here[-1] == rays[-1]:
+            # a run that crosses the start of a closed arc is one run
+            groups = [np.concatenate([groups[-1], groups[0]]), *groups[1:-1]]
+        for group in groups:
+            if len(group) > 1:
+                yield group, False
+
+
+class _Hermite:
+    """Quintic interpolation of the rays in time."""
+
+    def __init__(self, fan: RayFan) -> None:
+        self.fan = fan
+        c = speed_values(fan.body, fan.points)[..., None]
+        velocity, turning = vector_field(fan.body, fan.points, fan.directions)
+        self.velocity = velocity
+        self.acceleration = c * turning
+        speed = speed_of(fan.body)
+        if speed is not None:
+            # x'' = (c p)' with c' = grad c.x'
+            self.acceleration += np.sum(speed.gradient(fan.points) * velocity, axis=-1, keepdims=True) * fan.directions
+
+    def at(self, rays: IntArray, times: FloatArray) -> FloatArray:
+        """Points of the rays at one time each: (n,), (n,) -> (n, 3)."""
+        steps = self.fan.travel_time
+        k = np.clip(np.searchsorted(steps, times, side="right") - 1, 0, len(steps) - 2)
+        h = (steps[k + 1] - steps[k])[:, None]
+        s = (times - steps[k])[:, None] / h
+        cube = s**3
+        end = cube * (10 - 15 * s + 6 * s**2)
+        points = (1 - end) * self.fan.points[rays, k] + end * self.fan.points[rays, k + 1]
+        points += h * (s - cube * (6 - 8 * s + 3 * s**2)) * self.velocity[rays, k]
+        points += h * cube * (-4 + 7 * s - 3 * s**2) * self.velocity[rays, k + 1]
+        points += h**2 * 0.5 * (s**2 - cube * (3 - 3 * s + s**2)) * self.acceleration[rays, k]
+        points += h**2 * 0.5 * cube * (1 - 2 * s + s**2) * self.acceleration[rays, k + 1]
+        return project(self.fan.body, points)
+
+
+def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:
+    """Split a curve of angles (m, 2) where one jumps by more than pi; both ends are carried to the seam at +-pi."""
+    path = np.concatenate([parameters, parameters[:1]]) if closed else parameters
+    pieces: list[FloatArray] = []
+    current = [path[0]]
+    for after in path[1:]:
+        # a step may cross the seams of both angles
+        for axis in (0, 1):
+            jump = after - current[-1]
+            if abs(jump[axis]) <= np.pi:
+                continue
+            side = np.sign(current[-1][axis]) or 1.0
+            short = jump - 2 * np.pi * np.round(jump / (2 * np.pi))
+            share = (side * np.pi - current[-1][axis]) / short[axis] if short[axis] != 0 else 0.0
+            crossing = current[-1] + np.clip(share, 0.0, 1.0) * short
+            entry = crossing.copy()
+            crossing[axis], entry[axis] = side * np.pi, -side * np.pi
+            pieces.append(np.array([*current, crossing]))
+            current = [entry]
+        current.append(after)
+    pieces.append(np.array(current))
+    return pieces

@@ -1,0 +1,49 @@
+"""Bodies and phase maps shared by the tests; no test touches the user's cache."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _own_cache(tmp_path_factory):
+    patch = pytest.MonkeyPatch()
+    patch.setenv("CREEPING_CACHE", str(tmp_path_factory.mktemp("maps")))
+    yield
+    patch.undo()
+
+
+BODIES = {
+    "sphere": sc.Sphere(),
+    "ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8),
+    "triaxial": sc.Ellipsoid(1.0, 0.8, 0.6),
+    "torus": sc.Torus(),
+    "twisted": sc.TwistedEllipsoid(),
+    "weighted": sc.Sphere(speed="1 + x"),
+}
+
+
+@pytest.fixture(params=list(BODIES))
+def body(request):
+    return BODIES[request.param]
+
+
+@pytest.fixture(scope="session")
+def phase_map():
+    """Maps with a tolerance of 1e-6, built once: phase_map(name or body)."""
+    built = {}
+
+    def get(which):
+        shape = BODIES.get(which, which) if isinstance(which, str) else which
+        if repr(shape) not in built:
+            built[repr(shape)] = cr.build_phase_map(shape, tolerance=1e-6)
+        return built[repr(shape)]
+
+    return get
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20260301)

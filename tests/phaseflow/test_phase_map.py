@@ -1,0 +1,124 @@
+"""The composed map: against direct integration, its numpy twin, and its own group law."""
+
+import numpy as np
+import pytest
+from tolerances import COMPOSED, MAP
+
+import creeping as cr
+import scatterers as sc
+from creeping.phaseflow.bundle import random_bundle_points
+from creeping.phaseflow.phase_map import PhaseMap
+from creeping.phaseflow.tracing import pack, trace_states
+
+
+def rms(a, b):
+    return float(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=-1))))
+
+
+def test_composed_map_follows_the_tracer(body, phase_map, rng):
+    flow = phase_map(body)
+    states = pack(*random_bundle_points(body, 60, rng=rng), jacobi=True)
+    times = np.sort([0.0, 0.3, flow.horizon, 1.7, 4.0, 8.0])
+    exact = trace_states(body, states, times, rtol=1e-12)
+    got = flow.transport(states, times)
+    assert rms(got[..., :6][:, 0], exact[..., :6][:, 0]) < 1e-14
+    for k in range(1, len(times)):
+        assert rms(got[:, k, :6], exact[:, k, :6]) < COMPOSED, times[k]
+    # M grows with the ray: relative to its own size
+    size = 1 + np.abs(exact[..., 6:])
+    assert np.sqrt(np.mean(((got - exact)[..., 6:] / size) ** 2)) < 10 * COMPOSED
+
+
+def test_stays_on_the_bundle(body, phase_map, rng):
+    x, p = phase_map(body).flow(*random_bundle_points(body, 40, rng=rng), 5.0)
+    assert np.abs(body.level(x)).max() < 1e-12
+    np.testing.assert_allclose(np.linalg.norm(p, axis=-1), 1, atol=1e-14)
+    assert np.abs(np.sum(p * body.gradient(x), axis=-1)).max() < 1e-12
+
+
+def test_kernel_equals_numpy_twin(body, phase_map, rng):
+    flow = phase_map(body)
+    states = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True)
+    np.testing.assert_allclose(flow.leap(states, 1), flow.leap_numpy(states), atol=1e-12)
+
+
+def test_group_law_and_reversal(body, phase_map, rng):
+    flow = phase_map(body)
+    x, p = random_bundle_points(body, 40, rng=rng)
+    one = flow.flow(*flow.flow(x, p, 0.77), 0.9)
+    both = flow.flow(x, p, 1.67)
+    assert rms(one[0], both[0]) < 10 * MAP
+    back = flow.flow(both[0], -both[1], 1.67)
+    assert rms(back[0], x) < 10 * MAP
+    assert rms(-back[1], p) < 10 * MAP
+
+
+def test_error_is_what_a_fresh_sample_measures(body, phase_map, rng):
+    flow = phase_map(body)
+    assert flow.error.rms <= MAP
+    x, p = random_bundle_points(body, 400, rng=rng)
+    exact = np.concatenate(cr.trace(body, x, p, flow.horizon, rtol=1e-12), axis=-1)
+    fresh = rms(np.concatenate(flow.apply(x, p), axis=-1), exact)
+    assert 0.4 * flow.error.rms < fresh < 2.5 * flow.error.rms
+
+
+def test_points_at_the_edges_of_charts_are_no_worse(phase_map):
+    body, flow = sc.TwistedEllipsoid(), phase_map("twisted")
+    edge = np.stack([np.linspace(0, 1, 21), np.full(21, 1.0)], axis=-1)
+    x = np.concatenate([chart.point(edge) for chart in body.atlas.charts])
+    p = np.cross(body.gradient(x), [0.2, -0.5, 0.9])
+    exact = cr.trace(body, x, p, flow.horizon, rtol=1e-12)[0]
+    assert rms(flow.apply(x, p)[0], exact) < 5 * MAP
+
+
+@pytest.mark.parametrize("method", ["direct", "tower"])
+def test_any_time_between_the_maps(method, rng):
+    body = sc.Ellipsoid(1.2, 0.8, 0.8)
+    extra = {"time_step": 2**-6, "stages": 3} if method == "tower" else {}
+    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(24, 48), order=5, method=method, cache=False, **extra)
+    assert len(flow.leaps) == (4 if method == "tower" else 1)
+    x, p = random_bundle_points(body, 20, rng=rng)
+    times = np.sort(rng.uniform(0, 1, 40))
+    exact = cr.trace(body, x, p, times, rtol=1e-12)
+    got = flow.flow(x, p, times)
+    assert rms(got[0], exact[0]) < 2e-6
+    assert rms(got[1], exact[1]) < 2e-6
+
+
+def test_body_without_compiled_parts_gives_the_same_map(rng):
+    compiled = sc.Ellipsoid(1.0, 0.8, 0.6)
+
+    class Plain:
+        """A user's own class: the protocol and nothing else."""
+
+        def __init__(self):
+            self.bounds = compiled.bounds
+            self.atlas = type("Atlas", (), {"charts": compiled.atlas.charts, "locate": compiled.atlas.locate})()
+
+        def level(self, points):
+            return compiled.level(points)
+
+        def gradient(self, points):
+            return compiled.gradient(points)
+
+        def hessian(self, points):
+            return compiled.hessian(points)
+
+        def parameters(self, points):
+            return compiled.parameters(points)
+
+    plain = Plain()
+    options = {"horizon": 0.25, "grid": (10, 12), "order": 3, "cache": False}
+    one, other = cr.build_phase_map(plain, **options), cr.build_phase_map(compiled, **options)
+    np.testing.assert_allclose(one.leaps[0].state, other.leaps[0].state, atol=1e-9)
+    x, p = random_bundle_points(compiled, 10, rng=rng)
+    np.testing.assert_allclose(one.flow(x, p, 0.6)[0], other.flow(x, p, 0.6)[0], atol=1e-8)
+
+
+def test_direct_flow_has_the_same_protocol(rng):
+    body = sc.Ellipsoid(1.2, 0.8, 0.8)
+    flow = cr.DirectFlow(body, rtol=1e-11)
+    x, p = random_bundle_points(body, 5, rng=rng)
+    np.testing.assert_allclose(flow.apply(x, p)[0], cr.trace(body, x, p, flow.horizon)[0], atol=1e-9)
+    assert flow.error is None
+    assert isinstance(cr.build_phase_map(body, horizon=0.2, grid=(10, 12), order=3, cache=False), PhaseMap)

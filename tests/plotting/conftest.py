@@ -1,0 +1,96 @@
+"""A shadow line, fan and iso-phase curves on the unit sphere, exact and without the engine."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import scatterers as sc
+from creeping.plotting import display
+
+
+@dataclass(frozen=True)
+class IsoPhaseCurve:
+    level: float
+    of: str
+    points: Any
+    closed: bool
+    parameters: Any
+    parameter_pieces: Any
+
+
+def great_circle(direction, count):
+    """Points n.d = 0 of the unit sphere, counter-clockwise about d."""
+    e1 = np.cross(direction, [0.3, -0.5, 0.8])
+    e1 /= np.linalg.norm(e1)
+    e2 = np.cross(direction, e1)
+    angle = 2 * np.pi * np.arange(count)[:, None] / count
+    return np.cos(angle) * e1 + np.sin(angle) * e2, angle[:, 0]
+
+
+@pytest.fixture(scope="session")
+def sphere_line():
+    direction = np.array([1.0, 1.0, 1.0]) / np.sqrt(3)
+    points, angle = great_circle(direction, 96)
+    status = np.array(["attached"] * 60 + ["occluded"] * 20 + ["concave"] * 16)
+    curve = SimpleNamespace(points=points, normals=points, arclength=angle, length=2 * np.pi, status=status)
+    return SimpleNamespace(body=sc.Sphere(), direction=direction, curves=[curve])
+
+
+@pytest.fixture(scope="session")
+def sphere_fan(sphere_line):
+    """x = cos t x0 + sin t d, J = cos t; one ray detaches, one breaks off in NaN."""
+    start, direction = sphere_line.curves[0].points[:60:2], sphere_line.direction
+    t = np.linspace(0.0, 2.0, 21)
+    points = np.cos(t)[:, None] * start[:, None] + np.sin(t)[:, None] * direction
+    directions = -np.sin(t)[:, None] * start[:, None] + np.cos(t)[:, None] * direction
+    rays = len(start)
+    points[3, 15:] = directions[3, 15:] = np.nan
+    detachment = np.full(rays, np.inf)
+    detachment[5] = 0.73
+    spreading = np.tile(np.cos(t), (rays, 1))
+    return SimpleNamespace(
+        body=sphere_line.body,
+        line=sphere_line,
+        points=points,
+        directions=directions,
+        travel_time=t,
+        eikonal=np.tile(t, (rays, 1)),
+        spreading=spreading,
+        spreading_rate=np.tile(-np.sin(t), (rays, 1)),
+        curvature=np.ones((rays, len(t))),
+        caustic_index=(spreading < 0).astype(int),
+        status=np.arange(rays) % 3,
+        curve_index=np.zeros(rays, dtype=int),
+        detachment=detachment,
+    )
+
+
+@pytest.fixture(scope="session")
+def sphere_curves(sphere_line):
+    curves = []
+    for level in (0.3, 0.6, 0.9):
+        circle = np.cos(level) * sphere_line.curves[0].points + np.sin(level) * sphere_line.direction
+        parameters = sphere_line.body.parameters(np.concatenate([circle, circle[:1]]))
+        jumps = np.flatnonzero(np.abs(np.diff(parameters[:, 1])) > np.pi) + 1
+        curves.append(IsoPhaseCurve(level, "travel_time", circle, True, parameters, np.split(parameters, jumps)))
+    return curves
+
+
+@pytest.fixture
+def fresh_display(monkeypatch, tmp_path):
+    """No verdict in memory, an empty cache folder, no wish in the environment."""
+    monkeypatch.delenv("CREEPING_NO_GL", raising=False)
+    monkeypatch.setattr(display, "_cache_file", lambda: tmp_path / "cache" / "gl.json")
+    display._verdict.cache_clear()
+    yield tmp_path / "cache" / "gl.json"
+    display._verdict.cache_clear()
+
+
+@pytest.fixture(scope="session")
+def opengl():
+    probe = display.gl_available()
+    if not probe.ok:
+        pytest.skip(probe.reason)

@@ -1,0 +1,102 @@
+"""The question whether OpenGL works, with a subprocess that answers in every way."""
+
+import json
+import subprocess
+from types import SimpleNamespace
+
+import pytest
+
+from creeping.plotting import display
+from creeping.plotting.display import GLProbe, gl_available
+
+
+@pytest.fixture
+def answers(monkeypatch, fresh_display):
+    """Let the subprocess end with a given code; count how often it was asked."""
+    state = SimpleNamespace(code=0, stderr=b"", calls=0, raises=None)
+
+    def run(*_args, **_keywords):
+        state.calls += 1
+        if state.raises is not None:
+            raise state.raises
+        return SimpleNamespace(returncode=state.code, stderr=state.stderr)
+
+    monkeypatch.setattr(display.subprocess, "run", run)
+    return state
+
+
+def forget():
+    display._verdict.cache_clear()
+
+
+def test_asks_once_per_process_and_once_per_machine(answers, fresh_display):
+    assert gl_available() == GLProbe(True, "rendered")
+    assert gl_available().ok
+    assert answers.calls == 1
+    forget()
+    assert gl_available().ok
+    assert answers.calls == 1
+    assert len(json.loads(fresh_display.read_text())) == 1
+
+
+def test_another_display_asks_again(answers, monkeypatch):
+    gl_available()
+    monkeypatch.setenv("DISPLAY", ":77")
+    gl_available()
+    assert answers.calls == 2
+
+
+@pytest.mark.parametrize(
+    ("code", "stderr", "told"),
+    [
+        (-11, b"", "signal 11"),
+        (3, b"", "blank"),
+        (1, b"Traceback\nImportError: libX11.so.6: cannot open", "libX11.so.6"),
+        (7, b"", "exit code 7"),
+    ],
+)
+def test_failure_names_the_packages(answers, code, stderr, told):
+    answers.code, answers.stderr = code, stderr
+    probe = gl_available()
+    assert not probe.ok
+    assert told in probe.reason
+    for package in ("libegl1", "libgl1-mesa-dri", "libx11-6"):
+        assert package in probe.reason
+
+
+def test_timeout_is_not_remembered(answers, fresh_display):
+    answers.raises = subprocess.TimeoutExpired("python", 60)
+    assert "60 s" in gl_available().reason
+    assert not fresh_display.exists()
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "null", '{"x": 3}', "\x00\xff"])
+def test_damaged_cache_asks_again(answers, fresh_display, content):
+    fresh_display.parent.mkdir()
+    fresh_display.write_text(content, encoding="latin-1")
+    assert gl_available().ok
+    assert answers.calls == 1
+
+
+def test_wrong_entry_asks_again(answers, fresh_display):
+    gl_available()
+    stored = json.loads(fresh_display.read_text())
+    fresh_display.write_text(json.dumps({key: {"ok": "yes"} for key in stored}))
+    forget()
+    assert gl_available().ok
+    assert answers.calls == 2
+
+
+def test_unwritable_cache_is_no_error(answers, monkeypatch, tmp_path):
+    blocker = tmp_path / "file"
+    blocker.write_text("in the way")
+    monkeypatch.setattr(display, "_cache_file", lambda: blocker / "creeping" / "gl.json")
+    assert gl_available().ok
+
+
+def test_environment_says_no(answers, monkeypatch):
+    monkeypatch.setenv("CREEPING_NO_GL", "1")
+    probe = gl_available()
+    assert not probe.ok
+    assert "CREEPING_NO_GL" in probe.reason
+    assert answers.calls == 0

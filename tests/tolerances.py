@@ -1,0 +1,22 @@
+"""Tolerances of the tests, per quantity, each with its reason."""
+
+TRACE = 1e-10
+"""(x, p) after a length of a few units, traced at rtol 1e-12: the steps' errors add up."""
+INVARIANT = 1e-10
+"""Drift of a conserved quantity along a ray traced at rtol 1e-12."""
+TWIN = 1e-11
+"""Compiled against numpy: the same arithmetic in another order, steps chosen alike."""
+JACOBI_DIFFERENCE = 1e-7
+"""J against a central difference of step 1e-5 of traced rays: rounding 1e-11 over the step."""
+MAP = 1e-6
+"""Rms error of one g_T0 of a map built with that tolerance."""
+COMPOSED = 2e-5
+"""Error after eight units of length, composed from maps of 1e-6 each, the bodies' own growth included."""
+LINE_LENGTH = 1e-8
+"""Length of a shadow line against published digits."""
+FRACTION = 1e-6
+"""Share of a shadow line by status."""
+SPREADING = 1e-4
+"""J of a fan against finite differences across neighbouring rays, relative, before the first caustic."""
+ORDER = 0.3
+"""Fitted slope of an error against the expected order."""
