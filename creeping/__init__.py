@@ -48,8 +48,8 @@ __all__ = [
 if TYPE_CHECKING:
     from creeping._errors import CreepingError
     from creeping.phaseflow.building import build_phase_map
-    from creeping.phaseflow.phase_map import MapError, PhaseMap
     from creeping.phaseflow.caching import load_phase_map
+    from creeping.phaseflow.phase_map import MapError, PhaseMap
     from creeping.phaseflow.tracing import DirectFlow, trace
     from creeping.rays.fan import RayFan, RayStatus, launch
     from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves

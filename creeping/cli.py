@@ -61,16 +61,22 @@ def run(
     *,
     direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels; need not be unit.")],
     output: Folder,
-    length: Annotated[float | None, Parameter(help="Travel time of the rays; 2.5 body sizes if not given.")] = None,
+    length: Annotated[float | None, Parameter(help="Travel time of the rays; 1.5 body sizes if not given.")] = None,
     rays: Annotated[int, Parameter(help="Rays at the start; more are inserted where neighbours part.")] = 256,
     spacing: Annotated[float | None, Parameter(help="Spacing of iso-phase curves; length/16 if not given.")] = None,
-    of: Annotated[Literal["travel_time", "eikonal"], Parameter(help="What is constant on an iso-phase curve.")] = "travel_time",
-    launch_from: Annotated[Literal["attached", "all"], Parameter(help="Points of the shadow line that launch.")] = "attached",
+    of: Annotated[
+        Literal["travel_time", "eikonal"], Parameter(help="What is constant on an iso-phase curve.")
+    ] = "travel_time",
+    launch_from: Annotated[
+        Literal["attached", "all"], Parameter(help="Points of the shadow line that launch.")
+    ] = "attached",
     tolerance: Annotated[float, Parameter(help="Rms error of one step of the phase map.")] = 1e-6,
     flow: Annotated[Literal["map", "direct"], Parameter(help="Phase map or direct integration.")] = "map",
     speed: SpeedOption = None,
     cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
-    backend: Annotated[Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")] = "auto",
+    backend: Annotated[
+        Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")
+    ] = "auto",
     json_: Json = False,
 ) -> int:
     """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
@@ -89,10 +95,12 @@ def run(
         line = cr.shadow_line(shape, direction)
         say("phase map")
         carrier: Any = (
-            cr.build_phase_map(shape, tolerance=tolerance, cache=cache, progress=say) if flow == "map" else cr.DirectFlow(shape)
+            cr.build_phase_map(shape, tolerance=tolerance, cache=cache, progress=say)
+            if flow == "map"
+            else cr.DirectFlow(shape)
         )
         say("creeping rays")
-        fan = cr.launch(carrier, line, length=length or 2.5 * size(shape), n_rays=rays, status=launch_from)
+        fan = cr.launch(carrier, line, length=length or 1.5 * size(shape), n_rays=rays, status=launch_from)
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
         summary = _summary(body, speed, line, carrier, fan, curves, flow)
@@ -116,7 +124,9 @@ def levels_of(fan: Any, step: float, of: str) -> Any:
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
     if last - first > 1000:
-        raise InvalidInputError(f"spacing {step:g} makes {last - first + 1} iso-phase levels; give one above {(high - low) / 1000:g}")
+        raise InvalidInputError(
+            f"spacing {step:g} makes {last - first + 1} iso-phase levels; give one above {(high - low) / 1000:g}"
+        )
     return step * np.arange(first, last + 1)
 
 
@@ -133,7 +143,9 @@ def parse_body(text: str, speed: str | None = None) -> Any:
 
     name, _, rest = text.partition(":")
     if name not in BODIES:
-        raise InvalidInputError(f"unknown body {name!r}; known are {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8")
+        raise InvalidInputError(
+            f"unknown body {name!r}; known are {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8"
+        )
     values: dict[str, Any] = {}
     for item in filter(None, rest.split(",")):
         key, equals, number = item.partition("=")
@@ -153,7 +165,9 @@ def parse_body(text: str, speed: str | None = None) -> Any:
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
-def _summary(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any], flow: str) -> dict[str, Any]:
+def _summary(
+    body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any], flow: str
+) -> dict[str, Any]:
     import numpy as np
 
     from creeping.rays.fan import RayStatus
@@ -204,7 +218,9 @@ def _write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend
     plotting.write_csv(output / "line.csv", line=line)
     plotting.write_csv(output / "rays.csv", fan=fan)
     plotting.write_csv(output / "curves.csv", curves=curves)
-    names = ["rays.png", "parameters.png"] + [f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")]
+    names = ["rays.png", "parameters.png"] + [
+        f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")
+    ]
     return [*names, "summary.json"], str(drawn_by)
 
 
@@ -216,7 +232,9 @@ def _readable(summary: dict[str, Any], output: Path) -> str:
     if "phase_map" in summary:
         m = summary["phase_map"]
         grid = " x ".join(map(str, [m["charts"], *m["nodes"]]))
-        rows.append(f"phase map: T0 = {m['horizon']:g}, {grid} nodes, degree {m['degree']}; rms error of one step {m['rms']:.1e}")
+        rows.append(
+            f"phase map: T0 = {m['horizon']:g}, {grid} nodes, degree {m['degree']}; rms error {m['rms']:.1e} a leap"
+        )
     statuses = ", ".join(f"{n} {name}" for name, n in summary["ray_status"].items() if n)
     rows.append(f"rays: {summary['rays']} of length {summary['length']:g} ({statuses or 'none launched'})")
     error = summary["error_of_rays"]
@@ -288,7 +306,9 @@ def cache_list(*, json_: Json = False) -> int:
         size = sum(f.stat().st_size for f in folder.iterdir())
         try:
             content = storing.read_manifest(folder)
-            rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": content["body"], "error": content["error"][0]})
+            rows.append(
+                {"map": folder.name, "MB": round(size / 1e6, 1), "body": content["body"], "error": content["error"][0]}
+            )
         except CreepingError as error:
             rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": f"unreadable: {error}", "error": None})
     if json_:
@@ -362,7 +382,9 @@ def doctor() -> int:
     print(f"  3-D graphics: {'pyvista' if probe.ok else f'matplotlib, because {probe.reason}'}")
     root = cache_folder()
     nearest = next(p for p in [root, *root.parents] if p.exists())
-    print(f"  cache: {root} ({'writable' if os.access(nearest, os.W_OK) else 'NOT writable: maps are rebuilt each time'})")
+    print(
+        f"  cache: {root} ({'writable' if os.access(nearest, os.W_OK) else 'NOT writable: maps are rebuilt each time'})"
+    )
     return 3 if missing else 0
 
 

@@ -24,16 +24,24 @@ class Compiled(Protocol):
     """
 
     @property
-    def function(self) -> Any: ...
+    def function(self) -> Any:
+        """The compiled function."""
+        ...
+
     @property
-    def parameters(self) -> FloatArray: ...
+    def parameters(self) -> FloatArray:
+        """Its parameters (k,)."""
+        ...
 
 
 class Chart(Protocol):
     """One smooth map from (u, v) to the body; ``periodic`` says which variables have period 1."""
 
     @property
-    def periodic(self) -> tuple[bool, bool]: ...
+    def periodic(self) -> tuple[bool, bool]:
+        """Whether u and v have period 1."""
+        ...
+
     def point(self, uv: FloatArray) -> FloatArray:
         """Point of the body: (..., 2) -> (..., 3), L."""
         ...
@@ -47,7 +55,10 @@ class Atlas(Protocol):
     """Charts whose unit squares cover the body, right-handed: x_u x x_v points along n."""
 
     @property
-    def charts(self) -> Sequence[Chart]: ...
+    def charts(self) -> Sequence[Chart]:
+        """All charts, of one kind of periodicity."""
+        ...
+
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Chart number (...) and chart variables (..., 2) of points (..., 3) on the body."""
         ...
@@ -74,7 +85,10 @@ class Surface(Protocol):
     """
 
     @property
-    def atlas(self) -> Atlas: ...
+    def atlas(self) -> Atlas:
+        """Charts that cover the body."""
+        ...
+
     @property
     def bounds(self) -> FloatArray:
         """Box (2, 3) that contains the body, L."""
@@ -260,7 +274,9 @@ def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:
         by_value = np.stack([speed.value(points + e) - speed.value(points - e) for e in axes], axis=-1) / (2 * step)
         checks += [
             Check("negative speed", float(np.max(-value)), 0, "give c(x) > 0 on the body"),
-            Check("speed gradient against differences", _relative(slope, by_value), 1e-6, "mend the speed's gradient()"),
+            Check(
+                "speed gradient against differences", _relative(slope, by_value), 1e-6, "mend the speed's gradient()"
+            ),
         ]
     return checks
 
@@ -280,7 +296,9 @@ def _atlas_checks(body: Surface, points: FloatArray) -> list[Check]:
             outside = max(outside, float(np.max(np.maximum(-mine[:, free], mine[:, free] - 1))))
         back = chart.point(mine)
         gap = max(gap, float(np.max(np.linalg.norm(back - points[index == k], axis=-1))) / size(body))
-        off = max(off, float(np.max(np.abs(body.level(back)) / np.linalg.norm(body.gradient(back), axis=-1))) / size(body))
+        off = max(
+            off, float(np.max(np.abs(body.level(back)) / np.linalg.norm(body.gradient(back), axis=-1))) / size(body)
+        )
         columns = chart.tangents(mine)
         shifts = np.eye(2) * step
         differences = np.stack([chart.point(mine + e) - chart.point(mine - e) for e in shifts], axis=-1) / (2 * step)

@@ -95,7 +95,9 @@ def triangulate(
             break
         finer = cells + cells // 2
         if np.prod([len(axis) for axis in _grid_axes(box, finer)]) > MAX_POINTS:
-            raise SurfaceError(f"{values.size} grid points do not resolve the surface; it is too thin, or crosses itself")
+            raise SurfaceError(
+                f"{values.size} grid points do not resolve the surface; it is too thin, or crosses itself"
+            )
         cells = finer
     reach = max(float(axis[1] - axis[0]) for axis in axes)
     return Triangulation(_onto_surface(level, gradient, vertices, reach), triangles)

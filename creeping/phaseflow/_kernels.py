@@ -216,7 +216,7 @@ def spline_weights(t, degree, w):
 @njit(**_options)
 def _cell(t, cells, degree, w):
     """Cell number of grid coordinate t, held inside the grid, and the weights there."""
-    i = min(max(int(math.floor(t)), 0), cells - 1)
+    i = min(max(math.floor(t), 0), cells - 1)
     spline_weights(t - i, degree, w)
     return i
 
@@ -243,12 +243,10 @@ def _stencil(table, jacobi, ride_along, degree, chart, iu, iv, ia, wu, wv, wa, o
 
 
 @njit(**_options)
-def leap(
-    locate, locate_par, level, level_par, table, jacobi, degree, origin, cells, horizon, leaps, tolerance, states
-):
+def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, cells, horizon, leaps, tolerance, states):
     """Compose the map ``leaps`` times on states (n, 6 or 10), in place.
 
-    table (charts, nu, nv, na, 8) holds x' - x - T0 p and p' - p, jacobi (charts, nu, nv, na, 4) holds M - [[1, T0], [0, 1]];
+    table (charts, nu, nv, na, 8) holds x' - x - T0 p and p' - p, jacobi (charts, nu, nv, na, 4) M - [[1, T0], [0, 1]];
     grid coordinates are origin + cells * (u, v, angle/2 pi). Afterwards x is brought back to |F| <= tolerance |grad F|.
     """
     n, lanes = states.shape

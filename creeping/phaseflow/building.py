@@ -1,7 +1,7 @@
 """Building the phase map: the tower of Algorithm 1, the direct build, and the choice of grid from a tolerance.
 
-Tower [YC06a, Algorithm 1]: with B = (T0/tau)^(1/S) an integer, g_tau is one Runge-Kutta step of order 4 at every node, and
-g_(B^k tau) = (g_(B^(k-1) tau))^(B) evaluated at the nodes and interpolated again, k = 1..S. Direct: every node is traced
+Tower [YC06a, Algorithm 1]: with B = (T0/tau)^(1/S) an integer, g_tau is one Runge-Kutta step of order 4 at every
+node, and g_(B^k tau) = (g_(B^(k-1) tau))^(B) at the nodes is interpolated again, k = 1..S. Direct: every node is traced
 straight to T0 by the order-8 pair. The error is C (tau^4 + h^(p+1)) and C h^(p+1) respectively.
 """
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from creeping._errors import InvalidInputError, SurfaceError, ToleranceError
 from creeping._typing import Any, FloatArray
-from creeping.phaseflow.caching import cached_phase_map
 from creeping.phaseflow.bundle import random_bundle_points
+from creeping.phaseflow.caching import cached_phase_map
 from creeping.phaseflow.geodesic import principal_curvature_bound, speed_values
 from creeping.phaseflow.phase_map import Grid, Leap, MapError, PhaseMap
 from creeping.phaseflow.splines import interpolation_operator, prefilter, uniform_weights
@@ -209,7 +209,9 @@ def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: 
         flow = PhaseMap(body, grid, tuple(leaps), unmeasured)
         time = time_step * base**level
         leaps.append(_leap(_stored(states, flow.leap(states, base), time, grid), grid, time))
-    return _finish(body, grid, tuple(leaps), {"method": "tower", "time_step": time_step, "stages": stages, "base": base})
+    return _finish(
+        body, grid, tuple(leaps), {"method": "tower", "time_step": time_step, "stages": stages, "base": base}
+    )
 
 
 def node_states(body: Surface, grid: Grid) -> FloatArray:
@@ -270,7 +272,7 @@ def _refinement(values: FloatArray, grid: Grid, rms: float, target: float) -> Fl
         shares.append(float(np.sqrt(np.mean(np.sum(difference**2, axis=-1)))) + 1e-300)
     share = np.array(shares) / np.sqrt(np.sum(np.square(shares)))
     # axes of equal share grow alike; an axis of small share may stay
-    return np.maximum(share * rms / (target / np.sqrt(3)), 1e-3) ** (1 / (grid.degree + 1))
+    return np.asarray(np.maximum(share * rms / (target / np.sqrt(3)), 1e-3) ** (1 / (grid.degree + 1)))
 
 
 def _midpoints(values: FloatArray, degree: int, wraps: bool) -> FloatArray:
@@ -325,14 +327,18 @@ def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool]) -> t
         nodes = (nodes[0], *nodes)
     least = [degree + 1 if wraps else degree + 5 for wraps in periodic] + [degree + 1]
     if len(nodes) != 3 or not whole or any(n < m for n, m in zip(nodes, least, strict=True)):
-        raise InvalidInputError(f"grid = {grid!r}: give two or three whole numbers of at least {least} for order {degree}")
+        raise InvalidInputError(
+            f"grid = {grid!r}: give two or three whole numbers of at least {least} for order {degree}"
+        )
     return nodes
 
 
 def _tower_base(horizon: Any, time_step: Any, stages: Any) -> tuple[float, int, int]:
     """Check that B = (T0/tau)^(1/S) is a whole number >= 2."""
     if not (isinstance(stages, int) and stages >= 1 and np.isfinite(time_step) and 0 < time_step < horizon):
-        raise InvalidInputError(f"time_step = {time_step!r} and stages = {stages!r} do not make a tower below {horizon:g}")
+        raise InvalidInputError(
+            f"time_step = {time_step!r} and stages = {stages!r} do not make a tower below {horizon:g}"
+        )
     base = (horizon / time_step) ** (1 / stages)
     if abs(base - round(base)) > 1e-9 * base or round(base) < 2:
         raise InvalidInputError(f"(horizon/time_step)^(1/stages) = {base:.6g} is not a whole number >= 2")

@@ -114,10 +114,10 @@ def random_bundle_points(body: Surface, count: int, *, rng: np.random.Generator)
     # charts were visited in order: mix before cutting, or the last charts would be missing
     points = rng.permutation(np.concatenate(found))[:count]
     angle = 2 * np.pi * rng.random(count)
-    index, uv = body.atlas.locate(points)
+    chosen, uv = body.atlas.locate(points)
     directions = np.empty_like(points)
     for k, chart in enumerate(charts):
-        mine = index == k
+        mine = chosen == k
         frame = polar_frame(chart.tangents(uv[mine]))
         directions[mine] = frame[..., 0] * np.cos(angle[mine, None]) + frame[..., 1] * np.sin(angle[mine, None])
     return project_bundle(body, points, directions)

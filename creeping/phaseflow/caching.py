@@ -48,7 +48,11 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
         grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
         error = MapError(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
         leaps = tuple(
-            Leap(float(time), open_array(folder, f"state-{k}.npy", content), open_array(folder, f"jacobi-{k}.npy", content))
+            Leap(
+                float(time),
+                open_array(folder, f"state-{k}.npy", content),
+                open_array(folder, f"jacobi-{k}.npy", content),
+            )
             for k, time in enumerate(content["times"])
         )
     except (KeyError, TypeError, IndexError, ValueError) as reason:

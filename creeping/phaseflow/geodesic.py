@@ -115,4 +115,3 @@ def launch_spreading(body: Surface, points: FloatArray, directions: FloatArray, 
         oblique = np.divide(np.sum(directions * along, axis=-1), across, out=np.zeros_like(across), where=across != 0)
         spreading[:, 1] = np.sum(b * speed.gradient(points), axis=-1) * oblique
     return spreading
-

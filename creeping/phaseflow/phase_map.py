@@ -1,7 +1,8 @@
 """The phase map g_T0 of a body's geodesic flow, and the composition of maps to any time.
 
-A point (x, p) of T1Q has coordinates (chart, u, v, angle): x = X(u, v) and p = E(u, v) (cos angle, sin angle), E the isometric
-frame of the chart (`creeping.surface.polar_frame`). A map stores, as splines in (u, v, angle), the displacement
+A point (x, p) of T1Q has coordinates (chart, u, v, angle): x = X(u, v) and p = E(u, v) (cos angle, sin angle), E
+the isometric frame of the chart (`creeping.surface.polar_frame`). A map stores, as splines in (u, v, angle), the
+displacement
 
     D = x' - x - t p,   E = p' - p,   M - [[1, t], [0, 1]]
 
@@ -67,10 +68,7 @@ class Grid:
 
     def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Node values of u, v and the angle (radians)."""
-        u, v = (
-            (np.arange(self.nodes[k]) - self.origin[k]) / self.cells[k]
-            for k in (0, 1)
-        )
+        u, v = ((np.arange(self.nodes[k]) - self.origin[k]) / self.cells[k] for k in (0, 1))
         return u, v, 2 * np.pi * np.arange(self.nodes[2]) / self.nodes[2]
 
 
@@ -125,7 +123,8 @@ class PhaseMap:
         charts = len(self.leaps[-1].state)
         return (
             f"PhaseMap({self.body!r})\n"
-            f"  T0 = {self.horizon:g}, {charts} x {nu} x {nv} x {na} nodes, degree {self.grid.degree}, {self.nbytes / 1e6:.0f} MB\n"
+            f"  T0 = {self.horizon:g}, {charts} x {nu} x {nv} x {na} nodes, degree {self.grid.degree}, "
+            f"{self.nbytes / 1e6:.0f} MB\n"
             f"  error of one g_T0: rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} samples)"
         )
 

@@ -75,8 +75,6 @@ def evaluate(table: FloatArray, chart: IntArray, grid: FloatArray, degree: int) 
     for start in range(0, len(grid), 2048):
         part = slice(start, start + 2048)
         iu, iv, ia = (cell[part, k, None] + steps for k in range(3))
-        stencil = table[
-            chart[part, None, None, None], iu[:, :, None, None], iv[:, None, :, None], ia[:, None, None, :]
-        ]
+        stencil = table[chart[part, None, None, None], iu[:, :, None, None], iv[:, None, :, None], ia[:, None, None, :]]
         out[part] = np.einsum("ni,nj,nk,nijkl->nl", w[part, 0], w[part, 1], w[part, 2], stencil, optimize=True)
     return out

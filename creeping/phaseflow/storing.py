@@ -70,7 +70,9 @@ def write_folder(folder: str | Path, content: dict[str, Any], arrays: dict[str, 
         if aside is not None:
             shutil.rmtree(aside, ignore_errors=True)
         need = f"{sum(a.nbytes for a in arrays.values()) / 1e6:.0f} MB"
-        raise StoredMapError(f"cannot write {folder}: {error}; it needs {need} of space and write permission") from error
+        raise StoredMapError(
+            f"cannot write {folder}: {error}; it needs {need} of space and write permission"
+        ) from error
     return folder
 
 

@@ -141,7 +141,9 @@ def trace_states(
         out = np.empty((len(states), len(times), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
         scale = _scale(body, states.shape[1])
-        integrate(*compiled, states, np.asarray(times, dtype=float), *method, scale, float(rtol), float(step), MAX_STEPS, out)
+        integrate(
+            *compiled, states, np.asarray(times, dtype=float), *method, scale, float(rtol), float(step), MAX_STEPS, out
+        )
     failed = np.flatnonzero(~np.all(np.isfinite(out), axis=(1, 2)))
     if len(failed):
         raise IntegrationError(

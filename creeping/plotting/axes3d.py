@@ -78,7 +78,7 @@ def draw(ax: Any, drawing: Drawing) -> None:
 def _draw_body(ax: Any, drawing: Drawing) -> None:
     """Draw the triangles that face the camera, lit from it; the others are behind them."""
     from matplotlib.colors import to_rgb
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     corners = drawing.mesh.vertices[drawing.mesh.triangles]
     facing = normal(drawing.body, corners.mean(axis=1)) @ drawing.view.toward
@@ -157,7 +157,7 @@ def _limits(ax: Any, centre: FloatArray, half: float) -> None:
 
 def _measure(ax: Any, drawing: Drawing) -> tuple[FloatArray, FloatArray]:
     """Where the centre of the picture lies (2,), pixels, and how many pixels one L takes, across and up (2,)."""
-    from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     ax.apply_aspect()
     centre, view = drawing.centre, drawing.view

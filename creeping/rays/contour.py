@@ -52,7 +52,9 @@ def shadow_curves(
     edges_halved, sides_halved = _edges(halved.triangles)
     again = _loops(sides_halved, h_halved[edges_halved] >= 0, h_halved[halved.triangles] >= 0)
     if len(again) != len(loops):
-        raise _unsettled(critical, f"has {len(loops)} curves on one mesh and {len(again)} on the next; it nearly crosses itself")
+        raise _unsettled(
+            critical, f"has {len(loops)} curves on one mesh and {len(again)} on the next; it nearly crosses itself"
+        )
     return [_curve(body, direction, mesh, edges[loop], h) for loop in loops]
 
 
@@ -177,9 +179,7 @@ def _split(body: Surface, mesh: Triangulation, marked: BoolArray) -> Triangulati
     return Triangulation(np.concatenate([mesh.vertices, middles]), np.concatenate(triangles))
 
 
-def _curve(
-    body: Surface, direction: FloatArray, mesh: Triangulation, ends: IntArray, h: FloatArray
-) -> PanelCurve:
+def _curve(body: Surface, direction: FloatArray, mesh: Triangulation, ends: IntArray, h: FloatArray) -> PanelCurve:
     """Curve through the crossings of a loop of edges (k, 2)."""
     a, b = mesh.vertices[ends[:, 0]], mesh.vertices[ends[:, 1]]
     spacing = np.linalg.norm(b - a, axis=1)

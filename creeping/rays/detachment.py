@@ -1,8 +1,8 @@
 """Where a creeping ray ends: the first travel time at which kappa_n falls to 0.
 
-Between two steps the ray is traced again to Chebyshev-Lobatto times, and the root of the polynomial through kappa_n there
-is found by bisection. A step is searched if kappa_n changes sign over it, or may dip below 0 inside it: if a parabola
-through three neighbouring values has a negative minimum.
+Between two steps the ray is traced again to Chebyshev-Lobatto times, and the root of the polynomial through kappa_n
+there is found by bisection. A step is searched if kappa_n changes sign over it, or may dip below 0 inside it: if a
+parabola through three neighbouring values has a negative minimum.
 """
 
 import numpy as np

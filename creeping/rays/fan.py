@@ -49,11 +49,20 @@ class Flow(Protocol):
     """What carries the rays: a `PhaseMap` or a `DirectFlow`."""
 
     @property
-    def body(self) -> Surface: ...
+    def body(self) -> Surface:
+        """Body whose flow it is."""
+        ...
+
     @property
-    def horizon(self) -> float: ...
+    def horizon(self) -> float:
+        """Time of one leap."""
+        ...
+
     @property
-    def error(self) -> MapError | None: ...
+    def error(self) -> MapError | None:
+        """Measured error of one leap, None if direct."""
+        ...
+
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 10) to ascending times (m,): (n, m, 10)."""
         ...
@@ -135,7 +144,8 @@ class RayFan:
     def __repr__(self) -> str:
         counts = ", ".join(f"{int(np.sum(self.status == s))} {s.name}" for s in RayStatus if np.any(self.status == s))
         return (
-            f"RayFan({len(self.points)} rays x {len(self.travel_time)} steps to {self.length:g}, {len(self.closed_arcs)} arcs)\n"
+            f"RayFan({len(self.points)} rays x {len(self.travel_time)} steps to {self.length:g}, "
+            f"{len(self.closed_arcs)} arcs)\n"
             f"  {counts or 'no rays'}; caustics passed: up to {int(self.caustic_index.max(initial=0))}\n"
             f"  error at the end: rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
         )

@@ -63,7 +63,7 @@ def _shares(lengths: FloatArray, total: int) -> IntArray:
         counts[np.argmax(exact - counts)] += 1
     while counts.sum() > max(total, len(lengths)):
         counts[np.argmax(np.where(counts > 1, counts - exact, -np.inf))] -= 1
-    return counts
+    return np.asarray(counts)
 
 
 def parting_positions(

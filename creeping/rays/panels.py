@@ -167,7 +167,9 @@ def fit_panels(body: Surface, direction: FloatArray, nodes: FloatArray, spacing:
             if middle not in known:
                 known[middle] = _middle(body, direction, a[i], Ta[i], b[i], Tb[i])
             halves += [(low, middle), (middle, high)]
-        if len(done) + len(halves) > 20_000 or (len(bad) and np.min(np.linalg.norm(b - a, axis=1)[bad]) < 1e-11 * size(body)):
+        if len(done) + len(halves) > 20_000 or (
+            len(bad) and np.min(np.linalg.norm(b - a, axis=1)[bad]) < 1e-11 * size(body)
+        ):
             raise SingularIncidenceError(
                 f"the shadow line cannot be followed at {len(bad)} places, first near "
                 f"{np.round(a[bad[0]], 6).tolist()}; it turns too sharply there: perturb the direction by say 1e-3",

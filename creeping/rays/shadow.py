@@ -65,7 +65,9 @@ class ShadowCurve:
         """Points of the curve, exact at any arclength modulo the length: (m,) -> (m, 3), L."""
         s = np.asarray(arclength, dtype=float)
         if s.ndim > 1 or not np.all(np.isfinite(s)):
-            raise InvalidInputError(f"arclength of shape {s.shape} is not one finite number or a row of them; give (m,)")
+            raise InvalidInputError(
+                f"arclength of shape {s.shape} is not one finite number or a row of them; give (m,)"
+            )
         return self.panels.at(s.ravel()).reshape(*s.shape, 3)
 
     def __repr__(self) -> str:

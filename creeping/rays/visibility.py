@@ -43,9 +43,7 @@ class Arcs(NamedTuple):
         if len(self.codes) == 1:
             return ((0.0, self.length, STATUSES[self.codes[0]]),)
         ends = np.append(self.starts[1:], self.starts[0] + self.length)
-        return tuple(
-            (float(a), float(b), STATUSES[c]) for a, b, c in zip(self.starts, ends, self.codes, strict=True)
-        )
+        return tuple((float(a), float(b), STATUSES[c]) for a, b, c in zip(self.starts, ends, self.codes, strict=True))
 
 
 def incident_curvature(body: Surface, points: FloatArray, direction: FloatArray) -> FloatArray:

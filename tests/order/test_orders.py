@@ -58,5 +58,7 @@ def test_tracer_order():
     exact = trace_states(body, states, np.array([2.0]), rtol=1e-13)
     # below 1/8 the error meets rounding
     steps = np.array([1 / 5, 1 / 6, 1 / 7, 1 / 8])
-    errors = [np.sqrt(np.mean((trace_states(body, states, np.array([2.0]), rtol=0.0, step=h) - exact) ** 2)) for h in steps]
+    errors = [
+        np.sqrt(np.mean((trace_states(body, states, np.array([2.0]), rtol=0.0, step=h) - exact) ** 2)) for h in steps
+    ]
     assert slope(steps, errors) == pytest.approx(8, abs=0.6)

@@ -41,7 +41,9 @@ def test_tensor_product_is_exact_at_nodes_and_for_cubics(degree, rng):
     poly = (0.1 * u**3 - u)[:, None] * (v**2 + 1)[None, :]
     values = (poly[:, :, None] * np.cos(angle))[None, ..., None]
     table = prefilter(np.repeat(values, 2, axis=-1), degree, (False, False))
-    grid = np.stack([rng.uniform(0, nu - 1, 50), rng.uniform(0, nv - 1, 50), rng.integers(0, na, 50)], axis=-1).astype(float)
+    grid = np.stack([rng.uniform(0, nu - 1, 50), rng.uniform(0, nv - 1, 50), rng.integers(0, na, 50)], axis=-1).astype(
+        float
+    )
     got = evaluate(table, np.zeros(50, dtype=int), grid, degree)
     expected = (0.1 * grid[:, 0] ** 3 - grid[:, 0]) * (grid[:, 1] ** 2 + 1) * np.cos(2 * np.pi * grid[:, 2] / na)
     np.testing.assert_allclose(got[:, 0], expected, atol=1e-9)

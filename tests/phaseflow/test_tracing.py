@@ -25,8 +25,10 @@ def test_against_scipy(body, rng):
     x, p = random_bundle_points(body, 2, rng=rng)
     ends = cr.trace(body, x, p, 2.0, rtol=1e-12)
     for k in range(2):
+
         def field(_, y):
             return np.concatenate(vector_field(body, y[:3], y[3:]))
+
         reference = solve_ivp(field, (0, 2), np.r_[x[k], p[k]], method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
         np.testing.assert_allclose(np.r_[ends[0][k], ends[1][k]], reference, atol=TRACE)
 

@@ -69,7 +69,9 @@ def test_object_speed_flows_like_the_expression(rng):
     points = rng.normal(size=(5, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     directions = np.cross(points, [0.3, 0.5, 0.8])
-    for a, b in zip(cr.trace(by_object, points, directions, 1.0), cr.trace(by_text, points, directions, 1.0), strict=True):
+    for a, b in zip(
+        cr.trace(by_object, points, directions, 1.0), cr.trace(by_text, points, directions, 1.0), strict=True
+    ):
         np.testing.assert_allclose(a, b, atol=1e-9)
 
 
