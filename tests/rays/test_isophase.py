@@ -64,7 +64,9 @@ def test_two_components_give_two_curves(phase_map):
     assert [curve.closed for curve in curves] == [True, True]
     radii = [np.hypot(*curve.points[:, :2].T) for curve in curves]
     # at angle 0.3/r from the equators, on the upper half
-    np.testing.assert_allclose(np.sort([np.mean(r) for r in radii]), [1 - 0.5 * np.cos(0.6), 1 + 0.5 * np.cos(0.6)], atol=1e-6)
+    np.testing.assert_allclose(
+        np.sort([np.mean(r) for r in radii]), [1 - 0.5 * np.cos(0.6), 1 + 0.5 * np.cos(0.6)], atol=1e-6
+    )
 
 
 def test_pieces_end_on_the_seam(twisted_fan):
