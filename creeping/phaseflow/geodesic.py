@@ -1,6 +1,6 @@
 """The geodesic flow of a body, plain and weighted, and the curvatures along it.
 
-With n = grad F/|grad F|, H the Hessian of F, p (u when weighted) the unit tangent [YC06b, sec. 2]:
+With n = grad F/|grad F|, H the Hessian of F, p (u when weighted) the unit tangent [YC06b]:
 
     plain      x' = p,    p' = -(p.Hp)/|grad F|^2 grad F
     weighted   x' = c u,  u' = -grad c + (grad c.n) n + (grad c.u) u - c (u.Hu)/|grad F| n

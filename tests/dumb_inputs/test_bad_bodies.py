@@ -1,0 +1,119 @@
+"""Bodies that are none: each its own clear error, from check_surface and from whatever is built on it."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+
+SPHERE = sc.Sphere()
+BOX = np.array([[-1.0, -1, -1], [1, 1, 1]])
+
+
+class Changed:
+    """The unit sphere with some members replaced."""
+
+    def __init__(self, **members):
+        for name in ("level", "gradient", "hessian", "bounds", "atlas", "parameters"):
+            setattr(self, name, members.get(name, getattr(SPHERE, name)))
+
+
+def squared(x):
+    return np.sum(x * x, axis=-1)
+
+
+def balls(x):
+    return np.minimum(squared(x - [2, 0, 0]), squared(x + [2, 0, 0])) - 1
+
+
+def no_triangulation():
+    return {
+        "empty": (Changed(level=lambda x: squared(x) + 1), "no negative value"),
+        "inverted": (Changed(level=lambda x: 1 - squared(x)), "faces of its box"),
+        "open cylinder": (Changed(level=lambda x: x[..., 0] ** 2 + x[..., 1] ** 2 - 0.5), "faces of its box"),
+        "larger than its bounds": (Changed(bounds=0.4 * BOX), "faces of its box"),
+        "not finite": (Changed(level=lambda x: np.where(x[..., 0] > 0, np.nan, squared(x) - 1)), "not finite"),
+        "zero gradient on F = 0": (
+            Changed(level=lambda x: (squared(x) - 1) ** 3, gradient=lambda x: 6 * ((squared(x) - 1) ** 2)[..., None] * x),
+            "not smooth",
+        ),
+        "bounds that are no box": (Changed(bounds=np.zeros((2, 3))), "not two corners"),
+        "bounds with NaN": (Changed(bounds=BOX * np.nan), "not two corners"),
+    }
+
+
+def failing_checks():
+    hessian = SPHERE.hessian
+
+    class Rotated:
+        """Charts that do not belong to their locator."""
+
+        charts = SPHERE.atlas.charts[::-1]
+        locate = SPHERE.atlas.locate
+
+    class Mirrored:
+        """Charts turned inside out."""
+
+        class Chart:
+            periodic = (False, False)
+
+            def __init__(self, chart):
+                self.chart = chart
+
+            def point(self, uv):
+                return self.chart.point(uv[..., ::-1])
+
+            def tangents(self, uv):
+                return self.chart.tangents(uv[..., ::-1])[..., ::-1]
+
+        def __init__(self):
+            self.charts = [self.Chart(chart) for chart in SPHERE.atlas.charts]
+
+        def locate(self, points):
+            index, uv = SPHERE.atlas.locate(points)
+            return index, uv[..., ::-1]
+
+    return {
+        "wrong gradient": (Changed(gradient=lambda x: 2.01 * x), "gradient against differences"),
+        "wrong Hessian": (Changed(hessian=lambda x: 1.1 * hessian(x)), "Hessian against differences"),
+        "charts of another order": (Changed(atlas=Rotated()), "chart inverse"),
+        "charts inside out": (Changed(atlas=Mirrored()), "turned inside out"),
+        "two bodies": (
+            Changed(
+                level=balls,
+                gradient=lambda x: 2 * (x - np.sign(x[..., :1]) * [2.0, 0, 0]),
+                bounds=np.array([[-3.0, -1, -1], [3, 1, 1]]),
+            ),
+            "components beyond one",
+        ),
+    }
+
+
+@pytest.mark.parametrize("which", no_triangulation())
+def test_level_sets_that_are_no_body(which):
+    body, match = no_triangulation()[which]
+    with pytest.raises(cr.CreepingError, match=match):
+        cr.check_surface(body)
+    with pytest.raises(cr.CreepingError, match=match):
+        cr.shadow_line(body, (1, 2, 3))
+    with pytest.raises(cr.CreepingError, match=match):
+        cr.build_phase_map(body, horizon=0.5, grid=(12, 12), cache=False)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered", "ignore:divide by zero")
+@pytest.mark.parametrize("which", failing_checks())
+def test_members_that_contradict_each_other(which):
+    body, match = failing_checks()[which]
+    report = cr.check_surface(body)
+    assert not report.ok
+    assert match in " ".join(check.name for check in report.checks if not check.ok)
+    with pytest.raises(cr.CreepingError, match=match):
+        report.require()
+    with pytest.raises(cr.CreepingError, match=match):
+        cr.build_phase_map(body, horizon=0.5, grid=(12, 12), cache=False)
+
+
+def test_report_lists_every_check():
+    report = cr.check_surface(Changed(gradient=lambda x: 2.01 * x))
+    assert "BAD gradient against differences of F" in repr(report)
+    assert len(repr(report).splitlines()) == 1 + len(report.checks)
