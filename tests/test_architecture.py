@@ -1,6 +1,7 @@
 """The rules of the house that no tool checks: sizes, names, a closed root, a light import."""
 
 import ast
+import re
 import subprocess
 import sys
 from fnmatch import fnmatch
@@ -65,3 +66,34 @@ def test_import_is_light(module):
     code = f"import sys, {module}; print([name for name in {heavy!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]", f"import {module} drags in {done.stdout.strip()}"
+
+
+def test_public_names_grow_on_purpose():
+    import creeping
+
+    assert creeping.__all__ == [
+        "CreepingError",
+        "DirectFlow",
+        "IsoPhaseCurve",
+        "MapError",
+        "PhaseMap",
+        "RayFan",
+        "RayStatus",
+        "ShadowLine",
+        "__version__",
+        "build_phase_map",
+        "check_surface",
+        "iso_phase_curves",
+        "launch",
+        "load_phase_map",
+        "shadow_line",
+        "trace",
+    ]
+    assert all(getattr(creeping, name) is not None for name in creeping.__all__)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_cited_keys_are_in_the_bibliography(path):
+    known = set(re.findall(r"@\w+\{(\w+),", (ROOT / "creeping" / "references.bib").read_text(encoding="utf-8")))
+    cited = set(re.findall(r"\[([A-Z]{1,4}\d{2}[a-z]?)(?:, [^\]]*)?\]", path.read_text(encoding="utf-8")))
+    assert cited <= known, f"{name_of(path)} cites {sorted(cited - known)}, which creeping/references.bib lacks"

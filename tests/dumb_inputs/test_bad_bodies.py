@@ -34,7 +34,9 @@ def no_triangulation():
         "larger than its bounds": (Changed(bounds=0.4 * BOX), "faces of its box"),
         "not finite": (Changed(level=lambda x: np.where(x[..., 0] > 0, np.nan, squared(x) - 1)), "not finite"),
         "zero gradient on F = 0": (
-            Changed(level=lambda x: (squared(x) - 1) ** 3, gradient=lambda x: 6 * ((squared(x) - 1) ** 2)[..., None] * x),
+            Changed(
+                level=lambda x: (squared(x) - 1) ** 3, gradient=lambda x: 6 * ((squared(x) - 1) ** 2)[..., None] * x
+            ),
             "not smooth",
         ),
         "bounds that are no box": (Changed(bounds=np.zeros((2, 3))), "not two corners"),
