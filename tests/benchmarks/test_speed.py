@@ -1,0 +1,55 @@
+"""Costs that matter to a user; run with ``python -m pytest tests/benchmarks --benchmark-enable``."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.phaseflow.bundle import random_bundle_points
+from creeping.phaseflow.tracing import pack, trace_states
+
+BODIES = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "twisted": sc.TwistedEllipsoid()}
+
+
+@pytest.fixture(params=BODIES)
+def states(request):
+    body = BODIES[request.param]
+    return body, pack(*random_bundle_points(body, 20_000, rng=np.random.default_rng(0)))
+
+
+@pytest.mark.parametrize("which, grid", [("ellipsoid", (16, 64)), ("twisted", (24, 96))])
+def test_build_of_the_tower(benchmark, which, grid):
+    options = {"horizon": 1 / 8, "time_step": 2**-10, "stages": 7, "order": 3, "method": "tower", "cache": False}
+    benchmark.pedantic(cr.build_phase_map, (BODIES[which],), {"grid": grid, **options}, rounds=3, warmup_rounds=1)
+
+
+def test_one_leap(benchmark, states, phase_map):
+    body, points = states
+    flow = phase_map(body)
+    benchmark(flow.leap, points, 1)
+
+
+def test_direct_integration_over_the_same_time(benchmark, states, phase_map):
+    body, points = states
+    benchmark(trace_states, body, points, np.array([phase_map(body).horizon]), rtol=1e-7)
+
+
+@pytest.mark.parametrize("which", BODIES)
+def test_shadow_line(benchmark, which):
+    benchmark(cr.shadow_line, BODIES[which], (1, 1, 1))
+
+
+@pytest.mark.parametrize("which", BODIES)
+def test_fan(benchmark, which, phase_map):
+    body = BODIES[which]
+    line, flow = cr.shadow_line(body, (1, 1, 1)), phase_map(body)
+    benchmark(cr.launch, flow, line, length=4.0, n_rays=256, max_gap=np.inf)
+
+
+def test_help_of_the_command_line(benchmark):
+    command = [sys.executable, "-c", "from creeping.cli import main; main(['--help'])"]
+    benchmark.pedantic(subprocess.run, (command,), {"capture_output": True, "env": {**os.environ}}, rounds=5)
