@@ -1,8 +1,8 @@
 """How accurate is one g_T0, and what does it cost to build? The four examples of the paper, and maps from a tolerance.
 
 Algorithm 1 with T0 = 1/8, tau = 2^-10, S = 7, B = 2, cubic splines on the grids of [YC06b], and the maps that
-``build_phase_map`` chooses for 1e-6. Errors are rms and largest |(x, p) - traced| over random points of T1Q; seconds are
-processor time of a second build, so that compilation does not count. Run with ``python -m studies.map_accuracy``.
+``build_phase_map`` chooses for 1e-6. Errors are rms and largest |(x, p) - traced| over random points of T1Q; seconds
+are processor time of a second build, so that compilation does not count. Run ``python -m studies.map_accuracy``.
 """
 
 import time

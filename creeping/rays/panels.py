@@ -10,6 +10,7 @@ they shrink where the curve turns fast and the length needs no resampling.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -152,7 +153,7 @@ def fit_panels(body: Surface, direction: FloatArray, nodes: FloatArray, spacing:
     keys = _first_breaks(tangents)
     # a panel end is its place in the ring of nodes; halving takes a node of the ring while there is one between
     known = {float(k): (nodes[k % count], tangents[k % count]) for k in range(count + 1)}
-    todo = [(float(a), float(b)) for a, b in zip(keys[:-1], keys[1:], strict=True)]
+    todo = [(float(a), float(b)) for a, b in pairwise(keys)]
     done: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
     while todo:
         a, Ta = (np.array(part) for part in zip(*(known[key] for key, _ in todo), strict=True))
@@ -200,7 +201,7 @@ def _forward_nodes(body: Surface, direction: FloatArray, nodes: FloatArray, spac
 
 
 def _first_breaks(tangents: FloatArray) -> list[int]:
-    """Ring numbers, 0 to k, at which panels start: about 0.6 rad of turning, and at least eight panels if there are nodes."""
+    """Ring numbers, 0 to k, at which panels start: 0.6 rad of turning apart, eight panels if there are nodes."""
     count = len(tangents)
     cosine = np.clip(np.sum(tangents * np.roll(tangents, -1, axis=0), axis=1), -1, 1)
     turned = np.concatenate([[0.0], np.cumsum(np.arccos(cosine))])

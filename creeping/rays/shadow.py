@@ -3,7 +3,8 @@
     F(x) = 0,   grad F(x).d = 0,   T = grad F x Hd / |.|,   kappa_n(d) = d.Hd/|grad F|
 
 Seen from outside, the lit side (n.d < 0) is on the left of T. The steps are one module each: critical points of n.d,
-where the line would cross itself (`singular`); its topology (`contour`); its points (`panels`); its state (`visibility`).
+where the line would cross itself (`singular`), its topology (`contour`), its points (`panels`), its state
+(`visibility`).
 """
 
 from dataclasses import dataclass, field
@@ -76,7 +77,8 @@ class ShadowCurve:
         return (
             f"ShadowCurve({len(self.points)} points, length {self.length:.10g} L)\n"
             f"  {shares}; {len(self.arcs)} arcs\n"
-            f"  |n.d| at most {np.max(n_dot_d):.1e}; kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/L"
+            f"  |n.d| at most {np.max(n_dot_d):.1e}; "
+            f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/L"
         )
 
 
@@ -163,7 +165,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
 
 def _sampled(panels: PanelCurve, n_points: int) -> ShadowCurve:
     body, direction, length = panels.body, panels.direction, panels.length
-    arclength = np.arange(n_points) * (length / n_points)
+    arclength = np.linspace(0.0, length, n_points, endpoint=False, dtype=np.float64)
     points = panels.at(arclength)
     _, tangents = newton_step(body, direction, points)
     arcs = split_arcs(panels)

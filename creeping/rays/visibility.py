@@ -6,7 +6,8 @@
     attached:  the rest
 
 F along the backward ray starts with F = 0, F' = 0, F'' = d.Hd, so behind a convex point it first rises; it enters the
-body where an interior local minimum is negative. The state changes at zeros of kappa_n(d) and where such a minimum is 0.
+body where an interior local minimum is negative. The state changes at zeros of kappa_n(d) and where such a minimum
+is 0.
 """
 
 from collections.abc import Callable
@@ -153,7 +154,7 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray) -> BoolAr
     reach = np.maximum(reach, 1e-3 * size(body))
     t = reach[:, None] * (np.arange(1, RAY_SAMPLES + 2) / RAY_SAMPLES)
     F = body.level(points[:, None] - t[..., None] * direction)
-    hit = np.any(F < 0, axis=1)
+    hit = np.asarray(np.any(F < 0, axis=1))
     ray, j = np.nonzero((F[:, 1:-1] < F[:, :-2]) & (F[:, 1:-1] <= F[:, 2:]) & ~hit[:, None])
     if len(ray):
         step = reach[ray] / RAY_SAMPLES

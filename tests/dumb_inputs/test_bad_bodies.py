@@ -7,6 +7,7 @@ import creeping as cr
 import scatterers as sc
 
 SPHERE = sc.Sphere()
+CENTRE = np.array([2.0, 0.0, 0.0])
 BOX = np.array([[-1.0, -1, -1], [1, 1, 1]])
 
 
@@ -23,7 +24,7 @@ def squared(x):
 
 
 def balls(x):
-    return np.minimum(squared(x - [2, 0, 0]), squared(x + [2, 0, 0])) - 1
+    return np.minimum(squared(x - CENTRE), squared(x + CENTRE)) - 1
 
 
 def no_triangulation():

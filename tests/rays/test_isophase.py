@@ -1,5 +1,7 @@
 """Iso-phase curves: exact on the sphere, on the rays elsewhere, correctly split at the seam."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -74,7 +76,7 @@ def test_pieces_end_on_the_seam(twisted_fan):
     for curve in cr.iso_phase_curves(twisted_fan, np.arange(0.25, 2, 0.25)):
         pieces = curve.parameter_pieces
         crossed += len(pieces) - 1
-        for before, after in zip(pieces[:-1], pieces[1:], strict=True):
+        for before, after in pairwise(pieces):
             assert abs(before[-1, 1]) == pytest.approx(np.pi)
             assert after[0, 1] == pytest.approx(-before[-1, 1])
             assert after[0, 0] == pytest.approx(before[-1, 0])
