@@ -129,7 +129,8 @@ def _solve(body: Surface, direction: FloatArray, points: FloatArray) -> FloatArr
         ahead = _residual(body, direction, x[:, None] + shifts)
         J = np.swapaxes(ahead - _residual(body, direction, x[:, None] - shifts), 1, 2) / 2e-5
         Jt = np.swapaxes(J, 1, 2)
-        damping = np.maximum(np.sum(r * r, axis=1), 1e-28)
+        # the floor keeps the matrix regular where a whole curve is critical
+        damping = np.maximum(np.sum(r * r, axis=1), 1e-14 * np.trace(Jt @ J, axis1=1, axis2=2) + 1e-28)
         step = np.linalg.solve(Jt @ J + damping[:, None, None] * np.eye(3), -(Jt @ r[..., None]))[..., 0]
         norm = np.linalg.norm(step, axis=1)
         step *= np.minimum(1.0, 0.1 / np.maximum(norm, 1e-300))[:, None]

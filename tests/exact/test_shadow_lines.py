@@ -1,0 +1,228 @@
+"""Lengths and states of shadow lines against closed forms, published digits and a second method."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipe
+from tolerances import FRACTION, LINE_LENGTH
+
+import creeping as cr
+import scatterers as sc
+
+ROWS = [
+    (sc.TwistedEllipsoid(), (1, 1, 1), [5.1675274372]),
+    (sc.TwistedEllipsoid(), (1, 0, 0), [5.1661620318]),
+    (sc.TwistedEllipsoid(), (0, 1, 0), [5.1946874492]),
+    (sc.Ellipsoid(1.2, 0.8, 0.8), (1, 1, 1), [6.1340508514]),
+    (sc.Torus(), (0, 0, 1), [3 * np.pi, np.pi]),
+    (sc.Torus(), (1, 1, 1), [8.9274357171, 4.6171835804]),
+]
+
+
+class Peanut:
+    """Cassini oval of revolution about x: a user's class with only what a shadow line needs."""
+
+    c, b = 0.8, 0.9
+
+    def __init__(self):
+        half = np.array([np.hypot(self.c, self.b), 0.6, 0.6])
+        self.bounds = np.stack([-half, half])
+
+    def level(self, x):
+        return (np.sum(x**2, axis=-1) + self.c**2) ** 2 - 4 * self.c**2 * x[..., 0] ** 2 - self.b**4
+
+    def gradient(self, x):
+        g = 4 * (np.sum(x**2, axis=-1, keepdims=True) + self.c**2) * x
+        g[..., 0] -= 8 * self.c**2 * x[..., 0]
+        return g
+
+    def hessian(self, x):
+        h = 8 * x[..., :, None] * x[..., None, :]
+        h = h + 4 * (np.sum(x**2, axis=-1) + self.c**2)[..., None, None] * np.eye(3)
+        h[..., 0, 0] -= 8 * self.c**2
+        return h
+
+
+@pytest.mark.parametrize("body, direction, lengths", ROWS)
+def test_published_lengths(body, direction, lengths):
+    line = cr.shadow_line(body, direction)
+    np.testing.assert_allclose([curve.length for curve in line.curves], lengths, atol=LINE_LENGTH)
+    if not (isinstance(body, sc.Torus) and direction == (1, 1, 1)):
+        assert line.fractions["attached"] == 1.0
+
+
+def test_fractions_on_the_torus():
+    outer, inner = cr.shadow_line(sc.Torus(), (1, 1, 1)).curves
+    assert outer.fractions["attached"] == 1.0
+    expected = {"attached": 0.55740772, "occluded": 0.15522848, "concave": 0.28736380}
+    for status, share in expected.items():
+        assert inner.fractions[status] == pytest.approx(share, abs=FRACTION)
+
+
+@pytest.mark.parametrize(
+    "direction, lengths, shares",
+    [
+        ((0, 0, 1), [5.9629473823], (1, 0, 0)),
+        ((1, 0.5, 0.2), [6.3744816923], (0.78261705, 0.05494849, 0.16243446)),
+    ],
+)
+def test_peanut(direction, lengths, shares):
+    line = cr.shadow_line(Peanut(), direction)
+    np.testing.assert_allclose([curve.length for curve in line.curves], lengths, atol=LINE_LENGTH)
+    np.testing.assert_allclose(list(line.curves[0].fractions.values()), shares, atol=FRACTION)
+
+
+def test_three_curves_on_a_body_without_handles():
+    body = Peanut()
+    line = cr.shadow_line(body, (1, 0, 0))
+    # circles about the axis where the profile y(x) has y' = 0: the waist, and x^2 = c^2 - b^4/(4 c^2) twice
+    waist = np.sqrt(body.b**2 - body.c**2)
+    x2 = body.c**2 - body.b**4 / (4 * body.c**2)
+    bulge = np.sqrt(np.sqrt(body.b**4 + 4 * body.c**2 * x2) - body.c**2 - x2)
+    np.testing.assert_allclose(
+        [curve.length for curve in line.curves], 2 * np.pi * np.array([bulge, bulge, waist]), atol=LINE_LENGTH
+    )
+    assert line.curves[2].fractions["concave"] == pytest.approx(1)
+
+
+def test_ellipse_of_an_ellipsoid(rng):
+    # n.d = 0 is the plane x.A d = 0, A = diag(1/a^2): an ellipse with semi-axes from the plane section
+    axes = np.array([1.3, 0.9, 0.6])
+    for d in rng.normal(size=(5, 3)):
+        normal = d / axes**2
+        u = np.linalg.svd(normal[None])[2][1:]
+        section = np.linalg.eigvalsh(u @ np.diag(1 / axes**2) @ u.T) ** -0.5
+        long, short = section.max(), section.min()
+        (curve,) = cr.shadow_line(sc.Ellipsoid(*axes), d).curves
+        assert curve.length == pytest.approx(4 * long * ellipe(1 - (short / long) ** 2), abs=LINE_LENGTH)
+
+
+def followed(body, start, direction):
+    """Length of the closed curve through a point, by integrating its tangent: the second method."""
+    d = direction / np.linalg.norm(direction)
+
+    def tangent(_, x):
+        t = np.cross(body.gradient(x), body.hessian(x) @ d)
+        return t / np.linalg.norm(t)
+
+    first = tangent(0, start)
+
+    def returned(s, x):
+        return (x - start) @ first + (1.0 if s < 0.5 else 0.0)
+
+    returned.direction, returned.terminal = 1, True
+    ends = solve_ivp(tangent, (0, 40), start, method="DOP853", rtol=1e-12, atol=1e-13, events=returned)
+    assert np.linalg.norm(ends.y_events[0][0] - start) < 1e-8
+    return ends.t_events[0][0]
+
+
+@pytest.mark.parametrize("body", [sc.TwistedEllipsoid(), sc.Ellipsoid(1.0, 0.8, 0.6)])
+def test_lengths_by_following_the_tangent(body, rng):
+    for d in rng.normal(size=(4, 3)):
+        for curve in cr.shadow_line(body, d).curves:
+            assert followed(body, curve.points[0], d) == pytest.approx(curve.length, abs=1e-7)
+
+
+@pytest.mark.parametrize("direction", [(1, 0, 0.003), (1, 0, 1e-4), (1, 0.3, 0.01), (0.2, 1, -0.02)])
+def test_torus_near_its_singular_directions(direction):
+    # n.d = 0 in closed form: tan(theta) = -(d_x cos psi + d_y sin psi)/d_z, two curves half a turn apart
+    d = np.array(direction, dtype=float)
+    tilt, turn = np.hypot(d[0], d[1]) / d[2], np.arctan2(d[1], d[0])
+
+    def speed(psi, half):
+        lean = -tilt * np.cos(psi - turn)
+        theta = np.arctan(lean) + half * np.pi
+        slope = tilt * np.sin(psi - turn) / (1 + lean**2)
+        return np.hypot(0.5 * slope, 1 + 0.5 * np.cos(theta))
+
+    # the curve turns within d_z of psi - turn = +-pi/2: graded panels of Gauss points
+    edges = np.concatenate([[0.0], np.geomspace(1e-9, np.pi / 2, 80)])
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    middle, half_width = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    offsets = (middle[:, None] + half_width[:, None] * nodes).ravel()
+    w = (half_width[:, None] * weights).ravel()
+    expected = [
+        sum(
+            float(w @ speed(turn + centre + side * offsets, half))
+            for centre in (-np.pi / 2, np.pi / 2)
+            for side in (-1, 1)
+        )
+        for half in (0, 1)
+    ]
+    line = cr.shadow_line(sc.Torus(), direction)
+    np.testing.assert_allclose(sorted(c.length for c in line.curves), sorted(expected), atol=LINE_LENGTH)
+
+
+@pytest.mark.parametrize(
+    "body, direction, points",
+    [
+        (sc.Torus(), (1, 0, 0), [(0, 1, 0.5), (0, 1, -0.5), (0, -1, 0.5), (0, -1, -0.5)]),
+        (sc.Torus(), (1, 0.01, 0), [(-0.0099995, 0.99995, 0.5)]),
+        (sc.TwistedEllipsoid(), (0, 0, 1), [(0.483694, 0.073349, 0), (-0.483694, 0.073349, 0)]),
+    ],
+)
+def test_singular_incidences_name_their_crossings(body, direction, points):
+    with pytest.raises(cr.CreepingError, match="crosses itself") as caught:
+        cr.shadow_line(body, direction)
+    assert caught.value.distance < 1e-6
+    for point in points:
+        assert np.linalg.norm(caught.value.points - point, axis=1).min() < 1e-5
+    assert "perturb" in str(caught.value)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_lengths_scale_with_the_body(scale):
+    small, unit = (sc.Ellipsoid(1.2 * s, 0.8 * s, 0.5 * s) for s in (scale, 1.0))
+    lengths = [cr.shadow_line(body, (0.3, 1, 0.4)).length for body in (small, unit)]
+    assert lengths[0] == pytest.approx(scale * lengths[1], rel=1e-10)
+
+
+def test_points_lie_on_the_line_and_are_evenly_spaced():
+    body = sc.TwistedEllipsoid()
+    (curve,) = cr.shadow_line(body, (0.2, -0.4, 0.9), n_points=333).curves
+    assert curve.points.shape == (333, 3)
+    assert np.abs(body.level(curve.points)).max() < 1e-12
+    d = np.array([0.2, -0.4, 0.9]) / np.linalg.norm([0.2, -0.4, 0.9])
+    assert np.abs(curve.normals @ d).max() < 1e-12
+    np.testing.assert_allclose(np.diff(curve.arclength), curve.length / 333)
+    # a chord is shorter than its arc by (kappa s)^2/24 of it
+    chord = np.linalg.norm(np.roll(curve.points, -1, axis=0) - curve.points, axis=1)
+    np.testing.assert_allclose(chord, curve.length / 333, rtol=5e-3)
+    np.testing.assert_allclose(curve.at(curve.arclength + curve.length), curve.points, atol=1e-12)
+
+
+def test_status_of_points_agrees_with_the_arcs():
+    inner = cr.shadow_line(sc.Torus(), (1, 1, 1)).curves[1]
+    assert sum(end - start for start, end, _ in inner.arcs) == pytest.approx(inner.length)
+    for start, end, status in inner.arcs:
+        s = np.linspace(start, end, 9)[1:-1]
+        inside = np.abs((inner.arclength[:, None] - s + 0.5 * inner.length) % inner.length - 0.5 * inner.length)
+        assert set(inner.status[inside.argmin(axis=0)]) == {status} or (end - start) < 0.05
+
+
+@pytest.mark.parametrize("n_points", [15, 0, -1, 64.0, True, "64"])
+def test_bad_number_of_points(n_points):
+    with pytest.raises(cr.CreepingError, match="n_points"):
+        cr.shadow_line(sc.Sphere(), (1, 0, 0), n_points=n_points)
+
+
+@pytest.mark.parametrize(
+    "direction, match",
+    [
+        ((0, 0, 0), "zero vector"),
+        ((np.nan, 0, 1), "not finite"),
+        ((np.inf, 0, 1), "not finite"),
+        ((1, 2), "shape"),
+        ([[1, 0, 0]], "shape"),
+        ("north", "not three numbers"),
+        (None, "shape|not finite|three numbers"),
+    ],
+)
+def test_bad_directions(direction, match):
+    with pytest.raises(cr.CreepingError, match=match):
+        cr.shadow_line(sc.Sphere(), direction)
+
+
+@pytest.mark.parametrize("direction", [(3e-300, 0, 0), (1e200, 1e200, 0), (5, 0, 0)])
+def test_directions_of_any_length(direction):
+    assert cr.shadow_line(sc.Sphere(), direction).length == pytest.approx(2 * np.pi, abs=1e-10)
