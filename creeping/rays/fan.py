@@ -34,13 +34,13 @@ from creeping.rays.launch_points import (
     launching_arcs,
     line_tangents,
     parting_positions,
+    position_statuses,
 )
 from creeping.rays.shadow import ShadowLine
 from creeping.surface import Surface, size
 
 MAX_RAYS = 200_000
 """Rays beyond which refinement stops."""
-ARC_STATUS = {"attached": "OK", "occluded": "OCCLUDED", "concave": "CONCAVE"}
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
 
@@ -82,6 +82,10 @@ class RayStatus(IntEnum):
     """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
 
 
+LINE_STATUS = {"attached": RayStatus.OK, "occluded": RayStatus.OCCLUDED, "concave": RayStatus.CONCAVE}
+"""Status of a ray that starts well, by the status of the line at its launch point."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class RayFan:
     """Creeping rays of one incidence, all at the same travel times.
@@ -106,7 +110,7 @@ class RayFan:
     detachment : (rays,), L
         Travel time at which kappa_n first falls to 0, inf if it does not.
     curve_index, arc_index : (rays,)
-        Curve of the shadow line, and arc: rays of one arc are neighbours.
+        Curve of the shadow line, and arc: rays of one arc are neighbours; with ``status="all"`` an arc is a curve.
     arclength : (rays,), L
         Of the launch point along its curve.
     closed_arcs : tuple of bool
@@ -264,7 +268,7 @@ def _assemble(
     spreading, rate, stalled = _spreading(body, line, starts, states)
     curvature = normal_curvature(body, points, directions)
     detachment = detachment_times(body, points, directions, curvature, times)
-    status = np.array([RayStatus[ARC_STATUS[arcs[k].status]] for k in arc], dtype=np.int64)
+    status = np.array([LINE_STATUS[one] for one in position_statuses(line, arcs, arc, arclength)], dtype=np.int64)
     # a ray that never was a creeping ray keeps the reason
     status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
     status[stalled] = RayStatus.STALLED

@@ -14,23 +14,36 @@ from creeping.surface import Surface
 
 
 class Arc(NamedTuple):
-    """Part of one curve of the shadow line with one status; ``closed`` if it is the whole curve."""
+    """Part of one curve of the shadow line whose rays are neighbours; ``closed`` if it is the whole curve."""
 
     curve: int
     start: float
     end: float
-    status: str
     closed: bool
 
 
 def launching_arcs(line: ShadowLine, *, every: bool) -> list[Arc]:
-    """Attached arcs of the line, or all of them."""
+    """Attached arcs of the line, or its whole curves."""
     arcs = []
     for index, curve in enumerate(line.curves):
+        if every:
+            arcs.append(Arc(index, 0.0, curve.length, True))
+            continue
         for start, end, status in curve.arcs:
-            if every or status == "attached":
-                arcs.append(Arc(index, start, end, status, len(curve.arcs) == 1))
+            if status == "attached":
+                arcs.append(Arc(index, start, end, len(curve.arcs) == 1))
     return arcs
+
+
+def position_statuses(line: ShadowLine, arcs: list[Arc], arc: IntArray, arclength: FloatArray) -> list[str]:
+    """Status of the line at each position: (n,)."""
+    found = []
+    for k, s in zip(arc, arclength, strict=True):
+        curve = line.curves[arcs[k].curve]
+        holding = [status for start, end, status in curve.arcs if (s - start) % curve.length < end - start]
+        # rounding may leave a position between two arcs: then it is of neither side, and concave launches nothing
+        found.append(holding[0] if holding else "concave")
+    return found
 
 
 def launch_positions(line: ShadowLine, arcs: list[Arc], n_rays: int | None) -> tuple[IntArray, FloatArray]:

@@ -71,6 +71,13 @@ def test_two_components_give_two_curves(phase_map):
     )
 
 
+def test_curves_of_all_points_are_whole(phase_map):
+    # the inner component has six arcs of three states, and one iso-phase curve
+    body = sc.Torus()
+    fan = cr.launch(phase_map(body), cr.shadow_line(body, (1, 1, 1)), length=0.5, n_rays=200, status="all")
+    assert [curve.closed for curve in cr.iso_phase_curves(fan, 0.3)] == [True, True]
+
+
 def test_pieces_end_on_the_seam(twisted_fan):
     crossed = 0
     for curve in cr.iso_phase_curves(twisted_fan, np.arange(0.25, 2, 0.25)):
