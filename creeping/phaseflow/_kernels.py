@@ -123,6 +123,23 @@ def _error_norm(k, e3, e5, y, z, scale, rtol, h):
 
 
 @njit(**_options)
+def _combine(h, weights, k, y, z):
+    """Set z = y + h sum_r weights_r k_r, on flat arrays, two stages at a time."""
+    z[:] = y
+    stages = k.shape[0]
+    for r in range(0, stages - 1, 2):
+        first, second = h * weights[r], h * weights[r + 1]
+        if first != 0.0 or second != 0.0:
+            one, other = k[r], k[r + 1]
+            for m in range(z.shape[0]):
+                z[m] += first * one[m] + second * other[m]
+    if stages % 2 == 1:
+        last, one = h * weights[stages - 1], k[stages - 1]
+        for m in range(z.shape[0]):
+            z[m] += last * one[m]
+
+
+@njit(**_options)
 def _finite(y):
     total = 0.0
     for lane in range(y.shape[0]):
@@ -162,15 +179,7 @@ def integrate(
                 trial = left / (equal - used) if rtol == 0.0 else min(h, left)
                 # stages
                 for s in range(1, stages + 1):
-                    for lane in range(lanes):
-                        for i in range(BLOCK):
-                            z[lane, i] = y[lane, i]
-                    for r in range(s):
-                        weight = trial * (b[r] if s == stages else a[s, r])
-                        if weight != 0.0:
-                            for lane in range(lanes):
-                                for i in range(BLOCK):
-                                    z[lane, i] += weight * k[r, lane, i]
+                    _combine(trial, b if s == stages else a[s], k[:s].reshape(s, -1), y.reshape(-1), z.reshape(-1))
                     _right_hand_side(
                         level, level_par, speed, speed_par, weighted, z, k[s], value, grad, hess, c, dc, ddc
                     )
