@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -150,3 +152,17 @@ def test_fingerprint_of_a_body_that_has_none():
 def test_copied_folder_is_a_map(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "copy")
     assert cr.load_phase_map(tmp_path / "copy", BODY).horizon == 0.25
+
+
+def test_second_process_waits_and_opens_the_same_map(tmp_path):
+    code = (
+        "import creeping as cr, scatterers as sc\n"
+        "def say(text): print(text, flush=True)\n"
+        "options = dict(horizon=0.25, grid=(10, 12), order=3, progress=say)\n"
+        f"cr.build_phase_map(sc.Ellipsoid(1.0, 0.8, 0.6), cache={str(tmp_path)!r}, **options)"
+    )
+    both = [subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate(timeout=120)[0] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert sorted("tracing" in text for text in said) == [False, True]
+    assert len([p for p in tmp_path.iterdir() if p.is_dir()]) == 1
