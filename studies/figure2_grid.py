@@ -68,7 +68,13 @@ def grid_in_chart(ax: Any) -> None:
     for k in range(2, 6):
         ax.plot(*uv[k][front[k]].T, "o", ms=3.4, mfc="none", mew=0.6, color=COLOURS[k])
     ax.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color=COLOURS[0], lw=1.2)
-    ax.annotate("", (0.0, -0.33), (u[0], -0.33), arrowprops={"arrowstyle": "<->", "lw": 0.6}, annotation_clip=False)
+    ax.annotate(
+        "",
+        (0.0, -0.33),
+        (u[0], -0.33),
+        arrowprops={"arrowstyle": "<->", "lw": 0.6, "shrinkA": 0, "shrinkB": 0},
+        annotation_clip=False,
+    )
     ax.text(0.5 * u[0], -0.35, r"$\delta$", ha="center", va="top", fontsize=9)
     ax.set_aspect("equal")
     ax.set_xlim(u[0] - 0.03, u[-1] + 0.03)
@@ -94,7 +100,7 @@ def draw(path: Path, quick: bool) -> dict[str, Any]:
     figure.text(0.02, 0.94, "$\\bf{a}$  nodes of the charts that face the reader", fontsize=9)
     right = figure.add_axes((0.64, 0.20, 0.345, 0.72))
     grid_in_chart(right)
-    tag(right, "b", "chart $+x$ (dots), its neighbours (rings)")
+    tag(right, "b", "chart $+x$ and neighbours (rings)")
     handles = [
         Line2D([], [], color=colour, marker="o", ms=4, lw=1.2, label=name)
         for name, colour in zip(FACES, COLOURS, strict=True)

@@ -22,7 +22,7 @@ from studies._measured import end_error, error_card, headline, map_card
 
 BODY = sc.Sphere(speed="1 + x")
 W0 = np.array([0.0, 0.6])
-VIEW = View(float(np.radians(100)), float(np.radians(30)))
+VIEW = View(float(np.radians(112)), float(np.radians(30)))
 RAYS = 512
 DRAWN = 32
 STEP = 1 / 16

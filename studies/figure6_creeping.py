@@ -44,11 +44,11 @@ def draw(path: Path, quick: bool) -> dict[str, Any]:
         bottom = 0.525 - 0.46 * row
         body = figure.add_axes((0.0, bottom, 0.36, 0.41), projection="3d")
         drawings.append(on_body(body, fan, curves))
-        in_parameters(figure.add_axes((0.43, bottom + 0.075, 0.46, 0.32)), fan, curves)
+        in_parameters(figure.add_axes((0.425, bottom + 0.075, 0.455, 0.32)), fan, curves)
         name = f"$d$ = ({', '.join(map(str, d))})"
         figure.text(0.01, bottom + 0.425, rf"$\bf{{{'ac'[row]}}}$  {name}, on the body", fontsize=9)
         figure.text(0.38, bottom + 0.425, rf"$\bf{{{'bd'[row]}}}$  {name}, over the angles", fontsize=9)
-    add_keys(figure, drawings, levels, (0.915, 0.31, 0.016, 0.42))
+    add_keys(figure, drawings, levels, (0.905, 0.31, 0.016, 0.42))
     figure.savefig(path, dpi=100 if quick else 300)
     error = fans_error(found)
     return {

@@ -1,0 +1,140 @@
+"""Every figure of the paper is drawn, quickly, and its numbers hold."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import studies
+from creeping._errors import CreepingError, InvalidInputError
+from studies import figure3_circles, figure5_weighted
+
+MAP = 1e-4
+"""Rms of one g_T0: the tolerance of a quick map; Algorithm 1 on the grid of Figure 2 does better."""
+GROWTH = 10.0
+"""How much an error grows on the way, at most: neighbours part by e^2 in t = 1 on the torus' inner equator (K = -4),
+where few rays stay; linearly on the other bodies. The worst measured is 2.6, Figure 4."""
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """Cards and pictures, each drawn once: drawn(name) -> (card, pixels, folder)."""
+    from matplotlib.image import imread
+
+    folder = tmp_path_factory.mktemp("figures") / "made" / "on the way"
+    kept = {}
+
+    def get(name):
+        if name not in kept:
+            card = studies.draw(name, folder, quick=True)
+            kept[name] = card, np.asarray(imread(folder / card["file"]))[..., :3], folder
+        return kept[name]
+
+    return get
+
+
+@pytest.mark.parametrize("name", studies.FIGURES)
+def test_picture_is_not_blank(name, drawn):
+    _, pixels, _ = drawn(name)
+    paper = np.all(pixels > 0.99, axis=-1)
+    # the bodies take a tenth of the page at least, and some of the page stays white
+    assert 0.1 < np.mean(~paper) < 0.9
+    # nothing runs off the page: its rim is white
+    rim = np.concatenate([paper[0], paper[-1], paper[:, 0], paper[:, -1]])
+    assert rim.all()
+    # lines in colour, not only the grey of the body
+    assert np.mean(np.ptp(pixels, axis=-1) > 0.3) > 0.005
+
+
+@pytest.mark.parametrize("name", studies.FIGURES)
+def test_sidecar_says_what_was_drawn(name, drawn):
+    card, _, folder = drawn(name)
+    assert json.loads((folder / f"{name}.json").read_text()) == json.loads(json.dumps(card))
+    assert {"name", "title", "file", "parameters", "error", "headline", "seconds", "version", "quick"} == set(card)
+    assert card["title"].startswith(f"Figure {name[3]}")
+    assert f"{card['error']['rays']['rms']:.1e}" in card["headline"]
+
+
+@pytest.mark.parametrize("name", studies.FIGURES)
+def test_errors_are_those_of_the_map_added_up(name, drawn):
+    card, _, _ = drawn(name)
+    error, parameters = card["error"], card["parameters"]
+    assert 0 < error["map"]["rms"] <= MAP
+    assert error["rays"]["samples"] >= 16
+    leaps = parameters["time"] / parameters["T0"]
+    assert 0 < error["rays"]["rms"] <= GROWTH * leaps * error["map"]["rms"]
+
+
+def test_weighted_rays_are_exact(drawn):
+    """Over all rays, not only the traced ones, and against no integrator."""
+    card, _, _ = drawn("fig5-weighted")
+    error = card["error"]
+    assert error["exact"]["samples"] == card["parameters"]["rays"]
+    assert error["exact"]["rms"] <= GROWTH * card["parameters"]["time"] / card["parameters"]["T0"] * error["map"]["rms"]
+
+
+def test_exact_solution_is_one():
+    """The formulas of Figure 5 satisfy the traced flow, without any map."""
+    x, p = figure5_weighted.exact(np.array([0.3, 2.0, 4.5]), np.array([0.0, 0.7, 2.5]))
+    traced = cr.trace(figure5_weighted.BODY, x[:, 0], p[:, 0], [0.0, 0.7, 2.5], rtol=1e-12)
+    np.testing.assert_allclose(traced, (x, p), atol=1e-10)
+
+
+def test_caustic_is_where_neighbours_meet():
+    """On the conjugate locus x(t, alpha) stops moving with alpha; it moves by sin t or so elsewhere."""
+    from creeping.phaseflow.tracing import pack, trace_states
+    from studies._curves import directions_at
+
+    body, source = figure3_circles.BODY, figure3_circles.SOURCE
+    angles, step = np.linspace(0.2, 6.0, 12), 1e-4
+    times = np.linspace(0.0, 4.0, 65)
+    p = directions_at(body, source, angles)
+    x = np.broadcast_to(source, p.shape)
+    points, when = figure3_circles.first_caustic(trace_states(body, pack(x, p, jacobi=True), times, rtol=1e-12), times)
+    for angle, point, time in zip(angles, points, when, strict=True):
+        sides = directions_at(body, source, np.array([angle - step, angle + step]))
+        ends, _ = cr.trace(body, np.stack([source] * 2), sides, time, rtol=1e-12)
+        # cubics between times 1/16 apart: 1e-5
+        assert np.linalg.norm(ends[1] - ends[0]) / (2 * step) < 1e-4
+        np.testing.assert_allclose(ends.mean(axis=0), point, atol=1e-5)
+
+
+def test_titles_are_one_line_each():
+    titles = studies.titles()
+    assert list(titles) == list(studies.FIGURES)
+    assert all(title.startswith("Figure ") and title.endswith(".") for title in titles.values())
+
+
+def test_unknown_figure_leaves_nothing(tmp_path):
+    with pytest.raises(InvalidInputError, match="fig3-circles"):
+        studies.draw("fig7", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_failed_figure_leaves_nothing(tmp_path, monkeypatch):
+    def fail(path, quick):
+        path.write_bytes(b"half a picture")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(figure3_circles, "draw", fail)
+    with pytest.raises(CreepingError, match=r"fig3-circles\.png"):
+        studies.draw("fig3-circles", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_folder_that_is_a_file_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InvalidInputError, match="file"):
+        studies.draw("fig3-circles", tmp_path / "file")
+
+
+def test_importing_studies_imports_no_library():
+    code = (
+        "import sys, studies; studies.FIGURES; "
+        "assert not {'numpy', 'matplotlib', 'numba', 'scipy', 'trimesh'} & set(sys.modules); "
+        "studies.titles(); assert not {'matplotlib', 'numba', 'pyvista'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
