@@ -1,12 +1,13 @@
 """The picture in the plane of the body's parameters: (theta, phi), or (theta, psi) on a torus, in degrees."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.plotting._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._strokes import STATUS_COLOURS, LevelColours, ray_strokes, status_pieces
+from creeping.rays.seam import split_at_seam
 
 
 def plot_parameters(
@@ -47,7 +48,9 @@ def plot_parameters(
     if fan is not None:
         # finer than in space: near a pole phi turns fast
         for stroke in ray_strokes(fan, rays, np.inf if until is None else until, spacing=0.005):
-            pieces = [piece for points in stroke.lines for piece in unwrapped_pieces(body.parameters(points))]
+            pieces = [
+                piece for points in stroke.lines for piece in split_at_seam(body.parameters(points), closed=False)
+            ]
             _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
     colours = LevelColours.of(curves)
     for curve in curves:
@@ -56,7 +59,7 @@ def plot_parameters(
         _add(ax, curve.parameter_pieces, color=colours(curve.level), linewidth=1.0, label=label, zorder=3)
     for status in LINE_STATUSES:
         lines = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
-        pieces = [piece for points in lines for piece in unwrapped_pieces(body.parameters(points))]
+        pieces = _in_plane(body, lines)
         _add(ax, pieces, color=STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
     _frame(ax, torus=is_torus(line))
     if legend:
@@ -64,32 +67,9 @@ def plot_parameters(
     return ax
 
 
-def unwrapped_pieces(parameters: FloatArray) -> Iterator[FloatArray]:
-    """Split a curve (n, 2) where a parameter jumps by more than pi, and carry both ends on to the seam.
-
-    A jump is read as the shorter way round: the ends are joined by a straight line across the seam at +-pi.
-    """
-    start = 0
-    first: FloatArray | None = None
-    steps = np.diff(parameters, axis=0)
-    for k in np.flatnonzero(np.any(np.abs(steps) > np.pi, axis=1)):
-        turns = np.where(np.abs(steps[k]) > np.pi, -2 * np.pi * np.sign(steps[k]), 0.0)
-        way = steps[k] + turns
-        # only the seam crossed first counts where both parameters jump at once
-        crossed = turns != 0
-        reach = (np.where(way > 0, np.pi, -np.pi) - parameters[k])[crossed] / way[crossed]
-        fraction = float(np.clip(np.min(reach), 0.0, 1.0))
-        edge = parameters[k] + fraction * way
-        yield _joined(first, parameters[start : k + 1], edge)
-        first, start = edge - turns, int(k) + 1
-    piece = _joined(first, parameters[start:], None)
-    if len(piece) > 1:
-        yield piece
-
-
-def _joined(first: FloatArray | None, middle: FloatArray, last: FloatArray | None) -> FloatArray:
-    ends = [[] if first is None else [first], middle, [] if last is None else [last]]
-    return np.concatenate([np.reshape(np.asarray(part), (-1, 2)) for part in ends])
+def _in_plane(body: Any, lines: Sequence[FloatArray]) -> list[FloatArray]:
+    """Lines on the body (n, 3) as pieces of curves of its parameters (k, 2)."""
+    return [piece for points in lines for piece in split_at_seam(body.parameters(points), closed=False)]
 
 
 def is_torus(line: ShadowLineLike) -> bool:

@@ -13,6 +13,7 @@ from creeping._errors import InvalidInputError
 from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.phaseflow.geodesic import speed_of, speed_values, vector_field
 from creeping.rays.fan import RayFan
+from creeping.rays.seam import split_at_seam
 from creeping.surface import project
 
 
@@ -145,27 +146,3 @@ class _Hermite:
         points += h**2 * 0.5 * (s**2 - cube * (3 - 3 * s + s**2)) * self.acceleration[rays, k]
         points += h**2 * 0.5 * cube * (1 - 2 * s + s**2) * self.acceleration[rays, k + 1]
         return project(self.fan.body, points)
-
-
-def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:
-    """Split a curve of angles (m, 2) where one jumps by more than pi; both ends are carried to the seam at +-pi."""
-    path = np.concatenate([parameters, parameters[:1]]) if closed else parameters
-    pieces: list[FloatArray] = []
-    current = [path[0]]
-    for after in path[1:]:
-        # a step may cross the seams of both angles
-        for axis in (0, 1):
-            jump = after - current[-1]
-            if abs(jump[axis]) <= np.pi:
-                continue
-            side = np.sign(current[-1][axis]) or 1.0
-            short = jump - 2 * np.pi * np.round(jump / (2 * np.pi))
-            share = (side * np.pi - current[-1][axis]) / short[axis] if short[axis] != 0 else 0.0
-            crossing = current[-1] + np.clip(share, 0.0, 1.0) * short
-            entry = crossing.copy()
-            crossing[axis], entry[axis] = side * np.pi, -side * np.pi
-            pieces.append(np.array([*current, crossing]))
-            current = [entry]
-        current.append(after)
-    pieces.append(np.array(current))
-    return pieces

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from creeping.plotting import parameter_picture, picture, pictures
 from creeping.plotting._strokes import chosen_rays, refined, runs, status_pieces, strokes
 from creeping.plotting._view import View, shadow_view
 from creeping.plotting.display import GLProbe
-from creeping.plotting.parameter_plane import plot_parameters, unwrapped_pieces
+from creeping.plotting.parameter_plane import plot_parameters
 
 
 def pixels(path):
@@ -91,18 +90,6 @@ def test_axes_of_the_parameter_plane(sphere_line, body, name, span):
     ax = plot_parameters(line, ax=Figure().add_subplot())
     assert name in ax.get_xlabel()
     assert ax.get_ylim() == span
-
-
-def test_seam_is_crossed_at_pi():
-    turn = np.linspace(0, 4 * np.pi, 101)
-    phi = np.angle(np.exp(1j * turn))
-    pieces = list(unwrapped_pieces(np.stack([1 + 0.1 * turn, phi], axis=-1)))
-    assert len(pieces) == 3
-    for before, after in pairwise(pieces):
-        assert before[-1, 1] == pytest.approx(np.pi)
-        assert after[0, 1] == pytest.approx(-np.pi)
-        assert after[0, 0] == pytest.approx(before[-1, 0])
-    assert max(np.abs(np.diff(piece[:, 1])).max() for piece in pieces) < 0.2
 
 
 def test_status_pieces_join_and_close(sphere_line):

@@ -7,7 +7,6 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.rays.isophase import split_at_seam
 
 
 @pytest.fixture(scope="module")
@@ -90,21 +89,6 @@ def test_pieces_end_on_the_seam(twisted_fan):
         for piece in pieces:
             assert np.abs(np.diff(piece, axis=0)).max() <= np.pi
     assert crossed > 0
-
-
-def test_seam_of_both_angles_at_once():
-    path = np.array([[3.0, 3.0], [-3.0, -3.0], [-2.0, -2.9]])
-    pieces = split_at_seam(path, closed=False)
-    assert len(pieces) == 3
-    for piece in pieces:
-        assert np.abs(np.diff(piece, axis=0)).max() <= np.pi
-        assert np.abs(piece).max() <= np.pi + 1e-12
-
-
-def test_closed_curve_without_crossing_returns_to_its_start():
-    angle = np.linspace(0, 2 * np.pi, 20, endpoint=False)
-    (piece,) = split_at_seam(np.stack([1 + 0.5 * np.cos(angle), 0.5 * np.sin(angle)], axis=1), closed=True)
-    np.testing.assert_allclose(piece[0], piece[-1])
 
 
 @pytest.mark.parametrize("levels, of", [([np.nan], "travel_time"), ([0.1], "phase"), ([[0.1]], "eikonal")])
