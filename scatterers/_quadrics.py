@@ -96,32 +96,44 @@ class BentEllipsoid(Body):
 
 
 def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
-    """F, grad F and Hessian of a block; the compiled twin of level, gradient and hessian."""
+    """F, grad F and Hessian of a block; the compiled twin of level, gradient and hessian.
+
+    Each loop touches few rows: the compiler vectorises it only while it can check that they do not overlap.
+    """
     xx, yy, zz = 1 / parameters[0] ** 2, 1 / parameters[1] ** 2, 1 / parameters[2] ** 2
     d = parameters[3]
     n = points.shape[1]
-    # cos and sin first, in a loop of their own: the rest then vectorises
+    x, y, z = points[0], points[1], points[2]
+    straight, bend, slope = gradients[1], hessians[3], hessians[4]
+    # while they are not yet wanted for the Hessian, two of its rows hold d cos(pi z) and pi d sin(pi z)
     if d != 0.0:
         for i in range(n):
-            hessians[3, i] = d * math.cos(math.pi * points[2, i])
-            hessians[4, i] = d * math.sin(math.pi * points[2, i])
+            bend[i] = d * math.cos(math.pi * z[i])
+            slope[i] = math.pi * d * math.sin(math.pi * z[i])
+        for i in range(n):
+            straight[i] = y[i] - bend[i]
     else:
         for i in range(n):
-            hessians[3, i] = 0.0
-            hessians[4, i] = 0.0
+            bend[i] = slope[i] = 0.0
+            straight[i] = y[i]
     for i in range(n):
-        bend, slope = hessians[3, i], math.pi * hessians[4, i]
-        x, y, z = points[0, i], points[1, i] - bend, points[2, i]
-        values[i] = xx * x * x + yy * y * y + zz * z * z - 1.0
-        gradients[0, i] = 2 * xx * x
-        gradients[1, i] = 2 * yy * y
-        gradients[2, i] = 2 * zz * z + 2 * yy * y * slope
-        hessians[0, i] = 2 * xx
-        hessians[1, i] = 2 * yy
-        hessians[2, i] = 2 * zz + 2 * yy * (slope * slope + y * math.pi * math.pi * bend)
-        hessians[3, i] = 2 * yy * slope
-        hessians[4, i] = 0.0
-        hessians[5, i] = 0.0
+        values[i] = xx * x[i] * x[i] + zz * z[i] * z[i] - 1.0
+    for i in range(n):
+        values[i] += yy * straight[i] * straight[i]
+    for i in range(n):
+        gradients[0, i] = 2 * xx * x[i]
+    for i in range(n):
+        gradients[2, i] = 2 * zz * z[i] + 2 * yy * straight[i] * slope[i]
+    for i in range(n):
+        hessians[2, i] = 2 * zz + 2 * yy * (slope[i] * slope[i] + straight[i] * math.pi * math.pi * bend[i])
+    for i in range(n):
+        gradients[1, i] *= 2 * yy
+    for i in range(n):
+        hessians[3, i] = 2 * yy * slope[i]
+    hessians[0] = 2 * xx
+    hessians[1] = 2 * yy
+    hessians[4] = 0.0
+    hessians[5] = 0.0
 
 
 def _locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]

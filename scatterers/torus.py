@@ -113,23 +113,36 @@ class Torus(Body):
 
 
 def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
-    """F, grad F and Hessian of a block; the compiled twin of level, gradient and hessian."""
+    """F, grad F and Hessian of a block; the compiled twin of level, gradient and hessian.
+
+    Each loop touches few rows: the compiler vectorises it only while it can check that they do not overlap.
+    """
     major, scale = parameters[0], 2 / parameters[1] ** 2
-    for i in range(points.shape[1]):
-        x, y, z = points[0, i], points[1, i], points[2, i]
-        rho = max(math.sqrt(x * x + y * y), 1e-300)
-        ratio = major / rho
-        x1, y1 = x / rho, y / rho
-        values[i] = 0.5 * scale * ((rho - major) * (rho - major) + z * z) - 1.0
-        gradients[0, i] = scale * (1 - ratio) * x
-        gradients[1, i] = scale * (1 - ratio) * y
-        gradients[2, i] = scale * z
-        hessians[0, i] = scale * (1 - ratio * y1 * y1)
-        hessians[1, i] = scale * (1 - ratio * x1 * x1)
-        hessians[2, i] = scale
-        hessians[3, i] = 0.0
-        hessians[4, i] = 0.0
-        hessians[5, i] = scale * ratio * x1 * y1
+    x, y, z = points[0], points[1], points[2]
+    n = points.shape[1]
+    # while they are not yet wanted for the Hessian, two of its rows hold rho and R/rho
+    rho, ratio = hessians[3], hessians[4]
+    for i in range(n):
+        rho[i] = max(math.sqrt(x[i] * x[i] + y[i] * y[i]), 1e-300)
+    for i in range(n):
+        ratio[i] = major / rho[i]
+    for i in range(n):
+        values[i] = 0.5 * scale * ((rho[i] - major) * (rho[i] - major) + z[i] * z[i]) - 1.0
+    for i in range(n):
+        gradients[0, i] = scale * (1 - ratio[i]) * x[i]
+    for i in range(n):
+        gradients[1, i] = scale * (1 - ratio[i]) * y[i]
+    for i in range(n):
+        gradients[2, i] = scale * z[i]
+    for i in range(n):
+        hessians[0, i] = scale * (1 - ratio[i] * (y[i] / rho[i]) * (y[i] / rho[i]))
+    for i in range(n):
+        hessians[1, i] = scale * (1 - ratio[i] * (x[i] / rho[i]) * (x[i] / rho[i]))
+    for i in range(n):
+        hessians[5, i] = scale * ratio[i] * (x[i] / rho[i]) * (y[i] / rho[i])
+    hessians[2] = scale
+    hessians[3] = 0.0
+    hessians[4] = 0.0
 
 
 def _locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]

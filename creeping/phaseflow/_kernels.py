@@ -14,51 +14,61 @@ from numba import njit
 
 from creeping.phaseflow._contraction import contraction
 
-BLOCK = 32
+BLOCK = 64
 
 _options = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 
 
 @njit(**_options)
-def _right_hand_side(level, level_par, speed, speed_par, weighted, y, k, value, grad, hess, c, dc, ddc):
-    """Fill k with the derivative of y (lanes, BLOCK); value and grad keep F and grad F."""
-    level(y[:3], value, grad, hess, level_par)
-    jacobi = y.shape[0] > 6
+def _right_hand_side(level, level_par, speed, speed_par, weighted, y, k, geometry, weight):
+    """Fill k with the derivative of y (lanes, BLOCK).
+
+    ``geometry`` (10, BLOCK) keeps F, grad F and the Hessian of the block, ``weight`` those of the speed. Loops run over
+    flat arrays with constant row offsets: only then does the compiler see that rows do not overlap, and vectorise.
+    """
+    level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+    yf, kf, g = y.reshape(-1), k.reshape(-1), geometry.reshape(-1)
     for i in range(BLOCK):
-        px, py, pz = y[3, i], y[4, i], y[5, i]
-        gx, gy, gz = grad[0, i], grad[1, i], grad[2, i]
-        xx, yy, zz, yz, xz, xy = hess[0, i], hess[1, i], hess[2, i], hess[3, i], hess[4, i], hess[5, i]
-        inverse = 1.0 / (gx * gx + gy * gy + gz * gz)
-        bent = px * (xx * px + 2 * (xy * py + xz * pz)) + py * (yy * py + 2 * yz * pz) + pz * zz * pz
-        turn = -bent * inverse
-        k[0, i], k[1, i], k[2, i] = px, py, pz
-        k[3, i], k[4, i], k[5, i] = turn * gx, turn * gy, turn * gz
-        if jacobi:
-            curvature = (
-                gx * gx * (yy * zz - yz * yz)
-                + gy * gy * (xx * zz - xz * xz)
-                + gz * gz * (xx * yy - xy * xy)
-                + 2 * gy * gz * (xy * xz - xx * yz)
-                + 2 * gx * gz * (xy * yz - yy * xz)
-                + 2 * gx * gy * (xz * yz - zz * xy)
-            )
-            # parked in a lane of k that is overwritten below
-            k[7, i] = curvature * inverse * inverse
+        px, py, pz = yf[3 * BLOCK + i], yf[4 * BLOCK + i], yf[5 * BLOCK + i]
+        gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
+        bent = px * px * g[4 * BLOCK + i] + py * py * g[5 * BLOCK + i] + pz * pz * g[6 * BLOCK + i]
+        bent += 2 * (py * pz * g[7 * BLOCK + i] + px * pz * g[8 * BLOCK + i] + px * py * g[9 * BLOCK + i])
+        turn = -bent / (gx * gx + gy * gy + gz * gz)
+        kf[i], kf[BLOCK + i], kf[2 * BLOCK + i] = px, py, pz
+        kf[3 * BLOCK + i], kf[4 * BLOCK + i], kf[5 * BLOCK + i] = turn * gx, turn * gy, turn * gz
+    if y.shape[0] > 6:
+        _gaussian_curvature(g, kf)
     if weighted:
-        _add_weight(speed, speed_par, y, k, grad, hess, c, dc, ddc)
-    if jacobi:
+        _add_weight(speed, speed_par, y, k, geometry, weight)
+    if y.shape[0] > 6:
         for i in range(BLOCK):
-            curvature = k[7, i]
-            k[6, i] = y[7, i]
-            k[7, i] = -curvature * y[6, i]
-            k[8, i] = y[9, i]
-            k[9, i] = -curvature * y[8, i]
+            curvature = kf[7 * BLOCK + i]
+            kf[6 * BLOCK + i] = yf[7 * BLOCK + i]
+            kf[7 * BLOCK + i] = -curvature * yf[6 * BLOCK + i]
+            kf[8 * BLOCK + i] = yf[9 * BLOCK + i]
+            kf[9 * BLOCK + i] = -curvature * yf[8 * BLOCK + i]
 
 
 @njit(**_options)
-def _add_weight(speed, speed_par, y, k, grad, hess, c, dc, ddc):
+def _gaussian_curvature(g, kf):
+    """Put K = (grad F.adj(H) grad F)/|grad F|^4 into row 7 of k, which is free until the Jacobi lanes are filled."""
+    for i in range(BLOCK):
+        gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
+        xx, yy, zz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i]
+        yz, xz, xy = g[7 * BLOCK + i], g[8 * BLOCK + i], g[9 * BLOCK + i]
+        total = gx * gx * (yy * zz - yz * yz) + gy * gy * (xx * zz - xz * xz) + gz * gz * (xx * yy - xy * xy)
+        total += 2 * gy * gz * (xy * xz - xx * yz)
+        total += 2 * gx * gz * (xy * yz - yy * xz)
+        total += 2 * gx * gy * (xz * yz - zz * xy)
+        square = gx * gx + gy * gy + gz * gz
+        kf[7 * BLOCK + i] = total / (square * square)
+
+
+@njit(**_options)
+def _add_weight(speed, speed_par, y, k, geometry, weight):
     """Turn the plain derivative into that of the weighted flow."""
-    speed(y[:3], c, dc, ddc, speed_par)
+    speed(y[:3], weight[0], weight[1:4], weight[4:], speed_par)
+    grad, hess, c, dc, ddc = geometry[1:4], geometry[4:], weight[0], weight[1:4], weight[4:]
     for i in range(BLOCK):
         px, py, pz = y[3, i], y[4, i], y[5, i]
         gx, gy, gz = grad[0, i], grad[1, i], grad[2, i]
@@ -84,19 +94,21 @@ def _add_weight(speed, speed_par, y, k, grad, hess, c, dc, ddc):
 
 
 @njit(**_options)
-def _project_block(y, value, grad):
+def _project_block(y, geometry):
     """One Newton step of x onto F = 0 and p onto the tangent plane, with F and grad F at x."""
+    yf, g = y.reshape(-1), geometry.reshape(-1)
     for i in range(BLOCK):
-        gx, gy, gz = grad[0, i], grad[1, i], grad[2, i]
+        gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
         inverse = 1.0 / (gx * gx + gy * gy + gz * gz)
-        step = value[i] * inverse
-        y[0, i] -= step * gx
-        y[1, i] -= step * gy
-        y[2, i] -= step * gz
-        lean = (y[3, i] * gx + y[4, i] * gy + y[5, i] * gz) * inverse
-        px, py, pz = y[3, i] - lean * gx, y[4, i] - lean * gy, y[5, i] - lean * gz
+        step = g[i] * inverse
+        yf[i] -= step * gx
+        yf[BLOCK + i] -= step * gy
+        yf[2 * BLOCK + i] -= step * gz
+        px, py, pz = yf[3 * BLOCK + i], yf[4 * BLOCK + i], yf[5 * BLOCK + i]
+        lean = (px * gx + py * gy + pz * gz) * inverse
+        px, py, pz = px - lean * gx, py - lean * gy, pz - lean * gz
         norm = 1.0 / math.sqrt(px * px + py * py + pz * pz)
-        y[3, i], y[4, i], y[5, i] = px * norm, py * norm, pz * norm
+        yf[3 * BLOCK + i], yf[4 * BLOCK + i], yf[5 * BLOCK + i] = px * norm, py * norm, pz * norm
 
 
 @njit(**_options)
@@ -161,15 +173,14 @@ def integrate(
     stages = b.shape[0]
     k = np.empty((stages + 1, lanes, BLOCK))
     y, z = np.empty((lanes, BLOCK)), np.empty((lanes, BLOCK))
-    value, grad, hess = np.empty(BLOCK), np.empty((3, BLOCK)), np.empty((6, BLOCK))
-    c, dc, ddc = np.empty(BLOCK), np.empty((3, BLOCK)), np.empty((6, BLOCK))
+    geometry, weight = np.empty((10, BLOCK)), np.empty((10, BLOCK))
     failed = 0
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(BLOCK):
             for lane in range(lanes):
                 y[lane, i] = states[start + min(i, count - 1), lane]
-        _right_hand_side(level, level_par, speed, speed_par, weighted, y, k[0], value, grad, hess, c, dc, ddc)
+        _right_hand_side(level, level_par, speed, speed_par, weighted, y, k[0], geometry, weight)
         now, h, good = 0.0, step, True
         for m in range(times.shape[0]):
             used = 0
@@ -180,9 +191,7 @@ def integrate(
                 # stages
                 for s in range(1, stages + 1):
                     _combine(trial, b if s == stages else a[s], k[:s].reshape(s, -1), y.reshape(-1), z.reshape(-1))
-                    _right_hand_side(
-                        level, level_par, speed, speed_par, weighted, z, k[s], value, grad, hess, c, dc, ddc
-                    )
+                    _right_hand_side(level, level_par, speed, speed_par, weighted, z, k[s], geometry, weight)
                 used += 1
                 error = 0.0 if rtol == 0.0 else _error_norm(k, e3, e5, y, z, scale, rtol, trial)
                 if used > max_steps or trial < 1e-12 * step:
@@ -192,7 +201,7 @@ def integrate(
                 elif not _finite(z):
                     good = False
                 else:
-                    _project_block(z, value, grad)
+                    _project_block(z, geometry)
                     left = 0.0 if trial >= left else left - trial
                     for lane in range(lanes):
                         for i in range(BLOCK):
@@ -260,7 +269,7 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
     """
     n, lanes = states.shape
     y = np.empty((6, BLOCK))
-    value, grad, hess = np.empty(BLOCK), np.empty((3, BLOCK)), np.empty((6, BLOCK))
+    geometry = np.empty((10, BLOCK))
     chart, uv, frame = np.empty(BLOCK, np.int64), np.empty((2, BLOCK)), np.empty((6, BLOCK))
     wu, wv, wa, d = np.empty(8), np.empty(8), np.empty(8), np.empty(12)
     last_u = table.shape[1] - degree
@@ -300,12 +309,12 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
                 for lane in range(6):
                     y[lane, i] = y[lane, count - 1]
             for _newton in range(4):
-                level(y[:3], value, grad, hess, level_par)
+                level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
                 off = 0.0
                 for i in range(BLOCK):
-                    slope = math.sqrt(grad[0, i] ** 2 + grad[1, i] ** 2 + grad[2, i] ** 2)
-                    off = max(off, abs(value[i]) / slope)
-                _project_block(y, value, grad)
+                    slope = math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
+                    off = max(off, abs(geometry[0, i]) / slope)
+                _project_block(y, geometry)
                 if off <= tolerance:
                     break
         for i in range(count):
