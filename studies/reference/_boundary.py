@@ -1,8 +1,10 @@
 """The boundary conditions of the references, in one form.
 
-    alpha u + (beta/k) ∂u/∂n = 0:   soft alpha = 1, beta = 0;   hard alpha = 0, beta = 1;   impedance eta: alpha = i eta, beta = 1
+    alpha u + (beta/k) ∂u/∂n = 0
 
-The time factor is e^{-iωt}, n the outward normal, eta = rhoc/Z, passive for Re eta ≥ 0.
+soft: alpha = 1, beta = 0; hard: alpha = 0, beta = 1; impedance eta: alpha = i eta, beta = 1.
+
+The time factor is e^{-iωt}, n the outward normal, eta = rho c/Z, passive for Re eta ≥ 0.
 """
 
 from typing import Literal, TypeAlias
@@ -28,7 +30,7 @@ def condition(boundary: Boundary) -> tuple[complex, complex]:
 def series_length(x: float) -> int:
     """Orders after which the series of a body of size x = ka has converged to rounding.
 
-    J_n(x) falls beyond n = x like Ai(zeta), zeta = (2/x)^{1/3} (n - x): 12 x^{1/3} past x it is below 1e-16. Not many more,
+    J_n(x) falls beyond n = x like Ai(z), z = (2/x)^{1/3} (n - x): 12 x^{1/3} past x it is below 1e-16. Not many more,
     lest H_n(x), which grows as J_n falls, overflow at small x.
     """
     return int(x + 12 * x ** (1 / 3)) + 12

@@ -2,9 +2,12 @@
 
 With x = ka, phi from the forward direction, alpha u + (beta/k) ∂u/∂n = 0, ε₀ = 1 and εₙ = 2,
 
-    u_s = Σ εₙ iⁿ cₙ Hₙ(kr) cos nphi,    cₙ = -(alpha Jₙ + beta Jₙ')/Dₙ,    Dₙ = alpha Hₙ + beta Hₙ',    all at x
-    u_s ~ F e^{ikr}/√r,    F = √(2/πk) e^{-iπ/4} Σ εₙ cₙ cos nphi
-    on the surface, by the Wronskian:   u = beta (2i/πx) Σ εₙ iⁿ cos nphi/Dₙ,   ∂u/∂n = -alpha k (2i/πx) Σ εₙ iⁿ cos nphi/Dₙ
+    u_s = Σ εₙ iⁿ cₙ Hₙ(kr) cos(n phi),    cₙ = -(alpha Jₙ + beta Jₙ')/Dₙ,    Dₙ = alpha Hₙ + beta Hₙ',    all at x
+    u_s ~ F e^{ikr}/√r,    F = √(2/πk) e^{-iπ/4} Σ εₙ cₙ cos(n phi)
+
+and on the surface, by the Wronskian,
+
+    u = beta (2i/πx) Σ εₙ iⁿ cos(n phi)/Dₙ,    ∂u/∂n = -alpha k (2i/πx) Σ εₙ iⁿ cos(n phi)/Dₙ
 """
 
 import numpy as np
@@ -25,7 +28,7 @@ def _coefficients(x: float, boundary: Boundary) -> tuple[ComplexArray, ComplexAr
 
 
 def _angular_sum(coefficients: ComplexArray, phi: ArrayLike) -> ComplexArray:
-    """Σ εₙ coefficientₙ cos nphi: (N,), (m,) -> (m,)."""
+    """Σ εₙ coefficientₙ cos(n phi): (N,), (m,) -> (m,)."""
     n = np.arange(len(coefficients))
     weights = np.where(n == 0, 1.0, 2.0) * coefficients
     return np.asarray(np.cos(np.multiply.outer(np.asarray(phi, dtype=float), n)) @ weights)
@@ -81,7 +84,7 @@ def surface_derivative(wavenumber: float, radius: float, phi: ArrayLike, boundar
 
 
 def _surface_sum(wavenumber: float, radius: float, phi: ArrayLike, boundary: Boundary) -> ComplexArray:
-    """(2i/πx) Σ εₙ iⁿ cos nphi/Dₙ: (m,) -> (m,)."""
+    """(2i/πx) Σ εₙ iⁿ cos(n phi)/Dₙ: (m,) -> (m,)."""
     positive(wavenumber=wavenumber, radius=radius)
     x = wavenumber * radius
     _, denominators = _coefficients(x, boundary)

@@ -4,7 +4,10 @@ With x = ka, alpha u + (beta/k) ∂u/∂n = 0 on the sphere, and c = d.r the cos
 
     u_s = Σ iⁿ (2n+1) cₙ hₙ(kr) Pₙ(c),    cₙ = -(alpha jₙ + beta jₙ')/Dₙ,    Dₙ = alpha hₙ + beta hₙ',    all at x
     f = (1/ik) Σ (2n+1) cₙ Pₙ(c)
-    on the surface, by the Wronskian:   u = beta (i/x²) Σ iⁿ (2n+1) Pₙ/Dₙ,   ∂u/∂n = -alpha k (i/x²) Σ iⁿ (2n+1) Pₙ/Dₙ
+
+and on the surface, by the Wronskian,
+
+    u = beta (i/x²) Σ iⁿ (2n+1) Pₙ/Dₙ,   ∂u/∂n = -alpha k (i/x²) Σ iⁿ (2n+1) Pₙ/Dₙ
 
 hₙ is climbed by its recurrence, which is stable for the growing solution; jₙ comes from scipy.
 
@@ -76,7 +79,7 @@ def _cosines(cos_theta: ArrayLike) -> FloatArray:
     worst = float(np.max(np.abs(c), initial=0.0))
     if not worst <= 1 + 1e-9:
         raise ValueError(f"cosines go to {worst!r}; they are cosines of angles: hold them to [-1, 1]")
-    return np.clip(c, -1.0, 1.0)
+    return np.asarray(np.clip(c, -1.0, 1.0), dtype=float)
 
 
 def _angular_sum(coefficients: ComplexArray, c: FloatArray) -> ComplexArray:
