@@ -40,7 +40,7 @@ def test_total_less_creeping_is_one_smooth_reflected_wave(boundary):
 
 
 def test_pole_solves_the_characteristic_equation():
-    # by another Hankel function, an integral, good to 1e-8 where the two saddles cancel
+    # by another Hankel function, an integral, good to 1e-7 here, where its two saddles cancel
     x = 30.0
     t = np.linspace(-6.0, 6.0, 4001)
     path = t + 1j * np.pi * 0.5 * (1 + np.tanh(t))
@@ -55,10 +55,10 @@ def test_pole_solves_the_characteristic_equation():
         for lam in watson.poles(x, 1.0, boundary, 3):
             h, dh = hankel(lam), hankel(lam - 1) - lam / x * hankel(lam)
             if boundary == "soft":
-                assert abs(h) < 1e-8 * abs(dh)
+                assert abs(h) < 1e-6 * abs(dh)
             else:
                 eta = 0.0 if boundary == "hard" else boundary
-                assert abs((1j * eta - 1 / (2 * x)) * h + dh) < 1e-8 * abs(h)
+                assert abs((1j * eta - 1 / (2 * x)) * h + dh) < 1e-6 * abs(h)
     assert h1vp(31.0, x) == pytest.approx(hankel(30.0) - 31 / x * hankel(31.0), rel=1e-10)
 
 
