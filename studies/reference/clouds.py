@@ -11,7 +11,7 @@ plane; the other points are their images.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -66,7 +66,7 @@ class Body:
         table = np.concatenate([np.zeros((1, len(phi) - 1)), np.cumsum(cells, axis=0)])
         upright: list[FloatArray] = []
         periodic = not {0, 1} & set(self.mirrors)
-        for band, (low, high) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        for band, (low, high) in enumerate(pairwise(edges.tolist())):
             share = np.array([np.interp(high, z, column) - np.interp(low, z, column) for column in table.T])
             filled = np.concatenate([[0.0], np.cumsum(share)])
             count = max(1, round(filled[-1] / spacing**2))
@@ -153,8 +153,10 @@ def star(level: Field, gradient: Field, mirrors: tuple[int, ...] = (), start: fl
             r = r - np.clip(step, -0.5 * r, 0.5 * r)
             if np.max(np.abs(step)) < 1e-13 * start:
                 return np.asarray(r[..., None] * X)
+        lost = np.abs(step) > 1e-13 * start
         raise RuntimeError(
-            f"{np.sum(np.abs(step) > 1e-13 * start)} of {r.size} rays found no surface (last step {np.abs(step).max():.1e})"
+            f"{lost.sum()} of {r.size} rays found no surface (last step {np.abs(step).max():.1e}); "
+            "the body must be star-shaped about the origin"
         )
 
     return Body(to_body, gradient, mirrors)

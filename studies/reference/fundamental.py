@@ -159,7 +159,7 @@ def solve(
         matrix = np.zeros_like(blocks[0])
         for sign, block in zip(signs, blocks, strict=True):
             matrix += sign * block
-        right = -np.tensordot(signs, waves, axes=1) / len(group)
+        right = np.asarray(-np.tensordot(signs, waves, axes=1) / len(group), dtype=complex)
         classes.append(_least_squares(matrix, right))
     # q at the image g y: Σ_s chi_s(g) q_s
     strengths = np.concatenate([np.tensordot(signs, np.stack(classes), axes=1) for signs in characters.T])
