@@ -1,5 +1,8 @@
 """Partial waves of the sphere, against identities that do not use them."""
 
+import ast
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -132,3 +135,11 @@ def test_refusals():
         sphere.far_field(1.0, 1.0, [1.0], "firm")
     with pytest.raises(ValueError, match="wavenumber"):
         sphere.far_field(-1.0, 1.0, [1.0], "soft")
+
+
+def test_references_import_nothing_of_what_they_judge():
+    for module in Path(sphere.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            assert not [name for name in names if name.split(".")[0] in ("creeping", "scatterers")], module
