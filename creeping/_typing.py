@@ -8,5 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+ComplexArray = NDArray[np.complex128]
 
-__all__ = ["Any", "ArrayLike", "BoolArray", "FloatArray", "IntArray"]
+__all__ = ["Any", "ArrayLike", "BoolArray", "ComplexArray", "FloatArray", "IntArray"]

@@ -54,16 +54,7 @@ def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
     length = np.linalg.norm(p, axis=-1, keepdims=True)
     if np.any(length == 0):
         raise InvalidInputError(f"{int(np.sum(length == 0))} of {length.size} directions are zero")
-    distance = distance_to_body(body, x)
-    off = ~(distance <= OFF_BODY * size(body))
-    if off.any():
-        worst = float(np.nanmax(distance))
-        raise InvalidInputError(
-            f"{int(off.sum())} of {off.size} points are off the body (worst by {worst:.3g} L); project them first",
-            count=int(off.sum()),
-            worst=worst,
-        )
-    x = project(body, x)
+    x = on_body(body, x)
     n = normal(body, x)
     p = p / length
     tangent = p - np.sum(p * n, axis=-1, keepdims=True) * n
@@ -73,6 +64,28 @@ def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
             f"{int(np.sum(norm < 1e-6))} of {norm.size} directions are normal to the body; a ray needs a tangent"
         )
     return x, tangent / norm
+
+
+def on_body(body: Surface, points: FloatArray) -> FloatArray:
+    """Put points within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
+
+    Raises
+    ------
+    InvalidInputError
+        On a wrong shape, a value that is not finite, or a point farther off.
+    """
+    if points.ndim == 0 or points.shape[-1] != 3:
+        raise InvalidInputError(f"points have shape {points.shape}; the last axis must hold x, y, z")
+    distance = distance_to_body(body, points)
+    off = ~(distance <= OFF_BODY * size(body))
+    if off.any():
+        worst = float(np.nanmax(np.where(off, distance, 0.0)))
+        raise InvalidInputError(
+            f"{int(off.sum())} of {off.size} points are off the body (worst by {worst:.3g} L); project them first",
+            count=int(off.sum()),
+            worst=worst,
+        )
+    return project(body, points)
 
 
 def distance_to_body(body: Surface, points: FloatArray) -> FloatArray:

@@ -142,23 +142,29 @@ def _bisect(
     return np.asarray(0.5 * (low + high))
 
 
-def occluded(body: Surface, points: FloatArray, direction: FloatArray) -> BoolArray:
-    """Whether the backward ray from convex points of the shadow line enters the body: (n, 3) -> (n,)."""
+def occluded(
+    body: Surface, points: FloatArray, direction: FloatArray, reach: FloatArray | float = np.inf
+) -> BoolArray:
+    """Whether the backward ray x - t d, 0 < t < reach, enters the body: points (n, 3), d (3,) or (n, 3) -> (n,).
+
+    It leaves a point along the normal's side, or touches there from a convex side.
+    """
     if not len(points):
         return np.zeros(0, dtype=bool)
     box = np.asarray(body.bounds, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         exits = np.where(direction > 0, (points - box[0]) / direction, (points - box[1]) / direction)
-    reach = np.min(np.where(direction != 0, exits, np.inf), axis=1)
     # a point on the face of the box, or just beyond it by rounding, has nothing behind
-    reach = np.maximum(reach, 1e-3 * size(body))
+    inside = np.maximum(np.min(np.where(direction != 0, exits, np.inf), axis=1), 1e-3 * size(body))
+    reach = np.minimum(inside, reach)
     t = reach[:, None] * (np.arange(1, RAY_SAMPLES + 2) / RAY_SAMPLES)
-    F = body.level(points[:, None] - t[..., None] * direction)
+    direction = np.broadcast_to(direction, points.shape)
+    F = body.level(points[:, None] - t[..., None] * direction[:, None])
     hit = np.asarray(np.any(F < 0, axis=1))
     ray, j = np.nonzero((F[:, 1:-1] < F[:, :-2]) & (F[:, 1:-1] <= F[:, 2:]) & ~hit[:, None])
     if len(ray):
         step = reach[ray] / RAY_SAMPLES
-        deepest = _minima(body, points[ray], direction, t[ray, j + 1], step)
+        deepest = _minima(body, points[ray], direction[ray], t[ray, j + 1], step)
         hit[ray[deepest < 0]] = True
     return hit
 
@@ -168,8 +174,8 @@ def _minima(body: Surface, points: FloatArray, direction: FloatArray, t: FloatAr
     start = t
     for _ in range(6):
         x = points - t[:, None] * direction
-        slope = -body.gradient(x) @ direction
-        bend = np.einsum("mij,i,j->m", body.hessian(x), direction, direction)
+        slope = -np.sum(body.gradient(x) * direction, axis=1)
+        bend = np.einsum("mij,mi,mj->m", body.hessian(x), direction, direction)
         with np.errstate(divide="ignore", invalid="ignore"):
             move = np.where(bend > 0, -slope / bend, -np.sign(slope) * 0.25 * step)
         t = np.clip(t + move, start - step, start + step)

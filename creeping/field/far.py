@@ -1,0 +1,223 @@
+"""The far field of a plane wave: u_s ~ f(r) e^{ikR}/R, every direction, uniform across the caustics that we know of.
+
+    f = w F + (1 - w) [(1 - v) f_rays + v f_fan + f_reflected] + w W(θ; 4°, 12°) f_rays, long ones only
+
+with θ the angle from d, m̄ the mean of m over the shadow line and W a smooth step,
+
+    w = 1 - W(m̄ θ; 0.7, 1.2)                  F the forward lobe (`creeping.field.forward`)
+    v = W(min χ; 0.38, 0.52) for θ > 90°      χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > 0.9
+    f_rays = Σ -√(m1 m2) √(2/k) P |J'|^(-1/2) e^{-iπN/2} e^{ik(d.x0 + s - r.x)}   all rays with p = r
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.field.coefficients import Boundary, BoundaryLike, fock_scale, scalar_boundaries
+from creeping.field.far_geometry import FarGeometry, far_geometry
+from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
+from creeping.field.launching import scales, shed_wave, smoothstep
+from creeping.field.polarisation import dyads, wave_frame
+from creeping.field.reflected import reflected_amplitude
+from creeping.rays.fan import RayFan
+
+FORWARD = (0.7, 1.2)
+"""m̄ θ between which the forward lobe gives way."""
+NEAR_AXIS = (0.15, 0.3)
+"""m̄ θ between which its silhouette gives way to the poles."""
+LONG_RAYS = (np.radians(4.0), np.radians(12.0))
+MERGED = (0.38, 0.52)
+"""χ between which the fan integral replaces isolated rays."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FarField:
+    """Far field in m directions, a length; scalar, or (θ̂, φ̂) scattered by (θ̂, φ̂) incident.
+
+    Attributes
+    ----------
+    directions : (m, 3)
+        Unit r, from the body to the observer.
+    creeping, reflected, forward : (m,) or (m, 2, 2) complex, L
+        Parts; where parts are blended each carries its weight.
+    method : (m,) of str
+        What served the creeping part: "forward", "rays", "fan", or several joined by "+".
+    unresolved : (m,) of bool
+        Whether a part of the forward lobe found no point on the body (strongly concave ground).
+    wavenumber : float, 1/L
+    boundary : str
+    order : int
+    """
+
+    directions: FloatArray
+    creeping: ComplexArray
+    reflected: ComplexArray
+    forward: ComplexArray
+    method: np.ndarray[Any, np.dtype[np.str_]]
+    unresolved: BoolArray
+    wavenumber: float
+    boundary: str
+    order: int
+
+    @property
+    def total(self) -> ComplexArray:
+        """Sum of the parts."""
+        return np.asarray(self.creeping + self.reflected + self.forward)
+
+    @property
+    def cross_section(self) -> FloatArray:
+        """4π|f|², L²."""
+        return np.asarray(4 * np.pi * np.abs(self.total) ** 2)
+
+    def __repr__(self) -> str:
+        names, counts = np.unique(self.method, return_counts=True)
+        served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
+        return (
+            f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, order {self.order})\n"
+            f"  {served or 'none'}\n"
+            f"  |f| up to {np.max(np.abs(self.total), initial=0.0):.4g} L; {int(self.unresolved.sum())} unresolved"
+        )
+
+
+def far_field(
+    fan: RayFan, observation: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> FarField:
+    """Far field scattered by the body of a fan.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Long enough to pass where rays leave towards the observers; rays beyond its length are left out.
+    observation : (..., 3)
+        Directions r from the body to the observers; need not be unit. Flattened to (m, 3).
+    wavenumber : float, 1/L
+    boundary : "soft", "hard", "pec" or Impedance
+    order : 2 or 1
+        Second-order creeping waves, or the leading order.
+
+    Returns
+    -------
+    FarField
+        Geometry is kept with the fan: another frequency or boundary for the same directions costs less.
+
+    Raises
+    ------
+    InvalidInputError
+        On bad directions, wavenumber, boundary or order, and for a weighted body.
+    """
+    kinds = scalar_boundaries(boundary)
+    k = checked(wavenumber, order)
+    geometry = far_geometry(fan, observation, k)
+    parts = _Parts(geometry, len(kinds), k, order)
+    for number, kind in enumerate(kinds):
+        parts.add(number, kind)
+    return FarField(
+        directions=geometry.directions,
+        creeping=parts.creeping,
+        reflected=parts.reflected,
+        forward=parts.forward,
+        method=_methods(parts.in_forward, parts.in_fan),
+        unresolved=geometry.unresolved(parts.in_forward > 0),
+        wavenumber=k,
+        boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.eta:g}",
+        order=order,
+    )
+
+
+def checked(wavenumber: float, order: int) -> float:
+    """The wavenumber, if it and the order are usable."""
+    try:
+        k = float(wavenumber)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a number") from error
+    if not (np.isfinite(k) and k > 0):
+        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a positive finite number")
+    if order not in (1, 2):
+        raise InvalidInputError(f"order = {order!r} is neither 1 nor 2")
+    return k
+
+
+def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
+    """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
+    rays = geometry.shed.rays
+    m1, m2 = scales(rays, wavenumber)
+    phase = wavenumber * (rays.eikonal - np.sum(rays.directions * rays.points, axis=-1)) - 0.5 * np.pi * rays.far_caustics
+    with np.errstate(divide="ignore", invalid="ignore"):
+        amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / np.abs(rays.spreading_rate))
+        wave = amplitude * shed_wave(rays, wavenumber, boundary, order) * np.exp(1j * phase)
+    return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
+
+
+class _Parts:
+    """Weighted parts of the far field, summed contribution by contribution."""
+
+    def __init__(self, geometry: FarGeometry, kinds: int, wavenumber: float, order: int) -> None:
+        self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
+        self.vector = kinds == 2
+        m = len(geometry.directions)
+        self.creeping, self.reflected, self.forward = (
+            np.zeros((m, 2, 2) if self.vector else m, dtype=complex) for _ in range(3)
+        )
+        theta = geometry.angle
+        m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
+        self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
+        self.beyond_axis = smoothstep(m_theta, *NEAR_AXIS)
+        self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.merging, *MERGED), 0.0)
+        self.long_rays = self.in_forward * smoothstep(theta, *LONG_RAYS)
+
+    def add(self, number: int, kind: Boundary) -> None:
+        """Add every part of one scalar problem."""
+        g, k, order = self.geometry, self.wavenumber, self.order
+        w, d = self.in_forward, g.direction
+        shed = g.shed
+        share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
+        wave = _weighted(share, isolated_rays(g, k, kind, order))
+        n0, n = shed.rays.first_normal, g.shed_normals
+        self._sum(self.creeping, number, shed.observer, wave, n0, n)
+        fan = g.fan_nodes(k, self.in_fan > 0)
+        wave = _weighted(((1 - w) * self.in_fan)[fan.observer], fan_half(fan, g.directions, k, kind, order))
+        self._sum(self.creeping, number, fan.observer, wave, fan.rays.first_normal, g.normals_of(fan.rays.points))
+        s = g.specular
+        wave = _weighted((1 - w)[s.observer], reflected_amplitude(s, g.directions, d, k, kind, order))
+        self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
+        shadow, lit = g.forward_nodes(k, w > 0)
+        wave = shadow_half(shadow, g.directions, d, k, kind, order, self.beyond_axis[shadow.observer])
+        wave = _weighted(w[shadow.observer], wave)
+        self._sum(self.forward, number, shadow.observer, wave, shadow.rays.first_normal, g.normals_of(shadow.rays.points))
+        wave = lit_half(lit, g.directions, d, k, kind, order, self.beyond_axis[lit.observer])
+        self._sum(self.forward, number, lit.observer, _weighted(w[lit.observer], wave), lit.normals, lit.normals)
+        ahead = np.flatnonzero((w > 0) & (self.beyond_axis < 1))
+        wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(g.line, g.directions[ahead], k)
+        aside = np.cross(np.broadcast_to(d, (len(ahead), 3)), g.directions[ahead])
+        self._sum(self.forward, number, ahead, wave, aside, aside)
+
+    def _sum(
+        self, into: ComplexArray, number: int, observer: IntArray, wave: ComplexArray, n0: FloatArray, n: FloatArray
+    ) -> None:
+        """Add contributions (n,) of normals n0 where they land and n where they leave (n, 3)."""
+        if not self.vector:
+            np.add.at(into, observer, wave)
+            return
+        d, r = self.geometry.direction, self.geometry.directions[observer]
+        incident = np.broadcast_to(d, r.shape)
+        spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=-1)])
+        spare /= np.maximum(np.linalg.norm(spare, axis=-1, keepdims=True), 1e-300)
+        pair = dyads(wave_frame(n0, incident, spare), wave_frame(n, r, spare), d, r)
+        np.add.at(into, observer, wave[:, None, None] * pair[:, number])
+
+
+def _weighted(share: FloatArray, wave: ComplexArray) -> ComplexArray:
+    """Product, 0 where the share is 0 even if the wave is infinite there."""
+    return np.asarray(np.where(share != 0, share * np.where(share != 0, wave, 0.0), 0.0))
+
+
+def _methods(forward: FloatArray, fan: FloatArray) -> np.ndarray[Any, np.dtype[np.str_]]:
+    names = []
+    for w, v in zip(forward, fan, strict=True):
+        used = [name for name, share in (("forward", w), ("rays", (1 - w) * (1 - v)), ("fan", (1 - w) * v)) if share > 0]
+        names.append("+".join(used))
+    return np.array(names, dtype="<U16")
+
+

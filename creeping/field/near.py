@@ -1,0 +1,181 @@
+"""The diffracted field at points near the body, in its shadow: every ray whose tangent passes through the point.
+
+    u = D e^{ik(d.x0 + s + l)} / √(l |J + l J'|) e^{-iπN/2},   D = -√(m1 m2) √(2/k) P̂(ξ, Y),   Y = (m2 l/ρ2)²
+    P̂ = 2i√π e^{iπ/4} Σ_p R_p A_p exp{...} H_p(Y),   H_p the height gain, launch factor to the power Y/(1 + Y)
+
+The leading order is Fock's integral of the same modes, which holds down to ξ = 0, or, at great Y, UTD's form with
+X = k l ξ²/(2 m1 m2),
+
+    P̂ = P(ξ) + (e^{iπ/4}/(2√π ξ)) [1 - F_t(X)].
+
+N counts zeros of J on (0, s) and of J + l' J' on (0, l).
+"""
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping.field.coefficients import Boundary, BoundaryLike, modes_of
+from creeping.field.far import checked
+from creeping.field.far_geometry import fan_strips
+from creeping.field.fock import FAR_HEIGHT, height_gain, near_pekeris, pekeris, transition
+from creeping.field.launching import (
+    amplitude_factor,
+    end_factor,
+    end_residue,
+    fock_parameter,
+    mean_scale,
+    mode_waves,
+    scales,
+    smoothstep,
+)
+from creeping.field.on_surface import scalar_boundary, surface_waves
+from creeping.rays.fan import RayFan
+from creeping.rays.ray_points import RayPoints
+from creeping.rays.shedding import shed_near, shed_on
+from creeping.rays.visibility import occluded
+from creeping.surface import size
+
+SERIES = (0.5, 0.9)
+"""ξ + √Y between which the second order of decay and amplitude comes in: it is what the height gain adds to ξ."""
+ENDS = (0.4, 0.9)
+"""ξ between which the factors of varying curvature come in."""
+DEEP = 3.0
+"""ξ beyond which the sum of modes stands alone."""
+ON_BODY = 1e-7
+"""Distance from the body, in its sizes, below which a point counts as on it."""
+
+
+def near_field(
+    fan: RayFan, points: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> ComplexArray:
+    """Diffracted field u at points on or off the body.
+
+    In the shadow this is the total field. On the lit side only rays that have gone round the body count; incident and
+    reflected waves are left out there.
+
+    Parameters
+    ----------
+    fan : RayFan
+    points : (..., 3), L
+        Outside the body or on it.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard" or Impedance
+    order : 2 or 1
+
+    Returns
+    -------
+    complex, (...)
+        All rays through each point summed, 0 where none passes; infinite on a caustic.
+
+    Raises
+    ------
+    InvalidInputError
+        On points inside the body or not finite, a bad wavenumber, boundary or order, and for a weighted body.
+    """
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    y = np.asarray(points, dtype=float)
+    if y.ndim < 1 or y.shape[-1] != 3:
+        raise InvalidInputError(f"points have shape {y.shape}; give (..., 3)")
+    flat = y.reshape(-1, 3)
+    if not np.all(np.isfinite(flat)):
+        bad = np.flatnonzero(~np.all(np.isfinite(flat), axis=1))
+        raise InvalidInputError(f"{len(bad)} of {len(flat)} points are not finite (first: row {bad[0]})")
+    strips = fan_strips(fan)
+    height = _height(fan, flat)
+    inside = np.flatnonzero(height < -ON_BODY)
+    if len(inside):
+        raise InvalidInputError(
+            f"{len(inside)} of {len(flat)} points are inside the body (worst: row {inside[np.argmin(height[inside])]}, "
+            f"depth about {-height.min() * size(fan.body):.3g}); give points on it or outside"
+        )
+    total = np.zeros(len(flat), dtype=complex)
+    off = np.flatnonzero(height > ON_BODY)
+    if len(off):
+        shed = shed_near(strips, fan.body, flat[off])
+        wave = shed_waves(shed.rays, shed.reach, k, kind, order)
+        free = ~occluded(fan.body, shed.rays.points, -shed.rays.directions, shed.reach)
+        np.add.at(total, off[shed.observer], np.where(free & shed.rays.alive, wave, 0.0))
+    on = np.flatnonzero(height <= ON_BODY)
+    if len(on) and kind.kind != "soft":
+        found = shed_on(strips, fan.body, flat[on])
+        np.add.at(total, on[found.observer], surface_waves(found.rays, k, kind, order))
+    return total.reshape(y.shape[:-1])
+
+
+def _height(fan: RayFan, points: FloatArray) -> FloatArray:
+    """F/|grad F| in body sizes (n,), about the height above the body near it."""
+    gradient = np.linalg.norm(fan.body.gradient(points), axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # at the centre grad F may vanish: deep inside
+        return np.asarray(np.nan_to_num(fan.body.level(points) / gradient, nan=-1.0) / size(fan.body))
+
+
+def shed_waves(
+    rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int
+) -> ComplexArray:
+    """Contribution of each ray (n,) at the distance l = reach (n,) along its tangent."""
+    m1, m2 = scales(rays, wavenumber)
+    J, rate = rays.spreading, rays.spreading_rate
+    tube = J + reach * rate
+    zeros = rays.caustics + (J * tube < 0)
+    phase = wavenumber * (rays.eikonal + reach) - 0.5 * np.pi * zeros
+    with np.errstate(divide="ignore", invalid="ignore"):
+        amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / (reach * np.abs(tube)))
+        height = (m2 * reach * rays.curvature[1]) ** 2
+        return np.asarray(amplitude * _uniform(rays, reach, height, wavenumber, boundary, order) * np.exp(1j * phase))
+
+
+def _uniform(
+    rays: RayPoints, reach: FloatArray, height: FloatArray, wavenumber: float, boundary: Boundary, order: int
+) -> ComplexArray:
+    """P̂ (n,): the leading order, and what each correction of the modes adds where its series converges."""
+    xi = fock_parameter(rays, wavenumber)
+    m1, m2 = scales(rays, wavenumber)
+    q = boundary.q(np.sqrt(m1 * m2))
+    out = np.zeros(len(xi), dtype=complex)
+    low = (height <= FAR_HEIGHT) & (xi <= DEEP) & rays.alive
+    far = (height > FAR_HEIGHT) & (xi <= DEEP) & rays.alive
+    deep = (xi > DEEP) & rays.alive
+    if np.any(low):
+        out[low] = near_pekeris(xi[low], height[low], _part(q, low))
+    if np.any(far):
+        X = wavenumber * reach[far] * xi[far] ** 2 / (2 * m1[far] * m2[far])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            edge = np.exp(0.25j * np.pi) / (2 * np.sqrt(np.pi) * xi[far]) * (1 - transition(X))
+            out[far] = pekeris(xi[far], _part(q, far)) + edge
+    if np.any(deep):
+        out[deep] = _series(rays[deep], height[deep, None], wavenumber, boundary, order, ends=order == 2)
+    if order == 2:
+        for variable, range_, new, old in (
+            (xi + np.sqrt(height), SERIES, (2, False), (1, False)),
+            (xi, ENDS, (2, True), (2, False)),
+        ):
+            weight = smoothstep(variable, *range_)
+            some = (low | far) & (weight > 0)
+            if np.any(some):
+                pair = [
+                    _series(rays[some], height[some, None], wavenumber, boundary, o, ends=ends)
+                    for o, ends in (new, old)
+                ]
+                out[some] += weight[some] * (pair[0] - pair[1])
+    return out
+
+
+def _part(q: ComplexArray | float | None, mask: BoolArray) -> ComplexArray | float | None:
+    return q if q is None or np.ndim(q) == 0 else q[mask]  # type: ignore[index]
+
+
+def _series(
+    rays: RayPoints, height: FloatArray, wavenumber: float, boundary: Boundary, order: int, *, ends: bool
+) -> ComplexArray:
+    """Sum of modes with height gain (n,); ``ends`` with the factors of varying curvature at both ends."""
+    modes = modes_of(boundary, mean_scale(rays, wavenumber))
+    terms = end_residue(rays, wavenumber, boundary, "residue") * mode_waves(rays, modes, wavenumber, boundary, order)
+    if order == 2:
+        terms = terms * amplitude_factor(rays, modes, wavenumber, boundary, 0.25)
+    if ends:
+        terms = terms * end_factor(rays, modes, wavenumber, height[..., 0] / (1 + height[..., 0]))
+    terms = terms * height_gain(modes.tau, height)
+    return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))

@@ -1,0 +1,44 @@
+"""Polarisation of a perfect conductor's far field: each contribution is a sum of two dyads.
+
+    across   s = n × d/|n × d| of the incident, n' × r/|n' × r| of the scattered wave      soft
+    along    h = s × d,  s' × r                                                            electric hard
+
+n is the normal where the wave lands, n' where it leaves: both s and h are carried by the ray (b → b, n → n), with no
+exchange between them [PBM80]. Components are those of θ̂ and φ̂ at the directions of travel d and r.
+"""
+
+import numpy as np
+
+from creeping._typing import FloatArray
+
+
+def spherical_frame(directions: FloatArray) -> FloatArray:
+    """θ̂ and φ̂ at unit directions (..., 3), φ = 0 at the poles: (..., 2, 3)."""
+    x, y, z = np.moveaxis(directions, -1, 0)
+    across = np.hypot(x, y)
+    polar = across < 1e-12
+    safe = np.where(polar, 1.0, across)
+    cos, sin = np.where(polar, 1.0, x / safe), np.where(polar, 0.0, y / safe)
+    theta = np.stack([z * cos, z * sin, -across], axis=-1)
+    phi = np.stack([-sin, cos, np.zeros_like(cos)], axis=-1)
+    return np.stack([theta, phi], axis=-2)
+
+
+def wave_frame(normals: FloatArray, directions: FloatArray, spare: FloatArray) -> FloatArray:
+    """Vectors s and h of waves that travel along unit directions, (n, 3) each: (n, 2, 3).
+
+    ``spare`` (n, 3), tangent to the body, replaces n × d where d is along n.
+    """
+    s = np.cross(normals, directions)
+    long = np.linalg.norm(s, axis=-1, keepdims=True)
+    s = np.where(long > 1e-9, s / np.where(long > 1e-9, long, 1.0), spare)
+    return np.stack([s, np.cross(s, directions)], axis=-2)
+
+
+def dyads(
+    incoming: FloatArray, outgoing: FloatArray, direction: FloatArray, observers: FloatArray
+) -> FloatArray:
+    """Components of both dyads (n, 2 kinds, 2 scattered, 2 incident), from frames (n, 2, 3)."""
+    received = incoming @ spherical_frame(direction).T
+    sent = np.einsum("nkc,noc->nko", outgoing, spherical_frame(observers))
+    return np.asarray(sent[..., :, None] * received[..., None, :])

@@ -1,0 +1,62 @@
+"""The field reflected by the lit side, uniform up to grazing incidence.
+
+    f = (1/(2√|K|)) R e^{ik(d - r).x},   R = -√(-4/ξ) e^{iξ³/12} P(ξ; q + q_eff),   ξ = -2 m cos θᵢ,   q_eff = -r/(4m²)
+
+m with the curvature in the plane of incidence, r = κ_b/κ_n of the curvature across it. Where the body is not convex in
+that plane R is that of a plane, and each negative principal curvature turns the phase by -π/2.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.coefficients import Boundary, fock_scale
+from creeping.field.fock import FARTHEST, pekeris, pekeris_slope, pekeris_star
+from creeping.rays.specular import SpecularPoints
+
+
+def reflection(
+    cosine: FloatArray, along: FloatArray, across: FloatArray, wavenumber: float, boundary: Boundary, order: int
+) -> ComplexArray:
+    """Coefficient R (n,) from cos θᵢ and the curvatures in and across the plane of incidence (n,)."""
+    m = fock_scale(wavenumber, along)
+    curved = np.isfinite(m) & (2 * m * cosine < -FARTHEST) & (cosine > 1e-12)
+    out = plane_reflection(cosine, boundary)
+    if order == 2 and boundary.kind != "soft":
+        with np.errstate(divide="ignore", invalid="ignore"):
+            out = out * np.nan_to_num(1 - 1j * boundary.sign * across / (wavenumber * cosine))
+    if np.any(curved):
+        xi = -2 * m[curved] * cosine[curved]
+        wave = lit_wave(xi, m[curved], across[curved] / along[curved], boundary, order, star=False)
+        out[curved] = -np.sqrt(-4 / xi) * np.exp(1j * xi**3 / 12) * wave
+    return out
+
+
+def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
+    """R of a plane: -1 soft, +1 hard, (cos θᵢ - η)/(cos θᵢ + η)."""
+    if boundary.kind == "impedance":
+        return np.asarray((cosine - boundary.eta) / (cosine + boundary.eta))
+    return np.full(cosine.shape, -1.0 if boundary.kind == "soft" else 1.0, dtype=complex)
+
+
+def lit_wave(
+    xi: FloatArray, m: FloatArray, ratio: FloatArray, boundary: Boundary, order: int, *, star: bool
+) -> ComplexArray:
+    """P(ξ; q + q_eff), or e^{iπ/4} p*, on the lit side: ξ <= 0, scales m and r = κ_b/κ_n (n,)."""
+    q = boundary.q(m)
+    wave = np.exp(0.25j * np.pi) * pekeris_star(xi, q) if star else pekeris(xi, q)
+    if order == 2 and q is not None:
+        correction = -0.25 * boundary.sign * ratio / m**2 * pekeris_slope(xi, q)
+        wave = wave + np.exp(0.25j * np.pi) * correction
+    return wave
+
+
+def reflected_amplitude(
+    specular: SpecularPoints, observers: FloatArray, direction: FloatArray, wavenumber: float, boundary: Boundary, order: int
+) -> ComplexArray:
+    """Contribution of each specular point to the far field (n,), L."""
+    R = reflection(specular.cosine, specular.along, specular.across, wavenumber, boundary, order)
+    path = np.sum((direction - observers[specular.observer]) * specular.points, axis=1)
+    with np.errstate(divide="ignore"):
+        spread = 0.5 / np.sqrt(np.abs(np.prod(specular.principal, axis=1)))
+    turns = np.sum(specular.principal < 0, axis=1)
+    return np.asarray(spread * R * np.exp(1j * wavenumber * path - 0.5j * np.pi * turns))

@@ -1,0 +1,218 @@
+"""Which creeping rays are shed towards an observer: all of them, far away, off the body, or on it.
+
+    far away, direction r     p(σ, s) = r
+    at y off the body         x(σ, s) + l p(σ, s) = y,  l > 0
+    at y on the body          x(σ, s) = y
+
+In each case two functions on the strip vanish together, n.v and b.v with v = r or y - x (on the body: y - x along two
+tangents at y). Cells in which both change sign start Newton's method on the strip's splines.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.rays.ray_points import RayPoints
+from creeping.rays.strips import Strip, gather
+from creeping.surface import Surface, normal, size
+
+BLOCK = 4_000_000
+"""Values of a function on a strip for several observers that are held at once."""
+CLOSE = 1e-9
+"""Residual of a solution, in radians or body sizes."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShedRays:
+    """Rays that reach observers.
+
+    Attributes
+    ----------
+    observer : (n,) of int
+        Row of the observer.
+    strip : (n,) of int
+        Strip of the ray.
+    sigma : (n,), L
+        Its position on the strip.
+    rays : RayPoints
+        (n,) Where the rays leave the body, or are on it.
+    reach : (n,), L
+        l from there to the observer: inf far away, 0 on the body.
+    """
+
+    observer: IntArray
+    strip: IntArray
+    sigma: FloatArray
+    rays: RayPoints
+    reach: FloatArray
+
+
+def shed_far(strips: tuple[Strip, ...], body: Surface, directions: FloatArray) -> ShedRays:
+    """Rays shed in the unit directions r (m, 3)."""
+
+    def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
+        return some @ n, some @ b, some @ p > 0
+
+    def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
+        residual = target - at.directions
+        return np.stack([slopes[0][:, 3:], slopes[1][:, 3:]], axis=-1), residual
+
+    found = _search(strips, body, directions, functions, step)
+    return ShedRays(*found, np.full(len(found[0]), np.inf))
+
+
+def shed_near(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> ShedRays:
+    """Rays whose tangents pass through the points (m, 3) off the body."""
+    scale = size(body)
+
+    def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
+        return tuple(some @ v - np.sum(x * v, axis=0) for v in (n, b, p))  # type: ignore[return-value]
+
+    def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
+        away = target - at.points
+        l = np.sum(away * at.directions, axis=-1)
+        columns = [v[:, :3] + l[:, None] * v[:, 3:] for v in slopes]
+        # l is eliminated: only what lies across p counts
+        columns = [v - np.sum(v * at.directions, axis=-1, keepdims=True) * at.directions for v in columns]
+        return np.stack(columns, axis=-1) / scale, (away - l[:, None] * at.directions) / scale
+
+    observer, strip, sigma, rays = _search(strips, body, points, lambda *a: _positive(functions(*a)), step)
+    reach = np.sum((points[observer] - rays.points) * rays.directions, axis=-1)
+    ahead = reach > 0
+    return ShedRays(observer[ahead], strip[ahead], sigma[ahead], rays[ahead], reach[ahead])
+
+
+def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> ShedRays:
+    """Rays that pass through the points (m, 3) on the body."""
+    scale = size(body)
+    normals = normal(body, points)
+    first = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    frames = np.concatenate([points, normals, first, np.cross(normals, first)], axis=1)
+
+    def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
+        y, outward, e, f = (some[:, 3 * k : 3 * k + 3] for k in range(4))
+        return (
+            e @ x - np.sum(e * y, axis=1, keepdims=True),
+            f @ x - np.sum(f * y, axis=1, keepdims=True),
+            outward @ n > 0,
+        )
+
+    def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
+        columns = np.stack([slopes[0][:, :3], slopes[1][:, :3]], axis=-1) / scale
+        return columns, (target[:, :3] - at.points) / scale
+
+    found = _search(strips, body, frames, functions, step)
+    return ShedRays(*found, np.zeros(len(found[0])))
+
+
+_Functions = tuple[FloatArray, FloatArray, BoolArray]
+_Step = Callable[[RayPoints, tuple[FloatArray, FloatArray], FloatArray], tuple[FloatArray, FloatArray]]
+
+
+def _positive(values: tuple[FloatArray, ...]) -> _Functions:
+    return values[0], values[1], values[2] > 0
+
+
+def _search(
+    strips: tuple[Strip, ...], body: Surface, targets: FloatArray, functions: Callable[..., _Functions], step: _Step
+) -> tuple[IntArray, IntArray, FloatArray, RayPoints]:
+    """Solve on all strips: observers (n,), strips (n,), positions (n,) and points."""
+    observer, which, sigma, s = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], [np.zeros(0)], [np.zeros(0)]
+    for k, strip in enumerate(strips):
+        seeds = _seeds(strip, body, targets, functions)
+        row, at_sigma, at_s = _newton(strip, targets, *seeds, step)
+        observer.append(row)
+        which.append(np.full(len(row), k))
+        sigma.append(at_sigma)
+        s.append(at_s)
+    strip_of, position = np.concatenate(which), np.concatenate(sigma)
+    return np.concatenate(observer), strip_of, position, gather(strips, strip_of, position, np.concatenate(s))
+
+
+def _seeds(
+    strip: Strip, body: Surface, targets: FloatArray, functions: Callable[..., _Functions]
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Observers and middles (σ, s) of the cells in which both functions change sign."""
+    columns = strip.coarse_steps
+    rays = strip.rays[:, columns]
+    sigma = strip.positions
+    lanes = rays.lanes
+    if strip.closed:
+        sigma, lanes = np.append(sigma, sigma[0] + strip.period), np.concatenate([lanes, lanes[:1]])
+    shape = lanes.shape[:2]
+    x, p = lanes[..., 0:3].reshape(-1, 3), lanes[..., 3:6].reshape(-1, 3)
+    n = normal(body, x)
+    fields = [np.ascontiguousarray(v.T) for v in (x, n, np.cross(n, p), p)]
+    found = []
+    block = max(1, BLOCK // max(1, len(x)))
+    for first in range(0, len(targets), block):
+        f, g, ahead = functions(targets[first : first + block], *fields)
+        both = _changes(f.reshape(-1, *shape)) & _changes(g.reshape(-1, *shape))
+        ahead = ahead.reshape(-1, *shape)
+        both &= ahead[:, :-1, :-1] | ahead[:, 1:, 1:]
+        row, ray, column = np.nonzero(both)
+        found.append((row + first, 0.5 * (sigma[ray] + sigma[ray + 1]), 0.5 * (strip.times[columns][column] + strip.times[columns][column + 1])))
+    return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def _changes(values: FloatArray) -> BoolArray:
+    """Cells (..., rays - 1, steps - 1) whose corners have not all one sign."""
+    positive = values > 0
+    some = positive[:, :-1, :-1] | positive[:, 1:, :-1] | positive[:, :-1, 1:] | positive[:, 1:, 1:]
+    every = positive[:, :-1, :-1] & positive[:, 1:, :-1] & positive[:, :-1, 1:] & positive[:, 1:, 1:]
+    return np.asarray(some & ~every)
+
+
+def _newton(
+    strip: Strip, targets: FloatArray, row: IntArray, sigma: FloatArray, s: FloatArray, step: _Step
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Newton's method from the seeds, without those that leave their neighbourhood, and without duplicates."""
+    start_sigma, start_s = sigma, s
+    widths = strip.cell
+    residual = np.full(len(row), np.inf)
+    for _ in range(12):
+        at = strip.at(sigma, s)
+        columns, gap = step(at, strip.slopes(sigma, s), targets[row])
+        residual = np.linalg.norm(gap, axis=-1)
+        if np.all(residual < CLOSE):
+            break
+        gram = np.einsum("nij,nik->njk", columns, columns)
+        right = np.einsum("nij,ni->nj", columns, gap)
+        determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] ** 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = np.stack(
+                [
+                    (gram[:, 1, 1] * right[:, 0] - gram[:, 0, 1] * right[:, 1]) / determinant,
+                    (gram[:, 0, 0] * right[:, 1] - gram[:, 0, 1] * right[:, 0]) / determinant,
+                ],
+                axis=-1,
+            )
+        move = np.clip(np.nan_to_num(move), -np.array(widths), np.array(widths))
+        sigma = sigma + move[:, 0]
+        s = np.clip(s + move[:, 1], 0.0, strip.times[-1])
+    good = (residual < 100 * CLOSE) & (np.abs(sigma - start_sigma) < 3 * widths[0]) & (np.abs(s - start_s) < 3 * widths[1])
+    low, high = strip.positions[0] - widths[0], strip.positions[-1] + widths[0]
+    if not strip.closed:
+        good &= (sigma > low) & (sigma < high)
+    return _distinct(row[good], strip.wrap(sigma[good]), s[good], strip, size_of=widths)
+
+
+def _distinct(
+    row: IntArray, sigma: FloatArray, s: FloatArray, strip: Strip, *, size_of: tuple[float, float]
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """One of each group of solutions of an observer that agree to 1e-5 of a cell."""
+    keep: list[int] = []
+    near = (1e-5 * size_of[0], 1e-5 * size_of[1])
+    mine: dict[int, list[int]] = {}
+    for k in range(len(row)):
+        others = mine.setdefault(int(row[k]), [])
+        apart = [abs(sigma[k] - sigma[j]) for j in others]
+        if strip.closed:
+            apart = [min(a, strip.period - a) for a in apart]
+        if all(a > near[0] or abs(s[k] - s[j]) > near[1] for a, j in zip(apart, others, strict=True)):
+            others.append(k)
+            keep.append(k)
+    return row[keep], sigma[keep], s[keep]

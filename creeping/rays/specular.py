@@ -1,0 +1,141 @@
+"""Specular points of a plane wave: where the body mirrors the incidence d into the direction r.
+
+    n(x) = (r - d)/|r - d|,   cos θᵢ = n.r = -n.d,   K = κ1 κ2
+
+The shape operator S = dn/dx, restricted to the tangent plane, turns a step on the body into one of its normal. Seeds are
+vertices of a triangulation next to which n - h changes sign in two tangential components.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import FloatArray, IntArray
+from creeping.rays.visibility import occluded
+from creeping.surface import Surface, normal, project, size
+from creeping.triangulation import triangulate
+
+CONVERGED = 1e-10
+"""Residual of the normal at a specular point."""
+ALIKE = 1e-6
+"""Distance, in body sizes, below which two solutions are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpecularPoints:
+    """Specular points that the wave reaches and whose reflected ray leaves the body.
+
+    Attributes
+    ----------
+    observer : (n,) of int
+        Row of the observer direction.
+    points, normals : (n, 3)
+    cosine : (n,)
+        cos θᵢ.
+    along, across : (n,), 1/L
+        Normal curvatures in the plane of incidence and across it.
+    principal : (n, 2), 1/L
+        κ1 <= κ2, positive where convex.
+    """
+
+    observer: IntArray
+    points: FloatArray
+    normals: FloatArray
+    cosine: FloatArray
+    along: FloatArray
+    across: FloatArray
+    principal: FloatArray
+
+
+def specular_points(body: Surface, direction: FloatArray, observers: FloatArray) -> SpecularPoints:
+    """All lit specular points of the unit directions r (m, 3) for the unit incidence d.
+
+    A direction r = d has none.
+    """
+    difference = observers - direction
+    length = np.linalg.norm(difference, axis=1)
+    rows = np.flatnonzero(length > 1e-9)
+    wanted = difference[rows] / length[rows, None]
+    mesh = triangulate(body.level, body.gradient, body.bounds)
+    which, seeds = _seeds(body, mesh.vertices, mesh.triangles, wanted)
+    which, points = _newton(body, seeds, wanted, which)
+    row = rows[which]
+    n = normal(body, points)
+    free = ~(occluded(body, points, direction) | occluded(body, points, -observers[row]))
+    row, points, n = row[free], points[free], n[free]
+    r = observers[row]
+    q = r + direction
+    # backscatter has no plane of incidence: any tangent will do
+    spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
+    q = np.where(np.linalg.norm(q, axis=1, keepdims=True) > 1e-9, q, spare)
+    q = q - np.sum(q * n, axis=1, keepdims=True) * n
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    g = np.linalg.norm(body.gradient(points), axis=1)
+    H = body.hessian(points) / g[:, None, None]
+    b = np.cross(n, q)
+    along, across, mixed = (np.einsum("ni,nij,nj->n", v, H, w) for v, w in ((q, q), (b, b), (q, b)))
+    middle, half = 0.5 * (along + across), np.hypot(0.5 * (along - across), mixed)
+    return SpecularPoints(
+        observer=row,
+        points=points,
+        normals=n,
+        cosine=np.sum(n * r, axis=1),
+        along=along,
+        across=across,
+        principal=np.stack([middle - half, middle + half], axis=1),
+    )
+
+
+def _seeds(body: Surface, vertices: FloatArray, triangles: IntArray, wanted: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Wanted normals (m,) and centres of the triangles whose normals surround them."""
+    n = normal(body, vertices)
+    corners = n[triangles]
+    middle = corners.sum(axis=1)
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    # spherical cap around each triangle's normals, widened for curved sides
+    reach = np.max(np.arccos(np.clip(np.einsum("tki,ti->tk", corners, middle), -1, 1)), axis=1)
+    limit = np.cos(np.minimum(1.5 * reach + 1e-3, np.pi))
+    found = []
+    block = max(1, 4_000_000 // len(triangles))
+    for first in range(0, len(wanted), block):
+        row, t = np.nonzero(wanted[first : first + block] @ middle.T >= limit)
+        found.append((row + first, vertices[triangles[t]].mean(axis=1)))
+    which = np.concatenate([f[0] for f in found]) if found else np.zeros(0, dtype=int)
+    points = np.concatenate([f[1] for f in found]) if found else np.zeros((0, 3))
+    return which, project(body, points) if len(points) else points
+
+
+def _newton(body: Surface, points: FloatArray, wanted: FloatArray, which: IntArray) -> tuple[IntArray, FloatArray]:
+    """Move along the body until n = h; without duplicates and those that do not converge."""
+    largest = 0.1 * size(body)
+    for _ in range(30):
+        gap, step = _step(body, points, wanted[which])
+        if not len(points) or np.all(gap < CONVERGED):
+            break
+        long = np.linalg.norm(step, axis=1)
+        points = project(body, points + step * np.minimum(1.0, largest / np.maximum(long, 1e-300))[:, None])
+    good = np.sum((normal(body, points) - wanted[which]) ** 2, axis=1) < (100 * CONVERGED) ** 2
+    which, points = which[good], points[good]
+    keep: list[int] = []
+    mine: dict[int, list[int]] = {}
+    for k in range(len(which)):
+        others = mine.setdefault(int(which[k]), [])
+        if all(np.linalg.norm(points[k] - points[j]) > ALIKE * size(body) for j in others):
+            others.append(k)
+            keep.append(k)
+    return which[keep], points[keep]
+
+
+def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Size of n - h, and the tangential Newton step S dx = h - n."""
+    gradient = body.gradient(points)
+    g = np.linalg.norm(gradient, axis=1)
+    n = gradient / g[:, None]
+    gap = wanted - n
+    # S on the tangent plane, made regular by the identity along n
+    tangential = np.eye(3) - n[:, :, None] * n[:, None, :]
+    shape = tangential @ body.hessian(points) @ tangential / g[:, None, None] + n[:, :, None] * n[:, None, :]
+    right = gap - np.sum(gap * n, axis=1, keepdims=True) * n
+    # a flat point has no inverse: the least-squares step stays finite
+    step = np.einsum("nij,nj->ni", np.linalg.pinv(shape, rcond=1e-6), right)
+    return np.linalg.norm(gap, axis=1), step

@@ -1,0 +1,158 @@
+"""The fan as smooth functions of (σ, s): each arc of neighbouring rays is a strip, interpolated by tensor splines.
+
+σ is arclength along the shadow line, s arclength along the ray. On a closed arc σ is periodic.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import NdBSpline, make_interp_spline
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.rays.fan import RayFan
+from creeping.rays.ray_points import RayPoints, ray_points
+from creeping.surface import Surface, normal
+
+DEGREE = 5
+COARSE = 64
+"""Steps at least that a search looks at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """One arc of rays.
+
+    Attributes
+    ----------
+    positions : (rays,), L
+        σ of the rays, ascending; may pass the length of the curve where the arc wraps.
+    times : (steps,), L
+    rays : RayPoints
+        Shape (rays, steps).
+    period : float
+        Length of the closed curve; inf for an open arc.
+    """
+
+    positions: FloatArray
+    times: FloatArray
+    rays: RayPoints
+    period: float
+
+    @property
+    def closed(self) -> bool:
+        """Whether the last ray is a neighbour of the first."""
+        return bool(np.isfinite(self.period))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """σ at both ends: half a spacing beyond the rays of an open arc."""
+        low = float(self.positions[0])
+        if self.closed:
+            return low, low + self.period
+        half = 0.5 * float(self.positions[-1] - low) / max(1, len(self.positions) - 1)
+        return low - half, float(self.positions[-1]) + half
+
+    def first_normals(self, sigma: FloatArray) -> FloatArray:
+        """N at the launch points σ (n,): (n, 3)."""
+        n = self._splines[1](self.wrap(sigma))[:, 6:9]
+        return np.asarray(n / np.linalg.norm(n, axis=1, keepdims=True))
+
+    def nearest(self, sigma: FloatArray) -> IntArray:
+        """Ray next below σ: (n,) -> (n,)."""
+        return np.clip(np.searchsorted(self.positions, self.wrap(sigma), side="right") - 1, 0, len(self.positions) - 1)
+
+    def coarse_normals(self, body: Surface) -> FloatArray:
+        """N at the coarse steps of the rays: (rays, coarse steps, 3)."""
+        return normal(body, self.rays.points[:, self.coarse_steps])
+
+    @property
+    def coarse_steps(self) -> IntArray:
+        """Steps at which a search looks first, the last one among them."""
+        stride = max(1, (len(self.times) - 1) // COARSE)
+        return np.unique(np.append(np.arange(0, len(self.times), stride), len(self.times) - 1))
+
+    @property
+    def cell(self) -> tuple[float, float]:
+        """Largest spacing of rays, and of coarse steps, L."""
+        gaps = np.diff(np.append(self.positions, self.positions[0] + self.period) if self.closed else self.positions)
+        return float(np.max(gaps, initial=0.0)), float(np.max(np.diff(self.times[self.coarse_steps])))
+
+    @cached_property
+    def _splines(self) -> tuple[NdBSpline, NdBSpline]:
+        """Splines of the lanes in (σ, s) and of the starts in σ."""
+        sigma, lanes, starts = self.positions, self.rays.lanes, self.rays.starts[:, 0]
+        kind = None
+        if self.closed:
+            sigma = np.append(sigma, sigma[0] + self.period)
+            lanes, starts = np.concatenate([lanes, lanes[:1]]), np.concatenate([starts, starts[:1]])
+            kind = "periodic"
+        degree = DEGREE if len(sigma) > DEGREE else max(1, 2 * ((len(sigma) - 1) // 2) - 1)
+        across = make_interp_spline(sigma, lanes, k=degree, axis=0, bc_type=kind)
+        along = make_interp_spline(self.times, across.c, k=DEGREE, axis=1)
+        # make_interp_spline leaves its axis first in c
+        table = np.moveaxis(along.c, 0, 1)
+        first = make_interp_spline(sigma, starts, k=degree, axis=0, bc_type=kind)
+        return NdBSpline((across.t, along.t), table, (degree, DEGREE)), first
+
+    def wrap(self, sigma: FloatArray) -> FloatArray:
+        """σ within the strip's period."""
+        if not self.closed:
+            return sigma
+        return np.asarray(self.positions[0] + np.mod(sigma - self.positions[0], self.period))
+
+    def at(self, sigma: FloatArray, s: FloatArray) -> RayPoints:
+        """Points of the strip: (n,), (n,)."""
+        lanes, starts = self._splines
+        sigma = self.wrap(sigma)
+        return RayPoints(
+            lanes(np.stack([sigma, s], axis=-1)), starts(sigma), s, self._alive(sigma, s), self.rays.scale
+        )
+
+    def slopes(self, sigma: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives in σ and in s of (x, p): (n,), (n,) -> (n, 6), (n, 6)."""
+        lanes, _ = self._splines
+        where = np.stack([self.wrap(sigma), s], axis=-1)
+        return lanes(where, nu=(1, 0))[:, :6], lanes(where, nu=(0, 1))[:, :6]
+
+    def _alive(self, sigma: FloatArray, s: FloatArray) -> BoolArray:
+        """Whether both neighbouring rays are creeping there, at the step before."""
+        ray = self.nearest(sigma)
+        following = (ray + 1) % len(self.positions) if self.closed else np.minimum(ray + 1, len(self.positions) - 1)
+        step = np.clip(np.searchsorted(self.times, s, side="right") - 1, 0, len(self.times) - 1)
+        return np.asarray(self.rays.alive[ray, step] & self.rays.alive[following, step])
+
+
+def strips_of(fan: RayFan) -> tuple[Strip, ...]:
+    """One strip for each arc of the fan."""
+    times, everything = ray_points(fan)
+    found = []
+    lengths = [curve.length for curve in fan.line.curves]
+    for k, closed in enumerate(fan.closed_arcs):
+        mine = np.flatnonzero(fan.arc_index == k)
+        if not len(mine):
+            continue
+        length = lengths[int(fan.curve_index[mine[0]])]
+        positions = np.unwrap(fan.arclength[mine], period=length)
+        found.append(Strip(positions, times, everything[mine], length if closed else np.inf))
+    return tuple(found)
+
+
+def gather(strips: tuple[Strip, ...], which: IntArray, sigma: FloatArray, s: FloatArray) -> RayPoints:
+    """Points of several strips together: numbers of strips (n,), σ (n,), s (n,)."""
+    parts = [(np.flatnonzero(which == k), strip) for k, strip in enumerate(strips)]
+    parts = [(rows, strip) for rows, strip in parts if len(rows)]
+    if not parts:
+        empty = strips[0].rays if strips else None
+        if empty is None:
+            return RayPoints(np.zeros((0, 18)), np.zeros((0, 9)), np.zeros(0), np.zeros(0, dtype=bool), 1.0)
+        return empty[np.zeros(0, dtype=int), np.zeros(0, dtype=int)]
+    found = [strip.at(sigma[rows], s[rows]) for rows, strip in parts]
+    order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+    return RayPoints(
+        np.concatenate([f.lanes for f in found])[order],
+        np.concatenate([f.starts for f in found])[order],
+        np.concatenate([f.time for f in found])[order],
+        np.concatenate([f.alive for f in found])[order],
+        found[0].scale,
+    )
