@@ -11,6 +11,8 @@ from creeping._version import __version__
 _HOMES = {
     "CreepingError": "creeping._errors",
     "DirectFlow": "creeping.phaseflow.tracing",
+    "FarField": "creeping.field.far",
+    "Impedance": "creeping.field.coefficients",
     "IsoPhaseCurve": "creeping.rays.isophase",
     "MapError": "creeping.phaseflow.phase_map",
     "PhaseMap": "creeping.phaseflow.phase_map",
@@ -19,16 +21,21 @@ _HOMES = {
     "ShadowLine": "creeping.rays.shadow",
     "build_phase_map": "creeping.phaseflow.building",
     "check_surface": "creeping.surface",
+    "far_field": "creeping.field.far",
     "iso_phase_curves": "creeping.rays.isophase",
     "launch": "creeping.rays.fan",
     "load_phase_map": "creeping.phaseflow.caching",
+    "near_field": "creeping.field.near",
     "shadow_line": "creeping.rays.shadow",
+    "surface_field": "creeping.field.on_surface",
     "trace": "creeping.phaseflow.tracing",
 }
 
 __all__ = [
     "CreepingError",
     "DirectFlow",
+    "FarField",
+    "Impedance",
     "IsoPhaseCurve",
     "MapError",
     "PhaseMap",
@@ -38,15 +45,22 @@ __all__ = [
     "__version__",
     "build_phase_map",
     "check_surface",
+    "far_field",
     "iso_phase_curves",
     "launch",
     "load_phase_map",
+    "near_field",
     "shadow_line",
+    "surface_field",
     "trace",
 ]
 
 if TYPE_CHECKING:
     from creeping._errors import CreepingError
+    from creeping.field.coefficients import Impedance
+    from creeping.field.far import FarField, far_field
+    from creeping.field.near import near_field
+    from creeping.field.on_surface import surface_field
     from creeping.phaseflow.building import build_phase_map
     from creeping.phaseflow.caching import load_phase_map
     from creeping.phaseflow.phase_map import MapError, PhaseMap

@@ -74,6 +74,8 @@ def test_public_names_grow_on_purpose():
     assert creeping.__all__ == [
         "CreepingError",
         "DirectFlow",
+        "FarField",
+        "Impedance",
         "IsoPhaseCurve",
         "MapError",
         "PhaseMap",
@@ -83,10 +85,13 @@ def test_public_names_grow_on_purpose():
         "__version__",
         "build_phase_map",
         "check_surface",
+        "far_field",
         "iso_phase_curves",
         "launch",
         "load_phase_map",
+        "near_field",
         "shadow_line",
+        "surface_field",
         "trace",
     ]
     assert all(getattr(creeping, name) is not None for name in creeping.__all__)

@@ -105,7 +105,7 @@ def fock_scale(wavenumber: float, curvature: FloatArray) -> FloatArray:
 def modes_of(boundary: Boundary, m: FloatArray) -> Modes:
     """Modes at Fock scales m (...): (n,) for soft and hard, (..., n) for an impedance."""
     q = boundary.q(m)
-    if q is None or np.ndim(q) == 0 and not np.any(q):
+    if q is None or (np.ndim(q) == 0 and not np.any(q)):
         return boundary_modes(q)
     return boundary_modes(q)
 

@@ -4,7 +4,7 @@
 
 with θ the angle from d, m̄ the mean of m over the shadow line and W a smooth step,
 
-    w = 1 - W(m̄ θ; 0.7, 1.2)                  F the forward lobe (`creeping.field.forward`)
+    w = 1 - W(m̄ θ; 0.55, 0.85)                  F the forward lobe (`creeping.field.forward`)
     v = W(min χ; 0.38, 0.52) for θ > 90°      χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > 0.9
     f_rays = Σ -√(m1 m2) √(2/k) P |J'|^(-1/2) e^{-iπN/2} e^{ik(d.x0 + s - r.x)}   all rays with p = r
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.coefficients import Boundary, BoundaryLike, fock_scale, scalar_boundaries
+from creeping.field.coefficients import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.far_geometry import FarGeometry, far_geometry
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.launching import scales, shed_wave, smoothstep
@@ -23,9 +23,9 @@ from creeping.field.polarisation import dyads, wave_frame
 from creeping.field.reflected import reflected_amplitude
 from creeping.rays.fan import RayFan
 
-FORWARD = (0.7, 1.2)
+FORWARD = (0.55, 0.85)
 """m̄ θ between which the forward lobe gives way."""
-NEAR_AXIS = (0.15, 0.3)
+NEAR_AXIS = (0.25, 0.4)
 """m̄ θ between which its silhouette gives way to the poles."""
 LONG_RAYS = (np.radians(4.0), np.radians(12.0))
 MERGED = (0.38, 0.52)
@@ -75,7 +75,8 @@ class FarField:
         names, counts = np.unique(self.method, return_counts=True)
         served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
         return (
-            f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, order {self.order})\n"
+            f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
+            f"order {self.order})\n"
             f"  {served or 'none'}\n"
             f"  |f| up to {np.max(np.abs(self.total), initial=0.0):.4g} L; {int(self.unresolved.sum())} unresolved"
         )
@@ -143,7 +144,9 @@ def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, 
     """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
     rays = geometry.shed.rays
     m1, m2 = scales(rays, wavenumber)
-    phase = wavenumber * (rays.eikonal - np.sum(rays.directions * rays.points, axis=-1)) - 0.5 * np.pi * rays.far_caustics
+    phase = (
+        wavenumber * (rays.eikonal - np.sum(rays.directions * rays.points, axis=-1)) - 0.5 * np.pi * rays.far_caustics
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / np.abs(rays.spreading_rate))
         wave = amplitude * shed_wave(rays, wavenumber, boundary, order) * np.exp(1j * phase)
@@ -185,7 +188,9 @@ class _Parts:
         shadow, lit = g.forward_nodes(k, w > 0)
         wave = shadow_half(shadow, g.directions, d, k, kind, order, self.beyond_axis[shadow.observer])
         wave = _weighted(w[shadow.observer], wave)
-        self._sum(self.forward, number, shadow.observer, wave, shadow.rays.first_normal, g.normals_of(shadow.rays.points))
+        self._sum(
+            self.forward, number, shadow.observer, wave, shadow.rays.first_normal, g.normals_of(shadow.rays.points)
+        )
         wave = lit_half(lit, g.directions, d, k, kind, order, self.beyond_axis[lit.observer])
         self._sum(self.forward, number, lit.observer, _weighted(w[lit.observer], wave), lit.normals, lit.normals)
         ahead = np.flatnonzero((w > 0) & (self.beyond_axis < 1))
@@ -216,8 +221,8 @@ def _weighted(share: FloatArray, wave: ComplexArray) -> ComplexArray:
 def _methods(forward: FloatArray, fan: FloatArray) -> np.ndarray[Any, np.dtype[np.str_]]:
     names = []
     for w, v in zip(forward, fan, strict=True):
-        used = [name for name, share in (("forward", w), ("rays", (1 - w) * (1 - v)), ("fan", (1 - w) * v)) if share > 0]
+        used = [
+            name for name, share in (("forward", w), ("rays", (1 - w) * (1 - v)), ("fan", (1 - w) * v)) if share > 0
+        ]
         names.append("+".join(used))
     return np.array(names, dtype="<U16")
-
-

@@ -125,7 +125,7 @@ class FarGeometry:
         least = np.ones(len(self.directions))
         found = np.zeros(len(self.directions), dtype=bool)
         back = np.flatnonzero(self.angle > np.pi / 2)
-        nodes = HorizonGrid(self.strips, self.body, np.inf).crossings(back, self.directions[back])
+        nodes = HorizonGrid(self.strips, self.body, np.inf).crossings(back, self.directions)
         rays = nodes.rays
         near = np.sum(rays.directions * self.directions[nodes.observer], axis=1) > ALONG
         near &= (rays.time > 0.28 * size(self.body)) & rays.alive
@@ -145,7 +145,7 @@ class FarGeometry:
         if key not in self._fan_nodes:
             rows = np.flatnonzero(wanted)
             grid = HorizonGrid(self.strips, self.body, longest / 2 ** (fineness / 4))
-            self._fan_nodes[key] = grid.crossings(rows, self.directions[rows])
+            self._fan_nodes[key] = grid.crossings(rows, self.directions)
         return self._fan_nodes[key]
 
     def forward_nodes(self, wavenumber: float, wanted: BoolArray) -> tuple[HorizonRays, MidHorizon]:
@@ -155,7 +155,7 @@ class FarGeometry:
         if key not in self._forward:
             rows = np.flatnonzero(wanted)
             # at r = d every ray meets the horizon where it starts; the lobe is flat there to second order
-            r = off_axis(self.directions[rows], self.direction)
+            r = off_axis(self.directions, self.direction)
             reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
             counts = (48 + 1.5 * reach).astype(np.int64)
             self._forward[key] = forward_nodes(self.strips, self.line, rows, r, counts)

@@ -9,10 +9,12 @@ these integrals lose digits; there, in one, over the line of steepest descent th
 
     P(ξ) = (e^{iπ/4}/2i√π) ∫ W e^{iξt} dt = -S e^{-iξ³/12}/√(-4/ξ),
 
-S the reflection coefficient, which tends to that of a plane boundary.
+S the reflection coefficient, which tends to that of a plane boundary. A ``power`` n stands for t^n under each integral,
+which is (-i d/dξ)^n of the function and τ^n in its residue series.
 """
 
 from functools import cache
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -86,7 +88,7 @@ def _w2(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     return factor * value, factor / _UP * slope, zeta
 
 
-def _by_path(which: str, xi: FloatArray, q: ComplexArray | None) -> ComplexArray:
+def _by_path(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
     """p*, its derivative in q, or the surface function by both legs: xi (n,), q (n,) or None for soft."""
     path = _path()
     out = np.empty(len(xi), dtype=complex)
@@ -105,9 +107,11 @@ def _by_path(which: str, xi: FloatArray, q: ComplexArray | None) -> ComplexArray
             terms = above / below * np.exp(phase + path.fall - path.rise)
         elif which == "slope":
             terms = turned / below**2 * np.exp(phase + 2 * path.fall)
-        else:
+        elif which == "surface":
             terms = -turned / below * np.exp(phase + path.fall)
-        out[part] = terms @ path.weight / np.sqrt(np.pi)
+        else:
+            terms = -turned * path.lower / below**2 * np.exp(phase + path.fall)
+        out[part] = terms @ (path.weight * path.t**power) / np.sqrt(np.pi)
     return out
 
 
@@ -120,60 +124,73 @@ def boundary_modes(q: ComplexArray | float | None, n: int = MODES) -> Modes:
     return impedance_modes(q, n)
 
 
-def pekeris_star(xi: ArrayLike, q: ComplexArray | float | None) -> ComplexArray:
+def pekeris_star(xi: ArrayLike, q: ComplexArray | float | None, power: int = 0) -> ComplexArray:
     """Pekeris function p*(ξ), entire in ξ: (...) -> (...).
 
     Parameters
     ----------
     xi : (...)
     q : None for soft, 0 for hard, else complex, broadcast with xi, of one argument
+    power : int
+        (-i d/dξ)^power of it.
     """
-    return _evaluate("pekeris", np.asarray(xi, dtype=float), q)
+    return _evaluate("pekeris", np.asarray(xi, dtype=float), q, power)
 
 
 def pekeris(xi: ArrayLike, q: ComplexArray | float | None) -> ComplexArray:
     """P(ξ) = e^{iπ/4} [p*(ξ) - 1/(2√π ξ)], infinite at ξ = 0: (...) -> (...)."""
     xi = np.asarray(xi, dtype=float)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.exp(0.25j * np.pi) * (pekeris_star(xi, q) - 1 / (2 * np.sqrt(np.pi) * xi)))
+    return np.asarray(np.exp(0.25j * np.pi) * (pekeris_star(xi, q) - pole(xi)))
 
 
-def pekeris_slope(xi: ArrayLike, q: ComplexArray | float) -> ComplexArray:
-    """dp*/dq, not for soft: (...) -> (...)."""
-    return _evaluate("slope", np.asarray(xi, dtype=float), q)
+def pole(xi: FloatArray, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of 1/(2√π ξ), infinite at 0 (...)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(1j**power * factorial(power) / (2 * np.sqrt(np.pi) * xi ** (power + 1)))
 
 
-def surface_function(xi: ArrayLike, q: ComplexArray | float | None) -> ComplexArray:
-    """Fock's surface function g(ξ) of u, or F(ξ) of du/dn if soft: (...) -> (...)."""
-    return _evaluate("surface", np.asarray(xi, dtype=float), q)
+def pekeris_slope(xi: ArrayLike, q: ComplexArray | float, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of dp*/dq, not for soft: (...) -> (...)."""
+    return _evaluate("slope", np.asarray(xi, dtype=float), q, power)
 
 
-def _evaluate(which: str, xi: FloatArray, q: ComplexArray | float | None) -> ComplexArray:
+def surface_function(xi: ArrayLike, q: ComplexArray | float | None, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of Fock's surface function g(ξ) of u, or F(ξ) of du/dn if soft: (...) -> (...)."""
+    return _evaluate("surface", np.asarray(xi, dtype=float), q, power)
+
+
+def surface_slope(xi: ArrayLike, q: ComplexArray | float, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of dg/dq, not for soft: (...) -> (...)."""
+    return _evaluate("surface slope", np.asarray(xi, dtype=float), q, power)
+
+
+def _evaluate(which: str, xi: FloatArray, q: ComplexArray | float | None, power: int) -> ComplexArray:
     if q is None or np.ndim(q) == 0:
-        return _tabulated(which, xi.ravel(), None if q is None else complex(q)).reshape(xi.shape)
+        return _tabulated(which, xi.ravel(), None if q is None else complex(q), power).reshape(xi.shape)
     full_xi, full_q = np.broadcast_arrays(xi, np.asarray(q, dtype=complex))
-    return _direct(which, full_xi.ravel(), full_q.ravel()).reshape(full_xi.shape)
+    return _direct(which, full_xi.ravel(), full_q.ravel(), power).reshape(full_xi.shape)
 
 
-def _direct(which: str, xi: FloatArray, q: ComplexArray | None) -> ComplexArray:
+def _direct(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
     """Without a table: xi (n,), q (n,) or None."""
     out = np.empty(len(xi), dtype=complex)
     lit, deep = xi < LIT, xi > SERIES
     for mask, function in ((lit, _by_descent), (~(lit | deep), _by_path), (deep, _by_series)):
         if np.any(mask):
-            out[mask] = function(which, xi[mask], None if q is None else q[mask])
+            out[mask] = function(which, xi[mask], None if q is None else q[mask], power)
     return out
 
 
-def _by_descent(which: str, xi: FloatArray, q: ComplexArray | None) -> ComplexArray:
+def _by_descent(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
     """The lit side: trapezoidal rule, which converges exponentially, over the line of steepest descent."""
     out = np.empty(len(xi), dtype=complex)
+    on_surface = which.startswith("surface")
     for first in range(0, len(xi), 4096):
         part = slice(first, first + 4096)
         x = xi[part, None]
         # the integrand is a Gaussian of variance |ξ|/2, or 2|ξ|, times a slow factor
-        step = (0.24 if which == "surface" else 0.12) * np.sqrt(-x)
-        t = -(x**2) * (1.0 if which == "surface" else 0.25) + step * np.arange(-55, 56) * np.exp(0.75j * np.pi)
+        step = (0.24 if on_surface else 0.12) * np.sqrt(-x)
+        t = -(x**2) * (1.0 if on_surface else 0.25) + step * np.arange(-55, 56) * np.exp(0.75j * np.pi)
         lower, lower_slope, fall = _w1(t)
         below = lower if q is None else lower_slope - q[part, None] * lower
         if which == "pekeris":
@@ -182,58 +199,64 @@ def _by_descent(which: str, xi: FloatArray, q: ComplexArray | None) -> ComplexAr
             terms = above / below * np.exp(1j * x * t + fall - rise)
         elif which == "slope":
             terms = 1 / below**2 * np.exp(1j * x * t + 2 * fall)
-        else:
+        elif which == "surface":
             terms = -1 / below * np.exp(1j * x * t + fall)
-        out[part] = np.sum(terms, axis=1) * step[:, 0] * np.exp(0.75j * np.pi) / np.sqrt(np.pi)
-    return out + 1 / (2 * np.sqrt(np.pi) * xi) if which == "pekeris" else out
+        else:
+            terms = -lower / below**2 * np.exp(1j * x * t + fall)
+        out[part] = np.sum(terms * t**power, axis=1) * step[:, 0] * np.exp(0.75j * np.pi) / np.sqrt(np.pi)
+    return out + pole(xi, power) if which == "pekeris" else out
 
 
-def _by_series(which: str, xi: FloatArray, q: ComplexArray | None) -> ComplexArray:
-    """Residue series of the shadow."""
-    if which == "slope":
+def _by_series(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
+    """Residue series of the shadow; d/dq by a central difference."""
+    if which.endswith("slope"):
         assert q is not None
         step = 1e-4 * np.where(q == 0, 1j, q / np.where(q == 0, 1, np.abs(q)))
-        return np.asarray((_by_series("pekeris", xi, q + step) - _by_series("pekeris", xi, q - step)) / (2 * step))
+        whole = "pekeris" if which == "slope" else "surface"
+        pair = [_by_series(whole, xi, q + sign * step, power) for sign in (1, -1)]
+        return np.asarray((pair[0] - pair[1]) / (2 * step))
     modes = boundary_modes(0.0 if q is not None and np.all(q == 0) else q)
     amplitude = modes.surface if which == "surface" else modes.residue
-    total = 2j * np.sqrt(np.pi) * np.sum(amplitude * np.exp(1j * xi[:, None] * modes.tau), axis=-1)
-    return np.asarray(total if which == "surface" else total + 1 / (2 * np.sqrt(np.pi) * xi))
+    terms = amplitude * modes.tau**power * np.exp(1j * xi[:, None] * modes.tau)
+    total = 2j * np.sqrt(np.pi) * np.sum(terms, axis=-1)
+    return np.asarray(total if which == "surface" else total + pole(xi, power))
 
 
 @cache
-def _tables(which: str, q: complex | None) -> tuple[Any, Any]:
+def _tables(which: str, q: complex | None, power: int) -> tuple[Any, Any]:
     """Splines of one boundary: of the function between LIT and SERIES, and of its slow factor on the lit side."""
     xi = np.linspace(LIT, SERIES, 301)
     inverse = np.linspace(1 / LIT, 1 / FARTHEST, 201)
     values = [None if q is None else np.full(len(x), q) for x in (xi, inverse)]
-    slow = _by_descent(which, 1 / inverse, values[1])
+    slow = _by_descent(which, 1 / inverse, values[1], power)
     if which == "pekeris":
-        slow -= inverse / (2 * np.sqrt(np.pi))
+        slow -= pole(1 / inverse, power)
     return (
-        make_interp_spline(xi, _by_path(which, xi, values[0]), k=7),
-        make_interp_spline(inverse, slow * _unwind(which, 1 / inverse), k=7),
+        make_interp_spline(xi, _by_path(which, xi, values[0], power), k=7),
+        make_interp_spline(inverse, slow * _unwind(which, 1 / inverse, power), k=7),
     )
 
 
-def _unwind(which: str, xi: FloatArray) -> ComplexArray:
+def _unwind(which: str, xi: FloatArray, power: int) -> ComplexArray:
     """Inverse of the fast and the growing factor on the lit side."""
-    if which == "surface":
-        return np.asarray(np.exp(1j * xi**3 / 3))
-    return np.asarray(np.exp(1j * xi**3 / 12) / np.sqrt(-xi))
+    if which.startswith("surface"):
+        return np.asarray(np.exp(1j * xi**3 / 3) / xi ** (2 * power))
+    return np.asarray(np.exp(1j * xi**3 / 12) / (np.sqrt(-xi) * xi ** (2 * power)))
 
 
-def _tabulated(which: str, xi: FloatArray, q: complex | None) -> ComplexArray:
+def _tabulated(which: str, xi: FloatArray, q: complex | None, power: int) -> ComplexArray:
     """One boundary: splines, and the series beyond them."""
     out = np.empty(len(xi), dtype=complex)
     lit, deep = xi < LIT, xi > SERIES
     middle = ~(lit | deep)
-    between, slow = _tables(which, q)
+    between, slow = _tables(which, q, power)
     out[middle] = between(xi[middle])
-    some = np.maximum(xi[lit], FARTHEST)
-    pole = 1 / (2 * np.sqrt(np.pi) * xi[lit]) if which == "pekeris" else 0.0
-    out[lit] = slow(1 / some) / _unwind(which, xi[lit]) + pole
+    if np.any(lit):
+        out[lit] = slow(1 / np.maximum(xi[lit], FARTHEST)) / _unwind(which, xi[lit], power)
+        if which == "pekeris":
+            out[lit] += pole(xi[lit], power)
     if np.any(deep):
-        out[deep] = _by_series(which, xi[deep], None if q is None else np.full(int(deep.sum()), q))
+        out[deep] = _by_series(which, xi[deep], None if q is None else np.full(int(deep.sum()), q), power)
     return out
 
 
@@ -259,7 +282,7 @@ def height_gain(tau: ComplexArray, Y: ArrayLike) -> ComplexArray:
 def near_pekeris(xi: FloatArray, Y: FloatArray, q: ComplexArray | float | None) -> ComplexArray:
     """Sum of modes with height gain, as an integral that holds down to ξ = 0 (n,), (n,) -> (n,); Y up to FAR_HEIGHT.
 
-        -(1/√π) Y^(1/4) e^{-i(2/3)Y^(3/2)} ∫ e^{i(ξ + √Y)t} [v(t - Y) - V(t) w₁(t - Y)] dt,   from ∞e^{2πi/3} over 0 to ∞
+    -(1/√π) Y^(1/4) e^{-i(2/3)Y^(3/2)} ∫ e^{i(ξ + √Y)t} [v(t - Y) - V(t) w₁(t - Y)] dt,   from ∞e^{2πi/3} over 0 to ∞
     """
     nodes, weights = np.polynomial.legendre.leggauss(16)
     edges = np.linspace(0.0, 1.0, 33)
@@ -271,7 +294,7 @@ def near_pekeris(xi: FloatArray, Y: FloatArray, q: ComplexArray | float | None) 
     total = np.zeros(len(xi), dtype=complex)
     for turn in (1.0 + 0j, _UP):
         reach = Y + 12.0 if turn == 1 else np.full_like(Y, 24.0)
-        t = turn * reach * r
+        t = np.asarray(turn * reach * r, dtype=np.complex128)
         plain, _, plain_fall = _v(t - Y) if turn == 1 else _w2(t - Y)
         above, above_slope, rise = _v(t) if turn == 1 else _w2(t)
         below, below_slope, fall = _w1(t)

@@ -1,6 +1,6 @@
 """The forward lobe, and the fan integral: integrals over the shadow line that no caustic spoils.
 
-    I_S = -(1/√π) ∫ √(|J| m1 m2) e^{-iπ N/2} g(ξ) e^{ik(d.x0 + s* - r.x*)} dσ⊥    creeping rays at the horizon n.r = 0
+    I_S = -(1/√π) ∫ √(|J| m1 m2) e^{-iπN/2} g(ξ) e^{ik(d.x0 + s* - r.x*)} dσ⊥      rays at n.r = 0
     I_L = -(1/√π) ∫ m g(ξ) e^{iξ³/12} e^{ik(d - r).x} dσ⊥,   ξ = 2 m n.d           mid-horizon, lit half
     near d      g = p*, and the silhouette -1/(4π(1 - d.r)) ∮ e^{ik(d - r).x} (d × r).dl; i k A/(2π) at r = d
     beyond      g = p* - c²/(2√π ξ),  c = n0.e on S (e along r across d), c = n.(r - d)/|r - d| on L
@@ -13,8 +13,8 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.coefficients import Boundary, fock_scale
-from creeping.field.launching import fock_parameter, scales, shed_wave, smoothstep
-from creeping.field.reflected import lit_wave
+from creeping.field.fock import pekeris_slope, pekeris_star
+from creeping.field.launching import SECOND_ORDER, fock_parameter, scales, shared_pole, shed_wave, smoothstep
 from creeping.rays.horizon import HorizonRays, MidHorizon
 from creeping.rays.launch_points import line_tangents
 from creeping.rays.shadow import ShadowLine
@@ -24,17 +24,23 @@ TAPER = (0.3, 0.7)
 
 
 def shadow_half(
-    nodes: HorizonRays, observers: FloatArray, direction: FloatArray, wavenumber: float, boundary: Boundary, order: int,
-    pole: FloatArray,
+    nodes: HorizonRays,
+    observers: FloatArray,
+    direction: FloatArray,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+    pole_share: FloatArray,
 ) -> ComplexArray:
-    """Integrand of I_S times its weight (n,), L; ``pole`` (n,) weights the term in c², 0 near d and 1 beyond."""
+    """Integrand of I_S times its weight (n,), L; ``pole_share`` (n,) weights the term in c², 0 near d and 1 beyond."""
     rays = nodes.rays
     r = observers[nodes.observer]
     xi = fock_parameter(rays, wavenumber)
-    g = np.exp(-0.25j * np.pi) * shed_wave(rays, wavenumber, boundary, order, transverse_weight=0.5, star=True)
     e = r - np.sum(r * direction, axis=1, keepdims=True) * direction
     c = np.sum(rays.first_normal * e, axis=1) / np.maximum(np.linalg.norm(e, axis=1), 1e-300)
-    g = g - _over(pole * c**2, 2 * np.sqrt(np.pi) * xi)
+    g = np.exp(-0.25j * np.pi) * shed_wave(
+        rays, wavenumber, boundary, order, transverse_weight=0.5, pole_share=np.where(xi > 0, pole_share * c**2, 0.0)
+    )
     return _crossing_wave(nodes, r, wavenumber, g)
 
 
@@ -59,8 +65,13 @@ def _crossing_wave(nodes: HorizonRays, r: FloatArray, wavenumber: float, g: Comp
 
 
 def lit_half(
-    nodes: MidHorizon, observers: FloatArray, direction: FloatArray, wavenumber: float, boundary: Boundary, order: int,
-    pole: FloatArray,
+    nodes: MidHorizon,
+    observers: FloatArray,
+    direction: FloatArray,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+    pole_share: FloatArray,
 ) -> ComplexArray:
     """Integrand of I_L times its weight (n,), L."""
     r = observers[nodes.observer]
@@ -68,19 +79,41 @@ def lit_half(
     curved = np.isfinite(m)
     m = np.where(curved, m, 1.0)
     xi = np.minimum(2 * m * (nodes.normals @ direction), 0.0)
-    g = np.exp(-0.25j * np.pi) * lit_wave(
-        xi, m, np.where(curved, nodes.across / np.where(curved, nodes.along, 1.0), 0.0), boundary, order, star=True
-    )
     away = r - direction
     c = np.sum(nodes.normals * away, axis=1) / np.maximum(np.linalg.norm(away, axis=1), 1e-300)
-    g = g - _over(pole * c**2, 2 * np.sqrt(np.pi) * xi)
+    ratio = np.where(curved, nodes.across / np.where(curved, nodes.along, 1.0), 0.0)
+    g = lit_wave(xi, m, ratio, boundary, order, np.where(xi < 0, pole_share * c**2, 0.0))
     phase = wavenumber * np.sum((direction - r) * nodes.points, axis=1) + xi**3 / 12
     return np.asarray(np.where(curved, -m / np.sqrt(np.pi) * g * np.exp(1j * phase) * nodes.weight, 0.0))
 
 
-def _over(top: FloatArray, bottom: FloatArray) -> FloatArray:
-    """Quotient, 0 where the bottom is: there the top vanishes faster."""
-    return np.divide(top, bottom, out=np.zeros_like(top), where=bottom != 0)
+def lit_wave(
+    xi: FloatArray, m: FloatArray, ratio: FloatArray, boundary: Boundary, order: int, share: FloatArray
+) -> ComplexArray:
+    """p* - share/(2√π ξ) on the lit side, ξ <= 0, scales m and r = κ_b/κ_n (n,).
+
+    The second order is that of the shadow at ξ = 0, carried over from the path e^{ikaφ} of the circle to that of the
+    reflected ray: with D = -i d/dξ,
+
+        (1/m²) {(iξ/60) D² + (1/30) D + (iξ³/24) D + i (3/320) ξ⁵ + (r/2) (D + ξ²/4) - (1/10 ± r/4) d/dq} (p* - pole)
+
+    Far on the lit side all its growing terms cancel.
+    """
+    q = boundary.q(m)
+
+    g = pekeris_star(xi, q) - shared_pole(xi, share)
+    if order == 1:
+        return g
+    # near grazing the pole is left alone, beyond it is part of the reflected wave
+    share = share * smoothstep(-xi, *SECOND_ORDER)
+    whole, first, second = (pekeris_star(xi, q, n) - shared_pole(xi, share, n) for n in range(3))
+    change = 1j * xi / 60 * second + (1 / 30 + 1j * xi**3 / 24 + ratio / 2) * first
+    change = change + (3j / 320 * xi**5 + ratio * xi**2 / 8) * whole
+    if q is not None:
+        change = change - (0.1 + 0.25 * boundary.sign * ratio) * pekeris_slope(xi, q)
+        if np.ndim(q):
+            change = change - 2 / 15 * q * pekeris_slope(xi, q, 1)
+    return np.asarray(g + change / m**2)
 
 
 def silhouette(line: ShadowLine, observers: FloatArray, wavenumber: float) -> ComplexArray:

@@ -3,9 +3,10 @@
     ξ = (k/2)^(1/3) ∫ κₙ^(2/3) ds,   m = (kρ/2)^(1/3),   D = -√(m1 m2) √(2/k) P
     P = 2i√π e^{iπ/4} Σ_p R_p A_p exp{i ξ τ_p + i (2/k)^(1/3) ∫ c_p κₙ^(4/3) ds}
 
-The corrected series of second order diverges at small ξ; there P(ξ; q_eff) of first order stands, with q_eff = -r/(4m²)
-for the hard boundary's transverse curvature. For an impedance q varies along the ray: τ_p is taken at the mean of q
-weighted by κₙ^(2/3), so that its first-order variation is exact, and R_p at both ends.
+At small ξ the corrected series diverges. There each power of τ is read as one of t under the integral of P, where it is
+a derivative of P, and M0 = dτ/dq as a change of q; both forms are the same series. For an impedance q varies along the
+ray: τ_p is taken at the mean of q weighted by κₙ^(2/3), so that its first-order variation is exact, and R_p at the
+geometric mean of both ends.
 """
 
 import numpy as np
@@ -20,7 +21,7 @@ from creeping.field.coefficients import (
     fock_scale,
     modes_of,
 )
-from creeping.field.fock import pekeris, pekeris_slope, pekeris_star
+from creeping.field.fock import pekeris_slope, pekeris_star, pole
 from creeping.rays.ray_points import RayPoints
 
 SECOND_ORDER = (0.5, 0.9)
@@ -63,7 +64,9 @@ def mode_waves(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Bound
     return np.asarray(np.exp(1j * exponent))
 
 
-def end_factor(rays: RayPoints, modes: Modes, wavenumber: float, launch_share: FloatArray | float = 1.0) -> ComplexArray:
+def end_factor(
+    rays: RayPoints, modes: Modes, wavenumber: float, launch_share: FloatArray | float = 1.0
+) -> ComplexArray:
     """A = exp{-i τ² ρ1'/(12 m1)} exp{+i τ² ρ2'/(12 m2)}: (..., n).
 
     ``launch_share`` (...) is the power of the second factor: 0 on the body, 1 far away.
@@ -81,14 +84,23 @@ def amplitude_factor(
     """1 + (1/2) Σ [∂c/∂τ + ω r τ + β τ ρρ'']/m² over both ends: (..., n)."""
     plain, across = decay_slopes(modes, boundary.sign)
     total = np.ones((*rays.time.shape, 1), dtype=complex)
-    for m, r, bend in zip(scales(rays, wavenumber), transverse_ratios(rays), rays.radius_bend, strict=True):
-        with np.errstate(invalid="ignore", divide="ignore"):
-            weights = [np.nan_to_num(v / m**2)[..., None] for v in (np.ones_like(m), r, bend)]
+    for m, r, bend in _ends(rays, wavenumber):
+        by_curvature = transverse_weight * r + BETA * bend
         total = total + 0.5 * (
-            (plain * weights[0] + across * weights[1])
-            + modes.tau * (transverse_weight * weights[1] + BETA * weights[2])
+            plain / m**2 + across * r / m**2 + modes.tau * by_curvature / m**2 - modes.m0**2 * bend / (60 * m**2)
         )
     return total
+
+
+def _ends(rays: RayPoints, wavenumber: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """m, r and ρρ'' at both ends, each (..., 1); m is inf and the rest 0 where κₙ <= 0."""
+    found = []
+    for k in range(2):
+        values = (transverse_ratios(rays)[k], rays.radius_bend[k])
+        m = scales(rays, wavenumber)[k][..., None]
+        r, bend = (np.where(np.isfinite(m), np.nan_to_num(v)[..., None], 0.0) for v in values)
+        found.append((m, r, bend))
+    return found
 
 
 def transverse_ratios(rays: RayPoints) -> tuple[FloatArray, FloatArray]:
@@ -96,15 +108,6 @@ def transverse_ratios(rays: RayPoints) -> tuple[FloatArray, FloatArray]:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = [t / c for t, c in zip(rays.transverse, rays.curvature, strict=True)]
     return np.nan_to_num(ratios[0]), np.nan_to_num(ratios[1])
-
-
-def effective_q(rays: RayPoints, wavenumber: float, boundary: Boundary) -> FloatArray:
-    """q_eff = -r/(4m²), mean of both ends, sign turned for the electric hard boundary (...)."""
-    total = np.zeros(rays.time.shape)
-    for m, r in zip(scales(rays, wavenumber), transverse_ratios(rays), strict=True):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            total = total - 0.125 * boundary.sign * np.nan_to_num(r / m**2)
-    return total
 
 
 def mode_sum(
@@ -135,29 +138,76 @@ def shed_wave(
     order: int,
     *,
     transverse_weight: float = 0.25,
-    star: bool = False,
+    pole_share: FloatArray | float = 1.0,
 ) -> ComplexArray:
-    """P of each ray, or e^{iπ/4} p* without its pole (...).
+    """e^{iπ/4} [p* - share/(2√π ξ)] of each ray (...): P where the share is 1.
 
-    At second order the correction to P is the same in both; it vanishes with ξ.
+    Parameters
+    ----------
+    transverse_weight : float
+        ω: 1/4 for one ray, 1/2 under an integral over the shadow line.
+    pole_share : (...) or float
+        Where the pole is taken care of otherwise, second order leaves it alone too.
     """
     m1, m2 = scales(rays, wavenumber)
     xi = fock_parameter(rays, wavenumber)
     q = boundary.q(np.sqrt(m1 * m2))
-    with np.errstate(invalid="ignore"):
-        total = np.exp(0.25j * np.pi) * pekeris_star(xi, q) if star else pekeris(xi, q)
-    if order == 1:
-        return total
-    weight = smoothstep(xi, *SECOND_ORDER)
-    some = weight > 0
-    part = rays[some]
-    total[some] += weight[some] * (
-        mode_sum(part, wavenumber, boundary, 2, transverse_weight)
-        - mode_sum(part, wavenumber, boundary, 1, transverse_weight)
-    )
-    early = weight < 1
-    if boundary.kind != "soft" and np.any(early):
-        slope = pekeris_slope(xi[early], q if np.ndim(q) == 0 else q[early])  # type: ignore[arg-type,index]
-        correction = effective_q(rays[early], wavenumber, boundary) * slope * (1 - weight[early])
-        total[early] += np.exp(0.25j * np.pi) * correction
-    return total
+    share = np.broadcast_to(np.asarray(pole_share, dtype=float), xi.shape)
+    total = pekeris_star(xi, q) - shared_pole(xi, share)
+    if order == 2:
+        weight = smoothstep(xi, *SECOND_ORDER)
+        early, late = weight < 1, weight > 0
+        if np.any(early):
+            some = rays[early]
+            change = early_correction(some, wavenumber, boundary, transverse_weight)
+            total[early] += (1 - weight[early]) * change
+        if np.any(late):
+            some = rays[late]
+            change = np.exp(-0.25j * np.pi) * (
+                mode_sum(some, wavenumber, boundary, 2, transverse_weight)
+                - mode_sum(some, wavenumber, boundary, 1, transverse_weight)
+            )
+            squared, linear = pole_operator(some, wavenumber, transverse_weight)
+            change += (1 - share[late]) * (squared * pole(xi[late], 2) + linear * pole(xi[late], 1))
+            total[late] += weight[late] * change
+    return np.asarray(np.exp(0.25j * np.pi) * total)
+
+
+def shared_pole(xi: FloatArray, share: FloatArray, power: int = 0) -> ComplexArray:
+    """Share of the pole, 0 where the share is, even at ξ = 0 (...)."""
+    return np.asarray(np.where(share > 0, share * np.where(share > 0, pole(xi, power), 0.0), 0.0))
+
+
+def pole_operator(rays: RayPoints, wavenumber: float, transverse_weight: float) -> tuple[ComplexArray, FloatArray]:
+    """Factors of τ² and τ in the second order of a mode: from c, the ends, and the amplitude (...)."""
+    i = rays.integrals
+    turn = np.cbrt(2 / wavenumber) * (i[..., 2] / 60 - 2 / 45 * i[..., 4])
+    linear = np.zeros(rays.time.shape)
+    rates = rays.radius_rate
+    for sign, rate, (m, r, bend) in zip((-1, 1), rates, _ends(rays, wavenumber), strict=True):
+        with np.errstate(invalid="ignore"):
+            turn = turn + sign * np.nan_to_num(rate / m[..., 0]) / 12
+        linear = linear + 0.5 * ((1 / 30 + transverse_weight * r + BETA * bend) / m**2)[..., 0]
+    return 1j * turn, linear
+
+
+def early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary, transverse_weight: float) -> ComplexArray:
+    """What second order adds to p* at small ξ, where its series diverges (...); a pole is left alone.
+
+    Under the integral of p* each power of τ is one of t, and M0 is dτ/dq:
+    c = τ²/60 - (2/45) B τ² - (1/10 ± r/4 - B/60) M0 - (2/15) q τ M0, B = ρρ'' - (2/3) ρ'². In amplitudes B is ρρ''.
+    """
+    xi = fock_parameter(rays, wavenumber)
+    m1, m2 = scales(rays, wavenumber)
+    q = boundary.q(np.sqrt(m1 * m2))
+    squared, linear = pole_operator(rays, wavenumber, transverse_weight)
+    total = squared * pekeris_star(xi, q, 2) + linear * pekeris_star(xi, q, 1)
+    if q is not None:
+        shift = sum(
+            ((bend / 60 - 0.1 - 0.25 * boundary.sign * r) / (2 * m**2))[..., 0]
+            for m, r, bend in _ends(rays, wavenumber)
+        )
+        total = total + shift * pekeris_slope(xi, q)
+        if np.ndim(q):
+            total = total - 2 / 15 * q / (m1 * m2) * pekeris_slope(xi, q, 1)
+    return np.asarray(total)

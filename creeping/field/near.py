@@ -112,9 +112,7 @@ def _height(fan: RayFan, points: FloatArray) -> FloatArray:
         return np.asarray(np.nan_to_num(fan.body.level(points) / gradient, nan=-1.0) / size(fan.body))
 
 
-def shed_waves(
-    rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int
-) -> ComplexArray:
+def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """Contribution of each ray (n,) at the distance l = reach (n,) along its tangent."""
     m1, m2 = scales(rays, wavenumber)
     J, rate = rays.spreading, rays.spreading_rate

@@ -93,7 +93,9 @@ def scalar_boundary(boundary: BoundaryLike) -> Boundary:
     """
     kinds = scalar_boundaries(boundary)
     if len(kinds) > 1:
-        raise InvalidInputError("boundary 'pec' is for the far field; on and near the body give 'soft', 'hard' or Impedance")
+        raise InvalidInputError(
+            "boundary 'pec' is for the far field; on and near the body give 'soft', 'hard' or Impedance"
+        )
     return kinds[0]
 
 
@@ -106,9 +108,7 @@ def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order:
         weight = smoothstep(xi, *SECOND_ORDER)
         some = (weight > 0) & rays.alive
         part = rays[some]
-        wave[some] += weight[some] * (
-            _series(part, wavenumber, boundary, 2) - _series(part, wavenumber, boundary, 1)
-        )
+        wave[some] += weight[some] * (_series(part, wavenumber, boundary, 2) - _series(part, wavenumber, boundary, 1))
     first, last = rays.curvature
     phase = wavenumber * rays.eikonal - 0.5 * np.pi * rays.caustics
     with np.errstate(divide="ignore", invalid="ignore"):

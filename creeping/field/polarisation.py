@@ -35,9 +35,7 @@ def wave_frame(normals: FloatArray, directions: FloatArray, spare: FloatArray) -
     return np.stack([s, np.cross(s, directions)], axis=-2)
 
 
-def dyads(
-    incoming: FloatArray, outgoing: FloatArray, direction: FloatArray, observers: FloatArray
-) -> FloatArray:
+def dyads(incoming: FloatArray, outgoing: FloatArray, direction: FloatArray, observers: FloatArray) -> FloatArray:
     """Components of both dyads (n, 2 kinds, 2 scattered, 2 incident), from frames (n, 2, 3)."""
     received = incoming @ spherical_frame(direction).T
     sent = np.einsum("nkc,noc->nko", outgoing, spherical_frame(observers))

@@ -10,7 +10,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.coefficients import Boundary, fock_scale
-from creeping.field.fock import FARTHEST, pekeris, pekeris_slope, pekeris_star
+from creeping.field.fock import FARTHEST, pekeris, pekeris_slope
 from creeping.rays.specular import SpecularPoints
 
 
@@ -26,7 +26,11 @@ def reflection(
             out = out * np.nan_to_num(1 - 1j * boundary.sign * across / (wavenumber * cosine))
     if np.any(curved):
         xi = -2 * m[curved] * cosine[curved]
-        wave = lit_wave(xi, m[curved], across[curved] / along[curved], boundary, order, star=False)
+        q = boundary.q(m[curved])
+        wave = pekeris(xi, q)
+        if order == 2 and q is not None:
+            bent = -0.25 * boundary.sign * across[curved] / along[curved] / m[curved] ** 2
+            wave = wave + np.exp(0.25j * np.pi) * bent * pekeris_slope(xi, q)
         out[curved] = -np.sqrt(-4 / xi) * np.exp(1j * xi**3 / 12) * wave
     return out
 
@@ -38,20 +42,13 @@ def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
     return np.full(cosine.shape, -1.0 if boundary.kind == "soft" else 1.0, dtype=complex)
 
 
-def lit_wave(
-    xi: FloatArray, m: FloatArray, ratio: FloatArray, boundary: Boundary, order: int, *, star: bool
-) -> ComplexArray:
-    """P(ξ; q + q_eff), or e^{iπ/4} p*, on the lit side: ξ <= 0, scales m and r = κ_b/κ_n (n,)."""
-    q = boundary.q(m)
-    wave = np.exp(0.25j * np.pi) * pekeris_star(xi, q) if star else pekeris(xi, q)
-    if order == 2 and q is not None:
-        correction = -0.25 * boundary.sign * ratio / m**2 * pekeris_slope(xi, q)
-        wave = wave + np.exp(0.25j * np.pi) * correction
-    return wave
-
-
 def reflected_amplitude(
-    specular: SpecularPoints, observers: FloatArray, direction: FloatArray, wavenumber: float, boundary: Boundary, order: int
+    specular: SpecularPoints,
+    observers: FloatArray,
+    direction: FloatArray,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
 ) -> ComplexArray:
     """Contribution of each specular point to the far field (n,), L."""
     R = reflection(specular.cosine, specular.along, specular.across, wavenumber, boundary, order)

@@ -6,6 +6,7 @@ n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to 
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -71,44 +72,48 @@ class HorizonGrid:
             n = normal(body, strip.at(pairs[:, 0], pairs[:, 1]).points)
             self.parts.append((sigma, s, n.reshape(count, len(s), 3), (high - low) / count))
 
-    def crossings(self, observer: IntArray, directions: FloatArray) -> HorizonRays:
-        """Every crossing with p.r > 0, for unit directions (m, 3) of the observers (m,)."""
-        found: list[tuple[FloatArray, ...]] = []
+    def crossings(self, wanted: IntArray, directions: FloatArray) -> HorizonRays:
+        """Every crossing with p.r > 0, for the wanted rows of the observers' unit directions (m, 3)."""
+        seeds = []
         for k, (sigma, s, n, step) in enumerate(self.parts):
-            for row, r in zip(observer, directions, strict=True):
-                height = n @ r
+            for row in wanted:
+                height = n @ directions[row]
                 ray, j = np.nonzero(height[:, :-1] * height[:, 1:] < 0)
                 share = height[ray, j] / (height[ray, j] - height[ray, j + 1])
-                at = s[j] + share * (s[j + 1] - s[j])
-                found.append(
-                    (
-                        np.full(len(ray), row),
-                        np.full(len(ray), k),
-                        sigma[ray],
-                        at,
-                        np.full(len(ray), step),
-                        np.broadcast_to(r, (len(ray), 3)),
-                    )
-                )
-        if not found:
-            return HorizonRays(np.zeros(0, dtype=int), gather(self.strips, *_NOTHING), np.zeros(0))
-        row, which, sigma, s, step, r = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        row, which = row.astype(np.int64), which.astype(np.int64)
-        s, rays = _polish(self.strips, self.body, which, sigma, s, r)
-        keep = np.sum(rays.directions * r, axis=1) > 0
-        return HorizonRays(row[keep], rays[keep], (step * rays.width)[keep])
+                seeds.append(_Seeds.of(row, k, sigma[ray], s[j] + share * (s[j + 1] - s[j]), step))
+        nodes = _polish(self.strips, self.body, _Seeds.joined(seeds), directions)
+        ahead = np.sum(nodes.rays.directions * directions[nodes.observer], axis=1) > 0
+        return HorizonRays(nodes.observer[ahead], nodes.rays[ahead], nodes.weight[ahead])
 
 
-_NOTHING = (np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+class _Seeds(NamedTuple):
+    """Nodes before they are refined: observer, strip, σ, s, weight dσ, each (n,)."""
+
+    observer: IntArray
+    strip: IntArray
+    sigma: FloatArray
+    s: FloatArray
+    weight: FloatArray
+
+    @classmethod
+    def of(cls, row: int, strip: int, sigma: FloatArray, s: FloatArray, weight: FloatArray | float) -> "_Seeds":
+        """Nodes of one observer on one strip."""
+        count = len(sigma)
+        return cls(np.full(count, row), np.full(count, strip), sigma, s, np.broadcast_to(weight, (count,)))
+
+    @classmethod
+    def joined(cls, parts: list["_Seeds"]) -> "_Seeds":
+        """All parts as one."""
+        none = cls.of(0, 0, np.zeros(0), np.zeros(0), 0.0)
+        return cls(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
 
 
-def _polish(
-    strips: tuple[Strip, ...], body: Surface, which: IntArray, sigma: FloatArray, s: FloatArray, r: FloatArray
-) -> tuple[FloatArray, RayPoints]:
-    """Newton's method along each ray on n.r: s (n,) and the points there."""
+def _polish(strips: tuple[Strip, ...], body: Surface, seeds: _Seeds, directions: FloatArray) -> HorizonRays:
+    """Newton's method along each ray on n.r."""
     limit = 0.5 * max((strip.cell[1] for strip in strips), default=0.0)
+    r, s = directions[seeds.observer], seeds.s
     for _ in range(3):
-        rays = gather(strips, which, sigma, s)
+        rays = gather(strips, seeds.strip, seeds.sigma, s)
         gradient = body.gradient(rays.points)
         g = np.linalg.norm(gradient, axis=1)
         n = gradient / g[:, None]
@@ -117,10 +122,11 @@ def _polish(
         with np.errstate(divide="ignore", invalid="ignore"):
             move = np.nan_to_num(-np.sum(n * r, axis=1) / rate)
         s = np.maximum(s + np.clip(move, -limit, limit), 0.0)
-    return s, gather(strips, which, sigma, s)
+    rays = gather(strips, seeds.strip, seeds.sigma, s)
+    return HorizonRays(seeds.observer, rays, seeds.weight * rays.width)
 
 
-def joints(strip: Strip, direction: FloatArray, r: FloatArray) -> list[tuple[float, float, bool]]:
+def joints(strip: Strip, r: FloatArray) -> list[tuple[float, float, bool]]:
     """Intervals (σ start, σ end, shadow) of a strip with n0.r of one sign, negative on the shadow half."""
     low, high = strip.span
     sigma = np.linspace(low, high, 4 * len(strip.positions) + 1)
@@ -149,46 +155,62 @@ def joints(strip: Strip, direction: FloatArray, r: FloatArray) -> list[tuple[flo
 
 
 def forward_nodes(
-    strips: tuple[Strip, ...], line: ShadowLine, observer: IntArray, directions: FloatArray, counts: IntArray
+    strips: tuple[Strip, ...], line: ShadowLine, wanted: IntArray, directions: FloatArray, counts: IntArray
 ) -> tuple[HorizonRays, MidHorizon, IntArray]:
-    """Gauss nodes of both halves of the forward integral, and observers (rows) for which some were not found.
+    """Gauss nodes of both halves of the forward integral, and the observers for which some were not found.
 
     Parameters
     ----------
-    observer : (m,)
+    wanted : (w,)
         Rows of the observers.
     directions : (m, 3)
-    counts : (m,)
+        Unit directions of all observers, none of them d itself.
+    counts : (w,)
         Nodes on each interval between joints.
     """
-    d = line.direction
-    shadow: list[tuple[FloatArray, ...]] = []
-    lit: list[tuple[FloatArray, ...]] = []
-    lost: list[int] = []
-    for row, r, count in zip(observer, directions, counts, strict=True):
+    shadow, lit, lost = [], [_MidSeeds.empty()], []
+    for row, count in zip(wanted, counts, strict=True):
+        r = directions[row]
         nodes, weights = np.polynomial.legendre.leggauss(int(count))
         for k, strip in enumerate(strips):
-            for start, end, dark in joints(strip, d, r):
-                sigma = start + (end - start) * (nodes + 1) / 2
-                weight = (end - start) / 2 * weights
+            for start, end, dark in joints(strip, r):
+                sigma, weight = start + (end - start) * (nodes + 1) / 2, (end - start) / 2 * weights
                 if dark:
-                    s, ok = _first_crossing(strip, line.body, sigma, r)
-                    shadow.append((np.full(ok.sum(), row), np.full(ok.sum(), k), sigma[ok], s[ok], weight[ok], np.broadcast_to(r, (int(ok.sum()), 3))))
+                    s, found = _first_crossing(strip, line.body, sigma, r)
+                    shadow.append(_Seeds.of(row, k, sigma[found], s[found], weight[found]))
                 else:
-                    points, across, ok = _mid_horizon(strip, line, sigma, r)
-                    lit.append((np.full(ok.sum(), row), points[ok], weight[ok] * across[ok], np.broadcast_to(r, (int(ok.sum()), 3))))
-                if not np.all(ok):
-                    lost.append(int(row))
-    return _shadow_half(strips, line.body, shadow), _lit_half(line, lit), np.unique(np.array(lost, dtype=np.int64))
+                    x, across, found = _mid_horizon(strip, line, sigma, r)
+                    lit.append(_MidSeeds(np.full(int(found.sum()), row), x[found], (weight * across)[found]))
+                if not np.all(found):
+                    lost.append(row)
+    nodes_lit = _MidSeeds(*(np.concatenate(columns) for columns in zip(*lit, strict=True)))
+    return (
+        _polish(strips, line.body, _Seeds.joined(shadow), directions),
+        _mid_nodes(line, nodes_lit, directions),
+        np.unique(np.array(lost, dtype=np.int64)),
+    )
+
+
+class _MidSeeds(NamedTuple):
+    """Nodes of the mid-horizon: observer (n,), points (n, 3), weight (n,)."""
+
+    observer: IntArray
+    points: FloatArray
+    weight: FloatArray
+
+    @classmethod
+    def empty(cls) -> "_MidSeeds":
+        """No nodes."""
+        return cls(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
 
 
 def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArray) -> tuple[FloatArray, BoolArray]:
     """First s at which n.r rises through 0 on the rays σ (n,), to a coarse step, and whether there is one."""
     s = strip.times[strip.coarse_steps]
     heights = strip.coarse_normals(body) @ r
-    rises = heights > 0
+    rises = np.asarray(heights > 0)
     first = np.argmax(rises, axis=1)
-    found = rises.any(axis=1)
+    found = np.asarray(rises.any(axis=1))
     # a ray near a joint may rise within its first step: linear interpolation serves every start
     before = np.maximum(first - 1, 0)
     rows = np.arange(len(first))
@@ -201,15 +223,8 @@ def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArra
         crossing = np.concatenate([crossing[-1:], crossing, crossing[:1]])
         found = np.concatenate([found[-1:], found, found[:1]])
     at = strip.wrap(sigma)
-    return np.interp(at, positions, crossing), np.interp(at, positions, found.astype(float)) > 0.5
-
-
-def _shadow_half(strips: tuple[Strip, ...], body: Surface, parts: list[tuple[FloatArray, ...]]) -> HorizonRays:
-    if not parts:
-        return HorizonRays(np.zeros(0, dtype=np.int64), gather(strips, *_NOTHING), np.zeros(0))
-    row, which, sigma, s, weight, r = (np.concatenate(p) for p in zip(*parts, strict=True))
-    s, rays = _polish(strips, body, which.astype(np.int64), sigma, s, r)
-    return HorizonRays(row.astype(np.int64), rays, weight * rays.width)
+    whole = np.interp(at, positions, found.astype(float))
+    return np.interp(at, positions, crossing), np.asarray(whole > 0.5)
 
 
 def _mid_horizon(
@@ -238,24 +253,21 @@ def _mid_horizon(
         if np.all(long < 1e-13 * size(body)):
             break
     n = normal(body, x)
-    found = (np.abs(n @ q) < 1e-9) & (n @ line.direction < 1e-9) & (np.linalg.norm(x - x0, axis=1) < size(body))
+    found = np.asarray((np.abs(n @ q) < 1e-9) & (n @ line.direction < 1e-9))
+    found &= np.linalg.norm(x - x0, axis=1) < size(body)
     found &= np.abs(body.level(x)) <= 1e-9 * np.linalg.norm(body.gradient(x), axis=1) * size(body)
     order = np.argsort(sigma)
     slope = make_interp_spline(sigma[order], x[order], k=min(7, len(sigma) - 1))(sigma, nu=1)
-    return x, np.abs(np.sum(slope * np.cross(n, q), axis=1)), found
+    return x, np.abs(np.sum(slope * np.cross(n, q), axis=1)), np.asarray(found)
 
 
-def _lit_half(line: ShadowLine, parts: list[tuple[FloatArray, ...]]) -> MidHorizon:
-    if not parts:
-        none = np.zeros(0)
-        return MidHorizon(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)), none, none, none)
-    row, x, weight, r = (np.concatenate(p) for p in zip(*parts, strict=True))
-    body = line.body
+def _mid_nodes(line: ShadowLine, seeds: _MidSeeds, directions: FloatArray) -> MidHorizon:
+    body, x = line.body, seeds.points
     gradient = body.gradient(x)
     g = np.linalg.norm(gradient, axis=1)
     n = gradient / g[:, None]
-    q = line.direction + r
+    q = line.direction + directions[seeds.observer]
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     H = body.hessian(x)
     along, across = (np.einsum("ni,nij,nj->n", v, H, v) / g for v in (q, np.cross(n, q)))
-    return MidHorizon(row.astype(np.int64), x, n, weight, along, across)
+    return MidHorizon(seeds.observer, x, n, seeds.weight, along, across)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from creeping._errors import InvalidInputError
-from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.phaseflow.geodesic import speed_of
 from creeping.phaseflow.tracing import pack, trace_states
 from creeping.rays.fan import RayFan, RayStatus
@@ -60,9 +60,9 @@ class RayPoints:
     alive: BoolArray
     scale: float
 
-    def __getitem__(self, index: object) -> "RayPoints":
+    def __getitem__(self, index: Any) -> "RayPoints":
         """Part of the points, by an index of the leading axes."""
-        return RayPoints(self.lanes[index], self.starts[index], self.time[index], self.alive[index], self.scale)  # type: ignore[index]
+        return RayPoints(self.lanes[index], self.starts[index], self.time[index], self.alive[index], self.scale)
 
     @property
     def points(self) -> FloatArray:
@@ -183,7 +183,7 @@ def substeps(fan: RayFan) -> int:
 def _refined(fan: RayFan, parts: int, step: float) -> FloatArray:
     """x, p, J, J' at the finer steps and GUARD steps beyond both ends: (rays, steps, 8)."""
     rays, steps = fan.spreading.shape
-    offsets = step * np.arange(max(parts, GUARD + 1))
+    offsets = step * np.arange(max(parts, GUARD + 1), dtype=float)
     forward = np.concatenate([fan.points, fan.directions], axis=-1).reshape(-1, 6)
     traced = trace_states(fan.body, pack(forward[:, :3], forward[:, 3:], jacobi=True), offsets, rtol=1e-11)
     traced = traced.reshape(rays, steps, len(offsets), 10)
@@ -226,7 +226,7 @@ def _along(fan: RayFan, states: FloatArray, step: float, lanes: FloatArray) -> N
     H = fan.body.hessian(x)
     b = np.cross(gradient / g[..., None], p)
     curvatures = np.stack([np.einsum("...i,...ij,...j->...", v, H, v) / g for v in (p, b)], axis=-1)
-    t = step * (np.arange(states.shape[1]) - GUARD)
+    t = step * (np.arange(states.shape[1], dtype=float) - GUARD)
     both = make_interp_spline(t, curvatures, k=7, axis=1)
     first, second = both.derivative(1), both.derivative(2)
     inner = t[GUARD:-GUARD]
@@ -234,7 +234,7 @@ def _along(fan: RayFan, states: FloatArray, step: float, lanes: FloatArray) -> N
     lanes[..., 10], lanes[..., 11] = first(inner)[..., 0], second(inner)[..., 0]
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
 
-    def integral(start: FloatArray, length: FloatArray, rays: object) -> FloatArray:
+    def integral(start: Any, length: Any, rays: Any) -> FloatArray:
         """Over steps (m,) from their starts: rays x m x 5."""
         at = (start[:, None] + length[:, None] * (nodes + 1) / 2).ravel()
         values = both(at)[rays]

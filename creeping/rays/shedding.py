@@ -68,17 +68,18 @@ def shed_near(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> S
     scale = size(body)
 
     def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
-        return tuple(some @ v - np.sum(x * v, axis=0) for v in (n, b, p))  # type: ignore[return-value]
+        across, aside, along = (some @ v - np.sum(x * v, axis=0) for v in (n, b, p))
+        return across, aside, along > 0
 
     def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
         away = target - at.points
-        l = np.sum(away * at.directions, axis=-1)
-        columns = [v[:, :3] + l[:, None] * v[:, 3:] for v in slopes]
-        # l is eliminated: only what lies across p counts
+        reach = np.sum(away * at.directions, axis=-1)
+        columns = [v[:, :3] + reach[:, None] * v[:, 3:] for v in slopes]
+        # the length l is eliminated: only what lies across p counts
         columns = [v - np.sum(v * at.directions, axis=-1, keepdims=True) * at.directions for v in columns]
-        return np.stack(columns, axis=-1) / scale, (away - l[:, None] * at.directions) / scale
+        return np.stack(columns, axis=-1) / scale, (away - reach[:, None] * at.directions) / scale
 
-    observer, strip, sigma, rays = _search(strips, body, points, lambda *a: _positive(functions(*a)), step)
+    observer, strip, sigma, rays = _search(strips, body, points, functions, step)
     reach = np.sum((points[observer] - rays.points) * rays.directions, axis=-1)
     ahead = reach > 0
     return ShedRays(observer[ahead], strip[ahead], sigma[ahead], rays[ahead], reach[ahead])
@@ -110,10 +111,6 @@ def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> She
 
 _Functions = tuple[FloatArray, FloatArray, BoolArray]
 _Step = Callable[[RayPoints, tuple[FloatArray, FloatArray], FloatArray], tuple[FloatArray, FloatArray]]
-
-
-def _positive(values: tuple[FloatArray, ...]) -> _Functions:
-    return values[0], values[1], values[2] > 0
 
 
 def _search(
@@ -154,7 +151,13 @@ def _seeds(
         ahead = ahead.reshape(-1, *shape)
         both &= ahead[:, :-1, :-1] | ahead[:, 1:, 1:]
         row, ray, column = np.nonzero(both)
-        found.append((row + first, 0.5 * (sigma[ray] + sigma[ray + 1]), 0.5 * (strip.times[columns][column] + strip.times[columns][column + 1])))
+        found.append(
+            (
+                row + first,
+                0.5 * (sigma[ray] + sigma[ray + 1]),
+                0.5 * (strip.times[columns][column] + strip.times[columns][column + 1]),
+            )
+        )
     return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))  # type: ignore[return-value]
 
 
@@ -193,7 +196,9 @@ def _newton(
         move = np.clip(np.nan_to_num(move), -np.array(widths), np.array(widths))
         sigma = sigma + move[:, 0]
         s = np.clip(s + move[:, 1], 0.0, strip.times[-1])
-    good = (residual < 100 * CLOSE) & (np.abs(sigma - start_sigma) < 3 * widths[0]) & (np.abs(s - start_s) < 3 * widths[1])
+    good = (
+        (residual < 100 * CLOSE) & (np.abs(sigma - start_sigma) < 3 * widths[0]) & (np.abs(s - start_s) < 3 * widths[1])
+    )
     low, high = strip.positions[0] - widths[0], strip.positions[-1] + widths[0]
     if not strip.closed:
         good &= (sigma > low) & (sigma < high)

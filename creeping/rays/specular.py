@@ -2,8 +2,8 @@
 
     n(x) = (r - d)/|r - d|,   cos θᵢ = n.r = -n.d,   K = κ1 κ2
 
-The shape operator S = dn/dx, restricted to the tangent plane, turns a step on the body into one of its normal. Seeds are
-vertices of a triangulation next to which n - h changes sign in two tangential components.
+The shape operator S = dn/dx turns a step on the body into one of its normal. Seeds are the triangles of a mesh whose
+normals surround the one that is wanted.
 """
 
 from dataclasses import dataclass

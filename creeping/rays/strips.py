@@ -105,9 +105,7 @@ class Strip:
         """Points of the strip: (n,), (n,)."""
         lanes, starts = self._splines
         sigma = self.wrap(sigma)
-        return RayPoints(
-            lanes(np.stack([sigma, s], axis=-1)), starts(sigma), s, self._alive(sigma, s), self.rays.scale
-        )
+        return RayPoints(lanes(np.stack([sigma, s], axis=-1)), starts(sigma), s, self._alive(sigma, s), self.rays.scale)
 
     def slopes(self, sigma: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives in σ and in s of (x, p): (n,), (n,) -> (n, 6), (n, 6)."""

@@ -142,9 +142,7 @@ def _bisect(
     return np.asarray(0.5 * (low + high))
 
 
-def occluded(
-    body: Surface, points: FloatArray, direction: FloatArray, reach: FloatArray | float = np.inf
-) -> BoolArray:
+def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: FloatArray | float = np.inf) -> BoolArray:
     """Whether the backward ray x - t d, 0 < t < reach, enters the body: points (n, 3), d (3,) or (n, 3) -> (n,).
 
     It leaves a point along the normal's side, or touches there from a convex side.
@@ -156,14 +154,14 @@ def occluded(
         exits = np.where(direction > 0, (points - box[0]) / direction, (points - box[1]) / direction)
     # a point on the face of the box, or just beyond it by rounding, has nothing behind
     inside = np.maximum(np.min(np.where(direction != 0, exits, np.inf), axis=1), 1e-3 * size(body))
-    reach = np.minimum(inside, reach)
-    t = reach[:, None] * (np.arange(1, RAY_SAMPLES + 2) / RAY_SAMPLES)
+    limit: FloatArray = np.minimum(inside, np.asarray(reach, dtype=float))
+    t = limit[:, None] * (np.arange(1, RAY_SAMPLES + 2) / RAY_SAMPLES)
     direction = np.broadcast_to(direction, points.shape)
     F = body.level(points[:, None] - t[..., None] * direction[:, None])
     hit = np.asarray(np.any(F < 0, axis=1))
     ray, j = np.nonzero((F[:, 1:-1] < F[:, :-2]) & (F[:, 1:-1] <= F[:, 2:]) & ~hit[:, None])
     if len(ray):
-        step = reach[ray] / RAY_SAMPLES
+        step = limit[ray] / RAY_SAMPLES
         deepest = _minima(body, points[ray], direction[ray], t[ray, j + 1], step)
         hit[ray[deepest < 0]] = True
     return hit
