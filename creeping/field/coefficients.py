@@ -58,7 +58,7 @@ BoundaryLike = Literal["soft", "hard", "pec"] | Impedance
 
 @dataclass(frozen=True)
 class Boundary:
-    """One scalar boundary: ``kind`` is "soft", "hard", "electric hard" or "impedance"."""
+    """One scalar boundary: ``kind`` is "soft", "hard", "impedance", "electric soft" or "electric hard"."""
 
     kind: str
     eta: complex = 0j
@@ -72,14 +72,15 @@ class Boundary:
         """Parameter q of the Airy functions at a Fock scale m (...): None if soft, 0 if hard, else (...)."""
         if self.kind == "impedance":
             return np.asarray(1j * m * self.eta)
-        return None if self.kind == "soft" else 0.0
+        return None if self.kind.endswith("soft") else 0.0
 
 
-SOFT, HARD, ELECTRIC_HARD = Boundary("soft"), Boundary("hard"), Boundary("electric hard")
+SOFT, HARD = Boundary("soft"), Boundary("hard")
+ELECTRIC_SOFT, ELECTRIC_HARD = Boundary("electric soft"), Boundary("electric hard")
 
 
 def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
-    """Scalar problems of a boundary: one, or for "pec" those of E along b (soft) and along n (electric hard).
+    """Scalar problems of a boundary: one, or for "pec" those of E along b and along n.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
         if boundary.eta == 0:
             return (HARD,)
         return (Boundary("impedance", boundary.eta),)
-    known = {"soft": (SOFT,), "hard": (HARD,), "pec": (SOFT, ELECTRIC_HARD)}
+    known = {"soft": (SOFT,), "hard": (HARD,), "pec": (ELECTRIC_SOFT, ELECTRIC_HARD)}
     if isinstance(boundary, str) and boundary in known:
         return known[boundary]
     raise InvalidInputError(f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or Impedance(eta)")
@@ -104,10 +105,7 @@ def fock_scale(wavenumber: float, curvature: FloatArray) -> FloatArray:
 
 def modes_of(boundary: Boundary, m: FloatArray) -> Modes:
     """Modes at Fock scales m (...): (n,) for soft and hard, (..., n) for an impedance."""
-    q = boundary.q(m)
-    if q is None or (np.ndim(q) == 0 and not np.any(q)):
-        return boundary_modes(q)
-    return boundary_modes(q)
+    return boundary_modes(boundary.q(m))
 
 
 def decay_terms(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

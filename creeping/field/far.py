@@ -15,19 +15,22 @@ import numpy as np
 
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.coefficients import Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.far_geometry import FarGeometry, far_geometry
+from creeping.field.coefficients import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.far_geometry import FarGeometry, far_geometry, off_axis
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.launching import scales, shed_wave, smoothstep
 from creeping.field.polarisation import dyads, wave_frame
 from creeping.field.reflected import reflected_amplitude
 from creeping.rays.fan import RayFan
+from creeping.rays.ray_points import RayPoints
 
 FORWARD = (0.55, 0.85)
 """m̄ θ between which the forward lobe gives way."""
 NEAR_AXIS = (0.25, 0.4)
 """m̄ θ between which its silhouette gives way to the poles."""
 LONG_RAYS = (np.radians(4.0), np.radians(12.0))
+CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)}
+"""Polarisations of a conductor and the other of each, with the sign of their coupling."""
 MERGED = (0.38, 0.52)
 """χ between which the fan integral replaces isolated rays."""
 
@@ -144,13 +147,26 @@ def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, 
     """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
     rays = geometry.shed.rays
     m1, m2 = scales(rays, wavenumber)
-    phase = (
-        wavenumber * (rays.eikonal - np.sum(rays.directions * rays.points, axis=-1)) - 0.5 * np.pi * rays.far_caustics
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / np.abs(rays.spreading_rate))
-        wave = amplitude * shed_wave(rays, wavenumber, boundary, order) * np.exp(1j * phase)
+    path = rays.eikonal - np.sum(rays.directions * rays.points, axis=-1)
+    phase = wavenumber * path - 0.5 * np.pi * rays.far_caustics
+    wave = shed_wave(rays, wavenumber, boundary, order)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        if order == 2 and boundary in CROSSED:
+            sign, other = CROSSED[boundary]
+            wave = wave + sign * gradient_coupling(rays, wavenumber) * shed_wave(rays, wavenumber, other, order)
+        wave = -np.sqrt(2 * m1 * m2 / wavenumber / np.abs(rays.spreading_rate)) * wave * np.exp(1j * phase)
     return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
+
+
+def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
+    """i √(κ_t1 κ_t2)/(k J'): how much of one polarisation's wave goes with the other's (n,).
+
+    An amplitude n0.E that varies across the rays has a transverse field of higher order in 1/k; the soft wave is so
+    weak that this outweighs it. Found on the sphere, exactly; κ_t at both ends, for reciprocity, on other bodies.
+    """
+    first, last = rays.transverse
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(1j * np.sqrt(np.maximum(first * last, 0.0)) / (wavenumber * rays.spreading_rate))
 
 
 class _Parts:
@@ -195,7 +211,8 @@ class _Parts:
         self._sum(self.forward, number, lit.observer, _weighted(w[lit.observer], wave), lit.normals, lit.normals)
         ahead = np.flatnonzero((w > 0) & (self.beyond_axis < 1))
         wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(g.line, g.directions[ahead], k)
-        aside = np.cross(np.broadcast_to(d, (len(ahead), 3)), g.directions[ahead])
+        # any normal of the plane of d and r will do, and any vector across d where they are one
+        aside = np.cross(d, off_axis(g.directions[ahead], d))
         self._sum(self.forward, number, ahead, wave, aside, aside)
 
     def _sum(

@@ -52,30 +52,37 @@ def mean_scale(rays: RayPoints, wavenumber: float) -> FloatArray:
     return np.asarray(np.where(some, np.cbrt(wavenumber / 2) * mean, scales(rays, wavenumber)[0]))
 
 
-def mode_waves(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """exp{i ξ τ + i ∫ c/(mρ) ds}, without c at first order: (..., n)."""
-    exponent = fock_parameter(rays, wavenumber)[..., None] * modes.tau
-    if order == 2:
-        plain, across, varying = decay_terms(modes, boundary.sign)
-        i = rays.integrals[..., None]
-        exponent = exponent + np.cbrt(2 / wavenumber) * (
-            plain * i[..., 2, :] + across * i[..., 3, :] + varying * i[..., 4, :]
-        )
-    return np.asarray(np.exp(1j * exponent))
+def limited(change: ComplexArray, bound: ComplexArray | FloatArray | float) -> ComplexArray:
+    """A correction held below a bound in magnitude; below a third of it, untouched to 1e-2 of itself (...)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.nan_to_num(np.abs(change) / np.abs(bound), nan=0.0, posinf=1e30)
+    return np.asarray(change / np.sqrt(np.sqrt(1 + ratio**4)))
 
 
-def end_factor(
-    rays: RayPoints, modes: Modes, wavenumber: float, launch_share: FloatArray | float = 1.0
+def mode_waves(
+    rays: RayPoints,
+    modes: Modes,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+    *,
+    launch_share: FloatArray | float | None = 1.0,
 ) -> ComplexArray:
-    """A = exp{-i τ² ρ1'/(12 m1)} exp{+i τ² ρ2'/(12 m2)}: (..., n).
+    """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
 
-    ``launch_share`` (...) is the power of the second factor: 0 on the body, 1 far away.
+    ``launch_share`` (...) is the power of the launch factor: 0 on the body, 1 far away; None leaves both ends out. The
+    correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken down.
     """
-    m1, m2 = scales(rays, wavenumber)
-    rate1, rate2 = rays.radius_rate
-    with np.errstate(invalid="ignore"):
-        turn = np.nan_to_num(-rate1 / m1 + launch_share * rate2 / m2)
-    return np.asarray(np.exp(1j * modes.tau**2 * (turn / 12)[..., None]))
+    leading = fock_parameter(rays, wavenumber)[..., None] * modes.tau
+    if order == 1:
+        return np.asarray(np.exp(1j * leading))
+    plain, across, varying = decay_terms(modes, boundary.sign)
+    i = rays.integrals[..., None]
+    change = np.cbrt(2 / wavenumber) * (plain * i[..., 2, :] + across * i[..., 3, :] + varying * i[..., 4, :])
+    if launch_share is not None:
+        (rate1, rate2), (m1, m2) = rays.radius_rate, scales(rays, wavenumber)
+        change = change + modes.tau**2 * ((launch_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
+    return np.asarray(np.exp(1j * (leading + limited(change, 0.5 * leading))))
 
 
 def amplitude_factor(
@@ -83,13 +90,13 @@ def amplitude_factor(
 ) -> ComplexArray:
     """1 + (1/2) Σ [∂c/∂τ + ω r τ + β τ ρρ'']/m² over both ends: (..., n)."""
     plain, across = decay_slopes(modes, boundary.sign)
-    total = np.ones((*rays.time.shape, 1), dtype=complex)
+    change = np.zeros((*rays.time.shape, 1), dtype=complex)
     for m, r, bend in _ends(rays, wavenumber):
         by_curvature = transverse_weight * r + BETA * bend
-        total = total + 0.5 * (
+        change = change + 0.5 * (
             plain / m**2 + across * r / m**2 + modes.tau * by_curvature / m**2 - modes.m0**2 * bend / (60 * m**2)
         )
-    return total
+    return np.asarray(1 + limited(change, 1.0))
 
 
 def _ends(rays: RayPoints, wavenumber: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
@@ -118,7 +125,6 @@ def mode_sum(
     residue = end_residue(rays, wavenumber, boundary, "residue")
     terms = residue * mode_waves(rays, modes, wavenumber, boundary, order)
     if order == 2:
-        terms = terms * end_factor(rays, modes, wavenumber)
         terms = terms * amplitude_factor(rays, modes, wavenumber, boundary, transverse_weight)
     return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))
 
@@ -140,7 +146,7 @@ def shed_wave(
     transverse_weight: float = 0.25,
     pole_share: FloatArray | float = 1.0,
 ) -> ComplexArray:
-    """e^{iπ/4} [p* - share/(2√π ξ)] of each ray (...): P where the share is 1.
+    """e^{iπ/4} [p* - share/(2√π ξ)] of each ray (...): P where the share is 1, 0 where the creeping ray has ended.
 
     Parameters
     ----------
@@ -149,10 +155,21 @@ def shed_wave(
     pole_share : (...) or float
         Where the pole is taken care of otherwise, second order leaves it alone too.
     """
+    share = np.broadcast_to(np.asarray(pole_share, dtype=float), rays.time.shape)
+    if not np.all(rays.alive):
+        out = np.zeros(rays.time.shape, dtype=complex)
+        out[rays.alive] = shed_wave(
+            rays[rays.alive],
+            wavenumber,
+            boundary,
+            order,
+            transverse_weight=transverse_weight,
+            pole_share=share[rays.alive],
+        )
+        return out
     m1, m2 = scales(rays, wavenumber)
     xi = fock_parameter(rays, wavenumber)
     q = boundary.q(np.sqrt(m1 * m2))
-    share = np.broadcast_to(np.asarray(pole_share, dtype=float), xi.shape)
     total = pekeris_star(xi, q) - shared_pole(xi, share)
     if order == 2:
         weight = smoothstep(xi, *SECOND_ORDER)
@@ -160,7 +177,8 @@ def shed_wave(
         if np.any(early):
             some = rays[early]
             change = early_correction(some, wavenumber, boundary, transverse_weight)
-            total[early] += (1 - weight[early]) * change
+            q_early = q if q is None or np.ndim(q) == 0 else q[early]  # type: ignore[index]
+            total[early] += (1 - weight[early]) * limited(change, 0.5 * np.abs(pekeris_star(xi[early], q_early)))
         if np.any(late):
             some = rays[late]
             change = np.exp(-0.25j * np.pi) * (
@@ -175,7 +193,10 @@ def shed_wave(
 
 def shared_pole(xi: FloatArray, share: FloatArray, power: int = 0) -> ComplexArray:
     """Share of the pole, 0 where the share is, even at ξ = 0 (...)."""
-    return np.asarray(np.where(share > 0, share * np.where(share > 0, pole(xi, power), 0.0), 0.0))
+    some = share > 0
+    out = np.zeros(xi.shape, dtype=complex)
+    out[some] = share[some] * pole(xi[some], power)
+    return out
 
 
 def pole_operator(rays: RayPoints, wavenumber: float, transverse_weight: float) -> tuple[ComplexArray, FloatArray]:

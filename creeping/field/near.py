@@ -21,7 +21,6 @@ from creeping.field.far_geometry import fan_strips
 from creeping.field.fock import FAR_HEIGHT, height_gain, near_pekeris, pekeris, transition
 from creeping.field.launching import (
     amplitude_factor,
-    end_factor,
     end_residue,
     fock_parameter,
     mean_scale,
@@ -96,7 +95,7 @@ def near_field(
         shed = shed_near(strips, fan.body, flat[off])
         wave = shed_waves(shed.rays, shed.reach, k, kind, order)
         free = ~occluded(fan.body, shed.rays.points, -shed.rays.directions, shed.reach)
-        np.add.at(total, off[shed.observer], np.where(free & shed.rays.alive, wave, 0.0))
+        np.add.at(total, off[shed.observer], np.where(free, wave, 0.0))
     on = np.flatnonzero(height <= ON_BODY)
     if len(on) and kind.kind != "soft":
         found = shed_on(strips, fan.body, flat[on])
@@ -113,16 +112,20 @@ def _height(fan: RayFan, points: FloatArray) -> FloatArray:
 
 
 def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray (n,) at the distance l = reach (n,) along its tangent."""
+    """Contribution of each ray (n,) at the distance l = reach (n,) along its tangent; 0 where it has ended."""
+    if not np.all(rays.alive):
+        out = np.zeros(rays.time.shape, dtype=complex)
+        out[rays.alive] = shed_waves(rays[rays.alive], reach[rays.alive], wavenumber, boundary, order)
+        return out
     m1, m2 = scales(rays, wavenumber)
     J, rate = rays.spreading, rays.spreading_rate
     tube = J + reach * rate
     zeros = rays.caustics + (J * tube < 0)
     phase = wavenumber * (rays.eikonal + reach) - 0.5 * np.pi * zeros
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / (reach * np.abs(tube)))
-        height = (m2 * reach * rays.curvature[1]) ** 2
-        return np.asarray(amplitude * _uniform(rays, reach, height, wavenumber, boundary, order) * np.exp(1j * phase))
+    height = (m2 * reach * rays.curvature[1]) ** 2
+    return np.asarray(amplitude * _uniform(rays, reach, height, wavenumber, boundary, order) * np.exp(1j * phase))
 
 
 def _uniform(
@@ -133,9 +136,9 @@ def _uniform(
     m1, m2 = scales(rays, wavenumber)
     q = boundary.q(np.sqrt(m1 * m2))
     out = np.zeros(len(xi), dtype=complex)
-    low = (height <= FAR_HEIGHT) & (xi <= DEEP) & rays.alive
-    far = (height > FAR_HEIGHT) & (xi <= DEEP) & rays.alive
-    deep = (xi > DEEP) & rays.alive
+    low = (height <= FAR_HEIGHT) & (xi <= DEEP)
+    far = (height > FAR_HEIGHT) & (xi <= DEEP)
+    deep = xi > DEEP
     if np.any(low):
         out[low] = near_pekeris(xi[low], height[low], _part(q, low))
     if np.any(far):
@@ -170,10 +173,10 @@ def _series(
 ) -> ComplexArray:
     """Sum of modes with height gain (n,); ``ends`` with the factors of varying curvature at both ends."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber))
-    terms = end_residue(rays, wavenumber, boundary, "residue") * mode_waves(rays, modes, wavenumber, boundary, order)
+    share = height[..., 0] / (1 + height[..., 0]) if ends else None
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=share)
+    terms = end_residue(rays, wavenumber, boundary, "residue") * waves
     if order == 2:
         terms = terms * amplitude_factor(rays, modes, wavenumber, boundary, 0.25)
-    if ends:
-        terms = terms * end_factor(rays, modes, wavenumber, height[..., 0] / (1 + height[..., 0]))
     terms = terms * height_gain(modes.tau, height)
     return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))

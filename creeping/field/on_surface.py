@@ -3,10 +3,14 @@
     u = e^{ik(d.x0 + s)} (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} g(ξ)          hard, impedance
     du/dn: the same with (k/m2) F(ξ)                                        soft
 
-At second order each mode of g or F carries the decay c, the attachment factor exp{-i τ² ρ1'/(12 m1)} and, with means of
-both ends,
+Second order, as a factor of 1 + ( )/(m1 m2) of each mode or, at small ξ, under the integrals of g and F, r the mean of
+both ends:
 
-    soft  1 + (τ/60 + τ/12 + r τ/4)/(m1 m2)        hard  1 + ((1/2) ∂c/∂τ - τ/24 - c/(2τ) + r τ/4)/(m1 m2)
+    soft          τ (1/10 + r/4)
+    otherwise     τ (r/4 - 1/30) - (1/10 ± r/4 + (2/15) q τ) d/dq
+
+from the expansions of Hankel functions in the transition region [AS64, sec. 9.3] for the circular cylinder
+and the sphere; the decay c and the attachment factor exp{-i τ² ρ1'/(12 m1)} are those of `creeping.field.coefficients`.
 """
 
 import numpy as np
@@ -14,15 +18,15 @@ import numpy as np
 from creeping._errors import InvalidInputError
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.field.airy import Modes
-from creeping.field.coefficients import Boundary, BoundaryLike, decay_slopes, decay_terms, modes_of, scalar_boundaries
+from creeping.field.coefficients import Boundary, BoundaryLike, modes_of, scalar_boundaries
 from creeping.field.far import checked
 from creeping.field.far_geometry import fan_strips
-from creeping.field.fock import surface_function
+from creeping.field.fock import surface_function, surface_slope
 from creeping.field.launching import (
     SECOND_ORDER,
-    end_factor,
     end_residue,
     fock_parameter,
+    limited,
     mean_scale,
     mode_waves,
     scales,
@@ -100,31 +104,55 @@ def scalar_boundary(boundary: BoundaryLike) -> Boundary:
 
 
 def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray at its point (...)."""
+    """Contribution of each ray at its point (...), 0 where the creeping ray has ended."""
+    if not np.all(rays.alive):
+        out = np.zeros(rays.time.shape, dtype=complex)
+        out[rays.alive] = surface_waves(rays[rays.alive], wavenumber, boundary, order)
+        return out
     m1, m2 = scales(rays, wavenumber)
     xi = fock_parameter(rays, wavenumber)
     wave = surface_function(xi, boundary.q(np.sqrt(m1 * m2)))
     if order == 2:
         weight = smoothstep(xi, *SECOND_ORDER)
-        some = (weight > 0) & rays.alive
-        part = rays[some]
-        wave[some] += weight[some] * (_series(part, wavenumber, boundary, 2) - _series(part, wavenumber, boundary, 1))
+        early, late = weight < 1, weight > 0
+        change = _early_correction(rays[early], wavenumber, boundary)
+        wave[early] += (1 - weight[early]) * limited(change, 0.5 * np.abs(wave[early]))
+        part = rays[late]
+        wave[late] += weight[late] * (_series(part, wavenumber, boundary, 2) - _series(part, wavenumber, boundary, 1))
     first, last = rays.curvature
     phase = wavenumber * rays.eikonal - 0.5 * np.pi * rays.caustics
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         factor = np.cbrt(np.sqrt(last / first)) / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * phase)
-        if boundary.kind == "soft":
-            factor = factor * wavenumber / m2
-        return np.asarray(np.where(rays.alive, wave * factor, 0.0))
+    return np.asarray(wave * factor * (wavenumber / m2 if boundary.kind == "soft" else 1.0))
 
 
 def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """g or F by its residues (...)."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber))
-    terms = end_residue(rays, wavenumber, boundary, "surface") * mode_waves(rays, modes, wavenumber, boundary, order)
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=0.0)
+    terms = end_residue(rays, wavenumber, boundary, "surface") * waves
     if order == 2:
-        terms = terms * end_factor(rays, modes, wavenumber, 0.0) * _amplitude(rays, modes, wavenumber, boundary)
+        terms = terms * _amplitude(rays, modes, wavenumber, boundary)
     return np.asarray(2j * np.sqrt(np.pi) * np.sum(terms, axis=-1))
+
+
+def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) -> ComplexArray:
+    """What second order adds to g or F at small ξ: each power of τ is one of t under their integral (...)."""
+    m1, m2 = scales(rays, wavenumber)
+    q = boundary.q(np.sqrt(m1 * m2))
+    xi = fock_parameter(rays, wavenumber)
+    first, last = transverse_ratios(rays)
+    r = 0.5 * (first + last)
+    i = rays.integrals
+    attachment = rays.radius_rate[0] / m1 / 12
+    turn = np.cbrt(2 / wavenumber) * (i[..., 2] / 60 - 2 / 45 * i[..., 4]) - attachment
+    linear = (1 / 10 if q is None else -1 / 30) + r / 4
+    total = 1j * turn * surface_function(xi, q, 2) + linear / (m1 * m2) * surface_function(xi, q, 1)
+    if q is not None:
+        total = total - (0.1 + 0.25 * boundary.sign * r) / (m1 * m2) * surface_slope(xi, q)
+        if np.ndim(q):
+            total = total - 2 / 15 * q / (m1 * m2) * surface_slope(xi, q, 1)
+    return np.asarray(total)
 
 
 def _amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary) -> ComplexArray:
@@ -132,11 +160,11 @@ def _amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Bound
     m1, m2 = scales(rays, wavenumber)
     first, last = transverse_ratios(rays)
     r: FloatArray = 0.5 * (first + last)[..., None]
-    tau = modes.tau
+    tau, m0, q_m0 = modes.tau, modes.m0, modes.q_m0
     if boundary.kind == "soft":
-        bracket = tau / 60 + tau / 12 + r * tau / 4
+        bracket = tau * (1 / 10 + r / 4)
     else:
-        plain, across, _ = decay_terms(modes, boundary.sign)
-        slope, slope_across = decay_slopes(modes, boundary.sign)
-        bracket = 0.5 * (slope + r * slope_across) - tau / 24 - (plain + r * across) / (2 * tau) + r * tau / 4
-    return np.asarray(1 + bracket / (m1 * m2)[..., None])
+        # q² M0 = τ M0 - 1
+        crossed = tau * (tau * m0 - 1) - tau * q_m0 * m0 + q_m0
+        bracket = tau * (r / 4 - 1 / 30) + (0.1 + 0.25 * boundary.sign * r) * (m0**2 - q_m0) - 2 / 15 * crossed
+    return np.asarray(1 + limited(bracket / (m1 * m2)[..., None], 1.0))

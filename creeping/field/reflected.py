@@ -2,7 +2,9 @@
 
     f = (1/(2√|K|)) R e^{ik(d - r).x},   R = -√(-4/ξ) e^{iξ³/12} P(ξ; q + q_eff),   ξ = -2 m cos θᵢ,   q_eff = -r/(4m²)
 
-m with the curvature in the plane of incidence, r = κ_b/κ_n of the curvature across it. Where the body is not convex in
+m with the curvature in the plane of incidence, r = κ_b/κₙ of the curvature across it. q_eff belongs to the hard boundary
+and to impedances; it is 1 - iκ_b/(k cos θᵢ) away from grazing. On a conducting sphere that factor is found with E across
+the plane of incidence, and none with E in it. Where the body is not convex in
 that plane R is that of a plane, and each negative principal curvature turns the phase by -π/2.
 """
 
@@ -21,16 +23,19 @@ def reflection(
     m = fock_scale(wavenumber, along)
     curved = np.isfinite(m) & (2 * m * cosine < -FARTHEST) & (cosine > 1e-12)
     out = plane_reflection(cosine, boundary)
-    if order == 2 and boundary.kind != "soft":
+    shifted = order == 2 and boundary.kind not in ("soft", "electric hard")
+    if shifted and boundary.kind != "impedance":
         with np.errstate(divide="ignore", invalid="ignore"):
-            out = out * np.nan_to_num(1 - 1j * boundary.sign * across / (wavenumber * cosine))
+            out = out * np.nan_to_num(1 - 1j * across / (wavenumber * cosine))
     if np.any(curved):
         xi = -2 * m[curved] * cosine[curved]
         q = boundary.q(m[curved])
         wave = pekeris(xi, q)
-        if order == 2 and q is not None:
-            bent = -0.25 * boundary.sign * across[curved] / along[curved] / m[curved] ** 2
-            wave = wave + np.exp(0.25j * np.pi) * bent * pekeris_slope(xi, q)
+        if shifted:
+            # a soft wave has no q: the hard one's relative change stands for it
+            of = 0.0 if q is None else q
+            change = np.exp(0.25j * np.pi) * pekeris_slope(xi, of) / (pekeris(xi, of) if q is None else wave)
+            wave = wave * (1 - 0.25 * across[curved] / along[curved] / m[curved] ** 2 * change)
         out[curved] = -np.sqrt(-4 / xi) * np.exp(1j * xi**3 / 12) * wave
     return out
 
@@ -39,7 +44,7 @@ def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
     """R of a plane: -1 soft, +1 hard, (cos θᵢ - η)/(cos θᵢ + η)."""
     if boundary.kind == "impedance":
         return np.asarray((cosine - boundary.eta) / (cosine + boundary.eta))
-    return np.full(cosine.shape, -1.0 if boundary.kind == "soft" else 1.0, dtype=complex)
+    return np.full(cosine.shape, -1.0 if boundary.kind.endswith("soft") else 1.0, dtype=complex)
 
 
 def reflected_amplitude(

@@ -33,8 +33,9 @@ TURN = 0.12
 """Largest angle by which the ray turns in one step; splines of degree 5 then err by about 1e-8."""
 GUARD = 4
 """Steps traced beyond both ends, so that derivatives are central there too."""
-SHARPEST = 20.0
-"""Bound of |ρρ'' - (2/3) ρ'²|: where curvature varies as fast as that, the expansion that uses it has no meaning."""
+STEEPEST, SHARPEST = 4.0, 20.0
+"""Bounds of |ρ'| and of |ρρ''|, |ρρ'' - (2/3) ρ'²|: where curvature varies faster, as it does before a ray detaches, the
+expansion that uses them has no meaning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,15 +137,17 @@ class RayPoints:
 
 
 def _radius_rate(kappa: FloatArray) -> FloatArray:
-    """ρ' = -κ'/κ² from κ, κ', κ'' (..., 3)."""
+    """ρ' = -κ'/κ² from κ, κ', κ'' (..., 3), within STEEPEST; 0 where κ <= 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(-kappa[..., 1] / kappa[..., 0] ** 2)
+        rate = np.clip(-kappa[..., 1] / kappa[..., 0] ** 2, -STEEPEST, STEEPEST)
+    return np.asarray(np.where(kappa[..., 0] > 0, rate, 0.0))
 
 
 def _radius_bend(kappa: FloatArray) -> FloatArray:
-    """ρρ'' = -κ''/κ³ + 2 κ'²/κ⁴ from κ, κ', κ'' (..., 3)."""
+    """ρρ'' = -κ''/κ³ + 2 κ'²/κ⁴ from κ, κ', κ'' (..., 3), within SHARPEST; 0 where κ <= 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(-kappa[..., 2] / kappa[..., 0] ** 3 + 2 * kappa[..., 1] ** 2 / kappa[..., 0] ** 4)
+        bend = -kappa[..., 2] / kappa[..., 0] ** 3 + 2 * kappa[..., 1] ** 2 / kappa[..., 0] ** 4
+    return np.asarray(np.where(kappa[..., 0] > 0, np.clip(bend, -SHARPEST, SHARPEST), 0.0))
 
 
 def ray_points(fan: RayFan) -> tuple[FloatArray, RayPoints]:
