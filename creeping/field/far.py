@@ -16,21 +16,23 @@ import numpy as np
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.coefficients import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.far_geometry import FarGeometry, far_geometry, off_axis
+from creeping.field.far_geometry import FarGeometry, far_geometry, merging, off_axis
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.launching import scales, shed_wave, smoothstep
 from creeping.field.polarisation import dyads, wave_frame
-from creeping.field.reflected import reflected_amplitude
+from creeping.field.reflected import UNRESOLVED, next_order, reflected_amplitude
 from creeping.rays.fan import RayFan
 from creeping.rays.ray_points import RayPoints
 
 FORWARD = (0.55, 0.85)
 """m̄ θ between which the forward lobe gives way."""
-NEAR_AXIS = (0.25, 0.4)
+NEAR_AXIS = (0.3, 0.45)
 """m̄ θ between which its silhouette gives way to the poles."""
 LONG_RAYS = (np.radians(4.0), np.radians(12.0))
 CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)}
 """Polarisations of a conductor and the other of each, with the sign of their coupling."""
+MATTERS = 0.05
+"""Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
 MERGED = (0.38, 0.52)
 """χ between which the fan integral replaces isolated rays."""
 
@@ -48,7 +50,9 @@ class FarField:
     method : (m,) of str
         What served the creeping part: "forward", "rays", "fan", or several joined by "+".
     unresolved : (m,) of bool
-        Whether a part of the forward lobe found no point on the body (strongly concave ground).
+        Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
+        fan integral does not cover, a caustic of the reflected field (a specular point on nearly flat ground), or a
+        forward lobe with no mid-horizon (concave ground).
     wavenumber : float, 1/L
     boundary : str
     order : int
@@ -123,7 +127,7 @@ def far_field(
         reflected=parts.reflected,
         forward=parts.forward,
         method=_methods(parts.in_forward, parts.in_fan),
-        unresolved=geometry.unresolved(parts.in_forward > 0),
+        unresolved=parts.unresolved(),
         wavenumber=k,
         boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.eta:g}",
         order=order,
@@ -154,8 +158,17 @@ def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, 
         if order == 2 and boundary in CROSSED:
             sign, other = CROSSED[boundary]
             wave = wave + sign * gradient_coupling(rays, wavenumber) * shed_wave(rays, wavenumber, other, order)
-        wave = -np.sqrt(2 * m1 * m2 / wavenumber / np.abs(rays.spreading_rate)) * wave * np.exp(1j * phase)
+        amplitude = np.sqrt(2 * m1 * m2 / wavenumber / held_rate(rays, m2))
+        wave = np.where(amplitude > 0, -amplitude * wave * np.exp(1j * phase), 0.0)
     return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
+
+
+def held_rate(rays: RayPoints, m: FloatArray) -> FloatArray:
+    """|J'| (n,), held above |J|κₙ/(2m) on rays that have passed a caustic: there a fold's wave stops growing."""
+    rate = np.abs(rays.spreading_rate)
+    passed = (rays.prufer > np.pi / 2) | (rays.prufer < 0)
+    least = np.where(passed, 0.5 * np.abs(rays.spreading) * np.maximum(rays.curvature[1], 0.0) / m, 0.0)
+    return np.asarray(np.sqrt(np.sqrt(rate**4 + least**4)))
 
 
 def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
@@ -179,12 +192,23 @@ class _Parts:
         self.creeping, self.reflected, self.forward = (
             np.zeros((m, 2, 2) if self.vector else m, dtype=complex) for _ in range(3)
         )
+        self.doubtful = np.zeros(m)
         theta = geometry.angle
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
         self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
         self.beyond_axis = smoothstep(m_theta, *NEAR_AXIS)
-        self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.merging, *MERGED), 0.0)
+        self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.least_merging, *MERGED), 0.0)
         self.long_rays = self.in_forward * smoothstep(theta, *LONG_RAYS)
+
+    def unresolved(self) -> BoolArray:
+        """Directions in which an expansion fails for what matters there (m,)."""
+        total = np.abs(self.creeping + self.reflected + self.forward)
+        largest = total.reshape(len(total), -1).max(axis=1, initial=0.0)
+        return np.asarray((self.geometry.lost_forward & (self.in_forward > 0)) | (self.doubtful > MATTERS * largest))
+
+    def _doubt(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
+        """Note the size of contributions (n,) whose expansion fails."""
+        np.add.at(self.doubtful, observer, np.where(failing, np.abs(wave), 0.0))
 
     def add(self, number: int, kind: Boundary) -> None:
         """Add every part of one scalar problem."""
@@ -193,6 +217,9 @@ class _Parts:
         shed = g.shed
         share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
         wave = _weighted(share, isolated_rays(g, k, kind, order))
+        # the first zero of J' is the launch point itself, where the forward lobe serves
+        merged = (merging(shed.rays) > MERGED[1]) & ((shed.rays.prufer > np.pi / 2) | (shed.rays.prufer < 0))
+        self._doubt(shed.observer, wave, merged)
         n0, n = shed.rays.first_normal, g.shed_normals
         self._sum(self.creeping, number, shed.observer, wave, n0, n)
         fan = g.fan_nodes(k, self.in_fan > 0)
@@ -200,6 +227,7 @@ class _Parts:
         self._sum(self.creeping, number, fan.observer, wave, fan.rays.first_normal, g.normals_of(fan.rays.points))
         s = g.specular
         wave = _weighted((1 - w)[s.observer], reflected_amplitude(s, g.directions, d, k, kind, order))
+        self._doubt(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
         self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
         shadow, lit = g.forward_nodes(k, w > 0)
         wave = shadow_half(shadow, g.directions, d, k, kind, order, self.beyond_axis[shadow.observer])

@@ -10,6 +10,7 @@ from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.field.coefficients import fock_scale
 from creeping.rays.fan import RayFan
 from creeping.rays.horizon import HorizonGrid, HorizonRays, MidHorizon, forward_nodes
+from creeping.rays.ray_points import RayPoints
 from creeping.rays.shedding import ShedRays, shed_far
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
@@ -60,6 +61,13 @@ def off_axis(directions: FloatArray, axis: FloatArray) -> FloatArray:
     aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     turned = axis + NUDGE * aside / np.linalg.norm(aside)
     return np.where(near[:, None], turned, directions)
+
+
+def merging(rays: RayPoints) -> FloatArray:
+    """χ = |J|/(|J| + ρ|J'|): 1 where rays to a far observer merge, J' = 0, and 0 on a caustic of the surface (n,)."""
+    J, rate = np.abs(rays.spreading), np.abs(rays.spreading_rate)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.nan_to_num(J / (J + rate / rays.curvature[1]))
 
 
 class FarGeometry:
@@ -120,7 +128,7 @@ class FarGeometry:
         return specular_points(self.body, self.direction, self.directions)
 
     @cached_property
-    def merging(self) -> FloatArray:
+    def least_merging(self) -> FloatArray:
         """Least χ = |J|/(|J| + ρ|J'|) over horizon crossings with p.r > 0.9, of each observer (m,); 0 without any."""
         least = np.ones(len(self.directions))
         found = np.zeros(len(self.directions), dtype=bool)
@@ -129,10 +137,7 @@ class FarGeometry:
         rays = nodes.rays
         near = np.sum(rays.directions * self.directions[nodes.observer], axis=1) > ALONG
         near &= (rays.time > 0.28 * size(self.body)) & rays.alive
-        J, rate = np.abs(rays.spreading), np.abs(rays.spreading_rate)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            chi = np.nan_to_num(J / (J + rate / rays.curvature[1]))
-        np.minimum.at(least, nodes.observer[near], chi[near])
+        np.minimum.at(least, nodes.observer[near], merging(rays)[near])
         found[nodes.observer[near]] = True
         return np.where(found, least, 0.0)
 
@@ -162,11 +167,12 @@ class FarGeometry:
         shadow, lit, self._lost = self._forward[key]
         return shadow, lit
 
-    def unresolved(self, wanted: BoolArray) -> BoolArray:
-        """Observers for which nodes of the forward integral were not found."""
+    @property
+    def lost_forward(self) -> BoolArray:
+        """Observers for which nodes of the last forward integral were not found (m,)."""
         mask = np.zeros(len(self.directions), dtype=bool)
         mask[self._lost] = True
-        return mask & wanted
+        return mask
 
     def normals_of(self, points: FloatArray) -> FloatArray:
         """N at points (n, 3)."""

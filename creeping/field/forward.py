@@ -5,8 +5,8 @@
     near d      g = p*, and the silhouette -1/(4π(1 - d.r)) ∮ e^{ik(d - r).x} (d × r).dl; i k A/(2π) at r = d
     beyond      g = p* - c²/(2√π ξ),  c = n0.e on S (e along r across d), c = n.(r - d)/|r - d| on L
 
-By stationary phase I_S is the isolated ray and I_L the reflected field. The fan integral is I_S with g = e^{-iπ/4} P over
-every crossing, tapered in p.r; it replaces isolated rays where they merge.
+By stationary phase I_S is the isolated ray and I_L the reflected field. The fan integral is I_S with g = e^{-iπ/4} P
+over every crossing, tapered in p.r; it replaces isolated rays where they merge.
 """
 
 import numpy as np

@@ -71,7 +71,8 @@ def mode_waves(
     """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
 
     ``launch_share`` (...) is the power of the launch factor: 0 on the body, 1 far away; None leaves both ends out. The
-    correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken down.
+    correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
+    down.
     """
     leading = fock_parameter(rays, wavenumber)[..., None] * modes.tau
     if order == 1:

@@ -1,11 +1,16 @@
 """The field reflected by the lit side, uniform up to grazing incidence.
 
-    f = (1/(2√|K|)) R e^{ik(d - r).x},   R = -√(-4/ξ) e^{iξ³/12} P(ξ; q + q_eff),   ξ = -2 m cos θᵢ,   q_eff = -r/(4m²)
+    f = (1/(2√|K|)) [1 + (i/(k cos θᵢ)) (κ_b/2 - Λ)] R e^{ik(d - r).x}
+    R = -√(-4/ξ) e^{iξ³/12} P(ξ; q + q_eff),   ξ = -2 m cos θᵢ,   q_eff = -r/(4m²)
 
-m with the curvature in the plane of incidence, r = κ_b/κₙ of the curvature across it. q_eff belongs to the hard boundary
-and to impedances; it is 1 - iκ_b/(k cos θᵢ) away from grazing. On a conducting sphere that factor is found with E across
-the plane of incidence, and none with E in it. Where the body is not convex in
-that plane R is that of a plane, and each negative principal curvature turns the phase by -π/2.
+m with the curvature in the plane of incidence, r = κ_b/κₙ of the curvature across it. q_eff belongs to the hard
+boundary and to impedances; it is 1 - iκ_b/(k cos θᵢ) away from grazing. On a conducting sphere that factor is found
+with E across the plane of incidence, and none with E in it. Where the body is not convex in that plane R is that of a
+plane, and each negative principal curvature turns the phase by -π/2.
+
+The bracket is what the next order of the reflected field's series adds to that of P: Λ, from third and fourth
+derivatives of the surface (`creeping.rays.specular.shape_term`), is 1/(2a) on a sphere, where the bracket is 1, and
+3/(16a) on a cylinder, where κ_b = 0. It comes from Green's formula with the field on the surface to the same order.
 """
 
 import numpy as np
@@ -13,7 +18,11 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.coefficients import Boundary, fock_scale
 from creeping.field.fock import FARTHEST, pekeris, pekeris_slope
+from creeping.field.launching import limited
 from creeping.rays.specular import SpecularPoints
+
+UNRESOLVED = 0.25
+"""Size of the next term of the reflected field's series from which a specular point is too flat for it."""
 
 
 def reflection(
@@ -47,6 +56,12 @@ def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
     return np.full(cosine.shape, -1.0 if boundary.kind.endswith("soft") else 1.0, dtype=complex)
 
 
+def next_order(specular: SpecularPoints, wavenumber: float) -> FloatArray:
+    """Size (n,) of (κ_b/2 - Λ)/(k cos θᵢ), real: i times it is the next term of the reflected field's series."""
+    with np.errstate(divide="ignore", over="ignore"):
+        return np.asarray((specular.across / 2 - specular.shape) / (wavenumber * specular.cosine))
+
+
 def reflected_amplitude(
     specular: SpecularPoints,
     observers: FloatArray,
@@ -61,4 +76,11 @@ def reflected_amplitude(
     with np.errstate(divide="ignore"):
         spread = 0.5 / np.sqrt(np.abs(np.prod(specular.principal, axis=1)))
     turns = np.sum(specular.principal < 0, axis=1)
-    return np.asarray(spread * R * np.exp(1j * wavenumber * path - 0.5j * np.pi * turns))
+    f = spread * R * np.exp(1j * wavenumber * path - 0.5j * np.pi * turns)
+    size = next_order(specular, wavenumber)
+    if order == 2:
+        f = f * (1 + limited(np.asarray(1j * size, dtype=np.complex128), 0.5))
+    # towards a flat point the term grows like κ^-3: f, like κ^-1/2, stops growing where the term is not small
+    with np.errstate(over="ignore"):
+        excess = np.minimum(np.abs(size) / UNRESOLVED, 1e60)
+    return np.asarray(f * (1 + excess**4) ** (-1 / 24))

@@ -34,8 +34,8 @@ TURN = 0.12
 GUARD = 4
 """Steps traced beyond both ends, so that derivatives are central there too."""
 STEEPEST, SHARPEST = 4.0, 20.0
-"""Bounds of |ρ'| and of |ρρ''|, |ρρ'' - (2/3) ρ'²|: where curvature varies faster, as it does before a ray detaches, the
-expansion that uses them has no meaning."""
+"""Bounds of |ρ'| and of |ρρ''|, |ρρ'' - (2/3) ρ'²|: where curvature varies faster, as it does before a ray detaches,
+the expansion that uses them has no meaning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +86,19 @@ class RayPoints:
         return self.lanes[..., 7]
 
     @property
+    def prufer(self) -> FloatArray:
+        """Angle φ of (J, -J'), continuous along the ray, radians."""
+        return self.lanes[..., 8]
+
+    @property
     def caustics(self) -> IntArray:
         """Zeros of J passed."""
-        return np.floor(self.lanes[..., 8] / np.pi + 0.5).astype(np.int64)
+        return np.floor(self.prufer / np.pi + 0.5).astype(np.int64)
 
     @property
     def far_caustics(self) -> IntArray:
         """Zeros of J passed, and of J + l J' for l > 0."""
-        return np.floor(self.lanes[..., 8] / np.pi).astype(np.int64) + 1
+        return np.floor(self.prufer / np.pi).astype(np.int64) + 1
 
     @property
     def curvature(self) -> tuple[FloatArray, FloatArray]:

@@ -36,6 +36,8 @@ class SpecularPoints:
         Normal curvatures in the plane of incidence and across it.
     principal : (n, 2), 1/L
         κ1 <= κ2, positive where convex.
+    shape : (n,), 1/L
+        Λ of `shape_term`; 1/(2a) on a sphere, 3/(16a) on a cylinder.
     """
 
     observer: IntArray
@@ -45,6 +47,7 @@ class SpecularPoints:
     along: FloatArray
     across: FloatArray
     principal: FloatArray
+    shape: FloatArray
 
 
 def specular_points(body: Surface, direction: FloatArray, observers: FloatArray) -> SpecularPoints:
@@ -74,7 +77,9 @@ def specular_points(body: Surface, direction: FloatArray, observers: FloatArray)
     H = body.hessian(points) / g[:, None, None]
     b = np.cross(n, q)
     along, across, mixed = (np.einsum("ni,nij,nj->n", v, H, w) for v, w in ((q, q), (b, b), (q, b)))
-    middle, half = 0.5 * (along + across), np.hypot(0.5 * (along - across), mixed)
+    matrix = np.stack([np.stack([along, mixed], axis=-1), np.stack([mixed, across], axis=-1)], axis=-2)
+    principal, axes = np.linalg.eigh(matrix)
+    frame = np.einsum("nak,nai->nki", axes, np.stack([q, b], axis=1))
     return SpecularPoints(
         observer=row,
         points=points,
@@ -82,8 +87,57 @@ def specular_points(body: Surface, direction: FloatArray, observers: FloatArray)
         cosine=np.sum(n * r, axis=1),
         along=along,
         across=across,
-        principal=np.stack([middle - half, middle + half], axis=1),
+        principal=principal,
+        shape=shape_term(body, points, n, frame, principal),
     )
+
+
+def shape_term(
+    body: Surface, points: FloatArray, normals: FloatArray, frame: FloatArray, principal: FloatArray
+) -> FloatArray:
+    """Λ (n,), 1/L, of the next order of a stationary phase: ∫ e^{-2iKh} du dv has the factor 1 - iΛ/K.
+
+    h(u, v) is the height of the body over its tangent plane, u and v along the principal axes. With ψ = -2h and its
+    third and fourth derivatives ψ_uuu, ...,
+
+        Λ = (ψ_uuuu/κ1² + 2 ψ_uuvv/(κ1κ2) + ψ_vvvv/κ2²)/32 - [15 ψ_uuu²/κ1³ + 27 ψ_uuv²/(κ1²κ2) + 27 ψ_uvv²/(κ1κ2²)
+            + 15 ψ_vvv²/κ2³ + 18 ψ_uuu ψ_uvv/(κ1²κ2) + 18 ψ_uuv ψ_vvv/(κ1κ2²)]/576
+
+    Parameters
+    ----------
+    frame : (n, 2, 3)
+        Principal directions.
+    principal : (n, 2), 1/L
+    """
+    if not len(points):
+        return np.zeros(0)
+    # heights on a 5 x 5 stencil; rounding and truncation of a fourth derivative balance at about this step
+    step = 0.05 / np.max(np.abs(principal), axis=1)
+    offsets = np.arange(-2, 3)
+    u, v = (grid.ravel() for grid in np.meshgrid(offsets, offsets, indexing="ij"))
+    plane = u[:, None, None] * frame[:, 0] + v[:, None, None] * frame[:, 1]
+    base = points + step[:, None] * plane
+    height = np.zeros((len(u), len(points)))
+    for _ in range(8):
+        x = base + height[..., None] * normals
+        height = height - body.level(x) / np.sum(body.gradient(x) * normals, axis=-1)
+    psi = -2 * height.reshape(5, 5, -1)
+    one, two = np.array([0, -0.5, 0, 0.5, 0]), np.array([0, 1.0, -2, 1, 0])
+    three, four = np.array([-0.5, 1, 0, -1, 0.5]), np.array([1.0, -4, 6, -4, 1])
+    flat = np.array([0, 0, 1.0, 0, 0])
+
+    def derivative(a: FloatArray, b: FloatArray, order: int) -> FloatArray:
+        return np.asarray(np.einsum("i,j,ijn->n", a, b, psi) / step**order)
+
+    uuu, vvv = derivative(three, flat, 3), derivative(flat, three, 3)
+    uuv, uvv = derivative(two, one, 3), derivative(one, two, 3)
+    p, q = principal[:, 0], principal[:, 1]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        fourth = derivative(four, flat, 4) / p**2 + 2 * derivative(two, two, 4) / (p * q)
+        fourth = fourth + derivative(flat, four, 4) / q**2
+        third = 15 * uuu**2 / p**3 + 27 * uuv**2 / (p**2 * q) + 27 * uvv**2 / (p * q**2) + 15 * vvv**2 / q**3
+        third = third + 18 * uuu * uvv / (p**2 * q) + 18 * uuv * vvv / (p * q**2)
+        return np.nan_to_num(fourth / 32 - third / 576, posinf=1e300, neginf=-1e300)
 
 
 def _seeds(body: Surface, vertices: FloatArray, triangles: IntArray, wanted: FloatArray) -> tuple[IntArray, FloatArray]:
