@@ -1,4 +1,4 @@
-"""Pictures of shadow lines, creeping rays and iso-phase curves, and files of them for other programs.
+"""Pictures of shadow lines, creeping rays, iso-phase curves and fields, and files of them for other programs.
 
 Every name is imported on first use, so that importing this package costs neither matplotlib nor pyvista.
 ``scene.plot_rays_3d`` draws with pyvista, ``axes3d.plot_rays_3d`` with matplotlib; ``picture`` chooses.
@@ -10,27 +10,38 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from creeping.plotting.display import GLProbe, gl_available
     from creeping.plotting.export import write_csv, write_text, write_vtp
+    from creeping.plotting.far_cuts import far_cut_picture
+    from creeping.plotting.ffe import write_ffe
+    from creeping.plotting.field_pictures import decay_picture, surface_field_picture
     from creeping.plotting.parameter_plane import plot_parameters
     from creeping.plotting.pictures import parameter_picture, picture
 
 __all__ = [
     "GLProbe",
+    "decay_picture",
+    "far_cut_picture",
     "gl_available",
     "parameter_picture",
     "picture",
     "plot_parameters",
+    "surface_field_picture",
     "write_csv",
+    "write_ffe",
     "write_text",
     "write_vtp",
 ]
 
 _HOMES = {
     "GLProbe": "display",
+    "decay_picture": "field_pictures",
+    "far_cut_picture": "far_cuts",
     "gl_available": "display",
     "parameter_picture": "pictures",
     "picture": "pictures",
     "plot_parameters": "parameter_plane",
+    "surface_field_picture": "field_pictures",
     "write_csv": "export",
+    "write_ffe": "ffe",
     "write_text": "export",
     "write_vtp": "export",
 }

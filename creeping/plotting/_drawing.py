@@ -69,6 +69,8 @@ class Drawing:
     mesh : Triangulation
     strokes : list of Stroke
     colours : LevelColours
+    paint : (n, 3), optional
+        Red, green, blue in 0..1 at the vertices of the mesh; by default the body has one colour.
     """
 
     body: Surface
@@ -77,6 +79,7 @@ class Drawing:
     mesh: Triangulation
     strokes: list[Stroke]
     colours: LevelColours
+    paint: FloatArray | None = None
 
     @cached_property
     def incidence(self) -> Mark:
@@ -118,8 +121,8 @@ class Drawing:
         low, high = self.frame
         return self._at(*(0.5 * (low + high)))
 
-    def add_legend(self, figure: Any) -> None:
-        """Add a legend under a matplotlib figure, the shadow line first."""
+    def add_legend(self, figure: Any, *more: Any) -> None:
+        """Add a legend under a matplotlib figure, the shadow line first, ``more`` handles last."""
         from matplotlib.lines import Line2D
 
         named = sorted((stroke for stroke in self.strokes if stroke.label), key=lambda stroke: -stroke.rank)
@@ -127,6 +130,7 @@ class Drawing:
             Line2D([], [], color=stroke.colour, lw=max(stroke.width, 0.9), alpha=stroke.alpha, label=stroke.label)
             for stroke in named
         ]
+        handles += more
         figure.legend(handles=handles, loc="lower center", ncols=min(3, len(handles)), frameon=False, fontsize=8)
 
     def _at(self, right: float, up: float) -> FloatArray:

@@ -1,11 +1,11 @@
-"""What the pictures and the files read of a shadow line, a fan and an iso-phase curve, and nothing more."""
+"""What the pictures and the files read of a shadow line, a fan, an iso-phase curve and a far field, and nothing more."""
 
 from collections.abc import Sequence
 from typing import Protocol
 
 from numpy.typing import NDArray
 
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.surface import Surface
 
 LINE_STATUSES = ("attached", "occluded", "concave")
@@ -126,3 +126,49 @@ class IsoPhaseCurveLike(Protocol):
     def parameter_pieces(self) -> Sequence[FloatArray]:
         """Parameters (k, 2), radians, split at the periodic seam."""
         ...
+
+
+class FarFieldLike(Protocol):
+    """A far field in m directions, with its parts."""
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit vectors (m, 3) towards the observers."""
+        ...
+
+    @property
+    def creeping(self) -> ComplexArray:
+        """Part (m,) or (m, 2, 2), L."""
+        ...
+
+    @property
+    def reflected(self) -> ComplexArray:
+        """Part (m,) or (m, 2, 2), L."""
+        ...
+
+    @property
+    def forward(self) -> ComplexArray:
+        """Part (m,) or (m, 2, 2), L."""
+        ...
+
+    @property
+    def total(self) -> ComplexArray:
+        """Sum of the parts."""
+        ...
+
+    @property
+    def method(self) -> NDArray[Any]:
+        """What served each direction (m,)."""
+        ...
+
+    @property
+    def unresolved(self) -> BoolArray:
+        """Directions (m,) where a part was not found."""
+        ...
+
+    @property
+    def wavenumber(self) -> float: ...
+    @property
+    def boundary(self) -> str: ...
+    @property
+    def order(self) -> int: ...

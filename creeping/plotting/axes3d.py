@@ -83,7 +83,12 @@ def _draw_body(ax: Any, drawing: Drawing) -> None:
     corners = drawing.mesh.vertices[drawing.mesh.triangles]
     facing = normal(drawing.body, corners.mean(axis=1)) @ drawing.view.toward
     front = facing > -0.05
-    shade = brightness(facing[front])[:, None] * np.array(to_rgb(BODY_COLOUR))
+    if drawing.paint is None:
+        shade = brightness(facing[front])[:, None] * np.array(to_rgb(BODY_COLOUR))
+    else:
+        # little shade: colours are read off a bar
+        paint = drawing.paint[drawing.mesh.triangles[front]].mean(axis=1)
+        shade = (0.55 + 0.45 * brightness(facing[front]))[:, None] * paint
     # edges in the colour of the face close the hairlines between triangles
     ax.add_collection3d(Poly3DCollection(corners[front], facecolors=shade, edgecolors=shade, linewidths=0.3, zorder=1))
 

@@ -1,4 +1,4 @@
-"""Files of shadow lines, fans and iso-phase curves for other programs: VTK PolyData (.vtp) and CSV.
+"""Files of shadow lines, fans, iso-phase curves and far fields for other programs: VTK PolyData (.vtp) and CSV.
 
 Numbers keep all 17 digits, so that what is read back is what was written. Nothing here imports VTK.
 """
@@ -11,9 +11,9 @@ import numpy as np
 
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.plotting import _vtp
+from creeping.plotting import _far_table, _vtp
 from creeping.plotting._files import written_aside
-from creeping.plotting._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.plotting._inputs import LINE_STATUSES, FarFieldLike, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 
 KINDS = ("shadow line", "ray", "iso-phase curve")
 _RAY_ARRAYS = ("eikonal", "spreading", "spreading_rate", "curvature")
@@ -116,14 +116,15 @@ def write_csv(
     line: ShadowLineLike | None = None,
     fan: RayFanLike | None = None,
     curves: Sequence[IsoPhaseCurveLike] | None = None,
+    far: FarFieldLike | None = None,
 ) -> None:
-    """Write one table as CSV, one row per point, its columns explained in lines that begin with ``#``.
+    """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
 
     Parameters
     ----------
     path : str or path
         File to write; replaced at once when complete.
-    line, fan, curves
+    line, fan, curves, far
         Exactly one of them: they have different columns.
 
     Raises
@@ -133,10 +134,11 @@ def write_csv(
     CreepingError
         If the file cannot be written.
     """
-    given = [name for name, value in (("line", line), ("fan", fan), ("curves", curves)) if value is not None]
+    parts = {"line": line, "fan": fan, "curves": curves, "far": far}
+    given = [name for name, value in parts.items() if value is not None]
     if len(given) != 1:
         raise InvalidInputError(
-            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of line, fan, curves, a file for each"
+            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(parts)}, a file for each"
         )
     with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
         if line is not None:
@@ -145,6 +147,8 @@ def write_csv(
             _write_table(stream, _FAN_NOTES, _fan_rows(fan))
         elif curves is not None:
             _write_table(stream, _CURVE_NOTES, _curve_rows(curves))
+        elif far is not None:
+            _write_table(stream, _far_table.notes(far), _far_table.rows(far))
 
 
 _POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}

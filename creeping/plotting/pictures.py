@@ -63,20 +63,13 @@ def picture(
     CreepingError
         If pyvista is asked for and cannot draw here, or the file cannot be written.
     """
-    if backend not in BACKENDS:
-        raise InvalidInputError(f"backend {backend!r} is unknown; give one of {', '.join(BACKENDS)}")
-    if backend == "auto":
-        backend = "pyvista" if gl_available().ok else "matplotlib"
+    backend = chosen_backend(backend)
     drawing = compose(line, fan, curves, view=view, rays=rays, until=until)
-    figure, place = _page(drawing)
-    draw = _draw_pyvista if backend == "pyvista" else _draw_matplotlib
-    draw(figure, place, drawing, dpi)
+    figure, bar = drawn_page(drawing, backend, dpi)
     drawing.add_legend(figure)
-    left, bottom, width, height = place
     if drawing.colours.high > drawing.colours.low:
-        cax = figure.add_axes((left + width + 0.03, bottom + 0.12 * height, 0.022, 0.76 * height))
-        drawing.colours.add_bar(figure, cax=cax)
-    _save(figure, path, dpi)
+        drawing.colours.add_bar(figure, cax=figure.add_axes(bar))
+    save_figure(figure, path, dpi)
     return backend
 
 
@@ -99,13 +92,37 @@ def parameter_picture(
     """
     from creeping.plotting.parameter_plane import plot_parameters
 
-    figure = _figure((6.4, 4.4))
+    figure = new_figure((6.4, 4.4))
     figure.set_layout_engine("constrained")
     plot_parameters(line, fan, curves, ax=figure.add_subplot(), rays=rays, until=until)
-    _save(figure, path, dpi)
+    save_figure(figure, path, dpi)
 
 
-def _figure(inches: tuple[float, float]) -> Any:
+def chosen_backend(backend: str) -> str:
+    """Either "pyvista" or "matplotlib"; "auto" is pyvista where there is OpenGL.
+
+    Raises
+    ------
+    InvalidInputError
+        If the backend is not one of the three.
+    """
+    if backend not in BACKENDS:
+        raise InvalidInputError(f"backend {backend!r} is unknown; give one of {', '.join(BACKENDS)}")
+    if backend == "auto":
+        return "pyvista" if gl_available().ok else "matplotlib"
+    return backend
+
+
+def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
+    """Figure with the body's picture and room for a legend, and the place of a colour bar."""
+    figure, place = _page(drawing)
+    draw = _draw_pyvista if backend == "pyvista" else _draw_matplotlib
+    draw(figure, place, drawing, dpi)
+    left, bottom, width, height = place
+    return figure, (left + width + 0.03, bottom + 0.12 * height, 0.022, 0.76 * height)
+
+
+def new_figure(inches: tuple[float, float]) -> Any:
     """Return a figure outside pyplot: no window, no global state, whatever the user's backend."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -115,7 +132,7 @@ def _figure(inches: tuple[float, float]) -> Any:
     return figure
 
 
-def _save(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
+def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
     with written_aside(path) as aside:
         figure.savefig(aside, dpi=dpi, format="png")
 
@@ -128,7 +145,7 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
     body = float(np.clip(width * (high[1] - low[1]) / (high[0] - low[0]), 2.4, 4.6))
     legend = 0.55 if len({stroke.label for stroke in drawing.strokes} - {""}) > 3 else 0.38
     height = body + legend + 0.05
-    return _figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
+    return new_figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
 
 
 def _draw_matplotlib(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:

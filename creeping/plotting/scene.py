@@ -14,8 +14,7 @@ from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineL
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
 from creeping.plotting._view import View
 from creeping.plotting.display import gl_available
-from creeping.surface import Surface, normal
-from creeping.triangulation import Triangulation
+from creeping.surface import normal
 
 DEPTH_UNITS = 40.0  # of 1/65000 of the depth of the scene
 
@@ -82,7 +81,7 @@ def require_gl() -> None:
 def draw(plotter: Any, drawing: Drawing, *, scale: float = 2.0) -> None:
     """Draw a composed picture without arrow and legend; ``scale`` is the number of pixels per point of line width."""
     plotter.set_background("white")
-    _add_body(plotter, drawing.body, drawing.mesh)
+    _add_body(plotter, drawing)
     for stroke in drawing.strokes:
         _add_stroke(plotter, stroke, scale)
     _aim(plotter, drawing)
@@ -123,25 +122,23 @@ def _prefer_egl() -> None:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
-def _add_body(plotter: Any, body: Surface, mesh: Triangulation) -> None:
+def _add_body(plotter: Any, drawing: Drawing) -> None:
     import pyvista
 
+    mesh = drawing.mesh
     surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.triangles)
-    surface.point_data["Normals"] = normal(body, mesh.vertices)
+    surface.point_data["Normals"] = normal(drawing.body, mesh.vertices)
     surface.point_data.active_normals_name = "Normals"
+    if drawing.paint is None:
+        look = {"color": BODY_COLOUR, "ambient": 0.60, "diffuse": 0.42}
+    else:
+        # little shade: colours are read off a bar
+        surface.point_data["paint"] = np.round(255 * drawing.paint).astype(np.uint8)
+        look = {"scalars": "paint", "rgb": True, "ambient": 0.82, "diffuse": 0.18}
     # lit from the camera: dark at the rim, so that the outline shows on white
     plotter.remove_all_lights()
     plotter.add_light(pyvista.Light(light_type="headlight"))
-    plotter.add_mesh(
-        surface,
-        color=BODY_COLOUR,
-        smooth_shading=True,
-        ambient=0.60,
-        diffuse=0.42,
-        specular=0.0,
-        culling="back",
-        name="body",
-    )
+    plotter.add_mesh(surface, smooth_shading=True, specular=0.0, culling="back", name="body", **look)
 
 
 def _add_stroke(plotter: Any, stroke: Stroke, scale: float) -> None:

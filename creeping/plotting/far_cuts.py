@@ -1,0 +1,227 @@
+"""Pictures of the far field in one plane: decibels against the angle, over straight axes or round a circle."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping.plotting._decibels import cross_section_decibels, decibels, shown_range
+from creeping.plotting._inputs import FarFieldLike
+from creeping.plotting.pictures import new_figure, save_figure
+
+KINDS = ("cartesian", "polar")
+QUANTITIES = {
+    "amplitude": ("20 log$_{10}$|f| (dB re 1 L)", decibels),
+    "rcs": ("4π|f|$^2$ (dB re 1 L$^2$)", cross_section_decibels),
+}
+COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
+"""Scattered by incident component of a vector field: t is θ̂, p is φ̂."""
+COLOURS = ("#0b6fb8", "#d1495b", "#2a9d4e", "#8e5ea2", "#e08e0b", "#5a6872")
+PARTS = {"creeping": "--", "reflected": "-.", "forward": ":"}
+EXACT = "#111111"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of a cut: ``levels`` (m,) in dB, NaN where the field is not finite."""
+
+    label: str
+    levels: FloatArray
+    style: dict[str, Any]
+
+
+def far_cut_picture(
+    path: str | os.PathLike[str],
+    angles: ArrayLike,
+    fields: Mapping[str, FarFieldLike | ComplexArray],
+    *,
+    kind: str = "cartesian",
+    quantity: str = "amplitude",
+    exact: ComplexArray | None = None,
+    parts: bool = False,
+    components: Sequence[str] = ("tt", "pp"),
+    span: float = 60.0,
+    angle_name: str = "angle",
+    title: str | None = None,
+    dpi: int = 300,
+) -> None:
+    """Write a PNG of far fields against the angle in one plane.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write.
+    angles : (m,), radians
+        Angle of each direction; drawn in degrees, and joined in this order.
+    fields : dict of label to FarField or complex (m,) or (m, 2, 2), L
+        Curves, first over last.
+    kind : str
+        "cartesian", or "polar": angle 0 at the top, clockwise.
+    quantity : str
+        "amplitude", 20 log10 |f|, or "rcs", 10 log10(4π|f|²): dBsm where L is the metre.
+    exact : complex (m,) or (m, 2, 2), L, optional
+        Reference, drawn thin and black under the others.
+    parts : bool
+        Whether to draw the creeping, reflected and forward parts of each FarField as thin lines.
+    components : sequence of str
+        Of vector fields: "tt", "tp", "pt", "pp", scattered by incident, t for θ̂ and p for φ̂.
+    span : float, dB
+        Range below the highest value; what is lower is cut off.
+    angle_name : str
+        Name of the angle on the axis.
+    title : str, optional
+        By default the wavenumber and the boundary, where all fields share them.
+    dpi : int
+
+    Raises
+    ------
+    InvalidInputError
+        On an unknown kind, quantity or component, on shapes that do not fit, or where nothing can be drawn.
+    CreepingError
+        If the file cannot be written.
+    """
+    if kind not in KINDS:
+        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
+    angle = _angles(angles)
+    curves = cut_curves(len(angle), fields, quantity=quantity, exact=exact, parts=parts, components=components)
+    # parts may vanish: they do not set the range
+    low, high = shown_range([curve.levels for curve in curves if curve.style["linewidth"] > 0.8], span)
+    figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
+    figure.set_layout_engine("constrained")
+    label = QUANTITIES[quantity][0]
+    if kind == "cartesian":
+        ax = _straight_axes(figure, angle, (low, high), label, angle_name)
+    else:
+        ax = _round_axes(figure, (low, high), label, angle_name)
+    for curve in reversed(curves):
+        # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
+        levels = np.maximum(curve.levels, low if kind == "polar" else low - (high - low))
+        x = angle if kind == "polar" else np.degrees(angle)
+        ax.plot(x, levels, label=curve.label, **curve.style)
+    ax.set_title(_title(fields) if title is None else title, fontsize=9)
+    _add_legend(figure, ax)
+    save_figure(figure, path, dpi)
+
+
+def cut_curves(
+    count: int,
+    fields: Mapping[str, FarFieldLike | ComplexArray],
+    *,
+    quantity: str = "amplitude",
+    exact: ComplexArray | None = None,
+    parts: bool = False,
+    components: Sequence[str] = ("tt", "pp"),
+) -> list[Curve]:
+    """Curves of a cut of ``count`` directions, topmost first; for the arguments see `far_cut_picture`."""
+    if quantity not in QUANTITIES:
+        raise InvalidInputError(f"quantity {quantity!r} is unknown; give {' or '.join(QUANTITIES)}")
+    unknown = [name for name in components if name not in COMPONENTS]
+    if unknown or not components:
+        raise InvalidInputError(f"components {list(components)} are not among {', '.join(COMPONENTS)}")
+    if not fields:
+        raise InvalidInputError("there is no field to draw; give one at least")
+    thick: list[Curve] = []
+    thin: list[Curve] = []
+    for label, field in fields.items():
+        whole = field if isinstance(field, np.ndarray) else getattr(field, "total", field)
+        for suffix, pick in _picks(label, whole, count, components):
+            colour = COLOURS[len(thick) % len(COLOURS)]
+            style = {"color": colour, "linewidth": 1.3}
+            thick.append(Curve(label + suffix, _levels(pick(whole), quantity), style))
+            for part, dashes in PARTS.items() if parts and hasattr(field, "total") else ():
+                style = {"color": colour, "linewidth": 0.7, "linestyle": dashes}
+                levels = _levels(pick(getattr(field, part)), quantity)
+                # a part that is nowhere has no line
+                if np.any(np.isfinite(levels)):
+                    thin.append(Curve(f"{label}{suffix}, {part}", levels, style))
+    if exact is not None:
+        for suffix, pick in _picks("exact", exact, count, components):
+            style = {"color": EXACT, "linewidth": 0.81}
+            thin.append(Curve(f"exact{suffix}", _levels(pick(exact), quantity), style))
+    return thick + thin
+
+
+def _angles(angles: ArrayLike) -> FloatArray:
+    angle = np.asarray(angles, dtype=float)
+    if angle.ndim != 1 or len(angle) < 2 or not np.all(np.isfinite(angle)):
+        raise InvalidInputError(f"angles of shape {angle.shape} are not two or more finite numbers in radians")
+    return angle
+
+
+def _picks(label: str, values: Any, count: int, components: Sequence[str]) -> list[tuple[str, Any]]:
+    """Suffix of the label and selection of the values (m,) for every curve of one field."""
+    shape = np.shape(values)
+    if shape == (count,):
+        return [("", np.asarray)]
+    if shape != (count, 2, 2):
+        raise InvalidInputError(
+            f"field {label!r} has shape {shape}; {count} angles take ({count},) or ({count}, 2, 2) complex numbers"
+        )
+    greek = {"t": "θ", "p": "φ"}
+    return [
+        (f" {greek[name[0]]}{greek[name[1]]}", lambda v, at=COMPONENTS[name]: np.asarray(v)[:, at[0], at[1]])
+        for name in components
+    ]
+
+
+def _levels(values: ComplexArray, quantity: str) -> FloatArray:
+    levels: FloatArray = QUANTITIES[quantity][1](values)
+    return np.where(np.isposinf(levels), np.nan, levels)
+
+
+def _straight_axes(figure: Any, angle: FloatArray, heights: tuple[float, float], label: str, angle_name: str) -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    ax = figure.add_subplot()
+    left, right = np.degrees(angle.min()), np.degrees(angle.max())
+    ax.set_xlim(left, right)
+    ax.set_ylim(*heights)
+    # multiples of 15, 30, 45, ... degrees
+    ax.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 1.5, 2, 3, 4.5, 6, 9, 10]))
+    ax.set_xlabel(f"{angle_name} (degrees)", fontsize=9)
+    ax.set_ylabel(label, fontsize=9)
+    ax.grid(color="#d9dde0", linewidth=0.5)
+    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
+    for spine in ax.spines.values():
+        spine.set_linewidth(0.5)
+    return ax
+
+
+def _round_axes(figure: Any, heights: tuple[float, float], label: str, angle_name: str) -> Any:
+    ax = figure.add_subplot(projection="polar")
+    ax.set_theta_zero_location("N")
+    ax.set_theta_direction(-1)
+    ax.set_thetagrids(range(0, 360, 30), labels=[f"{v if v <= 180 else v - 360}°" for v in range(0, 360, 30)])
+    low, high = heights
+    step = next(s for s in (5, 10, 20, 50, 100, 1000) if (high - low) / s <= 6)
+    rings = np.arange(step * np.ceil(low / step + 1e-9), high + 1e-9, step)
+    ax.set_ylim(low, high)
+    # between two spokes, away from the forward lobe
+    ax.set_rgrids(rings, labels=[f"{v:g}" for v in rings], angle=165, fontsize=7, color="#5a6872")
+    ax.tick_params(axis="x", labelsize=8)
+    ax.grid(color="#d9dde0", linewidth=0.5)
+    ax.spines["polar"].set_linewidth(0.5)
+    ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
+    return ax
+
+
+def _title(fields: Mapping[str, Any]) -> str:
+    known = {
+        f"k = {field.wavenumber:g}/L, {field.boundary} boundary" for field in fields.values() if hasattr(field, "total")
+    }
+    return known.pop() if len(known) == 1 else ""
+
+
+def _add_legend(figure: Any, ax: Any) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(
+        handles[::-1],
+        labels[::-1],
+        loc="outside lower center",
+        ncols=min(4 if max(map(len, labels)) < 20 else 3, len(labels)),
+        frameon=False,
+        fontsize=8,
+    )

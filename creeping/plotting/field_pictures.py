@@ -1,0 +1,264 @@
+"""Pictures of the field on the body: decibels as colours of the surface, and along rays.
+
+Shown is |u|, or |du/dn|/k where u = 0. On the lit side it is Fock's surface function at ξ = m n.d < 0, which is
+geometrical optics away from the shadow line: 2, 2|n.d| if soft, 2 cos θ/(cos θ + η) on an impedance.
+"""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, BoolArray, FloatArray
+from creeping.field.coefficients import Boundary, BoundaryLike, fock_scale
+from creeping.field.far import checked
+from creeping.field.fock import surface_function
+from creeping.field.on_surface import scalar_boundary, surface_field
+from creeping.plotting._decibels import decibels, shown_range
+from creeping.plotting._drawing import compose
+from creeping.plotting._strokes import chosen_rays
+from creeping.plotting._view import View
+from creeping.plotting.far_cuts import COLOURS
+from creeping.plotting.pictures import chosen_backend, drawn_page, new_figure, save_figure
+from creeping.rays.fan import RayFan
+from creeping.rays.visibility import occluded
+from creeping.surface import normal
+
+NO_RAY = "#b4b9bd"
+PENUMBRA = -8.0
+"""ξ below which geometrical optics stands on the lit side, to 0.01 dB."""
+CAUSTIC = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
+LEAST_CELLS, MOST_CELLS = 48, 96
+"""Of the body along each side of its box."""
+
+
+def surface_field_picture(
+    path: str | os.PathLike[str],
+    fan: RayFan,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+    backend: str = "auto",
+    view: View | None = None,
+    span: float = 60.0,
+    cells: int | None = None,
+    dpi: int = 300,
+) -> str:
+    """Write a PNG of the body coloured by the magnitude of the total field on it, with the shadow line on top.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write.
+    fan : RayFan
+        Long enough to cover the shadow; where no ray passes the body is grey.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard" or Impedance
+    order : 2 or 1
+    backend : str
+        "pyvista", "matplotlib" or "auto".
+    view : View, optional
+        Camera; by default on the shadow side.
+    span : float, dB
+        Range of the colours below the highest level.
+    cells : int, optional
+        Fineness of the body, cells along each side of its box; by default eight a wavelength, within 48 to 96.
+    dpi : int
+
+    Returns
+    -------
+    str
+        "pyvista" or "matplotlib", whichever drew it.
+
+    Raises
+    ------
+    InvalidInputError
+        On a bad wavenumber, boundary, order, backend or span, and for a weighted body.
+    CreepingError
+        If pyvista is asked for and cannot draw here, or the file cannot be written.
+    """
+    backend = chosen_backend(backend)
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    if cells is None:
+        side = float(np.cbrt(np.prod(np.diff(fan.body.bounds, axis=0))))
+        cells = int(np.clip(8 * side * k / (2 * np.pi), CAUSTIC = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
+LEAST_CELLS, MOST_CELLS))
+    drawing = compose(fan.line, view=view, cells=cells)
+    levels = surface_levels(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
+    finite = levels[np.isfinite(levels)]
+    # neither a null nor a caustic of a few points stretches the colours
+    ends = np.percentile(finite, [1.0, 99.8]) if len(finite) else (-np.inf, np.inf)
+    low, high = shown_range([np.clip(finite, *ends)], span, step=2.0)
+    colours = _colours(low, high)
+    paint = colours.to_rgba(np.nan_to_num(levels, nan=low, posinf=high, neginf=low))[:, :3]
+    bare = np.isnan(levels)
+    if np.any(bare):
+        from matplotlib.colors import to_rgb
+
+        paint[bare] = to_rgb(NO_RAY)
+    figure, place = drawn_page(replace(drawing, paint=np.asarray(paint)), backend, dpi)
+    drawing.add_legend(figure, *(_patches() if np.any(bare) else ()))
+    beyond = ("min" if np.any(levels < low) else "") + ("max" if np.any(levels > high) else "")
+    bar = figure.colorbar(
+        colours, cax=figure.add_axes(place), extend={"": "neither", "minmax": "both"}.get(beyond, beyond)
+    )
+    bar.set_label(f"{_name(kind)} on the body, k = {k:g}/L, {_boundary_name(kind)}", fontsize=8)
+    bar.ax.tick_params(labelsize=8, width=0.5)
+    bar.outline.set_linewidth(0.5)
+    save_figure(figure, path, dpi)
+    return backend
+
+
+def surface_levels(
+    fan: RayFan, points: FloatArray, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> FloatArray:
+    """20 log10 of the field's magnitude at points of the body, lit or in the shadow: (n, 3) -> (n,).
+
+    |u|, or |du/dn|/k of the soft boundary; NaN in the shadow where no ray passes, inf on a caustic.
+    """
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    points = np.asarray(points, dtype=float)
+    lit = lit_points(fan, points)
+    magnitude = np.full(len(points), np.nan)
+    magnitude[lit] = _lit_magnitude(fan, points[lit], k, kind)
+    if np.any(~lit):
+        shadow = np.abs(surface_field(fan, points[~lit], wavenumber=k, boundary=boundary, order=order))
+        shadow = np.where(np.isnan(shadow), np.inf, shadow)
+        magnitude[~lit] = np.where(shadow > 0, shadow / (k if kind.kind == "soft" else 1.0), np.nan)
+    return decibels(magnitude)
+
+
+def lit_points(fan: RayFan, points: FloatArray) -> BoolArray:
+    """Whether the incident wave reaches points of the body (n, 3) from outside, unobstructed: (n,)."""
+    direction = fan.line.direction
+    lit = np.asarray(normal(fan.body, points) @ direction < 0)
+    lit[lit] = ~occluded(fan.body, points[lit], direction)
+    return lit
+
+
+def _lit_magnitude(fan: RayFan, points: FloatArray, wavenumber: float, kind: Boundary) -> FloatArray:
+    """|u| or |du/dn|/k where n.d < 0 (n,)."""
+    body, d = fan.body, fan.line.direction
+    n = normal(body, points)
+    cosine = -n @ d
+    along = d + cosine[:, None] * n
+    square = np.sum(along**2, axis=1)
+    bend = np.einsum("ni,nij,nj->n", along, body.hessian(points), along)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # at normal incidence every plane is one of incidence, and all give geometrical optics
+        kappa = np.nan_to_num(bend / square / np.linalg.norm(body.gradient(points), axis=1))
+    m = fock_scale(wavenumber, kappa)
+    near = -m * cosine > PENUMBRA
+    if kind.kind == "soft":
+        out = 2 * cosine
+        out[near] = np.abs(surface_function(-m[near] * cosine[near], None)) / m[near]
+        return np.asarray(out)
+    if kind.kind == "hard":
+        out, q = np.full(len(points), 2.0), 0.0
+    else:
+        out = np.abs(2 * cosine / (cosine + kind.eta))
+        q = kind.q(m[near])
+    out[near] = np.abs(surface_function(-m[near] * cosine[near], q))
+    return np.asarray(out)
+
+
+def decay_picture(
+    path: str | os.PathLike[str],
+    fan: RayFan,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+    rays: int = 6,
+    span: float = 80.0,
+    dpi: int = 300,
+) -> None:
+    """Write a PNG of each ray's own field against the way along it, for a few rays spread over the shadow line.
+
+    The curves rise at caustics, which dashed lines mark, and end where a ray has detached.
+
+    Parameters
+    ----------
+    path : str or path
+    fan : RayFan
+    wavenumber : float, 1/L
+    boundary : "soft", "hard" or Impedance
+    order : 2 or 1
+    rays : int
+        Rays drawn at most.
+    span : float, dB
+        Range below the field where the rays start.
+    dpi : int
+
+    Raises
+    ------
+    InvalidInputError
+        On a bad wavenumber, boundary, order, number of rays or span, and for a weighted body.
+    CreepingError
+        If the file cannot be written.
+    """
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    picked = chosen_rays(fan, rays)
+    if not picked:
+        raise InvalidInputError("the fan has no ray to draw; launch one from another shadow line")
+    field = surface_field(fan, wavenumber=k, boundary=boundary, order=order)[picked]
+    levels = decibels(field / k if kind.kind == "soft" else field)
+    levels[~np.isfinite(levels)] = np.nan
+    figure = new_figure((6.4, 4.2))
+    figure.set_layout_engine("constrained")
+    ax = figure.add_subplot()
+    # beside a caustic a step of a ray may lie at any height: the range follows the starts
+    starts = levels[:, : max(2, levels.shape[1] // 8)]
+    low, high = shown_range([np.clip(levels, -np.inf, np.nanmax(starts) + 10.0)], span)
+    for number, (ray, level) in enumerate(zip(picked, levels, strict=True)):
+        _draw_decay(ax, fan, ray, level, COLOURS[number % len(COLOURS)])
+    ax.set_xlim(0.0, float(fan.travel_time[-1]))
+    ax.set_ylim(low, high)
+    ax.set_xlabel("arclength from the shadow line (L)", fontsize=9)
+    ax.set_ylabel(_name(kind), fontsize=9)
+    ax.set_title(f"Field of single rays, k = {k:g}/L, {_boundary_name(kind)} boundary", fontsize=9)
+    ax.grid(color="#d9dde0", linewidth=0.5)
+    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
+    handles = ax.get_legend_handles_labels()[0]
+    if np.any(fan.caustic_index[picked]):
+        from matplotlib.lines import Line2D
+
+        handles.append(Line2D([], [], color=NO_RAY, label="caustic", **CAUSTIC))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    save_figure(figure, path, dpi)
+
+
+def _draw_decay(ax: Any, fan: RayFan, ray: int, level: FloatArray, colour: str) -> None:
+    ax.plot(fan.travel_time, level, color=colour, linewidth=1.2, label=f"ray {ray}")
+    passed = np.diff(fan.caustic_index[ray])
+    for step in np.flatnonzero(passed > 0):
+        J = fan.spreading[ray, step : step + 2]
+        share = J[0] / (J[0] - J[1]) if J[0] * J[1] < 0 else 0.5
+        at = fan.travel_time[step] + share * (fan.travel_time[step + 1] - fan.travel_time[step])
+        ax.axvline(at, color=colour, alpha=0.7, **CAUSTIC)
+
+
+def _colours(low: float, high: float) -> Any:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(low, high), "magma")
+
+
+def _patches() -> tuple[Any, ...]:
+    from matplotlib.patches import Patch
+
+    return (Patch(color=NO_RAY, label="no ray passes"),)
+
+
+def _name(kind: Boundary) -> str:
+    return "20 log$_{10}$|∂u/∂n|/k (dB)" if kind.kind == "soft" else "20 log$_{10}$|u| (dB)"
+
+
+def _boundary_name(kind: Boundary) -> str:
+    return f"impedance η = {kind.eta:g}" if kind.kind == "impedance" else kind.kind
