@@ -34,6 +34,7 @@ cache_app = App(name="cache", help="Stored phase maps: list, verify, clear.")
 app.command(cache_app)
 
 _output = Group("Output")
+_field = Group("Field")
 Body = Annotated[str, Parameter(help="Name with parameters, e.g. torus or ellipsoid:a=1.2,b=0.8,c=0.8.")]
 Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
@@ -63,7 +64,7 @@ def run(
     *,
     direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels; need not be unit.")],
     output: Folder,
-    length: Annotated[float | None, Parameter(help="Travel time of the rays; 1.5 body sizes if not given.")] = None,
+    length: Annotated[float | None, Parameter(help="Travel time of the rays; 1.5 body sizes, 3 with a field.")] = None,
     rays: Annotated[int, Parameter(help="Rays at the start; more are inserted where neighbours part.")] = 256,
     spacing: Annotated[float | None, Parameter(help="Spacing of iso-phase curves; length/16 if not given.")] = None,
     of: Annotated[
@@ -75,6 +76,20 @@ def run(
     tolerance: Annotated[float, Parameter(help="Rms error of one step of the phase map.")] = 1e-6,
     flow: Annotated[Literal["map", "direct"], Parameter(help="Phase map or direct integration.")] = "map",
     speed: SpeedOption = None,
+    wavenumber: Annotated[float | None, Parameter(group=_field, help="k, 1/L: adds the field to the results.")] = None,
+    boundary: Annotated[
+        str | None, Parameter(group=_field, help="soft (if not given), hard, pec or impedance:ETA, e.g. 0.5+0.2j.")
+    ] = None,
+    observe: Annotated[
+        list[str] | None,
+        Parameter(
+            group=_field,
+            negative="",
+            help="Where the far field is wanted; may be repeated. cut:PHI is theta from -180 to 180 in the plane PHI, "
+            "grid:STEP all theta and phi (gives far.ffe), THETA,PHI one direction, backscatter the way back. "
+            "If not given, the cut through the direction of the wave.",
+        ),
+    ] = None,
     cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
     backend: Annotated[
         Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")
@@ -85,6 +100,7 @@ def run(
     import numpy as np
 
     import creeping as cr
+    from creeping import _field_run
     from creeping.surface import size
 
     started = time.perf_counter()
@@ -92,6 +108,7 @@ def run(
     for name, value in (("length", length), ("spacing", spacing)):
         if value is not None and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
+    job = _field_run.job(wavenumber, boundary, observe, direction, weighted=speed is not None)
     with _Progress(quiet=json_) as say:
         say("shadow line")
         line = cr.shadow_line(shape, direction)
@@ -102,12 +119,21 @@ def run(
             else cr.DirectFlow(shape)
         )
         say("creeping rays")
-        fan = cr.launch(carrier, line, length=length or 1.5 * size(shape), n_rays=rays, status=launch_from)
+        fan = cr.launch(
+            carrier, line, length=length or (3 if job else 1.5) * size(shape), n_rays=rays, status=launch_from
+        )
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
         summary = _summary(body, speed, line, carrier, fan, curves, flow)
+        if job:
+            say("field")
+            far, field_seconds = job.far_field(fan)
         say("pictures and files")
         summary["files"], summary["drawn_by"] = _write_results(output, line, fan, curves, backend)
+        if job:
+            summary["field"], names = job.write(far, fan, output, backend)
+            summary["field"]["seconds"] = field_seconds
+            summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)
         from creeping.plotting import write_text
 
@@ -241,6 +267,12 @@ def _readable(summary: dict[str, Any], output: Path) -> str:
     rows.append(f"rays: {summary['rays']} of length {summary['length']:g} ({statuses or 'none launched'})")
     error = summary["error_of_rays"]
     rows.append(f"error at their ends against direct integration: rms {error['rms']:.1e}, max {error['max']:.1e}")
+    if "field" in summary:
+        f = summary["field"]
+        rows.append(
+            f"field: k = {f['wavenumber']:g}, {f['boundary']}, {f['directions']} directions, "
+            f"|f| up to {f['largest']:.4g}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
+        )
     rows.append(f"{summary['iso_phase_curves']} iso-phase curves; 3-D picture by {summary['drawn_by']}")
     rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
     return "\n".join(rows)

@@ -4,12 +4,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.plotting._decibels import decibels
 from creeping.plotting._inputs import FarFieldLike
 
 PARTS = ("creeping", "reflected", "forward")
-_COMPONENTS = {"_tt": (0, 0), "_tp": (0, 1), "_pt": (1, 0), "_pp": (1, 1)}
+_COMPONENTS = ("_tt", "_tp", "_pt", "_pp")
 
 
 def angles_of(directions: FloatArray) -> FloatArray:
@@ -47,19 +47,24 @@ def notes(far: FarFieldLike) -> dict[str, str]:
 def rows(far: FarFieldLike) -> Iterable[tuple[Any, ...]]:
     """One tuple for each direction, in the order of `notes`."""
     columns: list[Any] = [*np.asarray(far.directions).T, *np.degrees(angles_of(far.directions)).T]
-    for suffix, at in _suffixes(far).items():
-        total = np.asarray(far.total)[(slice(None), *at)]
+    for k in range(len(_suffixes(far))):
+        total = _component(far.total, k)
         columns += [total.real, total.imag, decibels(total)]
         for part in PARTS:
-            values = np.asarray(getattr(far, part))[(slice(None), *at)]
+            values = _component(getattr(far, part), k)
             columns += [values.real, values.imag]
     numbers = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
     for row, method, lost in zip(numbers, far.method, far.unresolved, strict=True):
         yield (*row, method, int(lost))
 
 
-def _suffixes(far: FarFieldLike) -> dict[str, tuple[int, ...]]:
-    return {"": ()} if np.ndim(far.total) == 1 else dict(_COMPONENTS)
+def _suffixes(far: FarFieldLike) -> tuple[str, ...]:
+    return ("",) if np.ndim(far.total) == 1 else _COMPONENTS
+
+
+def _component(values: ComplexArray, number: int) -> ComplexArray:
+    """One component (m,) of a field (m,) or (m, 2, 2)."""
+    return np.asarray(values).reshape(len(values), -1)[:, number]
 
 
 def _spelled(suffix: str) -> str:

@@ -1,4 +1,4 @@
-"""What the pictures and the files read of a shadow line, a fan, an iso-phase curve and a far field, and nothing more."""
+"""What pictures and files read of a shadow line, a fan, an iso-phase curve and a far field, and nothing more."""
 
 from collections.abc import Sequence
 from typing import Protocol

@@ -85,8 +85,8 @@ def _check_grid(far: FarFieldLike, theta: FloatArray, phi: FloatArray) -> None:
     directions = np.asarray(far.directions)
     if len(directions) != theta.size * phi.size:
         raise InvalidInputError(
-            f"a .ffe file holds a grid: the far field has {len(directions)} directions, a grid of {theta.size} theta by "
-            f"{phi.size} phi has {theta.size * phi.size}{remedy}"
+            f"a .ffe file holds a grid: the far field has {len(directions)} directions, a grid of {theta.size} theta "
+            f"by {phi.size} phi has {theta.size * phi.size}{remedy}"
         )
     off = np.linalg.norm(directions - grid_directions(theta, phi), axis=1)
     wrong = int(np.sum(off > 1e-9))
@@ -103,7 +103,8 @@ def _lines(far: FarFieldLike, theta: FloatArray, phi: FloatArray, direction: Arr
     yield "##File Type: Far field"
     yield "##File Format: 8"
     yield f"##Source: creeping {__version__}"
-    yield f"** {far.boundary} boundary, order {far.order}, k = {far.wavenumber!r} 1/L; here L is the metre, c that of light"
+    yield f"** {far.boundary} boundary, order {far.order}, k = {far.wavenumber!r} 1/L"
+    yield "** frequency: L is taken as the metre and the wave's speed as that of light"
     yield "** time factor exp(+jwt): complex conjugates of the far field f of creeping, exp(-iwt)"
     if not vector:
         yield "** SCALAR field: f stands in the columns of Etheta, those of Ephi are 0"
@@ -126,7 +127,7 @@ def _lines(far: FarFieldLike, theta: FloatArray, phi: FloatArray, direction: Arr
         fields = _components(far, theta, phi, number)
         # theta runs first
         for j, i in np.ndindex(len(phi), len(theta)):
-            e = np.conj(fields[i, j])
+            e = np.conj(fields[i, j]) + 0.0
             sections = 4 * np.pi * np.abs(e) ** 2
             row = (np.degrees(theta[i]), np.degrees(phi[j]), e[0].real, e[0].imag, e[1].real, e[1].imag, *sections)
             yield " " + "".join(f"{value:26.16E}" for value in (*row, float(np.sum(sections))))

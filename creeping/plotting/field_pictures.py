@@ -28,7 +28,7 @@ from creeping.surface import normal
 NO_RAY = "#b4b9bd"
 PENUMBRA = -8.0
 """ξ below which geometrical optics stands on the lit side, to 0.01 dB."""
-CAUSTIC = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
+CAUSTIC: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
 LEAST_CELLS, MOST_CELLS = 48, 96
 """Of the body along each side of its box."""
 
@@ -84,8 +84,7 @@ def surface_field_picture(
     k = checked(wavenumber, order)
     if cells is None:
         side = float(np.cbrt(np.prod(np.diff(fan.body.bounds, axis=0))))
-        cells = int(np.clip(8 * side * k / (2 * np.pi), CAUSTIC = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
-LEAST_CELLS, MOST_CELLS))
+        cells = int(np.clip(8 * side * k / (2 * np.pi), LEAST_CELLS, MOST_CELLS))
     drawing = compose(fan.line, view=view, cells=cells)
     levels = surface_levels(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
     finite = levels[np.isfinite(levels)]
@@ -152,17 +151,14 @@ def _lit_magnitude(fan: RayFan, points: FloatArray, wavenumber: float, kind: Bou
         # at normal incidence every plane is one of incidence, and all give geometrical optics
         kappa = np.nan_to_num(bend / square / np.linalg.norm(body.gradient(points), axis=1))
     m = fock_scale(wavenumber, kappa)
+    # a hard boundary is an impedance with eta = 0
     near = -m * cosine > PENUMBRA
     if kind.kind == "soft":
         out = 2 * cosine
         out[near] = np.abs(surface_function(-m[near] * cosine[near], None)) / m[near]
         return np.asarray(out)
-    if kind.kind == "hard":
-        out, q = np.full(len(points), 2.0), 0.0
-    else:
-        out = np.abs(2 * cosine / (cosine + kind.eta))
-        q = kind.q(m[near])
-    out[near] = np.abs(surface_function(-m[near] * cosine[near], q))
+    out = np.abs(2 * cosine / (cosine + kind.eta))
+    out[near] = np.abs(surface_function(-m[near] * cosine[near], kind.q(m[near])))
     return np.asarray(out)
 
 

@@ -133,6 +133,7 @@ def new_figure(inches: tuple[float, float]) -> Any:
 
 
 def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
+    """Write the figure as PNG, at once when complete."""
     with written_aside(path) as aside:
         figure.savefig(aside, dpi=dpi, format="png")
 
