@@ -1,14 +1,17 @@
 """The command line as a user meets it: outputs, exit codes, messages."""
 
+import csv
 import json
 import os
 import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
-from creeping import cli
+from creeping import _field_run, cli
+from studies.reference import sphere
 
 
 def creeping(*arguments, capsys=None):
@@ -43,6 +46,56 @@ def test_run_prints_json_only(tmp_path, capsys):
     assert "phase_map" not in summary
 
 
+def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
+    options = ["--direction", 0.06, 0.03, 1, "--flow", "direct", "--rays", 32, "--length", 3.6]
+    options += ["--backend", "matplotlib"]
+    field = ["--wavenumber", 20, "--boundary", "hard", "--observe", "cut:30", "--observe", "grid:45"]
+    code, out, _ = creeping("run", "sphere", *options, *field, "--observe", "150,20", "-o", tmp_path, capsys=capsys)
+    assert code == 0
+    assert "field: k = 20, hard" in out
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert {"far.csv", "far.png", "far.ffe", "field.png"} <= set(summary["files"])
+    assert sorted(summary["files"]) == sorted(f.name for f in tmp_path.iterdir())
+    entry = summary["field"]
+    assert (entry["wavenumber"], entry["boundary"], entry["order"]) == (20.0, "hard", 2)
+    assert entry["observe"] == ["cut:30", "grid:45", "150,20"]
+    assert entry["directions"] == sum(entry["methods"].values()) == 361 + 5 * 9 + 1
+    assert entry["unresolved"] == entry["not_finite"] == 0
+    # the forward lobe of the hard sphere from its series; the cut passes a quarter of a degree from its top
+    forward = abs(sphere.far_field(20.0, 1.0, [1.0], "hard")[0])
+    assert entry["largest"] == pytest.approx(forward, rel=0.02)
+    rows = list(csv.DictReader(x for x in (tmp_path / "far.csv").read_text().splitlines() if x[0] != "#"))
+    assert len(rows) == entry["directions"]
+    assert (round(float(rows[-1]["theta"])), round(float(rows[-1]["phi"]))) == (150, 20)
+
+
+def test_run_of_a_conductor_has_no_picture_of_the_body(tmp_path, capsys):
+    options = ["--direction", 1, 1, 0, "--flow", "direct", "--rays", 32, "--length", 3.2, "--backend", "matplotlib"]
+    field = ["--wavenumber", 10, "--boundary", "pec", "--observe", "backscatter"]
+    code, out, _ = creeping("run", "sphere", *options, *field, "--json", "-o", tmp_path, capsys=capsys)
+    assert code == 0
+    summary = json.loads(out)
+    assert set(summary["files"]) & {"far.csv", "far.png", "far.ffe", "field.png"} == {"far.csv"}
+    assert summary["field"]["boundary"] == "pec"
+
+
+def test_a_field_needs_a_good_request():
+    job = _field_run.job(20.0, None, None, (1.0, 1.0, 0.0))
+    assert (job.boundary, [target.text for target in job.targets]) == ("soft", ["cut:45"])
+    assert _field_run.job(None, None, None, (1.0, 0.0, 0.0)) is None
+    assert _field_run.parse_boundary("impedance:0.5+0.2j").eta == 0.5 + 0.2j
+    # a cut passes d, and goes on past the pole on the other side
+    cut = job.targets[0]
+    assert np.max(cut.directions @ np.array([1, 1, 0]) / np.sqrt(2)) == pytest.approx(1)
+    np.testing.assert_allclose(cut.directions[[0, 90, 270]] @ [1, 1, 1], [-1, -np.sqrt(2), np.sqrt(2)], atol=1e-12)
+    grid = _field_run.parse_target("grid:30", np.array([1.0, 0, 0]))
+    assert grid.directions.shape == (7 * 13, 3)
+
+
+_SPHERE = ["run", "sphere", "--direction", 1, 0, 0, "-o", "x"]
+_FIELD = [*_SPHERE, "--wavenumber", 20]
+
+
 @pytest.mark.parametrize(
     "arguments, match",
     [
@@ -60,6 +113,20 @@ def test_run_prints_json_only(tmp_path, capsys):
         (["run", "sphere", "--direction", 1, 0, 0, "--tolerance", 0, "-o", "x"], "tolerance"),
         (["run", "sphere", "--direction", 1, 0, 0, "--speed", "import os", "-o", "x"], "not valid"),
         (["run", "torus", "--direction", 1, 0, 0, "-o", "x"], "crosses itself"),
+        ([*_SPHERE, "--boundary", "hard"], "--boundary needs --wavenumber"),
+        ([*_SPHERE, "--boundary", "hard", "--observe", "cut:0"], "--boundary and --observe need --wavenumber"),
+        ([*_SPHERE, "--wavenumber", -3], "--wavenumber = -3.0 is not a positive"),
+        ([*_FIELD, "--boundary", "firm"], "'firm' is not soft, hard, pec or impedance:ETA"),
+        ([*_FIELD, "--boundary", "impedance:x"], "'x' is not a complex number"),
+        ([*_FIELD, "--boundary", "impedance:-1"], "gives energy off"),
+        ([*_FIELD, "--observe", "sphere:3"], "'sphere:3' is unknown; give cut:PHI"),
+        ([*_FIELD, "--observe", "cut"], "'cut' is unknown"),
+        ([*_FIELD, "--observe", "grid:7"], "must divide 180"),
+        ([*_FIELD, "--observe", "grid:0.1"], "more than 200000 directions"),
+        ([*_FIELD, "--observe", "grid:5", "--observe", "grid:9"], "several grids"),
+        ([*_FIELD, "--observe", "200,0"], "not between 0 and 180"),
+        ([*_FIELD, "--observe", "20,nan"], "is unknown"),
+        ([*_FIELD, "--speed", "1 + 0.1*x"], "leave out --speed"),
         (["check", "sphere", "--speed", "-1"], ""),
         (["figure", "nonsense"], "unknown figure"),
         (["figure"], "give one figure"),

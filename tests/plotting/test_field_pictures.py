@@ -1,0 +1,138 @@
+"""The field on a sphere as a picture: its levels against the exact series and the rays' own field."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping._errors import InvalidInputError
+from creeping.plotting import decay_picture, field_pictures, surface_field_picture
+from creeping.plotting.display import GLProbe
+from creeping.plotting.field_pictures import lit_points, surface_levels
+from studies.reference import sphere
+
+K = 30.0
+
+
+@pytest.fixture(scope="module")
+def fan():
+    body = sc.Sphere()
+    return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=2.2, n_rays=32)
+
+
+def at(angle):
+    """Points of the sphere by their angle from -z, the lit pole, in degrees."""
+    t = np.radians(np.atleast_1d(angle))
+    return np.stack([np.sin(t) * np.cos(0.3), np.sin(t) * np.sin(0.3), -np.cos(t)], axis=-1)
+
+
+@pytest.mark.parametrize("boundary", ["hard", "soft", cr.Impedance(0.5 + 0.2j)])
+def test_levels_are_those_of_the_exact_series(fan, boundary):
+    angles = np.array([0.0, 20.0, 50.0, 70.0, 80.0, 89.0, 91.0, 100.0, 120.0])
+    levels = surface_levels(fan, at(angles), wavenumber=K, boundary=boundary)
+    cosine = -np.cos(np.radians(angles))
+    if boundary == "soft":
+        exact = sphere.surface_derivative(K, 1.0, cosine, "soft") / K
+    else:
+        exact = sphere.surface_field(K, 1.0, cosine, boundary if boundary == "hard" else boundary.eta)
+    error = np.abs(levels - 20 * np.log10(np.abs(exact)))
+    # the lit side is of leading order: 0.4 dB where geometrical optics misses 3 dB, if soft 20
+    assert error[:3].max() < 0.08
+    assert error[3:6].max() < 0.4
+    assert error[6:].max() < 0.04
+
+
+@pytest.mark.parametrize("boundary", ["hard", "soft", cr.Impedance(0.5 + 0.2j)])
+def test_lit_side_joins_the_shadow(fan, boundary):
+    # the leading order has Fock's function on both sides of the shadow line
+    left, right = surface_levels(fan, at([89.9999, 90.0001]), wavenumber=K, boundary=boundary, order=1)
+    assert left == pytest.approx(right, abs=0.01)
+
+
+def test_shadow_is_the_surface_field(fan):
+    points = at([100.0, 130.0])
+    field = cr.surface_field(fan, points, wavenumber=K, boundary="soft")
+    levels = surface_levels(fan, points, wavenumber=K, boundary="soft")
+    np.testing.assert_allclose(levels, 20 * np.log10(np.abs(field) / K))
+
+
+def test_shadow_without_rays_is_nan():
+    body = sc.Sphere()
+    short = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=0.3, n_rays=16)
+    levels = surface_levels(short, at([95.0, 170.0]), wavenumber=K, boundary="hard")
+    assert np.isfinite(levels).tolist() == [True, False]
+
+
+def test_inner_equator_of_a_torus_is_not_lit_behind_its_tube():
+    body = sc.Torus()
+    line = cr.shadow_line(body, (1, 0, 0.2))
+    fan = cr.launch(cr.DirectFlow(body), line, length=0.2, n_rays=8)
+    assert lit_points(fan, np.array([[-1.5, 0, 0], [1.5, 0, 0], [0.5, 0, 0]])).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize("backend", ["matplotlib", "pyvista"])
+def test_picture_of_the_body(tmp_path, fan, backend, request):
+    from matplotlib.image import imread
+
+    if backend == "pyvista":
+        request.getfixturevalue("opengl")
+    path = tmp_path / "field.png"
+    options = {"wavenumber": K, "boundary": "hard", "cells": 16, "dpi": 50}
+    assert surface_field_picture(path, fan, backend=backend, **options) == backend
+    image = imread(path)[..., :3]
+    # coloured, not grey
+    assert np.mean(np.ptp(image, axis=-1) > 0.2) > 0.1
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_auto_falls_back_to_matplotlib(tmp_path, fan, monkeypatch):
+    monkeypatch.setattr("creeping.plotting.pictures.gl_available", lambda: GLProbe(False, "no libEGL"))
+    assert surface_field_picture(tmp_path / "a.png", fan, wavenumber=K, cells=12, dpi=40) == "matplotlib"
+
+
+@pytest.mark.parametrize("boundary", ["hard", "soft"])
+def test_decay_picture(tmp_path, fan, boundary, monkeypatch):
+    drawn = []
+    draw = field_pictures._draw_decay
+
+    def kept(ax, *rest):
+        drawn.append(ax)
+        draw(ax, *rest)
+
+    monkeypatch.setattr(field_pictures, "_draw_decay", kept)
+    decay_picture(tmp_path / "a.png", fan, wavenumber=K, boundary=boundary, rays=2, dpi=50)
+    assert (tmp_path / "a.png").stat().st_size > 5000
+    curves = [line for line in drawn[0].lines if str(line.get_label()).startswith("ray")]
+    assert len(curves) == 2
+    field = np.abs(cr.surface_field(fan, wavenumber=K, boundary=boundary))[0, 5] / (K if boundary == "soft" else 1)
+    assert curves[0].get_ydata()[5] == pytest.approx(20 * np.log10(field))
+    # on the sphere every ray passes its caustic after a quarter circle
+    caustics = [line.get_xdata()[0] for line in drawn[0].lines if line not in curves]
+    assert caustics == pytest.approx([np.pi / 2] * 2, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"boundary": "pec"}, "'pec' is for the far field"),
+        ({"boundary": "firm"}, "'firm' is not"),
+        ({"wavenumber": -1.0}, "wavenumber = -1.0"),
+        ({"order": 3}, "order = 3"),
+        ({"span": 0.0}, "span = 0.0"),
+    ],
+)
+@pytest.mark.parametrize("draw", [surface_field_picture, decay_picture])
+def test_bad_input_is_refused(tmp_path, fan, draw, change, match):
+    options = {"wavenumber": K, **change}
+    if draw is surface_field_picture:
+        options["cells"] = 8
+    with pytest.raises(InvalidInputError, match=match):
+        draw(tmp_path / "a.png", fan, **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_unknown_backend_and_no_rays(tmp_path, fan):
+    with pytest.raises(InvalidInputError, match="backend 'povray'"):
+        surface_field_picture(tmp_path / "a.png", fan, wavenumber=K, backend="povray")
+    with pytest.raises(InvalidInputError, match="at least one ray"):
+        decay_picture(tmp_path / "a.png", fan, wavenumber=K, rays=0)
