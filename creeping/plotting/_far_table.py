@@ -40,7 +40,7 @@ def notes(far: FarFieldLike) -> dict[str, str]:
             columns[f"{part}_re{suffix}"] = f"part of f, L{name}"
             columns[f"{part}_im{suffix}"] = "imaginary part"
     columns["method"] = "what served the creeping part"
-    columns["unresolved"] = "1 where a part of the forward lobe was not found"
+    columns["unresolved"] = "1 where a part was not found or its expansion fails"
     return columns
 
 

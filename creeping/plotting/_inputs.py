@@ -163,7 +163,7 @@ class FarFieldLike(Protocol):
 
     @property
     def unresolved(self) -> BoolArray:
-        """Directions (m,) where a part was not found."""
+        """Directions (m,) where a part was not found or its expansion fails."""
         ...
 
     @property

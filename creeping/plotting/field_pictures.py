@@ -105,7 +105,7 @@ def surface_field_picture(
     bar = figure.colorbar(
         colours, cax=figure.add_axes(place), extend={"": "neither", "minmax": "both"}.get(beyond, beyond)
     )
-    bar.set_label(f"{_name(kind)} on the body, k = {k:g}/L, {_boundary_name(kind)}", fontsize=8)
+    bar.set_label(f"{_name(kind)}\nk = {k:g}/L, {_boundary_name(kind)}", fontsize=8)
     bar.ax.tick_params(labelsize=8, width=0.5)
     bar.outline.set_linewidth(0.5)
     save_figure(figure, path, dpi)
