@@ -17,6 +17,8 @@ from creeping._typing import ArrayLike, ComplexArray
 
 MODES = 10
 """Modes summed; with them the series holds to 4e-4 at xi = 0.7 and to 1e-7 at xi = 1.3."""
+TABLE = 32
+"""Different |q| beyond which roots are interpolated before they are refined."""
 
 _TURN = np.exp(2j * np.pi / 3)
 _W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
@@ -86,12 +88,27 @@ def impedance_modes(q: ArrayLike, n: int = MODES) -> Modes:
     """
     q = np.asarray(q, dtype=complex)
     amounts = np.abs(q).ravel()
-    order = np.argsort(amounts)
-    tau = np.empty((q.size, n), dtype=complex)
-    now, roots = 0j, hard_roots(n)
-    for k in order:
-        now, roots = _continue(now, complex(q.ravel()[k]), roots)
-        tau[k] = roots
+    if not q.size:
+        return _constants(np.zeros((*q.shape, n), dtype=complex), soft=False)
+    phase = np.exp(1j * np.angle(q.ravel()[np.argmax(amounts)]))
+    nodes = np.unique(amounts)
+    interpolated = len(nodes) > TABLE
+    if interpolated:
+        # roots are smooth in |q|: Chebyshev nodes in its logarithm, then Newton
+        low, high = np.log(nodes[0]), np.log(nodes[-1])
+        unit = np.cos(np.pi * (np.arange(TABLE) + 0.5) / TABLE)[::-1]
+        nodes = np.exp(low + (high - low) * (unit + 1) / 2)
+    roots = np.empty((len(nodes), n), dtype=complex)
+    now, last = 0j, hard_roots(n)
+    for k, amount in enumerate(nodes):
+        now, last = _continue(now, complex(amount * phase), last)
+        roots[k] = last
+    if interpolated:
+        series = np.polynomial.chebyshev.chebfit(unit, roots, TABLE - 1)
+        at = np.clip(2 * (np.log(amounts) - low) / (high - low) - 1, -1, 1)
+        tau = _newton(np.polynomial.chebyshev.chebval(at, series).T, q.reshape(-1, 1))
+    else:
+        tau = roots[np.searchsorted(nodes, amounts)]
     return _constants(tau.reshape(*q.shape, n), soft=False)
 
 
@@ -109,7 +126,7 @@ def _continue(start: complex, end: complex, roots: ComplexArray) -> tuple[comple
     return start, roots
 
 
-def _newton(tau: ComplexArray, q: complex) -> ComplexArray:
+def _newton(tau: ComplexArray, q: complex | ComplexArray) -> ComplexArray:
     """Roots of w1' = q w1 near tau, by Newton on r - q or on 1/r - 1/q, r = w1'/w1, whichever is small there.
 
     dr/dτ = τ - r² by Airy's equation.
@@ -127,21 +144,17 @@ def _newton(tau: ComplexArray, q: complex) -> ComplexArray:
 
 
 def _constants(tau: ComplexArray, *, soft: bool) -> Modes:
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        value, slope = w1(tau)
-        if soft:
-            value = np.zeros_like(value)
-        elif tau.ndim == 1:
-            slope = np.where(np.abs(slope) < 1e-12 * np.abs(value), 0.0, slope)
-        divisor = slope * slope - tau * value * value
-        # a bound surface wave (|w1| overflows) is not excited by a plane wave: its constants are 0
-        finite = np.isfinite(divisor)
-        divisor = np.where(finite, divisor, np.inf)
-        value, slope = np.where(finite, value, 0.0), np.where(finite, slope, 0.0)
+    value, slope, zeta = scaled_ai(tau * _TURN)
+    value, slope = _W1 * value, _W1 * _TURN * slope
+    if soft:
+        value = np.zeros_like(value)
+    # all but the residues are ratios, free of the factor e^{-ζ}; a bound surface wave, whose w1 is huge, is not excited
+    # by a plane wave: its residues underflow to 0
+    divisor = slope * slope - tau * value * value
     return Modes(
         tau=tau,
-        residue=1 / divisor,
+        residue=np.exp(2 * zeta) / divisor,
         m0=-value * value / divisor,
         q_m0=-value * slope / divisor,
-        surface=slope / divisor if soft else -value / divisor,
+        surface=np.exp(zeta) * (slope if soft else -value) / divisor,
     )

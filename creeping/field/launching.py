@@ -193,8 +193,8 @@ def shed_wave(
 
 
 def shared_pole(xi: FloatArray, share: FloatArray, power: int = 0) -> ComplexArray:
-    """Share of the pole, 0 where the share is, even at ξ = 0 (...)."""
-    some = share > 0
+    """Share of the pole, 0 where the share or ξ is: a ray of no length sheds nothing (...)."""
+    some = (share > 0) & (xi != 0)
     out = np.zeros(xi.shape, dtype=complex)
     out[some] = share[some] * pole(xi[some], power)
     return out

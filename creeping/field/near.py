@@ -28,7 +28,7 @@ from creeping.field.launching import (
     scales,
     smoothstep,
 )
-from creeping.field.on_surface import scalar_boundary, surface_waves
+from creeping.field.on_surface import scalar_boundary, surface_amplitude, surface_waves
 from creeping.rays.fan import RayFan
 from creeping.rays.ray_points import RayPoints
 from creeping.rays.shedding import shed_near, shed_on
@@ -173,10 +173,13 @@ def _series(
 ) -> ComplexArray:
     """Sum of modes with height gain (n,); ``ends`` with the factors of varying curvature at both ends."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber))
-    share = height[..., 0] / (1 + height[..., 0]) if ends else None
-    waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=share)
+    share = height[..., 0] / (1 + height[..., 0])
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=share if ends else None)
     terms = end_residue(rays, wavenumber, boundary, "residue") * waves
     if order == 2:
-        terms = terms * amplitude_factor(rays, modes, wavenumber, boundary, 0.25)
+        # from the amplitude on the body to that far away
+        far = np.sqrt(share)[..., None]
+        amplitude = far * amplitude_factor(rays, modes, wavenumber, boundary, 0.25)
+        terms = terms * (amplitude + (1 - far) * surface_amplitude(rays, modes, wavenumber, boundary))
     terms = terms * height_gain(modes.tau, height)
     return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))

@@ -132,7 +132,7 @@ def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) 
     waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=0.0)
     terms = end_residue(rays, wavenumber, boundary, "surface") * waves
     if order == 2:
-        terms = terms * _amplitude(rays, modes, wavenumber, boundary)
+        terms = terms * surface_amplitude(rays, modes, wavenumber, boundary)
     return np.asarray(2j * np.sqrt(np.pi) * np.sum(terms, axis=-1))
 
 
@@ -155,7 +155,7 @@ def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) ->
     return np.asarray(total)
 
 
-def _amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary) -> ComplexArray:
+def surface_amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary) -> ComplexArray:
     """Second-order amplitude of each mode (..., n)."""
     m1, m2 = scales(rays, wavenumber)
     first, last = transverse_ratios(rays)
