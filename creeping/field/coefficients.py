@@ -22,7 +22,7 @@ import numpy as np
 
 from creeping._errors import InvalidInputError
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.airy import Modes
+from creeping.field.airy import MODES, Modes
 from creeping.field.fock import boundary_modes
 
 BETA = 0.08
@@ -103,9 +103,9 @@ def fock_scale(wavenumber: float, curvature: FloatArray) -> FloatArray:
         return np.asarray(np.cbrt(wavenumber / (2 * np.maximum(curvature, 0.0))))
 
 
-def modes_of(boundary: Boundary, m: FloatArray) -> Modes:
+def modes_of(boundary: Boundary, m: FloatArray, n: int = MODES) -> Modes:
     """Modes at Fock scales m (...): (n,) for soft and hard, (..., n) for an impedance."""
-    return boundary_modes(boundary.q(m))
+    return boundary_modes(boundary.q(m), n)
 
 
 def decay_terms(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

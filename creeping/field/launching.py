@@ -12,7 +12,7 @@ geometric mean of both ends.
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.airy import Modes
+from creeping.field.airy import MODES, Modes
 from creeping.field.coefficients import (
     BETA,
     Boundary,
@@ -130,12 +130,10 @@ def mode_sum(
     return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))
 
 
-def end_residue(rays: RayPoints, wavenumber: float, boundary: Boundary, name: str) -> ComplexArray:
-    """Constant of the modes: of the boundary, or the geometric mean of both ends' where q varies: (n,) or (..., n)."""
+def end_residue(rays: RayPoints, wavenumber: float, boundary: Boundary, name: str, n: int = MODES) -> ComplexArray:
+    """Constant of the modes, at the geometric mean of both ends' q where it varies: (n,) or (..., n)."""
     m1, m2 = scales(rays, wavenumber)
-    if boundary.kind != "impedance":
-        return np.asarray(getattr(modes_of(boundary, m1), name))
-    return np.asarray(getattr(modes_of(boundary, np.sqrt(m1 * m2)), name))
+    return np.asarray(getattr(modes_of(boundary, np.sqrt(m1 * m2), n), name))
 
 
 def shed_wave(

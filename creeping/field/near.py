@@ -3,8 +3,8 @@
     u = D e^{ik(d.x0 + s + l)} / √(l |J + l J'|) e^{-iπN/2},   D = -√(m1 m2) √(2/k) P̂(ξ, Y),   Y = (m2 l/ρ2)²
     P̂ = 2i√π e^{iπ/4} Σ_p R_p A_p exp{...} H_p(Y),   H_p the height gain, launch factor to the power Y/(1 + Y)
 
-The leading order is Fock's integral of the same modes, which holds down to ξ = 0, or, at great Y, UTD's form with
-X = k l ξ²/(2 m1 m2),
+Near the body the leading order is Fock's integral of the same modes, which holds down to ξ = 0. Farther off the modes
+add up by themselves but for a last ξ, where UTD's form stands, with X = k l ξ²/(2 m1 m2),
 
     P̂ = P(ξ) + (e^{iπ/4}/(2√π ξ)) [1 - F_t(X)].
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from creeping._errors import InvalidInputError
 from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping.field.airy import MODES
 from creeping.field.coefficients import Boundary, BoundaryLike, modes_of
 from creeping.field.far import checked
 from creeping.field.far_geometry import fan_strips
@@ -41,6 +42,9 @@ ENDS = (0.4, 0.9)
 """ξ between which the factors of varying curvature come in."""
 DEEP = 3.0
 """ξ beyond which the sum of modes stands alone."""
+HARD_BY = 0.04
+"""ξ below which, far from the body, even MANY modes do not add up; the shadow boundary is hard by."""
+MANY = 45
 ON_BODY = 1e-7
 """Distance from the body, in its sizes, below which a point counts as on it."""
 
@@ -131,37 +135,50 @@ def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: 
 def _uniform(
     rays: RayPoints, reach: FloatArray, height: FloatArray, wavenumber: float, boundary: Boundary, order: int
 ) -> ComplexArray:
-    """P̂ (n,): the leading order, and what each correction of the modes adds where its series converges."""
+    """P̂ (n,): near the body Fock's integral and what second order changes in the modes, farther the modes alone."""
     xi = fock_parameter(rays, wavenumber)
     m1, m2 = scales(rays, wavenumber)
     q = boundary.q(np.sqrt(m1 * m2))
     out = np.zeros(len(xi), dtype=complex)
     low = (height <= FAR_HEIGHT) & (xi <= DEEP)
-    far = (height > FAR_HEIGHT) & (xi <= DEEP)
-    deep = xi > DEEP
+    tall = (height > FAR_HEIGHT) & (xi < HARD_BY)
     if np.any(low):
         out[low] = near_pekeris(xi[low], height[low], _part(q, low))
-    if np.any(far):
-        X = wavenumber * reach[far] * xi[far] ** 2 / (2 * m1[far] * m2[far])
+        if order == 2:
+            out[low] += _second(rays[low], height[low], wavenumber, boundary)
+    if np.any(tall):
+        X = wavenumber * reach[tall] * xi[tall] ** 2 / (2 * m1[tall] * m2[tall])
         with np.errstate(divide="ignore", invalid="ignore"):
-            edge = np.exp(0.25j * np.pi) / (2 * np.sqrt(np.pi) * xi[far]) * (1 - transition(X))
-            out[far] = pekeris(xi[far], _part(q, far)) + edge
-    if np.any(deep):
-        out[deep] = _series(rays[deep], height[deep, None], wavenumber, boundary, order, ends=order == 2)
-    if order == 2:
-        for variable, range_, new, old in (
-            (xi + np.sqrt(height), SERIES, (2, False), (1, False)),
-            (xi, ENDS, (2, True), (2, False)),
-        ):
-            weight = smoothstep(variable, *range_)
-            some = (low | far) & (weight > 0)
-            if np.any(some):
-                pair = [
-                    _series(rays[some], height[some, None], wavenumber, boundary, o, ends=ends)
-                    for o, ends in (new, old)
-                ]
-                out[some] += weight[some] * (pair[0] - pair[1])
+            edge = np.exp(0.25j * np.pi) / (2 * np.sqrt(np.pi) * xi[tall]) * (1 - transition(X))
+            out[tall] = (1 - smoothstep(xi[tall], 0, HARD_BY)) * (pekeris(xi[tall], _part(q, tall)) + edge)
+    series = (~low) & (xi > 0)
+    if np.any(series):
+        part = rays[series]
+        weight = smoothstep(xi[series], *ENDS) if order == 2 else np.zeros(len(part.time))
+        plain, whole = (
+            _series(part, height[series, None], wavenumber, boundary, order, ends=ends, n=MANY)
+            for ends in (False, True)
+        )
+        taken = np.where(height[series] > FAR_HEIGHT, smoothstep(xi[series], 0, HARD_BY), 1.0)
+        out[series] += taken * ((1 - weight) * plain + weight * whole)
     return out
+
+
+def _second(rays: RayPoints, height: FloatArray, wavenumber: float, boundary: Boundary) -> ComplexArray:
+    """What second order changes in the sum of modes (n,): c and amplitudes by ξ + √Y, the ends by ξ."""
+    xi = fock_parameter(rays, wavenumber)
+    total = np.zeros(len(xi), dtype=complex)
+    for by, range_, new, old in (
+        (xi + np.sqrt(height), SERIES, (2, False), (1, False)),
+        (xi, ENDS, (2, True), (2, False)),
+    ):
+        weight = smoothstep(by, *range_)
+        some = weight > 0
+        if np.any(some):
+            part, tall = rays[some], height[some, None]
+            pair = [_series(part, tall, wavenumber, boundary, order, ends=ends) for order, ends in (new, old)]
+            total[some] += weight[some] * (pair[0] - pair[1])
+    return total
 
 
 def _part(q: ComplexArray | float | None, mask: BoolArray) -> ComplexArray | float | None:
@@ -169,13 +186,20 @@ def _part(q: ComplexArray | float | None, mask: BoolArray) -> ComplexArray | flo
 
 
 def _series(
-    rays: RayPoints, height: FloatArray, wavenumber: float, boundary: Boundary, order: int, *, ends: bool
+    rays: RayPoints,
+    height: FloatArray,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+    *,
+    ends: bool,
+    n: int = MODES,
 ) -> ComplexArray:
     """Sum of modes with height gain (n,); ``ends`` with the factors of varying curvature at both ends."""
-    modes = modes_of(boundary, mean_scale(rays, wavenumber))
+    modes = modes_of(boundary, mean_scale(rays, wavenumber), n)
     share = height[..., 0] / (1 + height[..., 0])
     waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=share if ends else None)
-    terms = end_residue(rays, wavenumber, boundary, "residue") * waves
+    terms = end_residue(rays, wavenumber, boundary, "residue", n) * waves
     if order == 2:
         # from the amplitude on the body to that far away
         far = np.sqrt(share)[..., None]

@@ -21,7 +21,7 @@ from creeping.surface import Surface, normal, size
 BLOCK = 4_000_000
 """Values of a function on a strip for several observers that are held at once."""
 CLOSE = 1e-9
-"""Residual at which a search ends, in radians or body sizes; splines of a coarse fan may leave a thousand times more."""
+"""Residual at which a search ends, in radians or body sizes; splines of a coarse fan leave up to 1000 times that."""
 
 
 @dataclass(frozen=True, eq=False)

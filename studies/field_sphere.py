@@ -1,0 +1,164 @@
+"""How accurate is the field on a sphere? Every part of it against exact series, over ka = 10, 30, 100, 300.
+
+Errors are relative, per cent. The creeping part alone is judged by its Regge poles, since in the backward half it is far
+below the total. Run ``python -m studies.field_sphere`` (about a minute).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+import creeping as cr
+import scatterers as sc
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.coefficients import scalar_boundaries
+from creeping.field.far import isolated_rays
+from creeping.field.far_geometry import far_geometry
+from creeping.field.forward import fan_half
+from creeping.rays.fan import RayFan
+from studies.reference import sphere, watson
+
+KA = (10.0, 30.0, 100.0, 300.0)
+AZIMUTH = 0.3
+"""Of the observers, radians: nothing may depend on it."""
+LIMITS: dict[str, tuple[float, ...]] = {
+    "creeping rays, soft, first order": (17, 8, 3.4, 2.7),
+    "creeping rays, soft": (3, 0.9, 0.3, 0.08),
+    "creeping rays, hard, first order": (62, 47, 29, 19),
+    "creeping rays, hard": (9, 3, 0.8, 0.3),
+    "back axis, soft, first order": (23, 10, 4.3, 2.7),
+    "back axis, soft": (1.3, 0.35, 0.08, 0.02),
+    "back axis, hard, first order": (76, 51, 33, 23),
+    "back axis, hard": (8, 2.6, 0.7, 0.24),
+    "forward, soft": (2.6, 0.7, 0.15, 0.04),
+    "forward, hard": (10, 2.2, 0.4, 0.1),
+    "total at 60 deg, soft": (1.5, 0.5, 0.09, 0.01),
+    "total at 60 deg, hard": (18, 6, 2, 0.7),
+    "near field in the shadow, soft": (6, 3, 1.4, 1.4),
+    "near field in the shadow, hard": (7, 8, 3, 0.9),
+    "PEC, E in the plane, from 20 deg": (39, 7, 2, 0.4),
+    "PEC, E across the plane, from 20 deg": (33, 11, 4, 1.6),
+}
+"""Figures of a prototype of the same formulas, per cent: what is to be reproduced within a factor 1.5."""
+
+
+def sphere_fan(length: float = 6.2) -> RayFan:
+    """Fan of the unit sphere for incidence along z, once round."""
+    body = sc.Sphere()
+    flow = cr.build_phase_map(body, tolerance=1e-6)
+    return cr.launch(flow, cr.shadow_line(body, (0, 0, 1)), length=length, n_rays=256)
+
+
+def observers(theta: FloatArray) -> FloatArray:
+    """Directions at angles theta (m,) from the forward direction: (m, 3)."""
+    sin = np.sin(theta)
+    return np.stack([sin * np.cos(AZIMUTH), sin * np.sin(AZIMUTH), np.cos(theta)], axis=-1)
+
+
+def worst(found: ComplexArray, exact: ComplexArray) -> float:
+    """Largest relative error, per cent."""
+    return float(100 * np.max(np.abs(found - exact) / np.abs(exact)))
+
+
+def creeping_rays(fan: RayFan, k: float, boundary: cr.Impedance | str, order: int) -> float:
+    """Short and long isolated ray, 30 to 150 deg, against the Regge poles."""
+    theta = np.radians(np.arange(30, 151, 10.0))
+    geometry = far_geometry(fan, observers(theta), k)
+    kind = scalar_boundaries(boundary)[0]  # type: ignore[arg-type]
+    found = np.zeros(len(theta), dtype=complex)
+    np.add.at(found, geometry.shed.observer, isolated_rays(geometry, k, kind, order))
+    reference = boundary if isinstance(boundary, str) else boundary.eta
+    return worst(found, watson.far_field(k, 1.0, theta, reference, modes=12 if k < 20 else 8))
+
+
+def back_axis(fan: RayFan, k: float, boundary: str, order: int) -> float:
+    """Fan integral at backscatter, where all rays merge, against the Regge poles."""
+    geometry = far_geometry(fan, [[0.0, 0, -1]], k)
+    nodes = geometry.fan_nodes(k, np.array([True]))
+    found = fan_half(nodes, geometry.directions, k, scalar_boundaries(boundary)[0], order).sum()  # type: ignore[arg-type]
+    return worst(np.array([found]), watson.far_field(k, 1.0, [np.pi], boundary))  # type: ignore[arg-type]
+
+
+def total(fan: RayFan, k: float, boundary: str, degrees: FloatArray) -> float:
+    """Total far field at angles from the forward direction, against partial waves."""
+    theta = np.radians(degrees)
+    found = cr.far_field(fan, observers(theta), wavenumber=k, boundary=boundary)  # type: ignore[arg-type]
+    return worst(found.total, sphere.far_field(k, 1.0, np.cos(theta), boundary))  # type: ignore[arg-type]
+
+
+def near(fan: RayFan, k: float, boundary: str) -> float:
+    """Total field in the shadow, 1.1 to 3 radii from the centre, 0.4 radii or more from the axis, which is a caustic."""
+    theta = np.radians(np.arange(8, 84, 4.0))
+    points = np.concatenate([radius * observers(theta) for radius in (1.1, 1.3, 1.5, 2.0, 3.0)])
+    across = np.hypot(points[:, 0], points[:, 1])
+    points = points[(across > 0.4) & (across < 0.95)]
+    found = cr.near_field(fan, points, wavenumber=k, boundary=boundary)  # type: ignore[arg-type]
+    exact = sphere.total_field(k, 1.0, points, np.array([0.0, 0, 1]), boundary)  # type: ignore[arg-type]
+    return worst(found, exact)
+
+
+def conductor(fan: RayFan, k: float, component: int) -> float:
+    """Total far field of a perfect conductor, 20 to 180 deg in steps of 10, against Mie's series.
+
+    Component 0 is E in the plane of scattering, 1 across it.
+    """
+    theta = np.radians(np.arange(20, 181, 10.0))
+    directions = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
+    found = cr.far_field(fan, directions, wavenumber=k, boundary="pec").total[:, component, component]
+    across, within = sphere.pec_far_field(k, 1.0, np.cos(theta))
+    return worst(found, across if component else within)
+
+
+def row_functions() -> dict[str, Callable[[RayFan, float], float]]:
+    """What computes each row of LIMITS from a fan and ka."""
+    rows: dict[str, Callable[[RayFan, float], float]] = {}
+    for b in ("soft", "hard"):
+        for order, label in ((1, ", first order"), (2, "")):
+            rows[f"creeping rays, {b}{label}"] = lambda fan, k, b=b, o=order: creeping_rays(fan, k, b, o)
+            rows[f"back axis, {b}{label}"] = lambda fan, k, b=b, o=order: back_axis(fan, k, b, o)
+        rows[f"forward, {b}"] = lambda fan, k, b=b: total(fan, k, b, np.array([0.0]))
+        rows[f"total at 60 deg, {b}"] = lambda fan, k, b=b: total(fan, k, b, np.array([60.0]))
+        rows[f"near field in the shadow, {b}"] = lambda fan, k, b=b: near(fan, k, b)
+    rows["PEC, E in the plane, from 20 deg"] = lambda fan, k: conductor(fan, k, 0)
+    rows["PEC, E across the plane, from 20 deg"] = lambda fan, k: conductor(fan, k, 1)
+    return {name: rows[name] for name in LIMITS}
+
+
+def sectors(fan: RayFan, k: float, boundary: str) -> tuple[list[float], float]:
+    """Total far field, 0 to 180 deg in steps of 1.
+
+    Returns
+    -------
+    list of float
+        Largest error over largest value in each sector of 30 deg, per cent.
+    float
+        Largest change of the error from one degree to the next where the method changes, over the mean of |f| within
+        3 deg, per cent.
+    """
+    theta = np.radians(np.arange(0, 181, 1.0))
+    found = cr.far_field(fan, observers(theta), wavenumber=k, boundary=boundary)  # type: ignore[arg-type]
+    exact = sphere.far_field(k, 1.0, np.cos(theta), boundary)  # type: ignore[arg-type]
+    error = found.total - exact
+    parts = [slice(first, first + 31) for first in range(0, 180, 30)]
+    shares = [float(100 * np.max(np.abs(error[part])) / np.max(np.abs(exact[part]))) for part in parts]
+    change = np.flatnonzero(found.method[1:] != found.method[:-1])
+    local = np.array([np.mean(np.abs(exact[max(0, j - 3) : j + 5])) for j in change])
+    jumps = 100 * np.abs(error[change + 1] - error[change]) / local
+    return shares, float(np.max(jumps))
+
+
+def main() -> None:
+    """Print the tables."""
+    fan = sphere_fan()
+    print(f"{'largest relative error, per cent (prototype)':46}" + "".join(f"{f'ka = {k:g}':>18}" for k in KA))
+    for name, function in row_functions().items():
+        cells = [f"{function(fan, k):8.3g} ({limit:g})" for k, limit in zip(KA, LIMITS[name], strict=True)]
+        print(f"{name:46}" + "".join(f"{cell:>18}" for cell in cells))
+    for boundary in ("soft", "hard"):
+        shares, jump = sectors(sphere_fan(6.6), 100.0, boundary)
+        print(f"ka = 100, {boundary}: error over largest value in sectors of 30 deg, per cent:", end=" ")
+        print(", ".join(f"{share:.3f}" for share in shares), f"; largest jump at a change of method {jump:.2f}")
+
+
+if __name__ == "__main__":
+    main()
