@@ -20,3 +20,13 @@ SPREADING = 1e-4
 """J of a fan against finite differences across neighbouring rays, relative, before the first caustic."""
 ORDER = 0.3
 """Fitted slope of an error against the expected order."""
+PRINTED = 2e-8
+"""Tables of Fock functions and roots printed to eight decimals."""
+MODE = 1e-11
+"""Roots of the Airy functions against scipy's zeros: its own digits."""
+FOCK_SEAM = 2e-8
+"""Jump of a Fock function of order 1 between two ways of computing it, ten modes being the worst of them."""
+FOCK_TABLE = 1e-7
+"""Splines of a Fock function and of two derivatives of it, relative, or absolute below 1."""
+DIFFERENCE = 1e-6
+"""A derivative against a central difference of fourth order with step 1e-3: table noise of 1e-9 over the step."""
