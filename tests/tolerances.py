@@ -30,3 +30,7 @@ FOCK_TABLE = 1e-7
 """Splines of a Fock function and of two derivatives of it, relative, or absolute below 1."""
 DIFFERENCE = 1e-6
 """A derivative against a central difference of fourth order with step 1e-3: table noise of 1e-9 over the step."""
+ALONG_RAY = 1e-8
+"""Curvatures, J and integrals along a ray of a fan traced at rtol 1e-12, steps re-traced at 1e-11."""
+CURVATURE_BEND = 1e-5
+"""ρ' from splines of degree 7 over steps of 0.1 rad against differences; ten times that for ρρ''."""

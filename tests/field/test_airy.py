@@ -109,3 +109,13 @@ def test_a_bound_surface_wave_leaves_no_nan(q):
     for name in ("tau", "residue", "m0", "q_m0", "surface"):
         assert np.all(np.isfinite(getattr(modes, name)))
     assert len(np.unique(np.round(modes.tau, 6))) == 10
+
+
+@pytest.mark.xfail(strict=True, reason="continuation loses roots beside a branch point, arg q of 25 to 28 degrees")
+@pytest.mark.parametrize("degrees, amount", [(25.0, 3.0), (26.0, 5.0), (27.0, 10.0), (28.0, 5.0)])
+def test_roots_stay_apart_beside_a_branch_point(degrees, amount):
+    # η = q/(im) of argument -62 to -65 degrees, passive
+    with np.errstate(all="ignore"):
+        tau = impedance_modes(amount * np.exp(1j * np.radians(degrees))).tau
+    assert np.all(np.isfinite(tau))
+    assert np.min(np.abs(tau[:, None] - tau) + 9 * np.eye(10)) > 0.01

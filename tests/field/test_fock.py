@@ -1,4 +1,4 @@
-"""Fock functions: printed tables, residues, asymptotic branch, differences in ξ and q, seams, the integral near a body."""
+"""Fock functions: printed tables, residues, asymptotes, differences, seams, the integral near a body."""
 
 import numpy as np
 import pytest
