@@ -34,3 +34,13 @@ ALONG_RAY = 1e-8
 """Curvatures, J and integrals along a ray of a fan traced at rtol 1e-12, steps re-traced at 1e-11."""
 CURVATURE_BEND = 1e-5
 """ρ' from splines of degree 7 over steps of 0.1 rad against differences; ten times that for ρρ''."""
+STRIP = 1e-6
+"""(x, p) of a strip of a hundred rays of the triaxial ellipsoid, splines of degree 5 across them."""
+STRIP_SLOPE = 3e-5
+"""Slopes of a spline against central differences of step 1e-4, where rays detach third derivatives reach 1e4."""
+SHED = 1e-6
+"""A ray found by a search, in radians and body sizes: the splines' error, the search itself ends at 1e-9."""
+SPECULAR = 1e-9
+"""Specular points against closed forms: ten times the residual of the normal at which the search ends."""
+SHAPE_TERM = 0.05
+"""Λ of a specular point: a fourth derivative differenced over 0.05 radii of curvature, 0.6 % off on a sphere."""

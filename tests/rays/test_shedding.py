@@ -1,0 +1,148 @@
+"""Rays shed towards observers: great circles in closed form, residuals, counts against a finer fan."""
+
+import numpy as np
+import pytest
+from tolerances import SHED
+
+import creeping as cr
+import scatterers as sc
+from creeping.rays.shedding import shed_far, shed_near, shed_on
+from creeping.rays.strips import strips_of
+from creeping.surface import project
+
+D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
+SPHERE, TRIAXIAL = sc.Sphere(), sc.Ellipsoid(1.0, 0.8, 0.6)
+
+
+@pytest.fixture(scope="module")
+def strips():
+    def made(body, length, n_rays):
+        line = cr.shadow_line(body, D)
+        flow = cr.DirectFlow(body, rtol=1e-11)
+        return strips_of(cr.launch(flow, line, length=length, n_rays=n_rays, max_gap=np.inf))
+
+    return {"sphere": made(SPHERE, 6.6, 48), "triaxial": made(TRIAXIAL, 3.2, 120)}
+
+
+def turned(theta, alpha):
+    """Unit vectors at the angle theta from D and alpha around it."""
+    e = np.cross(D, [1.0, 0, 0])
+    e /= np.linalg.norm(e)
+    around = np.cos(alpha)[:, None] * e + np.sin(alpha)[:, None] * np.cross(D, e)
+    return np.cos(theta)[:, None] * D + np.sin(theta)[:, None] * around
+
+
+def spread(n, rng):
+    v = rng.normal(size=(n, 3))
+    return v / np.linalg.norm(v, axis=1, keepdims=True)
+
+
+def per_observer(shed, m):
+    return np.bincount(shed.observer, minlength=m)
+
+
+def test_far_rays_of_the_sphere(strips, rng):
+    theta, alpha = rng.uniform(0.4, 2.9, 25), rng.uniform(-3, 3, 25)
+    r = turned(theta, alpha)
+    shed = shed_far(strips["sphere"], SPHERE, r)
+    assert np.all(np.isinf(shed.reach))
+    for k in range(25):
+        s = np.sort(shed.rays.time[shed.observer == k])
+        # round either side: θ and 2π - θ, and a turn later where the fan is long enough
+        expected = [theta[k], 2 * np.pi - theta[k], *([2 * np.pi + theta[k]] if theta[k] < 6.6 - 2 * np.pi else [])]
+        np.testing.assert_allclose(s, expected, atol=SHED)
+
+
+def test_far_rays_of_the_ellipsoid_leave_in_their_directions(strips, rng):
+    r = spread(60, rng)
+    shed = shed_far(strips["triaxial"], TRIAXIAL, r)
+    np.testing.assert_allclose(shed.rays.directions, r[shed.observer], atol=SHED)
+    np.testing.assert_array_equal(shed.strip, 0)
+
+
+def windings(strips, body, r):
+    """Number of preimages of r under p: triangles of a fine grid whose tangents surround it."""
+    (strip,) = strips
+    sigma = strip.positions[0] + strip.period * np.arange(481) / 480
+    s = np.linspace(0, strip.times[-1], 400)
+    grid = np.stack(np.meshgrid(sigma, s, indexing="ij"), axis=-1).reshape(-1, 2)
+    p = strip.at(grid[:, 0], grid[:, 1]).directions.reshape(481, 400, 3)
+    a, b, c, d = p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]
+    count = 0
+    for x, y, z in ((a, b, c), (a, c, d)):
+        sides = np.stack([np.cross(u, v) @ r for u, v in ((x, y), (y, z), (z, x))])
+        count += np.sum((np.all(sides > 0, axis=0) | np.all(sides < 0, axis=0)) & (x @ r > 0.5))
+    return count
+
+
+def test_number_of_far_rays_is_that_of_a_finer_grid(strips, rng):
+    r = np.concatenate([spread(10, rng), turned(np.array([2.9, 3.0, 3.1, np.pi]), np.array([0.5, 1.5, 2.5, 0.0]))])
+    r = r[r @ D < 0.95]
+    counts = per_observer(shed_far(strips["triaxial"], TRIAXIAL, r), len(r))
+    np.testing.assert_array_equal(counts, [windings(strips["triaxial"], TRIAXIAL, one) for one in r])
+    # inside the astroid of the backward direction there are two more rays than outside
+    assert counts.max() - counts.min() >= 2
+
+
+def test_near_rays_of_the_sphere(strips, rng):
+    radius, theta, alpha = rng.uniform(1.05, 4, 20), rng.uniform(0.1, 1.2, 20), rng.uniform(-3, 3, 20)
+    y = radius[:, None] * turned(theta, alpha)
+    shed = shed_near(strips["sphere"], SPHERE, y)
+    for k in range(20):
+        mine = shed.observer == k
+        reach = np.sqrt(radius[k] ** 2 - 1)
+        np.testing.assert_allclose(shed.reach[mine], reach, atol=SHED)
+        # the tangent from y touches at arctan(l) before it; the launch points are π/2 from D
+        first = np.array([np.pi / 2 - theta[k], np.pi / 2 + theta[k]]) - np.arctan(reach)
+        expected = np.concatenate([first, first + 2 * np.pi])
+        expected = expected[(expected > 1e-6) & (expected < 6.6)]
+        np.testing.assert_allclose(np.sort(shed.rays.time[mine]), expected, atol=SHED)
+
+
+def test_near_rays_pass_through_their_points(strips, rng):
+    y = project(TRIAXIAL, spread(40, rng)) * rng.uniform(1.02, 5, 40)[:, None]
+    shed = shed_near(strips["triaxial"], TRIAXIAL, y)
+    assert len(shed.observer) > 20
+    assert np.all(shed.reach > 0)
+    end = shed.rays.points + shed.reach[:, None] * shed.rays.directions
+    # the error of a spline of p grows with the distance
+    assert np.max(np.linalg.norm(end - y[shed.observer], axis=1) / (1 + shed.reach)) < SHED
+
+
+def test_near_rays_far_away_are_the_far_ones(strips):
+    r = turned(np.array([0.9, 1.4]), np.array([0.3, 2.0]))
+    far = shed_far(strips["triaxial"], TRIAXIAL, r)
+    near = shed_near(strips["triaxial"], TRIAXIAL, 1e5 * r)
+    for k in range(2):
+        np.testing.assert_allclose(
+            np.sort(near.rays.time[near.observer == k]), np.sort(far.rays.time[far.observer == k]), atol=1e-3
+        )
+
+
+def test_rays_on_the_sphere_pass_through_their_points(strips, rng):
+    theta = rng.uniform(0.05, 3.0, 20)
+    y = turned(theta, rng.uniform(-3, 3, 20))
+    shed = shed_on(strips["sphere"], SPHERE, y)
+    np.testing.assert_allclose(shed.rays.points, y[shed.observer], atol=SHED)
+    np.testing.assert_array_equal(shed.reach, 0)
+    for k in range(20):
+        ways = np.array([np.pi / 2 - theta[k], np.pi / 2 + theta[k]])
+        expected = np.sort(np.concatenate([ways, ways + 2 * np.pi]))
+        expected = expected[(expected > 0) & (expected < 6.6)]
+        np.testing.assert_allclose(np.sort(shed.rays.time[shed.observer == k]), expected, atol=SHED)
+
+
+def test_rays_on_the_ellipsoid_pass_through_their_points(strips, rng):
+    sigma, s = rng.uniform(0, 4, 30), rng.uniform(0.2, 3.0, 30)
+    y = strips["triaxial"][0].at(sigma, s).points
+    shed = shed_on(strips["triaxial"], TRIAXIAL, y)
+    np.testing.assert_allclose(shed.rays.points, y[shed.observer], atol=SHED)
+    # the ray that a point was taken from is among those found
+    for k in range(30):
+        mine = shed.observer == k
+        assert np.min(np.abs(shed.sigma[mine] - sigma[k]) + np.abs(shed.rays.time[mine] - s[k])) < 1e-5
+
+
+def test_nothing_is_shed_by_no_strips_or_to_nobody(strips):
+    for search in (shed_far, shed_near, shed_on):
+        assert len(search((), SPHERE, D[None]).observer) == 0
