@@ -1,0 +1,166 @@
+"""Fields asked for with bad input: each its own clear error; empty input gives empty fields."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+
+D = (0.0, 0.0, 1.0)
+SPHERE = sc.Sphere()
+NAN = float("nan")
+FIELDS = {
+    "far": lambda fan, **options: cr.far_field(fan, options.pop("at", [[0.0, 0.6, -0.8]]), **options),
+    "near": lambda fan, **options: cr.near_field(fan, options.pop("at", [[0.0, 0.2, 1.5]]), **options),
+    "surface": lambda fan, **options: cr.surface_field(fan, options.pop("at", [[0.0, 0.6, 0.8]]), **options),
+}
+
+
+def launched(body=SPHERE, **options):
+    options = {"length": 3.5, "n_rays": 24, "max_gap": np.inf} | options
+    return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, D), **options)
+
+
+@pytest.fixture(scope="module")
+def fan():
+    return launched()
+
+
+@pytest.fixture(params=list(FIELDS))
+def field(request):
+    return FIELDS[request.param]
+
+
+@pytest.mark.parametrize("k", [0, -1.0, NAN, float("inf"), "ten", None, 1j, [10.0, 20.0]])
+def test_bad_wavenumbers_are_named(field, fan, k):
+    with pytest.raises(cr.CreepingError, match="wavenumber"):
+        field(fan, wavenumber=k)
+
+
+@pytest.mark.parametrize("order", [0, 3, -1, 1.5, "2", None])
+def test_bad_orders_are_named(field, fan, order):
+    with pytest.raises(cr.CreepingError, match="order"):
+        field(fan, wavenumber=10.0, order=order)
+
+
+@pytest.mark.parametrize("boundary", ["softt", None, 1.0, 1j])
+def test_bad_boundaries_are_named(field, fan, boundary):
+    with pytest.raises(cr.CreepingError, match="boundary"):
+        field(fan, wavenumber=10.0, boundary=boundary)
+
+
+@pytest.mark.parametrize("name", ["near", "surface"])
+def test_a_conductor_is_for_the_far_field(fan, name):
+    with pytest.raises(cr.CreepingError, match="far field"):
+        FIELDS[name](fan, wavenumber=10.0, boundary="pec")
+
+
+@pytest.mark.parametrize("at", [[1.0, 0.0], 3.0, [[1.0, 0, 0, 0]], np.zeros((3, 2))])
+def test_arrays_of_a_wrong_shape_are_named(field, fan, at):
+    with pytest.raises(cr.CreepingError, match="shape"):
+        field(fan, at=at, wavenumber=10.0)
+
+
+@pytest.mark.parametrize("bad", [NAN, float("inf")])
+def test_rows_that_are_not_finite_are_counted(field, fan, bad):
+    at = np.array([[0.0, 0.6, 0.8], [bad, 0, 1], [0.6, 0.0, 0.8]])
+    with pytest.raises(cr.CreepingError, match="1 of 3"):
+        field(fan, at=at, wavenumber=10.0)
+
+
+@pytest.mark.parametrize("at", ["abc", [["a", "b", "c"]], [[1.0, 2.0], [3.0]], None, {"x": 1}])
+def test_far_observers_that_are_no_numbers_are_named(fan, at):
+    with pytest.raises(cr.CreepingError, match="observation"):
+        cr.far_field(fan, at, wavenumber=10.0)
+
+
+@pytest.mark.xfail(strict=True, raises=(ValueError, TypeError), reason="numpy's own error gets through")
+@pytest.mark.parametrize("at", ["abc", [["a", "b", "c"]], [[1.0, 2.0], [3.0]], {"x": 1}])
+@pytest.mark.parametrize("name", ["near", "surface"])
+def test_points_that_are_no_numbers_are_named(fan, name, at):
+    with pytest.raises(cr.CreepingError, match="points"):
+        FIELDS[name](fan, at=at, wavenumber=10.0)
+
+
+def test_a_direction_of_no_length_is_counted(fan):
+    with pytest.raises(cr.CreepingError, match="1 of 2 observation directions are zero"):
+        cr.far_field(fan, [[0.0, 0, 1], [0.0, 0, 0]], wavenumber=10.0)
+
+
+def test_points_inside_are_counted(fan):
+    at = [[0.0, 0.2, 1.5], [0.0, 0, 0.7], [0.1, 0, 0.2]]
+    with pytest.raises(cr.CreepingError, match=r"2 of 3 points are inside the body \(worst: row 2"):
+        cr.near_field(fan, at, wavenumber=10.0)
+    with pytest.raises(cr.CreepingError, match="1 of 1 points are inside"):
+        cr.near_field(fan, [[0.0, 0, 0]], wavenumber=10.0)
+
+
+def test_points_off_the_body_are_counted(fan):
+    at = [[0.0, 0.6, 0.8], [0.0, 0, 1.7]]
+    with pytest.raises(cr.CreepingError, match="1 of 2 points are off the body"):
+        cr.surface_field(fan, at, wavenumber=10.0)
+
+
+def test_weighted_bodies_are_refused(field):
+    fan = launched(sc.Sphere(speed="1 + x/4"), length=1.0)
+    with pytest.raises(cr.CreepingError, match="speed"):
+        field(fan, wavenumber=10.0)
+
+
+@pytest.mark.xfail(strict=True, raises=TypeError, reason="no blocks to join in shedding._seeds")
+@pytest.mark.parametrize("boundary", ["soft", "hard", cr.Impedance(0.5), "pec"])
+def test_no_directions_give_an_empty_far_field(fan, boundary):
+    far = cr.far_field(fan, np.zeros((0, 3)), wavenumber=10.0, boundary=boundary)
+    assert far.total.shape == ((0, 2, 2) if boundary == "pec" else (0,))
+    assert len(repr(far).splitlines()) == 3
+
+
+@pytest.mark.xfail(strict=True, raises=TypeError, reason="no blocks to join in shedding._seeds")
+def test_no_points_on_the_body_give_an_empty_field(fan):
+    assert cr.surface_field(fan, np.zeros((0, 3)), wavenumber=10.0).shape == (0,)
+
+
+def test_no_points_give_an_empty_near_field(fan):
+    assert cr.near_field(fan, np.zeros((0, 3)), wavenumber=10.0).shape == (0,)
+
+
+def no_rays():
+    """A fan none of whose arcs has a ray."""
+    fan = launched()
+    arrays = ("points", "directions", "eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
+    rows = (*arrays, "status", "detachment", "curve_index", "arc_index", "arclength")
+    values = {name: getattr(fan, name) for name in fan.__dataclass_fields__}
+    values |= {name: values[name][:0] for name in rows} | {"closed_arcs": ()}
+    return cr.RayFan(**values)
+
+
+@pytest.mark.xfail(strict=True, raises=ValueError, reason="ray_points._refined reshapes an empty array with -1")
+def test_a_fan_without_rays_sheds_nothing():
+    fan = no_rays()
+    far = cr.far_field(fan, [[0.0, 0.6, -0.8], [0.6, 0.0, 0.8]], wavenumber=20.0)
+    np.testing.assert_array_equal(far.creeping, 0)
+    # the mirror needs no creeping ray
+    assert np.all(np.abs(far.reflected) > 0.1)
+    assert cr.near_field(fan, [[0.0, 0.2, 1.5]], wavenumber=20.0) == 0
+    assert cr.surface_field(fan, [[0.0, 0.6, 0.8]], wavenumber=20.0) == 0
+    assert cr.surface_field(fan, wavenumber=20.0).shape == (0, len(fan.travel_time))
+
+
+@pytest.mark.parametrize("n_rays", [1, 2, 3])
+@pytest.mark.parametrize("boundary", ["soft", cr.Impedance(1)])
+def test_a_fan_of_few_rays_gives_finite_fields_or_says_so(n_rays, boundary):
+    fan = launched(n_rays=n_rays)
+    far = cr.far_field(fan, [[0.0, 0.6, -0.8], [0.6, 0.0, 0.8]], wavenumber=20.0, boundary=boundary)
+    assert np.all(np.isfinite(far.total))
+    assert cr.near_field(fan, [[0.0, 0.2, 1.5]], wavenumber=20.0, boundary=boundary).shape == (1,)
+
+
+def test_shapes_of_observers_are_kept_near_and_flattened_far(fan):
+    at = np.array([[[0.0, 0.3, 1.4], [0.1, 0.2, 1.3]]])
+    assert cr.near_field(fan, at, wavenumber=10.0).shape == (1, 2)
+    assert cr.near_field(fan, at[0, 0], wavenumber=10.0).shape == ()
+    assert cr.far_field(fan, at, wavenumber=10.0).directions.shape == (2, 3)
+    # lengths of directions mean nothing
+    np.testing.assert_allclose(
+        cr.far_field(fan, 7 * at, wavenumber=10.0).total, cr.far_field(fan, at, wavenumber=10.0).total, rtol=1e-9
+    )
