@@ -97,7 +97,7 @@ def amplitude_factor(
         change = change + 0.5 * (
             plain / m**2 + across * r / m**2 + modes.tau * by_curvature / m**2 - modes.m0**2 * bend / (60 * m**2)
         )
-    return np.asarray(1 + limited(change, 1.0))
+    return np.asarray(1 + limited(change, 2.0))
 
 
 def _ends(rays: RayPoints, wavenumber: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:

@@ -167,4 +167,4 @@ def surface_amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary
         # q² M0 = τ M0 - 1
         crossed = tau * (tau * m0 - 1) - tau * q_m0 * m0 + q_m0
         bracket = tau * (r / 4 - 1 / 30) + (0.1 + 0.25 * boundary.sign * r) * (m0**2 - q_m0) - 2 / 15 * crossed
-    return np.asarray(1 + limited(bracket / (m1 * m2)[..., None], 1.0))
+    return np.asarray(1 + limited(bracket / (m1 * m2)[..., None], 2.0))

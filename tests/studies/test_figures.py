@@ -36,7 +36,32 @@ def drawn(tmp_path_factory):
     return get
 
 
-@pytest.mark.parametrize("name", studies.FIGURES)
+PAPER = [name for name in studies.FIGURES if name.startswith("fig")]
+FIELD = [name for name in studies.FIGURES if name.startswith("field")]
+
+
+@pytest.mark.parametrize("name", FIELD)
+def test_field_figure_carries_its_error(name, drawn):
+    card, pixels, folder = drawn(name)
+    assert json.loads((folder / f"{name}.json").read_text()) == json.loads(json.dumps(card))
+    paper = np.all(pixels > 0.99, axis=-1)
+    assert 0.02 < np.mean(~paper) < 0.95
+    assert np.mean(np.ptp(pixels, axis=-1) > 0.3) > 0.002
+    assert card["error"]["field"]
+
+
+def test_field_cut_lies_on_the_exact_curve(drawn):
+    card, _, _ = drawn("field-cut")
+    assert card["error"]["field"]["largest_over_largest"] < 0.02
+    assert card["error"]["field"]["median_relative"] < 0.01
+
+
+def test_field_on_the_body_is_measured(drawn):
+    card, _, _ = drawn("field-body")
+    assert np.median(card["error"]["field"]["median_relative_by_arclength"]) < 10.5
+
+
+@pytest.mark.parametrize("name", PAPER)
 def test_picture_is_not_blank(name, drawn):
     _, pixels, _ = drawn(name)
     paper = np.all(pixels > 0.99, axis=-1)
@@ -49,7 +74,7 @@ def test_picture_is_not_blank(name, drawn):
     assert np.mean(np.ptp(pixels, axis=-1) > 0.3) > 0.005
 
 
-@pytest.mark.parametrize("name", studies.FIGURES)
+@pytest.mark.parametrize("name", PAPER)
 def test_sidecar_says_what_was_drawn(name, drawn):
     card, _, folder = drawn(name)
     assert json.loads((folder / f"{name}.json").read_text()) == json.loads(json.dumps(card))
