@@ -17,8 +17,12 @@ from creeping._typing import ArrayLike, ComplexArray
 
 MODES = 10
 """Modes summed; with them the series holds to 4e-4 at xi = 0.7 and to 1e-7 at xi = 1.3."""
-TABLE = 32
-"""Different |q| beyond which roots are interpolated before they are refined."""
+FAR = 500.0
+"""|z| beyond which the expansion of Ai is used: its next term is 1e-12 there."""
+SMALLEST = 1e-9
+"""Step in q below which roots are taken as they are: q lies on a branch point, where two of them are one."""
+TABLE = 256
+"""Different |q| beyond which roots are continued to so many only, and refined from there."""
 
 _TURN = np.exp(2j * np.pi / 3)
 _W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
@@ -32,8 +36,16 @@ def w1(t: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
 
 def scaled_ai(z: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Ai and Ai' without their factor e^{-ζ}, and ζ = (2/3) z^(3/2), principal branch, any shape."""
+    z = np.asarray(z, dtype=complex)
+    zeta = 2 / 3 * z * np.sqrt(z)
     value, slope, _, _ = airye(z)
-    return value, slope, 2 / 3 * z * np.sqrt(z)
+    far = np.abs(z) > FAR
+    if np.any(far):
+        # library routines give up at large |z|; three terms of the expansion are exact there
+        root, inverse = np.sqrt(np.sqrt(z[far])), 1 / zeta[far]
+        value[far] = (1 - inverse * 5 / 72 + inverse**2 * 385 / 10368) / (2 * np.sqrt(np.pi) * root)
+        slope[far] = -(1 + inverse * 7 / 72 - inverse**2 * 455 / 10368) * root / (2 * np.sqrt(np.pi))
+    return value, slope, zeta
 
 
 @dataclass(frozen=True)
@@ -92,38 +104,51 @@ def impedance_modes(q: ArrayLike, n: int = MODES) -> Modes:
         return _constants(np.zeros((*q.shape, n), dtype=complex), soft=False)
     phase = np.exp(1j * np.angle(q.ravel()[np.argmax(amounts)]))
     nodes = np.unique(amounts)
-    interpolated = len(nodes) > TABLE
-    if interpolated:
-        # roots are smooth in |q|: Chebyshev nodes in its logarithm, then Newton
-        low, high = np.log(nodes[0]), np.log(nodes[-1])
-        unit = np.cos(np.pi * (np.arange(TABLE) + 0.5) / TABLE)[::-1]
-        nodes = np.exp(low + (high - low) * (unit + 1) / 2)
+    if len(nodes) > TABLE:
+        nodes = np.geomspace(max(nodes[0], 1e-12), nodes[-1], TABLE)
     roots = np.empty((len(nodes), n), dtype=complex)
     now, last = 0j, hard_roots(n)
     for k, amount in enumerate(nodes):
         now, last = _continue(now, complex(amount * phase), last)
         roots[k] = last
-    if interpolated:
-        series = np.polynomial.chebyshev.chebfit(unit, roots, TABLE - 1)
-        at = np.clip(2 * (np.log(amounts) - low) / (high - low) - 1, -1, 1)
-        tau = _newton(np.polynomial.chebyshev.chebval(at, series).T, q.reshape(-1, 1))
-    else:
-        tau = roots[np.searchsorted(nodes, amounts)]
+    nearest = np.clip(np.searchsorted(nodes, amounts), 0, len(nodes) - 1)
+    start, at = roots[nearest], (nodes[nearest] * phase)[:, None]
+    step = q.reshape(-1, 1) - at
+    tau = _newton(start + step / (start - at * at), q.reshape(-1, 1)) if np.any(step) else start
     return _constants(tau.reshape(*q.shape, n), soft=False)
 
 
 def _continue(start: complex, end: complex, roots: ComplexArray) -> tuple[complex, ComplexArray]:
-    """Carry the roots from one q to another: midpoint steps of dτ/dq, each polished by Newton."""
-    while abs(end - start) > 0:
-        # dτ/dq changes over |τ - q²|; a quarter of that keeps Newton on its root
-        reach = 0.25 * min(1.0, float(np.min(np.abs(roots - start * start)))) * max(1.0, abs(start))
-        step = end - start if abs(end - start) <= reach else (end - start) / abs(end - start) * reach
-        middle = start + step / 2
-        half = roots + 0.5 * step / (roots - start * start)
-        guess = roots + step / (half - middle * middle)
-        start = end if step == end - start else start + step
-        roots = _newton(guess, start)
-    return start, roots
+    """Carry the roots from one q to another: midpoint steps of dτ/dq, each polished by Newton.
+
+    Two roots meet where δ = τ - q² is 0. A step lets δ, with dδ/dq = 1/δ - 2q, change by a fifth at most; it is halved
+    when roots run together.
+    """
+    if start == end:
+        return end, roots
+    ray = (end - start) / abs(end - start)
+    while start != end:
+        delta = roots - start * start
+        reach = 0.2 * float(np.min(np.abs(delta) / np.maximum(np.abs(1 / delta - 2 * start), 1e-12)))
+        step = min(reach, 0.5 * max(1.0, abs(start)), abs(end - start))
+        while True:
+            following = end if step == abs(end - start) else start + step * ray
+            middle = start + 0.5 * step * ray
+            half = roots + 0.5 * step * ray / delta
+            found = _newton(roots + step * ray / (half - middle * middle), following)
+            if step < SMALLEST or (np.all(np.isfinite(found)) and _apart(found, roots, step)):
+                break
+            step *= 0.5
+        start, roots = following, found
+    return end, roots
+
+
+def _apart(found: ComplexArray, before: ComplexArray, step: float) -> bool:
+    """Whether the roots are still distinct, and none has jumped to another's place."""
+    gaps = np.abs(found[:, None] - found[None, :]) + np.diag(np.full(len(found), np.inf))
+    moved = np.abs(found - before)
+    near = np.min(np.abs(before[:, None] - before[None, :]) + np.diag(np.full(len(before), np.inf)), axis=1)
+    return bool(np.min(gaps) > 1e-7 and np.all(moved < 0.5 * near + 3 * step * (1 + np.abs(found)) ** 0.5))
 
 
 def _newton(tau: ComplexArray, q: complex | ComplexArray) -> ComplexArray:

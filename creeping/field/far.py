@@ -203,7 +203,7 @@ class _Parts:
     def unresolved(self) -> BoolArray:
         """Directions in which an expansion fails for what matters there (m,)."""
         total = np.abs(self.creeping + self.reflected + self.forward)
-        largest = total.reshape(len(total), -1).max(axis=1, initial=0.0)
+        largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
         return np.asarray((self.geometry.lost_forward & (self.in_forward > 0)) | (self.doubtful > MATTERS * largest))
 
     def _doubt(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:

@@ -233,14 +233,15 @@ def _tables(which: str, q: complex | None, power: int) -> tuple[Any, Any]:
         slow -= pole(1 / inverse, power)
     return (
         make_interp_spline(xi, _by_path(which, xi, values[0], power), k=7),
-        make_interp_spline(inverse, slow * _unwind(which, 1 / inverse, power), k=7),
+        make_interp_spline(inverse, slow * _unwind(which, q, 1 / inverse, power), k=7),
     )
 
 
-def _unwind(which: str, xi: FloatArray, power: int) -> ComplexArray:
+def _unwind(which: str, q: complex | None, xi: FloatArray, power: int) -> ComplexArray:
     """Inverse of the fast and the growing factor on the lit side."""
     if which.startswith("surface"):
-        return np.asarray(np.exp(1j * xi**3 / 3) / xi ** (2 * power))
+        # F grows like ξ, g does not
+        return np.asarray(np.exp(1j * xi**3 / 3) / xi ** (2 * power + (q is None)))
     return np.asarray(np.exp(1j * xi**3 / 12) / (np.sqrt(-xi) * xi ** (2 * power)))
 
 
@@ -252,7 +253,7 @@ def _tabulated(which: str, xi: FloatArray, q: complex | None, power: int) -> Com
     between, slow = _tables(which, q, power)
     out[middle] = between(xi[middle])
     if np.any(lit):
-        out[lit] = slow(1 / np.maximum(xi[lit], FARTHEST)) / _unwind(which, xi[lit], power)
+        out[lit] = slow(1 / np.maximum(xi[lit], FARTHEST)) / _unwind(which, q, xi[lit], power)
         if which == "pekeris":
             out[lit] += pole(xi[lit], power)
     if np.any(deep):

@@ -30,6 +30,7 @@ from creeping.field.launching import (
     smoothstep,
 )
 from creeping.field.on_surface import scalar_boundary, surface_amplitude, surface_waves
+from creeping.phaseflow.bundle import as_points
 from creeping.rays.fan import RayFan
 from creeping.rays.ray_points import RayPoints
 from creeping.rays.shedding import shed_near, shed_on
@@ -78,13 +79,8 @@ def near_field(
     """
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
-    y = np.asarray(points, dtype=float)
-    if y.ndim < 1 or y.shape[-1] != 3:
-        raise InvalidInputError(f"points have shape {y.shape}; give (..., 3)")
+    y = as_points(points)
     flat = y.reshape(-1, 3)
-    if not np.all(np.isfinite(flat)):
-        bad = np.flatnonzero(~np.all(np.isfinite(flat), axis=1))
-        raise InvalidInputError(f"{len(bad)} of {len(flat)} points are not finite (first: row {bad[0]})")
     strips = fan_strips(fan)
     height = _height(fan, flat)
     inside = np.flatnonzero(height < -ON_BODY)

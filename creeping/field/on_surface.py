@@ -33,7 +33,7 @@ from creeping.field.launching import (
     smoothstep,
     transverse_ratios,
 )
-from creeping.phaseflow.bundle import on_body
+from creeping.phaseflow.bundle import as_points, on_body
 from creeping.rays.fan import RayFan
 from creeping.rays.ray_points import RayPoints, substeps
 from creeping.rays.shedding import shed_on
@@ -79,7 +79,7 @@ def surface_field(
         for number, rays in enumerate(times):
             out[fan.arc_index == np.unique(fan.arc_index)[number]] = surface_waves(rays, k, kind, order)
         return out
-    y = np.asarray(points, dtype=float)
+    y = as_points(points)
     flat = on_body(fan.body, y).reshape(-1, 3)
     found = shed_on(fan_strips(fan), fan.body, flat)
     total = np.zeros(len(flat), dtype=complex)

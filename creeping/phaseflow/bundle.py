@@ -66,16 +66,36 @@ def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
     return x, tangent / norm
 
 
+def as_points(points: ArrayLike) -> FloatArray:
+    """Points of a caller as an array (..., 3).
+
+    Raises
+    ------
+    InvalidInputError
+        If they are not numbers, of another shape, or not finite.
+    """
+    try:
+        x = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"points are not an array of numbers: {error}") from error
+    if x.ndim == 0 or x.shape[-1] != 3:
+        raise InvalidInputError(f"points have shape {x.shape}; the last axis must hold x, y, z")
+    bad = ~np.all(np.isfinite(x), axis=-1)
+    if bad.any():
+        raise InvalidInputError(
+            f"{int(bad.sum())} of {bad.size} points are not finite (first: row {int(np.argmax(bad.ravel()))})"
+        )
+    return x
+
+
 def on_body(body: Surface, points: FloatArray) -> FloatArray:
     """Put points within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
 
     Raises
     ------
     InvalidInputError
-        On a wrong shape, a value that is not finite, or a point farther off.
+        On a point farther off.
     """
-    if points.ndim == 0 or points.shape[-1] != 3:
-        raise InvalidInputError(f"points have shape {points.shape}; the last axis must hold x, y, z")
     distance = distance_to_body(body, points)
     off = ~(distance <= OFF_BODY * size(body))
     if off.any():

@@ -206,7 +206,7 @@ def _refined(fan: RayFan, parts: int, step: float) -> FloatArray:
     return np.concatenate(
         [
             before[:, GUARD:0:-1],
-            out[:, :-1, :parts].reshape(rays, -1, 8),
+            out[:, :-1, :parts].reshape(rays, (steps - 1) * parts, 8),
             out[:, -1, : GUARD + 1],
         ],
         axis=1,

@@ -145,7 +145,7 @@ def _seeds(
     x, p = lanes[..., 0:3].reshape(-1, 3), lanes[..., 3:6].reshape(-1, 3)
     n = normal(body, x)
     fields = [np.ascontiguousarray(v.T) for v in (x, n, np.cross(n, p), p)]
-    found = []
+    found = [(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))]
     block = max(1, BLOCK // max(1, len(x)))
     for first in range(0, len(targets), block):
         f, g, ahead = functions(targets[first : first + block], *fields)

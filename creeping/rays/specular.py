@@ -112,7 +112,7 @@ def shape_term(
     if not len(points):
         return np.zeros(0)
     # heights on a 5 x 5 stencil; rounding and truncation of a fourth derivative balance at about this step
-    step = 0.05 / np.max(np.abs(principal), axis=1)
+    step = 0.02 / np.max(np.abs(principal), axis=1)
     offsets = np.arange(-2, 3)
     u, v = (grid.ravel() for grid in np.meshgrid(offsets, offsets, indexing="ij"))
     plane = u[:, None, None] * frame[:, 0] + v[:, None, None] * frame[:, 1]

@@ -99,7 +99,7 @@ def test_modes_of_many_are_those_of_each(turn):
         20.0,
         8 + 0.5j,
         60 - 2j,
-        pytest.param(300.0, marks=pytest.mark.xfail(strict=True, reason="w1 out of range: all roots nan, q > 128")),
+        300.0,
     ],
 )
 def test_a_bound_surface_wave_leaves_no_nan(q):
@@ -111,7 +111,6 @@ def test_a_bound_surface_wave_leaves_no_nan(q):
     assert len(np.unique(np.round(modes.tau, 6))) == 10
 
 
-@pytest.mark.xfail(strict=True, reason="continuation loses roots beside a branch point, arg q of 23 to 32 degrees")
 @pytest.mark.parametrize("degrees, amount", [(25.0, 3.0), (26.0, 5.0), (27.0, 10.0), (28.0, 5.0), (30.25, 5.0)])
 def test_roots_stay_apart_beside_a_branch_point(degrees, amount):
     # η = q/(im) of argument -58 to -67 degrees, passive
