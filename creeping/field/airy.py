@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from scipy.special import ai_zeros, airy, airye
 
-from creeping._typing import ArrayLike, ComplexArray
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
 
 MODES = 10
 """Modes summed; with them the series holds to 4e-4 at xi = 0.7 and to 1e-7 at xi = 1.3."""
@@ -21,8 +21,10 @@ FAR = 500.0
 """|z| beyond which the expansion of Ai is used: its next term is 1e-12 there."""
 SMALLEST = 1e-9
 """Step in q below which roots are taken as they are: q lies on a branch point, where two of them are one."""
-TABLE = 256
-"""Different |q| beyond which roots are continued to so many only, and refined from there."""
+MANY, CHEBYSHEV = 500, 40
+"""Number of q above which constants are interpolated, from so many nodes."""
+FIRST, RATIO = 0.05, 1.02
+"""Least |q|, and ratio of neighbours, at which roots are kept; Newton goes on from the node below."""
 
 _TURN = np.exp(2j * np.pi / 3)
 _W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
@@ -99,23 +101,64 @@ def impedance_modes(q: ArrayLike, n: int = MODES) -> Modes:
         All of one argument (q = i m η at various m).
     """
     q = np.asarray(q, dtype=complex)
-    amounts = np.abs(q).ravel()
-    if not q.size:
+    if q.size > MANY:
+        modes = _interpolated(q, n)
+        if modes is not None:
+            return modes
+    return _at(q, n)
+
+
+def _interpolated(q: ComplexArray, n: int) -> Modes | None:
+    """Constants from Chebyshev nodes in log |q|, or None where they are not smooth enough, beside a branch point."""
+    amounts = np.abs(q)
+    low, high = np.log(max(amounts.min(), 1e-12)), np.log(amounts.max())
+    if high - low < 1e-9:
+        return None
+    unit = np.cos(np.pi * (np.arange(CHEBYSHEV) + 0.5) / CHEBYSHEV)
+    phase = q.ravel()[np.argmax(amounts)] / amounts.max()
+    fields = ("tau", "residue", "m0", "q_m0", "surface")
+
+    def exact(at: FloatArray) -> ComplexArray:
+        modes = _at(np.exp(low + (high - low) * (at + 1) / 2) * phase, n)
+        return np.stack([getattr(modes, name) for name in fields], axis=1)
+
+    values = exact(unit)
+    series = np.polynomial.chebyshev.chebfit(unit, values.reshape(CHEBYSHEV, -1), CHEBYSHEV - 1)
+    probes = np.linspace(-0.97, 0.93, 9)
+    found = np.polynomial.chebyshev.chebval(probes, series).T.reshape(len(probes), len(fields), n)
+    if np.max(np.abs(found - exact(probes)) / np.max(np.abs(values), axis=0)) > 1e-8:
+        return None
+    at = np.clip(2 * (np.log(np.maximum(amounts, 1e-12)).ravel() - low) / (high - low) - 1, -1, 1)
+    table = np.polynomial.chebyshev.chebval(at, series).T.reshape(*q.shape, len(fields), n)
+    return Modes(*(table[..., k, :] for k in range(len(fields))))
+
+
+def _at(q: ComplexArray, n: int) -> Modes:
+    flat = q.ravel()
+    if not flat.size:
         return _constants(np.zeros((*q.shape, n), dtype=complex), soft=False)
-    phase = np.exp(1j * np.angle(q.ravel()[np.argmax(amounts)]))
-    nodes = np.unique(amounts)
-    if len(nodes) > TABLE:
-        nodes = np.geomspace(max(nodes[0], 1e-12), nodes[-1], TABLE)
-    roots = np.empty((len(nodes), n), dtype=complex)
-    now, last = 0j, hard_roots(n)
-    for k, amount in enumerate(nodes):
-        now, last = _continue(now, complex(amount * phase), last)
-        roots[k] = last
-    nearest = np.clip(np.searchsorted(nodes, amounts), 0, len(nodes) - 1)
-    start, at = roots[nearest], (nodes[nearest] * phase)[:, None]
-    step = q.reshape(-1, 1) - at
-    tau = _newton(start + step / (start - at * at), q.reshape(-1, 1)) if np.any(step) else start
+    amounts = np.abs(flat)
+    # one key for all q of a boundary: the argument without its rounding
+    phase = complex(np.round(np.exp(1j * np.angle(flat[np.argmax(amounts)])), 12))
+    nodes, roots = _branch(phase / abs(phase), n, int(np.ceil(np.log(max(amounts.max() / FIRST, 1)) / np.log(RATIO))))
+    nearest = np.searchsorted(np.abs(nodes), amounts, side="right") - 1
+    start, at = roots[nearest], nodes[nearest][:, None]
+    tau = _newton(start + (flat[:, None] - at) / (start - at * at), flat[:, None])
     return _constants(tau.reshape(*q.shape, n), soft=False)
+
+
+_BRANCHES: dict[tuple[complex, int], tuple[list[complex], list[ComplexArray]]] = {}
+
+
+def _branch(phase: complex, n: int, steps: int) -> tuple[ComplexArray, ComplexArray]:
+    """Roots at q = 0 and FIRST x RATIO^j e^{iα}, j <= steps, kept for the next call: (m,), (m, n)."""
+    nodes, roots = _BRANCHES.setdefault((phase, n), ([0j], [hard_roots(n)]))
+    while len(nodes) < steps + 2:
+        following = FIRST * RATIO ** (len(nodes) - 1) * phase
+        _, found = _continue(nodes[-1], following, roots[-1])
+        roots.append(found)
+        nodes.append(following)
+    return np.array(nodes), np.array(roots)
 
 
 def _continue(start: complex, end: complex, roots: ComplexArray) -> tuple[complex, ComplexArray]:
@@ -163,7 +206,8 @@ def _newton(tau: ComplexArray, q: complex | ComplexArray) -> ComplexArray:
             r, inverse = slope / value, value / slope
             move = np.where(np.abs(r) < 1, (r - q) / (tau - r * r), (inverse - 1 / q) / (1 - tau * inverse * inverse))
         tau = tau - move
-        if np.max(np.abs(move) / np.maximum(1.0, np.abs(tau))) < 1e-15:
+        # convergence is quadratic: the next move would be below rounding
+        if np.max(np.abs(move) / np.maximum(1.0, np.abs(tau))) < 1e-9:
             break
     return tau
 

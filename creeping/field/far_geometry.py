@@ -25,11 +25,11 @@ ALONG = 0.9
 """p.r above which a crossing is near a ray towards the observer."""
 
 
-def fan_strips(fan: RayFan) -> tuple[Strip, ...]:
-    """Strips of a fan, made once."""
+def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
+    """Strips of a fan, made once; those of a single ray, which have nothing to interpolate, on request."""
     if fan not in _STRIPS:
         _STRIPS[fan] = strips_of(fan)
-    return _STRIPS[fan]
+    return tuple(strip for strip in _STRIPS[fan] if single or len(strip.positions) > 1)
 
 
 def far_geometry(fan: RayFan, observation: ArrayLike, wavenumber: float) -> "FarGeometry":

@@ -72,7 +72,7 @@ def surface_field(
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     if points is None:
-        times = [strip.rays[:, :: substeps(fan)] for strip in fan_strips(fan)]
+        times = [strip.rays[:, :: substeps(fan)] for strip in fan_strips(fan, single=True)]
         if not times:
             return np.zeros(fan.spreading.shape, dtype=complex)
         out = np.empty(fan.spreading.shape, dtype=complex)

@@ -105,7 +105,10 @@ class Strip:
         """Points of the strip: (n,), (n,)."""
         lanes, starts = self._splines
         sigma = self.wrap(sigma)
-        return RayPoints(lanes(np.stack([sigma, s], axis=-1)), starts(sigma), s, self._alive(sigma, s), self.rays.scale)
+        points, first = lanes(np.stack([sigma, s], axis=-1)), starts(sigma)
+        # between a ray that has detached and one that has not, the interpolated curvature decides
+        alive = self._alive(sigma, s) & (points[:, 9] > 0) & (first[:, 2] > 0)
+        return RayPoints(points, first, s, np.asarray(alive), self.rays.scale)
 
     def slopes(self, sigma: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives in σ and in s of (x, p): (n,), (n,) -> (n, 6), (n, 6)."""
@@ -122,7 +125,7 @@ class Strip:
 
 
 def strips_of(fan: RayFan) -> tuple[Strip, ...]:
-    """One strip for each arc of the fan."""
+    """One strip for each arc of the fan that has rays; one of a single ray cannot be interpolated."""
     times, everything = ray_points(fan)
     found = []
     lengths = [curve.length for curve in fan.line.curves]
