@@ -122,7 +122,7 @@ def far_field(
     for number, kind in enumerate(kinds):
         parts.add(number, kind)
     return FarField(
-        directions=geometry.directions,
+        directions=geometry.directions.copy(),
         creeping=parts.creeping,
         reflected=parts.reflected,
         forward=parts.forward,
@@ -164,7 +164,10 @@ def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, 
 
 
 def held_rate(rays: RayPoints, m: FloatArray) -> FloatArray:
-    """|J'| (n,), held above |J|κₙ/(2m) on rays that have passed a caustic: there a fold's wave stops growing."""
+    """|J'| (n,), held above |J|κₙ/(2m) where φ is outside [0, π/2]: at a fold that is not the launch point's own.
+
+    There a fold's wave stops growing.
+    """
     rate = np.abs(rays.spreading_rate)
     passed = (rays.prufer > np.pi / 2) | (rays.prufer < 0)
     least = np.where(passed, 0.5 * np.abs(rays.spreading) * np.maximum(rays.curvature[1], 0.0) / m, 0.0)
@@ -192,7 +195,7 @@ class _Parts:
         self.creeping, self.reflected, self.forward = (
             np.zeros((m, 2, 2) if self.vector else m, dtype=complex) for _ in range(3)
         )
-        self.doubtful = np.zeros(m)
+        self.doubtful, self.lost = np.zeros(m), np.zeros(m, dtype=bool)
         theta = geometry.angle
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
         self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
@@ -204,7 +207,7 @@ class _Parts:
         """Directions in which an expansion fails for what matters there (m,)."""
         total = np.abs(self.creeping + self.reflected + self.forward)
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
-        return np.asarray((self.geometry.lost_forward & (self.in_forward > 0)) | (self.doubtful > MATTERS * largest))
+        return np.asarray((self.lost & (self.in_forward > 0)) | (self.doubtful > MATTERS * largest))
 
     def _doubt(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
         """Note the size of contributions (n,) whose expansion fails."""
@@ -229,7 +232,8 @@ class _Parts:
         wave = _weighted((1 - w)[s.observer], reflected_amplitude(s, g.directions, d, k, kind, order))
         self._doubt(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
         self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
-        shadow, lit = g.forward_nodes(k, w > 0)
+        shadow, lit, lost = g.forward_nodes(k, w > 0)
+        self.lost[lost] = True
         wave = shadow_half(shadow, g.directions, d, k, kind, order, self.beyond_axis[shadow.observer])
         wave = _weighted(w[shadow.observer], wave)
         self._sum(

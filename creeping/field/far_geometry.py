@@ -74,12 +74,12 @@ class FarGeometry:
     """What every frequency shares: rays shed towards the observers, specular points, nodes of the integrals."""
 
     def __init__(self, fan: RayFan, directions: FloatArray) -> None:
-        self.fan, self.directions = fan, directions
+        # not the fan itself: this is kept as long as the fan lives
+        self.directions, self.launch_curvature = directions, fan.curvature[:, 0]
         self.line, self.body, self.direction = fan.line, fan.body, fan.line.direction
         self.strips = fan_strips(fan)
-        self._fan_nodes: dict[tuple[int, bytes], HorizonRays] = {}
-        self._forward: dict[tuple[int, bytes], tuple[HorizonRays, MidHorizon, IntArray]] = {}
-        self._lost = np.zeros(0, dtype=np.int64)
+        self._fan_nodes: tuple[tuple[int, bytes], HorizonRays] | None = None
+        self._forward: tuple[tuple[int, bytes], tuple[HorizonRays, MidHorizon, IntArray]] | None = None
 
     @cached_property
     def angle(self) -> FloatArray:
@@ -90,7 +90,7 @@ class FarGeometry:
     @cached_property
     def mean_root_radius(self) -> float:
         """Mean of ρ^(1/3) over the launch points: m̄ = (k/2)^(1/3) times it."""
-        kappa = self.fan.curvature[:, 0]
+        kappa = self.launch_curvature
         return float(np.mean(fock_scale(2.0, kappa[kappa > 0]))) if np.any(kappa > 0) else 1.0
 
     @cached_property
@@ -147,32 +147,27 @@ class FarGeometry:
         # in steps of a quarter octave, so that near frequencies share them
         fineness = int(np.ceil(4 * np.log2(max(wavenumber * longest, 256.0))))
         key = (fineness, wanted.tobytes())
-        if key not in self._fan_nodes:
+        kept = self._fan_nodes
+        if kept is None or kept[0] != key:
             rows = np.flatnonzero(wanted)
-            grid = HorizonGrid(self.strips, self.body, longest / 2 ** (fineness / 4))
-            self._fan_nodes[key] = grid.crossings(rows, self.directions)
-        return self._fan_nodes[key]
+            strips = self.strips if len(rows) else ()
+            grid = HorizonGrid(strips, self.body, longest / 2 ** (fineness / 4))
+            self._fan_nodes = kept = (key, grid.crossings(rows, self.directions))
+        return kept[1]
 
-    def forward_nodes(self, wavenumber: float, wanted: BoolArray) -> tuple[HorizonRays, MidHorizon]:
-        """Nodes of both halves of the forward integral for the wanted observers."""
+    def forward_nodes(self, wavenumber: float, wanted: BoolArray) -> tuple[HorizonRays, MidHorizon, IntArray]:
+        """Nodes of both halves of the forward integral for the wanted observers, and observers that lack some."""
         fineness = int(np.ceil(4 * np.log2(max(wavenumber * size(self.body), 16.0))))
         key = (fineness, wanted.tobytes())
-        if key not in self._forward:
+        kept = self._forward
+        if kept is None or kept[0] != key:
             rows = np.flatnonzero(wanted)
             # at r = d every ray meets the horizon where it starts; the lobe is flat there to second order
             r = off_axis(self.directions, self.direction)
             reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
             counts = (48 + 1.5 * reach).astype(np.int64)
-            self._forward[key] = forward_nodes(self.strips, self.line, rows, r, counts)
-        shadow, lit, self._lost = self._forward[key]
-        return shadow, lit
-
-    @property
-    def lost_forward(self) -> BoolArray:
-        """Observers for which nodes of the last forward integral were not found (m,)."""
-        mask = np.zeros(len(self.directions), dtype=bool)
-        mask[self._lost] = True
-        return mask
+            self._forward = kept = (key, forward_nodes(self.strips, self.line, rows, r, counts))
+        return kept[1]
 
     def normals_of(self, points: FloatArray) -> FloatArray:
         """N at points (n, 3)."""

@@ -70,7 +70,8 @@ def near_field(
     Returns
     -------
     complex, (...)
-        All rays through each point summed, 0 where none passes; infinite on a caustic.
+        All rays through each point summed, 0 where none passes; grows without bound towards a caustic, and has no
+        meaning on one.
 
     Raises
     ------
@@ -125,7 +126,8 @@ def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: 
     with np.errstate(divide="ignore", over="ignore"):
         amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / (reach * np.abs(tube)))
     height = (m2 * reach * rays.curvature[1]) ** 2
-    return np.asarray(amplitude * _uniform(rays, reach, height, wavenumber, boundary, order) * np.exp(1j * phase))
+    wave = _uniform(rays, reach, height, wavenumber, boundary, order) * np.exp(1j * phase)
+    return np.asarray(np.where(np.isinf(amplitude), np.inf, np.where(np.isinf(amplitude), 0.0, amplitude) * wave))
 
 
 def _uniform(

@@ -4,7 +4,7 @@ With n the normal, p the ray's tangent, b = n × p, H the Hessian of F:
 
     κₙ = p.Hp/|∇F|,   κ_t = b.Hb/|∇F|,   ρ = 1/κₙ,   ' = d/ds
     integrals over s of  κₙ^(1/3),  κₙ^(2/3),  κₙ^(4/3),  κₙ^(1/3) κ_t,  κₙ^(4/3) (ρρ'' - (2/3) ρ'²)
-    tan φ = -J'/J, φ(0) = 0, counts zeros: J has floor(φ/π + 1/2) of them, and 1 + floor(φ/π) of J' are behind
+    tan φ = -L J'/J, φ(0) = 0, L the body's size: floor(φ/π + 1/2) zeros of J are behind, and 1 + floor(φ/π) of J'
 
 Between the steps of the fan the rays are traced again, so that splines of degree 7 along them give κₙ' and κₙ''. Powers
 are taken after interpolation, and the integrals end where κₙ first falls to 0: there the creeping ray ends.
@@ -255,6 +255,8 @@ def _along(fan: RayFan, states: FloatArray, step: float, lanes: FloatArray) -> N
     ends = np.clip(fan.detachment[:, None] - inner[:-1], 0.0, np.diff(inner))
     for ray in np.flatnonzero(fan.detachment < inner[-1]):
         cut = np.flatnonzero(ends[ray] < np.diff(inner))
+        if not len(cut):
+            continue
         pieces[ray, cut] = 0.0
         pieces[ray, cut[0]] = integral(inner[cut[:1]], ends[ray, cut[:1]], ray)[0]
     lanes[:, 0, 13:18] = 0.0

@@ -105,7 +105,10 @@ def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> She
 
     def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
         columns = np.stack([slopes[0][:, :3], slopes[1][:, :3]], axis=-1) / scale
-        return columns, (target[:, :3] - at.points) / scale
+        residual = (target[:, :3] - at.points) / scale
+        # splines keep x on the body to their own error only: what counts lies in the tangent plane at y
+        outward = target[:, 3:6]
+        return columns, residual - np.sum(residual * outward, axis=-1, keepdims=True) * outward
 
     found = _search(strips, body, frames, functions, step)
     return ShedRays(*found, np.zeros(len(found[0])))

@@ -11,7 +11,7 @@ from scipy.interpolate import NdBSpline, make_interp_spline
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.rays.fan import RayFan
-from creeping.rays.ray_points import RayPoints, ray_points
+from creeping.rays.ray_points import LANES, START_LANES, RayPoints, ray_points
 from creeping.surface import Surface, normal
 
 DEGREE = 5
@@ -146,7 +146,9 @@ def gather(strips: tuple[Strip, ...], which: IntArray, sigma: FloatArray, s: Flo
     if not parts:
         empty = strips[0].rays if strips else None
         if empty is None:
-            return RayPoints(np.zeros((0, 18)), np.zeros((0, 9)), np.zeros(0), np.zeros(0, dtype=bool), 1.0)
+            return RayPoints(
+                np.zeros((0, LANES)), np.zeros((0, START_LANES)), np.zeros(0), np.zeros(0, dtype=bool), 1.0
+            )
         return empty[np.zeros(0, dtype=int), np.zeros(0, dtype=int)]
     found = [strip.at(sigma[rows], s[rows]) for rows, strip in parts]
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))
