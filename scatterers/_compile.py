@@ -2,8 +2,10 @@
 
 A *level evaluator* fills, for a block of n points, F, grad F and the six Hessian entries
 (xx, yy, zz, yz, xz, xy); a *locator* fills chart number, chart variables and the isometric frame
-(rows e1x, e1y, e1z, e2x, e2y, e2z). Parameters arrive in an array, so one compiled function serves
-every body of its class and is cached on disk. numba is imported at the first use, for a quick start.
+(rows e1x, e1y, e1z, e2x, e2y, e2z). Of a sphere map x = psi(s), a *forward* function fills x and the nine
+entries of d psi/ds by rows (xx, xy, xz, yx, ...), an *inverse* function fills s, of unit length.
+Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.
+numba is imported at the first use, for a quick start.
 """
 
 from collections.abc import Callable
@@ -15,6 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+Kind = Literal["level", "locator", "forward", "inverse"]
+
+
 @dataclass(frozen=True, eq=False)
 class Compiled:
     """A block function, compiled when first asked for, and the parameters to call it with.
@@ -24,13 +29,15 @@ class Compiled:
     source : callable
         Plain Python of the function, with the arguments
         ``(points (3, n), values (n,), gradients (3, n), hessians (6, n), parameters)`` for a level or a speed,
-        ``(points (3, n), chart (n,), uv (2, n), frame (6, n), parameters)`` for a locator.
-    kind : {"level", "locator"}
+        ``(points (3, n), chart (n,), uv (2, n), frame (6, n), parameters)`` for a locator,
+        ``(s (3, n), points (3, n), derivatives (9, n), parameters)`` for a forward sphere map,
+        ``(points (3, n), s (3, n), parameters)`` for its inverse.
+    kind : {"level", "locator", "forward", "inverse"}
     parameters : (k,) float64
     """
 
     source: Callable[..., None]
-    kind: Literal["level", "locator"]
+    kind: Kind
     parameters: NDArray[np.float64]
 
     @property
@@ -44,10 +51,12 @@ def _compile(source: Callable[..., None], kind: str) -> Any:
     from numba import cfunc, types
 
     row, rows = types.float64[::1], types.float64[:, ::1]
-    if kind == "level":
-        signature = types.void(rows, row, rows, rows, row)
-    else:
-        signature = types.void(rows, types.int64[::1], rows, rows, row)
+    signature = {
+        "level": types.void(rows, row, rows, rows, row),
+        "locator": types.void(rows, types.int64[::1], rows, rows, row),
+        "forward": types.void(rows, rows, rows, row),
+        "inverse": types.void(rows, rows, row),
+    }[kind]
     # code made from an expression has no file that numba could cache beside
     in_file = not source.__code__.co_filename.startswith("<")
     return cfunc(signature, cache=in_file, error_model="numpy")(source)
