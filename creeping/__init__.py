@@ -14,13 +14,15 @@ _HOMES = {
     "FarField": "creeping.field.far",
     "Impedance": "creeping.field.coefficients",
     "IsoPhaseCurve": "creeping.rays.isophase",
-    "MapError": "creeping.phaseflow.phase_map",
+    "Growth": "creeping.phaseflow.phase_map",
+    "MapError": "creeping.phaseflow.tracing",
     "PhaseMap": "creeping.phaseflow.phase_map",
     "RayFan": "creeping.rays.fan",
     "RayStatus": "creeping.rays.fan",
     "ShadowLine": "creeping.rays.shadow",
-    "build_phase_map": "creeping.phaseflow.building",
+    "build_phase_map": "creeping.phaseflow.request",
     "check_surface": "creeping.surface",
+    "choose_flow": "creeping.phaseflow.choosing",
     "far_field": "creeping.field.far",
     "iso_phase_curves": "creeping.rays.isophase",
     "launch": "creeping.rays.fan",
@@ -35,6 +37,7 @@ __all__ = [
     "CreepingError",
     "DirectFlow",
     "FarField",
+    "Growth",
     "Impedance",
     "IsoPhaseCurve",
     "MapError",
@@ -45,6 +48,7 @@ __all__ = [
     "__version__",
     "build_phase_map",
     "check_surface",
+    "choose_flow",
     "far_field",
     "iso_phase_curves",
     "launch",
@@ -61,10 +65,11 @@ if TYPE_CHECKING:
     from creeping.field.far import FarField, far_field
     from creeping.field.near import near_field
     from creeping.field.on_surface import surface_field
-    from creeping.phaseflow.building import build_phase_map
     from creeping.phaseflow.caching import load_phase_map
-    from creeping.phaseflow.phase_map import MapError, PhaseMap
-    from creeping.phaseflow.tracing import DirectFlow, trace
+    from creeping.phaseflow.choosing import choose_flow
+    from creeping.phaseflow.phase_map import Growth, PhaseMap
+    from creeping.phaseflow.request import build_phase_map
+    from creeping.phaseflow.tracing import DirectFlow, MapError, trace
     from creeping.rays.fan import RayFan, RayStatus, launch
     from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
     from creeping.rays.shadow import ShadowLine, shadow_line

@@ -35,6 +35,16 @@ class SphereMap(Protocol):
         """Sphere point of a body point, up to its length: (..., 3) -> (..., 3)."""
         ...
 
+    @property
+    def compiled_forward(self) -> Compiled:
+        """Compiled psi and its derivative, of kind "forward"."""
+        ...
+
+    @property
+    def compiled_inverse(self) -> Compiled:
+        """Compiled psi^-1, of kind "inverse"."""
+        ...
+
 
 @dataclass(frozen=True)
 class FaceChart:
@@ -121,11 +131,17 @@ class PeriodicChart:
 
 @dataclass(frozen=True)
 class PeriodicAtlas:
-    """A single doubly periodic chart; ``coordinates`` inverts it, ``compiled`` is a locator or None."""
+    """A single doubly periodic chart; ``coordinates`` inverts it.
+
+    For kernels: ``compiled`` is a locator; ``compiled_forward`` takes (u, v, anything) to the point and, in columns 0
+    and 1 of the derivative, the tangents; ``compiled_inverse`` takes points to (u, v, 0). All or none may be None.
+    """
 
     chart: PeriodicChart
     coordinates: Callable[[FloatArray], FloatArray]
     compiled: Compiled | None = None
+    compiled_forward: Compiled | None = None
+    compiled_inverse: Compiled | None = None
 
     @property
     def charts(self) -> Sequence[PeriodicChart]:

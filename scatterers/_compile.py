@@ -5,19 +5,28 @@ A *level evaluator* fills, for a block of n points, F, grad F and the six Hessia
 (rows e1x, e1y, e1z, e2x, e2y, e2z). Of a sphere map x = psi(s), a *forward* function fills x and the nine
 entries of d psi/ds by rows (xx, xy, xz, yx, ...), an *inverse* function fills s, of unit length.
 Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.
-numba is imported at the first use, for a quick start.
+numba is imported at the first use, for a quick start: plain Python that several of them call is marked by `helper`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-
 Kind = Literal["level", "locator", "forward", "inverse"]
+F = TypeVar("F", bound=Callable[..., Any])
+# products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+_helpers: list[Callable[..., Any]] = []
+
+
+def helper(function: F) -> F:
+    """Let compiled functions call this plain Python; numba is told at the first compilation."""
+    _helpers.append(function)
+    return function
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +58,10 @@ class Compiled:
 @cache
 def _compile(source: Callable[..., None], kind: str) -> Any:
     from numba import cfunc, types
+    from numba.extending import register_jitable
 
+    while _helpers:
+        register_jitable(**OPTIONS)(_helpers.pop())
     row, rows = types.float64[::1], types.float64[:, ::1]
     signature = {
         "level": types.void(rows, row, rows, rows, row),
@@ -59,4 +71,4 @@ def _compile(source: Callable[..., None], kind: str) -> Any:
     }[kind]
     # code made from an expression has no file that numba could cache beside
     in_file = not source.__code__.co_filename.startswith("<")
-    return cfunc(signature, cache=in_file, error_model="numpy")(source)
+    return cfunc(signature, cache=in_file, **OPTIONS)(source)

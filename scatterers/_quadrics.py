@@ -5,6 +5,7 @@ differ in their parameters only, so they share one evaluator and one chart locat
 """
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 
 from scatterers._body import Body, finite, positive
 from scatterers._charts import CubeSphereAtlas
-from scatterers._compile import Compiled
+from scatterers._compile import Compiled, Kind
+from scatterers._frames import cube_tangents, fill_frame
+from scatterers._trigonometry import cos_pi, sin_pi
 
 __all__ = ["BentEllipsoid", "finite", "positive"]
 FloatArray = NDArray[np.float64]
@@ -84,15 +87,28 @@ class BentEllipsoid(Body):
         theta = np.arctan2(np.hypot(s[..., 0], s[..., 1]), s[..., 2])
         return np.stack([theta, np.arctan2(s[..., 1], s[..., 0])], axis=-1)
 
+    def _compiled(self, source: Callable[..., None], kind: Kind) -> Compiled:
+        return Compiled(source, kind, np.array(self._shape(), dtype=float))
+
     @cached_property
     def compiled(self) -> Compiled:
         """Compiled level evaluator."""
-        return Compiled(_evaluate, "level", np.array(self._shape(), dtype=float))
+        return self._compiled(_evaluate, "level")
+
+    @cached_property
+    def compiled_forward(self) -> Compiled:
+        """Compiled psi and its derivative."""
+        return self._compiled(_forward, "forward")
+
+    @cached_property
+    def compiled_inverse(self) -> Compiled:
+        """Compiled psi^-1, normalised."""
+        return self._compiled(_inverse, "inverse")
 
     @cached_property
     def atlas(self) -> CubeSphereAtlas:
         """Six charts."""
-        return CubeSphereAtlas(self, Compiled(_locate, "locator", np.array(self._shape(), dtype=float)))
+        return CubeSphereAtlas(self, self._compiled(_locate, "locator"))
 
 
 def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
@@ -100,88 +116,90 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
 
     Each loop touches few rows: the compiler vectorises it only while it can check that they do not overlap.
     """
-    xx, yy, zz = 1 / parameters[0] ** 2, 1 / parameters[1] ** 2, 1 / parameters[2] ** 2
-    d = parameters[3]
+    xx, yy, zz, d = 1 / parameters[0] ** 2, 1 / parameters[1] ** 2, 1 / parameters[2] ** 2, parameters[3]
+    quarter = 1 / (4 * yy)
     n = points.shape[1]
-    x, y, z = points[0], points[1], points[2]
-    straight, bend, slope = gradients[1], hessians[3], hessians[4]
-    # while they are not yet wanted for the Hessian, two of its rows hold d cos(pi z) and pi d sin(pi z)
     if d != 0.0:
+        # while they are not yet wanted for the Hessian, two of its rows hold d cos(pi z) and pi d sin(pi z)
         for i in range(n):
-            bend[i] = d * math.cos(math.pi * z[i])
-            slope[i] = math.pi * d * math.sin(math.pi * z[i])
+            hessians[3, i] = d * cos_pi(points[2, i])
+            hessians[4, i] = math.pi * d * sin_pi(points[2, i])
         for i in range(n):
-            straight[i] = y[i] - bend[i]
+            gradients[0, i] = 2 * xx * points[0, i]
+            gradients[1, i] = 2 * yy * (points[1, i] - hessians[3, i])
+        for i in range(n):
+            x, z, bent = points[0, i], points[2, i], gradients[1, i]
+            values[i] = xx * x * x + quarter * bent * bent + (zz * z * z - 1.0)
+        for i in range(n):
+            gradients[2, i] = 2 * zz * points[2, i] + gradients[1, i] * hessians[4, i]
+        for i in range(n):
+            slope = hessians[4, i]
+            hessians[2, i] = 2 * zz + 2 * yy * slope * slope + math.pi**2 * gradients[1, i] * hessians[3, i]
+            hessians[3, i] = 2 * yy * slope
     else:
         for i in range(n):
-            bend[i] = slope[i] = 0.0
-            straight[i] = y[i]
+            x, y, z = points[0, i], points[1, i], points[2, i]
+            values[i] = xx * x * x + yy * y * y + (zz * z * z - 1.0)
+            gradients[0, i] = 2 * xx * x
+        for i in range(n):
+            gradients[1, i] = 2 * yy * points[1, i]
+            gradients[2, i] = 2 * zz * points[2, i]
+        for i in range(n):
+            hessians[2, i] = 2 * zz
+            hessians[3, i] = 0.0
     for i in range(n):
-        values[i] = xx * x[i] * x[i] + zz * z[i] * z[i] - 1.0
-    for i in range(n):
-        values[i] += yy * straight[i] * straight[i]
-    for i in range(n):
-        gradients[0, i] = 2 * xx * x[i]
-    for i in range(n):
-        gradients[2, i] = 2 * zz * z[i] + 2 * yy * straight[i] * slope[i]
-    for i in range(n):
-        hessians[2, i] = 2 * zz + 2 * yy * (slope[i] * slope[i] + straight[i] * math.pi * math.pi * bend[i])
-    for i in range(n):
-        gradients[1, i] *= 2 * yy
-    for i in range(n):
-        hessians[3, i] = 2 * yy * slope[i]
-    hessians[0] = 2 * xx
-    hessians[1] = 2 * yy
-    hessians[4] = 0.0
-    hessians[5] = 0.0
+        hessians[0, i] = 2 * xx
+        hessians[1, i] = 2 * yy
+        hessians[4, i] = 0.0
+        hessians[5, i] = 0.0
 
 
 def _locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
     """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame."""
-    radii = parameters
+    a, b, c, d = parameters[0], parameters[1], parameters[2], parameters[3]
     for i in range(points.shape[1]):
         z = points[2, i]
-        s = (
-            points[0, i] / radii[0],
-            (points[1, i] - radii[3] * math.cos(math.pi * z)) / radii[1],
-            z / radii[2],
+        bend, shear = 0.0, 0.0
+        if d != 0.0:
+            bend, shear = d * cos_pi(z), -math.pi * c * d * sin_pi(z)
+        chart[i], uv[0, i], uv[1, i], tx, ty, tz, wx, wy, wz = cube_tangents(
+            points[0, i] / a, (points[1, i] - bend) / b, z / c
         )
-        size = (abs(s[0]), abs(s[1]), abs(s[2]))
-        a = 0 if size[0] >= size[1] and size[0] >= size[2] else (1 if size[1] >= size[2] else 2)
-        b, c = (a + 1) % 3, (a + 2) % 3
-        sign = -1.0 if s[a] < 0 else 1.0
-        tan_u, tan_v = s[b] / s[a], s[c] / size[a]
-        chart[i] = 2 * a + (1 if s[a] < 0 else 0)
-        uv[0, i] = math.atan(tan_u) / (math.pi / 2) + 0.5
-        uv[1, i] = math.atan(tan_v) / (math.pi / 2) + 0.5
-        # tangents of the cube-sphere: d cube = (0, sign (1 + tan_u^2), 0) and (0, 0, 1 + tan_v^2) in (a, b, c),
-        # less their part along s; a common factor does not change the frame
-        norm2 = 1.0 + tan_u * tan_u + tan_v * tan_v
-        du, dv = 1.0 + tan_u * tan_u, 1.0 + tan_v * tan_v
-        p = tan_u * du / norm2
-        q = tan_v * dv / norm2
-        ta, tb, tc = -sign * p, sign * (du - tan_u * p), -tan_v * p
-        wa, wb, wc = -sign * q, -sign * tan_u * q, dv - tan_v * q
-        if a == 0:
-            tx, ty, tz, wx, wy, wz = ta, tb, tc, wa, wb, wc
-        elif a == 1:
-            tx, ty, tz, wx, wy, wz = tc, ta, tb, wc, wa, wb
-        else:
-            tx, ty, tz, wx, wy, wz = tb, tc, ta, wb, wc, wa
-        shear = 0.0
-        if radii[3] != 0.0:
-            shear = -math.pi * radii[2] * radii[3] * math.sin(math.pi * z)
-        tx, ty, tz = radii[0] * tx, radii[1] * ty + shear * tz, radii[2] * tz
-        wx, wy, wz = radii[0] * wx, radii[1] * wy + shear * wz, radii[2] * wz
-        g11 = tx * tx + ty * ty + tz * tz
-        g12 = tx * wx + ty * wy + tz * wz
-        g22 = wx * wx + wy * wy + wz * wz
-        root = math.sqrt(g11 * g22 - g12 * g12)
-        scale = 1.0 / (root * math.sqrt(g11 + g22 + 2 * root))
-        m11, m12, m22 = (g22 + root) * scale, -g12 * scale, (g11 + root) * scale
-        frame[0, i] = tx * m11 + wx * m12
-        frame[1, i] = ty * m11 + wy * m12
-        frame[2, i] = tz * m11 + wz * m12
-        frame[3, i] = tx * m12 + wx * m22
-        frame[4, i] = ty * m12 + wy * m22
-        frame[5, i] = tz * m12 + wz * m22
+        fill_frame(frame, i, a * tx, b * ty + shear * tz, c * tz, a * wx, b * wy + shear * wz, c * wz)
+
+
+def _forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def]
+    """Points and derivatives of psi for a block; the compiled twin of forward and derivative."""
+    a, b, c, d = parameters[0], parameters[1], parameters[2], parameters[3]
+    n = s.shape[1]
+    for i in range(n):
+        points[0, i] = a * s[0, i]
+        points[2, i] = c * s[2, i]
+    for i in range(n):
+        points[1, i] = b * s[1, i]
+        derivatives[5, i] = 0.0
+    if d != 0.0:
+        for i in range(n):
+            points[1, i] += d * cos_pi(c * s[2, i])
+        for i in range(n):
+            derivatives[5, i] = -math.pi * c * d * sin_pi(c * s[2, i])
+    for i in range(n):
+        derivatives[0, i], derivatives[1, i], derivatives[2, i] = a, 0.0, 0.0
+        derivatives[3, i], derivatives[4, i] = 0.0, b
+    for i in range(n):
+        derivatives[6, i], derivatives[7, i], derivatives[8, i] = 0.0, 0.0, c
+
+
+def _inverse(points, s, parameters):  # type: ignore[no-untyped-def]
+    """psi^-1 of a block, of unit length; the compiled twin of inverse."""
+    a, b, c, d = 1 / parameters[0], 1 / parameters[1], 1 / parameters[2], parameters[3]
+    n = points.shape[1]
+    for i in range(n):
+        s[1, i] = points[1, i]
+    if d != 0.0:
+        for i in range(n):
+            s[1, i] -= d * cos_pi(points[2, i])
+    for i in range(n):
+        x, y, z = a * points[0, i], b * s[1, i], c * points[2, i]
+        scale = 1.0 / math.sqrt(x * x + y * y + z * z)
+        s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scatterers._body import Body, positive
 from scatterers._charts import PeriodicAtlas, PeriodicChart
 from scatterers._compile import Compiled
+from scatterers._trigonometry import cos_pi, sin_pi
 
 FloatArray = NDArray[np.float64]
 
@@ -108,8 +109,9 @@ class Torus(Body):
     def atlas(self) -> PeriodicAtlas:
         """One doubly periodic chart."""
         chart = PeriodicChart(self._point, self._tangents)
-        locator = Compiled(_locate, "locator", np.array([self.R, self.r]))
-        return PeriodicAtlas(chart, self._coordinates, locator)
+        radii = np.array([self.R, self.r])
+        there, back = Compiled(_forward, "forward", radii), Compiled(_inverse, "inverse", radii)
+        return PeriodicAtlas(chart, self._coordinates, Compiled(_locate, "locator", radii), there, back)
 
 
 def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
@@ -118,31 +120,33 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
     Each loop touches few rows: the compiler vectorises it only while it can check that they do not overlap.
     """
     major, scale = parameters[0], 2 / parameters[1] ** 2
-    x, y, z = points[0], points[1], points[2]
     n = points.shape[1]
-    # while they are not yet wanted for the Hessian, two of its rows hold rho and R/rho
-    rho, ratio = hessians[3], hessians[4]
+    # while they are not yet wanted for the Hessian, two of its rows hold R/rho and 1/rho
     for i in range(n):
-        rho[i] = max(math.sqrt(x[i] * x[i] + y[i] * y[i]), 1e-300)
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        square = x * x + y * y
+        inverse = 1.0 / max(math.sqrt(square), 1e-300)
+        beyond = square * inverse - major
+        hessians[4, i] = inverse
+        values[i] = 0.5 * scale * (beyond * beyond + z * z) - 1.0
     for i in range(n):
-        ratio[i] = major / rho[i]
+        hessians[3, i] = major * hessians[4, i]
+        gradients[2, i] = scale * points[2, i]
     for i in range(n):
-        values[i] = 0.5 * scale * ((rho[i] - major) * (rho[i] - major) + z[i] * z[i]) - 1.0
+        radial = scale * (1 - hessians[3, i])
+        gradients[0, i] = radial * points[0, i]
+        gradients[1, i] = radial * points[1, i]
     for i in range(n):
-        gradients[0, i] = scale * (1 - ratio[i]) * x[i]
+        sine = points[1, i] * hessians[4, i]
+        hessians[0, i] = scale * (1 - hessians[3, i] * sine * sine)
+        hessians[5, i] = scale * hessians[3, i] * sine * (points[0, i] * hessians[4, i])
     for i in range(n):
-        gradients[1, i] = scale * (1 - ratio[i]) * y[i]
+        cosine = points[0, i] * hessians[4, i]
+        hessians[1, i] = scale * (1 - hessians[3, i] * cosine * cosine)
     for i in range(n):
-        gradients[2, i] = scale * z[i]
-    for i in range(n):
-        hessians[0, i] = scale * (1 - ratio[i] * (y[i] / rho[i]) * (y[i] / rho[i]))
-    for i in range(n):
-        hessians[1, i] = scale * (1 - ratio[i] * (x[i] / rho[i]) * (x[i] / rho[i]))
-    for i in range(n):
-        hessians[5, i] = scale * ratio[i] * (x[i] / rho[i]) * (y[i] / rho[i])
-    hessians[2] = scale
-    hessians[3] = 0.0
-    hessians[4] = 0.0
+        hessians[2, i] = scale
+        hessians[3, i] = 0.0
+        hessians[4, i] = 0.0
 
 
 def _locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
@@ -162,3 +166,29 @@ def _locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-de
         cos_theta, sin_theta = radial / tube, z / tube
         frame[0, i], frame[1, i], frame[2, i] = -sin_psi, cos_psi, 0.0
         frame[3, i], frame[4, i], frame[5, i] = -sin_theta * cos_psi, -sin_theta * sin_psi, cos_theta
+
+
+def _forward(chart, points, derivatives, parameters):  # type: ignore[no-untyped-def]
+    """Points and tangents of a block; the compiled twin of the chart's point and tangents."""
+    major, minor = parameters[0], parameters[1]
+    turn = 2 * math.pi
+    for i in range(chart.shape[1]):
+        # the period of the chart variables is 1, that of cos_pi is 2
+        cos_psi, sin_psi = cos_pi(2 * chart[0, i]), sin_pi(2 * chart[0, i])
+        cos_theta, sin_theta = cos_pi(2 * chart[1, i]), sin_pi(2 * chart[1, i])
+        rho, height = major + minor * cos_theta, minor * sin_theta
+        points[0, i], points[1, i], points[2, i] = rho * cos_psi, rho * sin_psi, height
+        derivatives[0, i], derivatives[3, i], derivatives[6, i] = -turn * rho * sin_psi, turn * rho * cos_psi, 0.0
+        derivatives[1, i], derivatives[4, i] = -turn * height * cos_psi, -turn * height * sin_psi
+        derivatives[7, i] = turn * minor * cos_theta
+        derivatives[2, i], derivatives[5, i], derivatives[8, i] = 0.0, 0.0, 0.0
+
+
+def _inverse(points, chart, parameters):  # type: ignore[no-untyped-def]
+    """Chart variables of a block, in turns."""
+    turn = 1 / (2 * math.pi)
+    for i in range(points.shape[1]):
+        x, y = points[0, i], points[1, i]
+        chart[0, i] = math.atan2(y, x) * turn
+        chart[1, i] = math.atan2(points[2, i], math.sqrt(x * x + y * y) - parameters[0]) * turn
+        chart[2, i] = 0.0

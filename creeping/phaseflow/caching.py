@@ -5,11 +5,16 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from creeping._errors import CreepingError, StoredMapError
 from creeping._typing import Any
 from creeping._version import __version__
-from creeping.phaseflow.phase_map import Grid, Leap, MapError, PhaseMap
+from creeping.phaseflow.grids import Grid, Leap
+from creeping.phaseflow.models import Model, model_of
+from creeping.phaseflow.phase_map import Growth, PhaseMap
 from creeping.phaseflow.storing import SCHEMA, content_digest, fingerprint, open_array, read_manifest
+from creeping.phaseflow.tracing import MapError
 from creeping.surface import Surface
 
 
@@ -47,30 +52,48 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     try:
         grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
         error = MapError(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
+        growth = content["growth"] and Growth(*(tuple(map(float, row)) for row in content["growth"]))
         leaps = tuple(
             Leap(
                 float(time),
                 open_array(folder, f"state-{k}.npy", content),
+                np.array([float(value) for value in content["centres"][k]]),
                 open_array(folder, f"jacobi-{k}.npy", content),
+                np.array([float(value) for value in content["matrices"][k]]),
             )
             for k, time in enumerate(content["times"])
         )
+        model = model_of(body, str(content["model"]))
     except (KeyError, TypeError, IndexError, ValueError) as reason:
         if isinstance(reason, CreepingError):
             raise
         raise StoredMapError(f"{folder}: the manifest is incomplete ({reason!r}); rebuild the map") from reason
-    _check_shapes(folder, grid, leaps, len(body.atlas.charts))
-    return PhaseMap(body, grid, leaps, error, content["parameters"])
+    if model.name != content["model"]:
+        raise StoredMapError(f"{folder} is stored as {content['model']!r}, which {body!r} does not offer; rebuild it")
+    _check_shapes(folder, grid, leaps, model)
+    return PhaseMap(body, model, grid, leaps, error, growth or None, content["parameters"])
 
 
-def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], charts: int) -> None:
-    """Kernels trust the shapes, so they must follow from the grid."""
-    p = grid.degree
-    sides = [n + p if wraps else n + p - 1 for n, wraps in zip(grid.nodes, (*grid.periodic, True), strict=True)]
+def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Model) -> None:
+    """Kernels trust shapes and types, so they must follow from the grid."""
+    whole = (model.charts, *grid.sides)
     for leap in leaps:
-        for table, lanes in ((leap.state, 8), (leap.jacobi, 4)):
-            if table.shape != (charts, *sides, lanes) or p not in (3, 5):
-                raise StoredMapError(f"{folder}: table {table.shape} does not fit grid {grid.nodes}; rebuild the map")
+        fits = leap.state.shape == (*whole, model.lanes) and grid.degree in (3, 5)
+        fits &= leap.centre.shape == (model.lanes,) and leap.matrix.shape == (4,)
+        fits &= leap.jacobi.shape in ((*whole, 4), (0, *grid.sides, 4)) and leap.jacobi.dtype == leap.state.dtype
+        if not fits:
+            raise StoredMapError(f"{folder}: tables {leap.state.shape} do not fit grid {grid.nodes}; rebuild the map")
+
+
+def _place(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Path:
+    root = cache_folder() if folder is True else Path(str(folder))
+    digest = content_digest({"schema": SCHEMA, "version": __version__, "body": fingerprint(body), **key})
+    return root / f"{type(body).__name__.lower()}-{digest[:24]}"
+
+
+def is_cached(body: Surface, key: dict[str, Any], *, folder: bool | str | Path) -> bool:
+    """Whether a map of the body with these parameters is in the cache."""
+    return _place(body, key, folder).exists()
 
 
 def cached_phase_map(
@@ -84,9 +107,8 @@ def cached_phase_map(
     """Open the map from the cache, or build it and store it; a second process waits for the first."""
     from filelock import FileLock
 
-    root = cache_folder() if folder is True else Path(str(folder))
-    digest = content_digest({"schema": SCHEMA, "version": __version__, "body": fingerprint(body), **key})
-    place = root / f"{type(body).__name__.lower()}-{digest[:24]}"
+    place = _place(body, key, folder)
+    root = place.parent
     try:
         root.mkdir(parents=True, exist_ok=True)
         lock = FileLock(root / f".{place.name}.lock")

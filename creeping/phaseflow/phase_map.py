@@ -1,13 +1,9 @@
 """The phase map g_T0 of a body's geodesic flow, and the composition of maps to any time.
 
-A point (x, p) of T1Q has coordinates (chart, u, v, angle): x = X(u, v) and p = E(u, v) (cos angle, sin angle), E
-the isometric frame of the chart (`creeping.surface.polar_frame`). A map stores, as splines in (u, v, angle), the
-displacement
-
-    D = x' - x - t p,   E = p' - p,   M - [[1, t], [0, 1]]
-
-of the time-t flow and of its Jacobi matrix; g_(m T0) = g_T0 o ... o g_T0 [YC06a, Algorithm 2]. The remainder of a time
-below T0 is covered by the shorter maps of the tower, if there is one, and below those by the order-8 integrator.
+A point (x, p) of T1Q has coordinates (chart, u, v, angle). A map stores, as splines in (u, v, angle), the displacement
+of the time-t flow in the coordinates of its model (`models`), and of its Jacobi matrix M - [[1, t], [0, 1]];
+g_(m T0) = g_T0 o ... o g_T0 [YC06a, Algorithm 2]. The remainder of a time below T0 is covered by the shorter maps of
+the tower, if there is one, and below those by the order-8 integrator.
 """
 
 from dataclasses import dataclass, field
@@ -16,74 +12,49 @@ from pathlib import Path
 import numpy as np
 
 from creeping._errors import InvalidInputError
-from creeping._typing import Any, ArrayLike, FloatArray
+from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping._version import __version__
-from creeping.phaseflow.bundle import bundle_points, project_bundle
-from creeping.phaseflow.splines import evaluate
+from creeping.phaseflow.bundle import bundle_points
+from creeping.phaseflow.grids import Grid, Leap
+from creeping.phaseflow.models import Model
 from creeping.phaseflow.storing import fingerprint, write_folder
-from creeping.phaseflow.tracing import as_times, compiled_parts, pack, trace_states
-from creeping.surface import Surface, polar_frame, size
-
-MARGIN = 2
-"""Nodes of a chart beyond each edge of its unit square: every point finds a chart two grid points from the edge."""
-PROJECTION = 1e-13
-"""Distance from the body, in units of its size, at which a composed ray counts as on it."""
+from creeping.phaseflow.tracing import MapError, as_times, pack, trace_states, unpack
+from creeping.surface import Surface
 
 
 @dataclass(frozen=True)
-class MapError:
-    """Error of one g_T0 against direct integration.
+class Growth:
+    """Error of composed maps against the length of the ray, measured against direct integration.
 
     Attributes
     ----------
-    rms, max : float
-        Of |(x, p) - (x, p)_traced|, the norm in R^6, over the samples.
-    samples : int
-        Random points of T1Q.
+    lengths : tuple of float, L (travel time for a weighted body)
+        Ascending.
+    rms, max : tuple of float
+        As in `MapError`, at each length.
     """
 
-    rms: float
-    max: float
-    samples: int
+    lengths: tuple[float, ...]
+    rms: tuple[float, ...]
+    max: tuple[float, ...]
 
+    def rms_after(self, length: float) -> float:
+        """Rms error after a length, by interpolation in logarithms; beyond the last one by its last slope."""
+        if length <= self.lengths[0]:
+            return self.rms[0]
+        t, e = np.log(self.lengths), np.log(np.maximum(self.rms, 1e-300))
+        at = np.log(length)
+        if length > self.lengths[-1]:
+            # errors of a chaotic flow grow like an exponential, which a power law underestimates
+            rate = (e[-1] - e[-2]) / (self.lengths[-1] - self.lengths[-2]) if len(t) > 1 else 0.0
+            return float(np.exp(min(e[-1] + rate * (length - self.lengths[-1]), 50.0)))
+        return float(np.exp(np.interp(at, t, e)))
 
-@dataclass(frozen=True)
-class Grid:
-    """Nodes of a map along u, v and the angle; MARGIN of them lie outside the unit square on each side."""
-
-    nodes: tuple[int, int, int]
-    degree: int
-    periodic: tuple[bool, bool]
-
-    @property
-    def origin(self) -> FloatArray:
-        """Grid coordinates of u = v = 0."""
-        return np.array([0.0 if wraps else float(MARGIN) for wraps in self.periodic])
-
-    @property
-    def cells(self) -> FloatArray:
-        """Cells per unit of u, v and per turn of the angle."""
-        sides = [n if wraps else n - 1 - 2 * MARGIN for n, wraps in zip(self.nodes[:2], self.periodic, strict=True)]
-        return np.array([*sides, self.nodes[2]], dtype=float)
-
-    def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Node values of u, v and the angle (radians)."""
-        u, v = ((np.arange(self.nodes[k]) - self.origin[k]) / self.cells[k] for k in (0, 1))
-        return u, v, 2 * np.pi * np.arange(self.nodes[2]) / self.nodes[2]
-
-
-@dataclass(frozen=True, eq=False)
-class Leap:
-    """The splines of one time: ``state`` (charts, nu, nv, na, 8) and ``jacobi`` (charts, nu, nv, na, 4)."""
-
-    time: float
-    state: FloatArray
-    jacobi: FloatArray
-
-    def __post_init__(self) -> None:
-        # read-only like the arrays of a stored map: kernels are compiled for one kind of array
-        for table in (self.state, self.jacobi):
-            table.flags.writeable = False
+    def trusted_length(self, tolerance: float) -> float:
+        """Longest measured or extrapolated length, at most twice the measured, whose rms error meets the tolerance."""
+        ends = np.linspace(self.lengths[0], 2 * self.lengths[-1], 2001)
+        good = np.array([self.rms_after(float(t)) <= tolerance for t in ends])
+        return float(ends[np.argmin(good) - 1]) if good[0] and not good.all() else float(ends[-1] if good[0] else 0.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,19 +64,25 @@ class PhaseMap:
     Attributes
     ----------
     body : Surface
+    model : Model
+        Coordinates in which rays are composed.
     grid : Grid
     leaps : tuple of Leap
         Maps by ascending time, the last is g_T0; more than one only for ``method="tower"``.
     error : MapError
-        Measured when the map was built.
+        Of one g_T0, measured when the map was built.
+    growth : Growth or None
+        Error after longer and longer rays.
     parameters : dict
         How the map was built.
     """
 
     body: Surface
+    model: Model
     grid: Grid
     leaps: tuple[Leap, ...]
     error: MapError
+    growth: Growth | None = None
     parameters: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -116,17 +93,26 @@ class PhaseMap:
     @property
     def nbytes(self) -> int:
         """Memory of the splines, bytes."""
-        return sum(leap.state.nbytes + leap.jacobi.nbytes for leap in self.leaps)
+        return sum(leap.nbytes for leap in self.leaps)
+
+    @property
+    def rides(self) -> bool:
+        """Whether the Jacobi matrix rides along, as fans need it to."""
+        return self.leaps[-1].rides
 
     def __repr__(self) -> str:
-        nu, nv, na = self.grid.nodes
-        charts = len(self.leaps[-1].state)
-        return (
-            f"PhaseMap({self.body!r})\n"
-            f"  T0 = {self.horizon:g}, {charts} x {nu} x {nv} x {na} nodes, degree {self.grid.degree}, "
-            f"{self.nbytes / 1e6:.0f} MB\n"
-            f"  error of one g_T0: rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} samples)"
-        )
+        leap = self.leaps[-1]
+        grid = " x ".join(map(str, (len(leap.state), *self.grid.nodes)))
+        rows = [
+            f"PhaseMap({self.body!r})",
+            f"  T0 = {self.horizon:g}, {grid} nodes, degree {self.grid.degree}, {leap.state.dtype}, "
+            f"{self.nbytes / 1e6:.1f} MB",
+            f"  error of one g_T0: rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} samples)",
+        ]
+        if self.growth is not None:
+            pairs = zip(self.growth.lengths, self.growth.rms, strict=True)
+            rows.append("  rms after a length: " + ", ".join(f"{t:g}: {e:.1e}" for t, e in pairs))
+        return "\n".join(rows)
 
     def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Advance by one horizon.
@@ -159,34 +145,38 @@ class PhaseMap:
         """
         values, scalar = as_times(times)
         x, p = bundle_points(self.body, points, directions)
-        states = self.transport(pack(x, p), values).reshape(*x.shape[:-1], len(values), 6)
-        if scalar:
-            states = states[..., 0, :]
-        return states[..., :3].copy(), states[..., 3:].copy()
+        return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 6 or 10) to the ascending times (m,): (n, m, 6 or 10).
 
         Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c.
+
+        Raises
+        ------
+        InvalidInputError
+            If the states carry a Jacobi matrix and the map does not.
         """
-        states = np.array(states, dtype=float)
-        out = np.empty((len(states), len(times), states.shape[1]))
+        states = np.array(states, dtype=float, order="C")
+        times = np.asarray(times, dtype=float)
         # a time that misses a multiple of the horizon by rounding is that multiple
-        whole = np.floor(np.asarray(times) / self.horizon * (1 + 4e-16) + 1e-12).astype(int)
-        done = 0
-        for count in np.unique(whole):
-            states = self.leap(states, int(count) - done)
-            done = int(count)
-            mine = np.flatnonzero(whole == count)
-            rest = np.maximum(times[mine] - done * self.horizon, 0.0)
-            out[:, mine] = self._remainder(states, rest)
+        whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12).astype(np.int64)
+        rest = np.maximum(times - whole * self.horizon, 0.0)
+        rest[rest < 1e-12 * self.horizon] = 0.0
+        stops, place = np.unique(whole, return_inverse=True)
+        at = self._composed(states, self.leaps[-1], np.diff(stops, prepend=0))
+        if stops[0] == 0:
+            at[:, 0] = states
+        out = at[:, place]
+        for k in range(len(stops)):
+            mine = np.flatnonzero((place == k) & (rest > 0))
+            if len(mine):
+                out[:, mine] = self._remainder(at[:, k], rest[mine])
         return out
 
     def _remainder(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance by times below the horizon: down the tower, then by direct integration."""
         if len(self.leaps) == 1:
-            if not np.any(times > 0):
-                return np.repeat(states[:, None], len(times), axis=1)
             return trace_states(self.body, states, times, rtol=self._rtol, step=self.horizon / 4)
         out = np.empty((len(states), len(times), states.shape[1]))
         for m, left in enumerate(times):
@@ -209,48 +199,19 @@ class PhaseMap:
         """Compose one map (g_T0 by default) ``count`` times on states (n, 6 or 10)."""
         if count < 0:
             raise InvalidInputError(f"cannot compose a map {count} times")
-        level = level or self.leaps[-1]
         states = np.array(states, dtype=float, order="C")
-        compiled, locator = compiled_parts(self.body), getattr(self.body.atlas, "compiled", None)
-        if compiled is None or locator is None:
-            for _ in range(count):
-                states = self.leap_numpy(states, level)
+        if count == 0:
             return states
-        from creeping.phaseflow._kernels import leap
+        return self._composed(states, level or self.leaps[-1], np.array([count]))[:, 0]
 
-        off = PROJECTION * size(self.body)
-        tables = level.state, level.jacobi, self.grid.degree, self.grid.origin, self.grid.cells
-        leap(locator.function, locator.parameters, compiled[0], compiled[1], *tables, level.time, count, off, states)
-        return states
+    def _composed(self, states: FloatArray, level: Leap, counts: IntArray) -> FloatArray:
+        if states.shape[1] > 6 and not level.rides:
+            raise InvalidInputError("this map carries no Jacobi matrix; build it with ride_along=True")
+        return self.model.flow(self.grid, level, states, counts)
 
     def leap_numpy(self, states: FloatArray, level: Leap | None = None) -> FloatArray:
         """Apply one map once; the numpy twin of the compiled composition."""
-        level = level or self.leaps[-1]
-        x, p = states[:, :3], states[:, 3:6]
-        chart, grid = self.coordinates(x, p)
-        d = evaluate(level.state, chart, grid, self.grid.degree)
-        out = np.empty_like(states)
-        out[:, :3], out[:, 3:6] = project_bundle(self.body, x + level.time * p + d[:, :3], p + d[:, 3:6])
-        if states.shape[1] > 6:
-            m = evaluate(level.jacobi, chart, grid, self.grid.degree) + np.array([1.0, 0.0, level.time, 1.0])
-            for first in (6, 8):
-                i, j = states[:, first], states[:, first + 1]
-                out[:, first] = m[:, 0] * i + m[:, 2] * j
-                out[:, first + 1] = m[:, 1] * i + m[:, 3] * j
-        return out
-
-    def coordinates(self, points: FloatArray, directions: FloatArray) -> tuple[Any, FloatArray]:
-        """Charts (n,) and grid coordinates (n, 3) of points of T1Q."""
-        chart, uv = self.body.atlas.locate(points)
-        angle = np.empty(len(points))
-        for index, one in enumerate(self.body.atlas.charts):
-            mine = chart == index
-            frame = polar_frame(one.tangents(uv[mine]))
-            along = np.einsum("ni,nik->nk", directions[mine], frame)
-            angle[mine] = np.arctan2(along[:, 1], along[:, 0])
-        grid = np.concatenate([uv, angle[:, None] / (2 * np.pi) % 1.0], axis=1) * self.grid.cells
-        grid[:, :2] += self.grid.origin
-        return chart, grid
+        return self.model.leap_numpy(self.grid, level or self.leaps[-1], states)
 
     def save(self, folder: str | Path) -> Path:
         """Store the map in a new folder of .npy files with a manifest; `load_phase_map` opens it.
@@ -263,11 +224,15 @@ class PhaseMap:
         content = {
             "version": __version__,
             "body": fingerprint(self.body),
+            "model": self.model.name,
             "nodes": list(self.grid.nodes),
             "degree": self.grid.degree,
             "periodic": list(self.grid.periodic),
             "times": [leap.time for leap in self.leaps],
+            "centres": [leap.centre.tolist() for leap in self.leaps],
+            "matrices": [leap.matrix.tolist() for leap in self.leaps],
             "error": [self.error.rms, self.error.max, self.error.samples],
+            "growth": self.growth and [self.growth.lengths, self.growth.rms, self.growth.max],
             "parameters": self.parameters,
         }
         states = {f"state-{k}.npy": leap.state for k, leap in enumerate(self.leaps)}

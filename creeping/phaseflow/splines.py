@@ -28,7 +28,10 @@ def interpolation_operator(n: int, degree: int, periodic: bool) -> FloatArray:
         collocation = np.zeros((n, n))
     else:
         spline = make_interp_spline(np.arange(float(n)), np.eye(n), k=degree)
-        samples = np.linspace(0, n - 1, n + degree - 1)
+        # the nodes, and midpoints of the first and last cells: equally spaced samples would drift through the
+        # midpoints of inner cells, where splines of odd degree cannot tell an oscillation from zero
+        ends = np.arange((degree - 1) // 2) + 0.5
+        samples = np.sort(np.concatenate([np.arange(float(n)), ends, n - 1 - ends]))
         collocation = np.zeros((n + degree - 1, n + degree - 1))
     cell = np.minimum(np.floor(samples).astype(int), n - 1 if periodic else n - 2)
     weights = uniform_weights(samples - cell, degree)
@@ -54,6 +57,20 @@ def uniform_weights(t: FloatArray, degree: int) -> FloatArray:
             w[..., j] = ((t + d - j) * w[..., j - 1] + (j + 1 - t) * w[..., j]) / d
         w[..., 0] = (1 - t) * w[..., 0] / d
     return w
+
+
+@cache
+def thinning_operator(n: int, stride: int, degree: int, periodic: bool) -> FloatArray:
+    """Matrix from n values to those of the spline through every stride-th of them, at all n: (n, n/stride or so).
+
+    Without periodicity n - 1 is a multiple of the stride, else n.
+    """
+    kept = len(range(0, n, stride))
+    operator = interpolation_operator(kept, degree, periodic)
+    place = np.arange(n) / stride
+    cell = np.minimum(np.floor(place).astype(int), kept - 1 if periodic else kept - 2)
+    w = uniform_weights(place - cell, degree)
+    return np.asarray(sum(w[:, j, None] * operator[cell + j] for j in range(degree + 1)))
 
 
 def prefilter(values: FloatArray, degree: int, periodic: tuple[bool, bool]) -> FloatArray:

@@ -16,7 +16,7 @@ from creeping._errors import CreepingError, StoredMapError
 from creeping._typing import Any, FloatArray
 from creeping.surface import Surface
 
-SCHEMA = 1
+SCHEMA = 2
 MANIFEST = "manifest.json"
 _MAX_MANIFEST = 1_000_000
 
@@ -60,7 +60,7 @@ def write_folder(folder: str | Path, content: dict[str, Any], arrays: dict[str, 
             files = {}
             for name, array in arrays.items():
                 np.save(aside / name, array, allow_pickle=False)
-                files[name] = {"shape": list(array.shape), "blake2b": _digest(aside / name)}
+                files[name] = {"shape": list(array.shape), "type": str(array.dtype), "blake2b": _digest(aside / name)}
             signed = {"schema": SCHEMA, **content, "files": files}
             text = json.dumps({"content": signed, "blake2b": content_digest(signed)}, indent=1)
             (aside / MANIFEST).write_text(text)
@@ -108,9 +108,10 @@ def open_array(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
     """Map one array after checking size, digest, header and shape."""
     path, entry = folder / name, content["files"][name]
     shape = tuple(int(n) for n in entry["shape"])
+    kind = {"float32": np.float32, "float64": np.float64}[entry["type"]]
     try:
         # the header of a .npy file takes one or two blocks of 64 bytes; a longer file is not what was written
-        extra = path.stat().st_size - 8 * int(np.prod(shape, dtype=object))
+        extra = path.stat().st_size - np.dtype(kind).itemsize * int(np.prod(shape, dtype=object))
         if not 0 < extra <= 256:
             raise StoredMapError(f"{path} is truncated or too long; rebuild the map")
         if _digest(path) != entry["blake2b"]:
@@ -120,8 +121,8 @@ def open_array(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
         if isinstance(error, CreepingError):
             raise
         raise StoredMapError(f"{path} cannot be read ({error}); rebuild the map") from error
-    if array.shape != shape or array.dtype != np.float64 or not array.flags.c_contiguous:
-        raise StoredMapError(f"{path} holds {array.dtype} {array.shape}, not float64 {shape}; rebuild the map")
+    if array.shape != shape or array.dtype != kind or not array.flags.c_contiguous:
+        raise StoredMapError(f"{path} holds {array.dtype} {array.shape}, not {entry['type']} {shape}; rebuild the map")
     return array
 
 

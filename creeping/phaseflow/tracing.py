@@ -11,13 +11,31 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._errors import IntegrationError, InvalidInputError
-from creeping._typing import Any, ArrayLike, FloatArray
+from creeping._typing import Any, ArrayLike, FloatArray, IntArray
+from creeping.phaseflow._threads import in_threads
 from creeping.phaseflow.bundle import bundle_points, project_bundle
-from creeping.phaseflow.geodesic import metric_curvature, speed_of, vector_field
+from creeping.phaseflow.geodesic import metric_curvature, normal_curvature, speed_of, speed_values, vector_field
 from creeping.surface import Surface, size
 
 MAX_STEPS = 100_000
 """Steps between two outputs after which a block of rays is given up."""
+
+
+@dataclass(frozen=True)
+class MapError:
+    """Error of a flow against direct integration.
+
+    Attributes
+    ----------
+    rms, max : float
+        Of |(x, p) - (x, p)_traced|, the norm in R^6, over the samples.
+    samples : int
+        Random points of T1Q.
+    """
+
+    rms: float
+    max: float
+    samples: int
 
 
 class Tableau(NamedTuple):
@@ -27,6 +45,20 @@ class Tableau(NamedTuple):
     b: FloatArray
     e3: FloatArray
     e5: FloatArray
+
+    def packed(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """Nonzero weights row by row, for the compiled tracer: numbers of them, their places, themselves.
+
+        Rows are those of a, then b, e3 and e5.
+        """
+        stages = len(self.b)
+        rows = [*self.a, self.b, self.e3, self.e5]
+        terms = np.array([np.count_nonzero(row) for row in rows])
+        index, weights = np.zeros((len(rows), stages + 1), dtype=np.int64), np.zeros((len(rows), stages + 1))
+        for number, row in enumerate(rows):
+            places = np.flatnonzero(row)
+            index[number, : len(places)], weights[number, : len(places)] = places, row[places]
+        return terms, index, weights
 
 
 @cache
@@ -95,18 +127,23 @@ def trace(
         raise InvalidInputError(f"rtol = {rtol!r} is not between 1e-14 and 1e-2")
     values, scalar = as_times(times)
     x, p = bundle_points(body, points, directions)
-    states = trace_states(body, pack(x, p), values, rtol=rtol)
-    states = states.reshape(*x.shape[:-1], len(values), 6)
+    return unpack(trace_states(body, pack(x, p), values, rtol=rtol), x.shape, scalar)
+
+
+def unpack(states: FloatArray, shape: tuple[int, ...], scalar: bool) -> tuple[FloatArray, FloatArray]:
+    """Points and directions of states (n, m, 6), in the shape of the starting points; (..., 3) for a scalar time."""
+    states = states.reshape(*shape[:-1], states.shape[1], 6)
     if scalar:
         states = states[..., 0, :]
     return states[..., :3].copy(), states[..., 3:].copy()
 
 
-def pack(points: FloatArray, directions: FloatArray, *, jacobi: bool = False) -> FloatArray:
-    """States (n, 6), or (n, 10) with the identity as Jacobi matrix, from (..., 3) points and directions."""
+def pack(points: FloatArray, directions: FloatArray, *, jacobi: bool = False, attenuation: bool = False) -> FloatArray:
+    """States from (..., 3) points and directions: (n, 6), (n, 10) with the identity as Jacobi matrix, or (n, 11)."""
     states = np.concatenate([points.reshape(-1, 3), directions.reshape(-1, 3)], axis=1)
-    if jacobi:
-        states = np.concatenate([states, np.tile([1.0, 0.0, 0.0, 1.0], (len(states), 1))], axis=1)
+    if jacobi or attenuation:
+        riding = [1.0, 0.0, 0.0, 1.0, 0.0][: 5 if attenuation else 4]
+        states = np.concatenate([states, np.tile(riding, (len(states), 1))], axis=1)
     return states
 
 
@@ -119,10 +156,10 @@ def trace_states(
     step: float | None = None,
     tableau: Tableau | None = None,
 ) -> FloatArray:
-    """Trace states (n, 6 or 10) to the ascending times (m,): (n, m, 6 or 10).
+    """Trace states (n, 6, 10 or 11) to the ascending times (m,): (n, m, the same).
 
     ``rtol = 0`` takes equal steps of at most ``step``. Lanes 6 to 9 are the columns of the Jacobi matrix of
-    the metric ds/c; see `creeping.phaseflow._kernels`.
+    the metric ds/c, lane 10 the attenuation integral; see `creeping.phaseflow._integrator`.
 
     Raises
     ------
@@ -136,14 +173,20 @@ def trace_states(
     if compiled is None:
         out = trace_numpy(body, states, times, method, rtol=rtol, step=step)
     else:
-        from creeping.phaseflow._kernels import integrate
+        from creeping.phaseflow._integrator import integrate
 
         out = np.empty((len(states), len(times), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
         scale = _scale(body, states.shape[1])
-        integrate(
-            *compiled, states, np.asarray(times, dtype=float), *method, scale, float(rtol), float(step), MAX_STEPS, out
-        )
+        ends = np.asarray(times, dtype=float)
+        tableau_parts = method.packed()
+
+        def run(part: slice) -> None:
+            integrate(
+                *compiled, states[part], ends, *tableau_parts, scale, float(rtol), float(step), MAX_STEPS, out[part]
+            )
+
+        in_threads(run, len(states))
     failed = np.flatnonzero(~np.all(np.isfinite(out), axis=(1, 2)))
     if len(failed):
         raise IntegrationError(
@@ -166,9 +209,12 @@ def compiled_parts(body: Surface) -> tuple[Any, FloatArray, Any, FloatArray, boo
 
 
 def _scale(body: Surface, lanes: int) -> FloatArray:
-    """Magnitude below which a lane's error counts absolutely: lengths for x and M12, 1 for the others."""
+    """Magnitude below which a lane's error counts absolutely: lengths for x and M12, 1 for the others.
+
+    The attenuation does not steer the steps: where kappa_n passes 0 it has kinks, at which 64 rays would wait in turn.
+    """
     length = size(body)
-    return np.array([length] * 3 + [1.0] * 3 + [1.0, 1 / length, length, 1.0][: lanes - 6])
+    return np.array([length] * 3 + [1.0] * 3 + [1.0, 1 / length, length, 1.0, np.inf][: lanes - 6])
 
 
 def derivative_numpy(body: Surface, states: FloatArray) -> FloatArray:
@@ -179,6 +225,9 @@ def derivative_numpy(body: Surface, states: FloatArray) -> FloatArray:
         curvature = metric_curvature(body, states[:, :3])
         k[:, 6], k[:, 8] = states[:, 7], states[:, 9]
         k[:, 7], k[:, 9] = -curvature * states[:, 6], -curvature * states[:, 8]
+    if states.shape[1] > 10:
+        kappa = normal_curvature(body, states[:, :3], states[:, 3:6])
+        k[:, 10] = speed_values(body, states[:, :3]) * np.maximum(kappa, 0.0) ** (2 / 3)
     return k
 
 
@@ -244,19 +293,20 @@ class DirectFlow:
     ----------
     body : Surface
     rtol : float
-        Relative tolerance per step.
+        Relative tolerance per step; the step adapts to the worst of 64 rays.
     horizon : float
         Time of one `apply`, L.
+    step : float, optional, L
+        Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
+    error : MapError, optional
+        At the end of rays, if `choose_flow` has measured it.
     """
 
     body: Surface
     rtol: float = 1e-10
     horizon: float = 1.0
-
-    @property
-    def error(self) -> None:
-        """No measured error: this is the integrator that maps are measured against."""
-        return None
+    step: float | None = None
+    error: MapError | None = None
 
     def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Advance by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
@@ -264,8 +314,12 @@ class DirectFlow:
 
     def flow(self, points: ArrayLike, directions: ArrayLike, times: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Advance to times >= 0; same shapes as `trace`."""
-        return trace(self.body, points, directions, times, rtol=self.rtol)
+        values, scalar = as_times(times)
+        x, p = bundle_points(self.body, points, directions)
+        return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 6 or 10) to the ascending times (m,): (n, m, 6 or 10)."""
+        if self.step is not None:
+            return trace_states(self.body, states, times, rtol=0.0, step=self.step)
         return trace_states(self.body, states, times, rtol=self.rtol)

@@ -24,9 +24,8 @@ from creeping.phaseflow.geodesic import (
     speed_of,
     speed_values,
 )
-from creeping.phaseflow.phase_map import MapError
 from creeping.phaseflow.storing import fingerprint
-from creeping.phaseflow.tracing import pack, trace_states
+from creeping.phaseflow.tracing import MapError, pack, trace_states
 from creeping.rays.detachment import detachment_times
 from creeping.rays.launch_points import (
     Arc,

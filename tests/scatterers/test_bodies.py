@@ -2,12 +2,19 @@
 
 import numpy as np
 import pytest
+from numba import njit
 
 import creeping as cr
 import scatterers as sc
 from creeping.surface import Surface, polar_frame
+from scatterers._trigonometry import cos_pi, sin_pi
 
 COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+
+
+@njit
+def call(function, *arguments):
+    function(*arguments)
 
 
 def test_every_body_passes_its_check(body):
@@ -51,6 +58,52 @@ def test_compiled_locator_equals_numpy(body, rng):
         expected = polar_frame(chart.tangents(uv))
         np.testing.assert_allclose(frame[:3].T, expected[..., 0], atol=1e-13)
         np.testing.assert_allclose(frame[3:].T, expected[..., 1], atol=1e-13)
+
+
+def test_compiled_sphere_map_equals_numpy(body, rng):
+    if isinstance(body, sc.Torus):
+        pytest.skip("a torus is no image of the sphere")
+    sphere_map = body.atlas.sphere_map
+    s = rng.normal(size=(50, 3))
+    s /= np.linalg.norm(s, axis=-1, keepdims=True)
+    forward, inverse = sphere_map.compiled_forward, sphere_map.compiled_inverse
+    points, derivatives, back = np.empty((3, 50)), np.empty((9, 50)), np.empty((3, 50))
+    forward.source(np.ascontiguousarray(s.T), points, derivatives, forward.parameters)
+    np.testing.assert_allclose(points.T, sphere_map.forward(s), atol=1e-14)
+    np.testing.assert_allclose(derivatives.T.reshape(-1, 3, 3), sphere_map.derivative(s), atol=1e-14)
+    inverse.source(points, back, inverse.parameters)
+    np.testing.assert_allclose(back.T, s, atol=1e-14)
+
+
+@pytest.mark.parametrize("kind", ["level", "forward", "inverse", "locator"])
+def test_compiled_functions_equal_their_source(body, kind, rng):
+    if isinstance(body, sc.Torus) and kind in ("forward", "inverse"):
+        pytest.skip("a torus is no image of the sphere")
+    # 37 leaves a remainder for every width of vector
+    points = np.ascontiguousarray(body.atlas.charts[0].point(rng.uniform(0.1, 0.9, (37, 2))).T)
+    rows = {"level": (0, 3, 6), "forward": (3, 9), "inverse": (3,), "locator": (-1, 2, 6)}[kind]
+    compiled = {
+        "level": lambda: body.compiled,
+        "locator": lambda: body.atlas.compiled,
+        "forward": lambda: body.atlas.sphere_map.compiled_forward,
+        "inverse": lambda: body.atlas.sphere_map.compiled_inverse,
+    }[kind]()
+
+    def outputs():
+        return [np.empty((r, 37)) if r > 0 else np.empty(37, np.int64 if r else float) for r in rows]
+
+    fast, plain = outputs(), outputs()
+    call(compiled.function, points, *fast, compiled.parameters)
+    compiled.source(points, *plain, compiled.parameters)
+    for a, b in zip(fast, plain, strict=True):
+        np.testing.assert_allclose(a, b, atol=2e-14)
+
+
+def test_polynomial_cosine_and_sine(rng):
+    z = np.concatenate([rng.uniform(-3, 3, 2000), np.arange(-6, 7) / 2])
+    np.testing.assert_allclose([cos_pi(v) for v in z], np.cos(np.pi * z), atol=2e-15)
+    np.testing.assert_allclose([sin_pi(v) for v in z], np.sin(np.pi * z), atol=2e-15)
+    assert cos_pi(0.5) == pytest.approx(0, abs=2e-16)
 
 
 def test_polar_frame_is_the_nearest_orthonormal_frame(rng):

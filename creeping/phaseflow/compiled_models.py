@@ -1,0 +1,212 @@
+"""Maps stored as displacements of rotations or of angles: what their kernels need, and the plain numpy twins.
+
+Formulas are those of `_rotations` and `_angles`.
+"""
+
+import numpy as np
+
+from creeping._errors import ToleranceError
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.phaseflow._threads import in_threads
+from creeping.phaseflow.ambient import carry_jacobi
+from creeping.phaseflow.grids import Grid, Leap
+from creeping.phaseflow.quaternions import quaternion_product, quaternions
+from creeping.phaseflow.splines import evaluate
+from creeping.surface import Surface, polar_frame
+
+REACH = float(np.sqrt(2) - 1)
+"""Stereographic coordinate of a chart's edge; see `_rotations`."""
+SUREST = 0.3
+"""Least cosine between successive displacements of a rotation that leaves no doubt about its sign."""
+
+
+class CompiledModel:
+    """What rotations and angles share: four lanes, composed by `_composition`."""
+
+    name: str
+    lanes = 4
+    kind: int
+    charts: int
+
+    def __init__(self, body: Surface) -> None:
+        self.body = body
+        atlas: Any = body.atlas
+        source = getattr(atlas, "sphere_map", atlas)
+        there, back = source.compiled_forward, source.compiled_inverse
+        self._there = there.function, there.parameters
+        self._back = back.function, back.parameters
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """Scale and shift from the coordinates of ``locate`` to those of the grid."""
+        raise NotImplementedError
+
+    def states(self, coordinates: FloatArray) -> FloatArray:
+        """See `Model`."""
+        from creeping.phaseflow._composition import to_body
+
+        out = np.empty((len(coordinates), 6))
+        to_body(self.kind, *self._there, coordinates, out)
+        return out
+
+    def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
+        """See `Model`.
+
+        Raises
+        ------
+        ToleranceError
+            If the states are too far apart in time to follow.
+        """
+        from creeping.phaseflow._composition import displacements
+
+        out = np.empty((len(nodes), 4))
+        surest = displacements(self.kind, *self._there, *self._back, nodes, traced, out)
+        if not surest >= SUREST:
+            raise ToleranceError(
+                f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {surest:.2f}); "
+                "give a shorter horizon"
+            )
+        return out
+
+    def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
+        """See `Model`."""
+        from creeping.phaseflow._composition import flow
+
+        out = np.empty((len(states), len(counts), states.shape[1]))
+        states = np.ascontiguousarray(states, dtype=float)
+        counts = np.asarray(counts, dtype=np.int64)
+        tables = leap.state, leap.centre, leap.jacobi, leap.matrix, grid.degree, *self.placement(grid)
+
+        def run(part: slice) -> None:
+            flow(self.kind, *self._there, *self._back, *tables, states[part], counts, out[part])
+
+        in_threads(run, len(states))
+        return out
+
+    def doubled(self, grid: Grid, leap: Leap, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Displacement (n, 4) and Jacobi matrix (n, 4; empty without ride-along) of two leaps from the nodes."""
+        from creeping.phaseflow._composition import double
+
+        out = np.empty((len(nodes), 4))
+        matrices = np.empty((len(nodes) if leap.rides else 0, 4))
+        tables = leap.state, leap.centre, leap.jacobi, leap.matrix, grid.degree, *self.placement(grid)
+
+        def run(part: slice) -> None:
+            double(self.kind, *tables, nodes[part], out[part], matrices[part] if leap.rides else matrices)
+
+        in_threads(run, len(nodes))
+        return out, matrices
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        raise NotImplementedError
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        raise NotImplementedError
+
+    def leap_numpy(self, grid: Grid, leap: Leap, states: FloatArray) -> FloatArray:
+        """See `Model`."""
+        inner, chart, located = self._locate_numpy(states)
+        scale, shift = self.placement(grid)
+        place = shift + scale * located
+        d = evaluate(leap.state, chart, place, grid.degree) + leap.centre
+        out = np.empty_like(states)
+        out[:, :3], out[:, 3:6] = self._move_numpy(inner, d)
+        carry_jacobi(grid, leap, chart, place, states, out)
+        return out
+
+
+class RotationModel(CompiledModel):
+    """Rotations [s, q, s x q]; six stereographic charts."""
+
+    name = "rotation"
+    kind = 0
+    charts = 6
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """See `CompiledModel`."""
+        half = 0.5 * grid.cells[:2]
+        return np.array([*half, grid.cells[2]]), np.array([*(grid.origin + half), 0.0])
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`."""
+        # [s, q, s x q] is the chart's own rotation, times that of (u, v) at angle 0, times a turn about s
+        u, v = (REACH * (2 * np.asarray(value) - 1) for value in (u, v))
+        across = 1 + u * u + v * v
+        s = np.stack([(2 - across) / across, 2 * u / across, 2 * v / across], axis=1)
+        q = np.stack([-s[:, 1], 1 - u * s[:, 1], -v * s[:, 1]], axis=1)
+        half = 0.5 * np.asarray(angle)
+        zero = np.zeros_like(half)
+        spin = np.stack([np.cos(half), np.sin(half), zero, zero], axis=1)
+        order = [(k - chart // 2) % 3 for k in range(3)]
+        sign = -1.0 if chart % 2 else 1.0
+        own = np.diag([sign, sign, 1.0])[order]
+        first = quaternions(own[None, :, 0], own[None, :, 1])
+        return quaternion_product(quaternion_product(first, quaternions(s, q)), spin)
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        source: Any = getattr(self.body.atlas, "sphere_map", None)
+        s = source.inverse(states[:, :3])
+        s = s / np.linalg.norm(s, axis=1, keepdims=True)
+        basis = _across(s)
+        frame = polar_frame(source.derivative(s) @ basis)
+        q = np.einsum("nik,nk->ni", basis, np.einsum("nik,ni->nk", frame, states[:, 3:6]))
+        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        axis = np.argmax(np.abs(s), axis=1)
+        order = (axis[:, None] + np.arange(3)) % 3
+        s_abc, q_abc = np.take_along_axis(s, order, 1), np.take_along_axis(q, order, 1)
+        sign = np.where(s_abc[:, 0] < 0, -1.0, 1.0)
+        s_abc[:, :2] *= sign[:, None]
+        q_abc[:, :2] *= sign[:, None]
+        uv = s_abc[:, 1:] / (1 + s_abc[:, :1])
+        along = q_abc[:, 1:] - uv * q_abc[:, :1]
+        angle = np.arctan2(along[:, 1], along[:, 0]) / (2 * np.pi) % 1.0
+        located = np.concatenate([uv / REACH, angle[:, None]], axis=1)
+        return quaternions(s, q), 2 * axis + (sign < 0), located
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        source: Any = getattr(self.body.atlas, "sphere_map", None)
+        r = quaternion_product(inner, d)
+        r /= np.linalg.norm(r, axis=1, keepdims=True)
+        w, x, y, z = r.T
+        s = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
+        q = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1)
+        basis = np.stack([q, np.cross(s, q)], axis=-1)
+        return source.forward(s), polar_frame(source.derivative(s) @ basis)[..., 0]
+
+
+class AngleModel(CompiledModel):
+    """(u, v, angle) in turns on one doubly periodic chart."""
+
+    name = "angles"
+    kind = 1
+    charts = 1
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """See `CompiledModel`."""
+        return grid.cells, np.zeros(3)
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`."""
+        return np.stack([u, v, angle / (2 * np.pi), np.zeros_like(u)], axis=1)
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        chart, uv = self.body.atlas.locate(states[:, :3])
+        frame = polar_frame(self.body.atlas.charts[0].tangents(uv))
+        along = np.einsum("nik,ni->nk", frame, states[:, 3:6])
+        angle = np.arctan2(along[:, 1], along[:, 0]) / (2 * np.pi) % 1.0
+        located = np.concatenate([uv, angle[:, None]], axis=1)
+        return located, chart, located
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        chart = self.body.atlas.charts[0]
+        moved = inner + d[:, :3]
+        frame = polar_frame(chart.tangents(moved[:, :2]))
+        angle = 2 * np.pi * moved[:, 2:]
+        return chart.point(moved[:, :2]), np.cos(angle) * frame[..., 0] + np.sin(angle) * frame[..., 1]
+
+
+def _across(s: FloatArray) -> FloatArray:
+    """Orthonormal basis of the planes across unit vectors: (n, 3) -> (n, 3, 2)."""
+    other = np.eye(3)[np.argmin(np.abs(s), axis=1)]
+    first = np.cross(other, s)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(s, first)], axis=-1)

@@ -1,0 +1,82 @@
+"""Coordinates of the bundle in which a map is stored and composed.
+
+A model says where a ray lies on the grid, what displacement is stored there, and how a displacement moves a ray:
+
+    AmbientModel    (x, p) itself; any atlas. Stored: x' - x - t p and p' - p. Each leap ends back on T1Q.
+    RotationModel   x = psi(s), s on the unit sphere: the rotation R = [s, q, s x q]. Stored: the quaternion of R^-1 R'.
+    AngleModel      one doubly periodic chart: (u, v, angle) in turns. Stored: their differences.
+
+The last two stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
+"""
+
+from typing import Protocol
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.phaseflow.ambient import AmbientModel
+from creeping.phaseflow.compiled_models import AngleModel, RotationModel
+from creeping.phaseflow.grids import Grid, Leap
+from creeping.phaseflow.tracing import compiled_parts
+from creeping.surface import Surface
+
+
+class Model(Protocol):
+    """What a map needs of its coordinates; see the module head."""
+
+    @property
+    def name(self) -> str:
+        """What stored maps call it."""
+        ...
+
+    @property
+    def lanes(self) -> int:
+        """Numbers stored for a displacement."""
+        ...
+
+    @property
+    def charts(self) -> int:
+        """Charts of the grid."""
+        ...
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """Coordinates of points of a chart, u and v in [0, 1] on its square, angle in radians: (n,) x 3 -> (n, k)."""
+        ...
+
+    def states(self, coordinates: FloatArray) -> FloatArray:
+        """Points and directions: (n, k) -> (n, 6)."""
+        ...
+
+    def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
+        """Stored quantity of the last of the traced states (n, m, 6 or more), followed to it: (n, lanes)."""
+        ...
+
+    def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
+        """Compose counts[0], then counts[1], ... maps on states (n, 6 or 10): (n, m, the same)."""
+        ...
+
+    def leap_numpy(self, grid: Grid, leap: Leap, states: FloatArray) -> FloatArray:
+        """One map on states (n, 6 or 10), by numpy alone."""
+        ...
+
+
+def nodes_of(model: Model, grid: Grid) -> FloatArray:
+    """Coordinates of the nodes of all charts: (charts nu nv na, k)."""
+    shape = [values.ravel() for values in np.meshgrid(*grid.axes(), indexing="ij")]
+    return np.concatenate([model.at(chart, *shape) for chart in range(model.charts)])
+
+
+def model_of(body: Surface, name: str | None = None) -> Model:
+    """Model of a body: the one named, or the fastest it allows."""
+    atlas: Any = body.atlas
+    sphere_map = getattr(atlas, "sphere_map", None)
+    if name in (None, "rotation", "angles") and compiled_parts(body) is not None:
+        if hasattr(sphere_map, "compiled_forward") and name != "angles":
+            return RotationModel(body)
+        if (
+            getattr(atlas, "compiled_forward", None) is not None
+            and all(atlas.charts[0].periodic)
+            and name != "rotation"
+        ):
+            return AngleModel(body)
+    return AmbientModel(body)

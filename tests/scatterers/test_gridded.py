@@ -1,0 +1,235 @@
+"""The body given by samples: its spline, its sphere map, their compiled twins, and bad input."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numba import njit
+
+import creeping as cr
+import scatterers as sc
+from creeping.surface import normal, polar_frame
+from scatterers._tensor_spline import TensorSpline, coefficients, interpolation_operator, weights
+
+COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+PARENT = sc.TwistedEllipsoid()
+
+
+@njit
+def call(function, *arguments):
+    function(*arguments)
+
+
+@cache
+def gridded(nodes):
+    return sc.Gridded.sampled(PARENT, nodes)
+
+
+def directions(rng, n):
+    s = rng.normal(size=(n, 3))
+    return s / np.linalg.norm(s, axis=-1, keepdims=True)
+
+
+def evaluate(compiled, points):
+    n = len(points)
+    values, gradients, hessians = np.empty(n), np.empty((3, n)), np.empty((6, n))
+    call(compiled.function, np.ascontiguousarray(points.T), values, gradients, hessians, compiled.parameters)
+    return values, gradients.T, hessians.T
+
+
+@pytest.mark.parametrize("n", [8, 13, 64, 200])
+def test_interpolation_is_scipys_and_stays_well_conditioned(n):
+    from scipy.interpolate import make_interp_spline
+
+    nodes, t = np.arange(float(n)), np.linspace(0, n - 1, 333)
+    cell = np.minimum(t.astype(int), n - 2)
+    c = interpolation_operator(n) @ np.cos(nodes)
+    found = np.sum(weights(t - cell, 0)[..., 0] * c[cell[:, None] + np.arange(6)], axis=-1)
+    np.testing.assert_allclose(found, make_interp_spline(nodes, np.cos(nodes), k=5)(t), atol=1e-13)
+
+
+def test_spline_reproduces_quintics(rng):
+    origin, spacing, shape = np.array([-1.0, 0.5, 2.0]), np.array([0.2, 0.1, 0.15]), (9, 12, 10)
+    nodes = np.moveaxis(np.indices(shape), 0, -1) * spacing + origin
+    p, q, r = (np.polynomial.Polynomial(rng.normal(size=6)) for _ in range(3))
+    x, y, z = np.moveaxis(nodes, -1, 0)
+    spline = TensorSpline(coefficients(p(x) * q(y) * r(z)), origin, spacing)
+    points = origin + rng.uniform(0, 1, (300, 3)) * (np.array(shape) - 1) * spacing
+    x, y, z = points.T
+    dp, dq, dr = p.deriv(), q.deriv(), r.deriv()
+    scale = np.max(np.abs(p(x) * q(y) * r(z)))
+    np.testing.assert_allclose(spline.value(points), p(x) * q(y) * r(z), atol=1e-12 * scale)
+    gradient = np.stack([dp(x) * q(y) * r(z), p(x) * dq(y) * r(z), p(x) * q(y) * dr(z)], axis=-1)
+    np.testing.assert_allclose(spline.gradient(points), gradient, atol=1e-12 * np.max(np.abs(gradient)))
+    h = spline.hessian(points)
+    expected = [dp.deriv()(x) * q(y) * r(z), p(x) * dq.deriv()(y) * r(z), p(x) * q(y) * dr.deriv()(z)]
+    expected += [p(x) * dq(y) * dr(z), dp(x) * q(y) * dr(z), dp(x) * dq(y) * r(z)]
+    for (i, j), e in zip(COLUMNS, expected, strict=True):
+        np.testing.assert_allclose(h[:, i, j], e, atol=1e-11 * np.max(np.abs(expected)))
+        np.testing.assert_array_equal(h[:, i, j], h[:, j, i])
+    values, gradients, hessians = evaluate(spline.compiled, points)
+    np.testing.assert_allclose(values, spline.value(points), atol=1e-13 * scale)
+    np.testing.assert_allclose(gradients, spline.gradient(points), atol=1e-13 * np.max(np.abs(gradient)))
+    np.testing.assert_allclose(hessians.T, [h[:, i, j] for i, j in COLUMNS], atol=1e-12 * np.max(np.abs(h)))
+
+
+def test_sampled_body_agrees_with_its_parent(rng):
+    points = PARENT.forward(directions(rng, 2000))
+    body = gridded(64)
+    np.testing.assert_allclose(body.level(points), 0, atol=1e-8)
+    np.testing.assert_allclose(normal(body, points), normal(PARENT, points), atol=1e-7)
+    np.testing.assert_allclose(body.gradient(points), PARENT.gradient(points), atol=1e-6)
+    np.testing.assert_allclose(body.hessian(points), PARENT.hessian(points), atol=1e-4)
+
+
+def test_sampled_body_converges_with_order_six(rng):
+    # away from the tips, where the ends of the grid lift the error
+    points = PARENT.forward(directions(rng, 2000))
+    points = points[np.abs(points[:, 2]) < 0.5]
+    coarse, fine = (np.max(np.abs(gridded(n).level(points))) for n in (24, 48))
+    assert 5.5 < np.log(coarse / fine) / np.log(47 / 23) < 7.5
+
+
+def test_check_passes():
+    report = cr.check_surface(gridded(32))
+    assert report.ok, report
+    assert report.genus == 0
+    assert report.area == pytest.approx(cr.check_surface(PARENT).area, rel=2e-3)
+
+
+def test_compiled_level_equals_numpy(rng):
+    body = gridded(32)
+    points = PARENT.forward(directions(rng, 100)) + rng.normal(size=(100, 3)) * 0.05
+    values, gradients, hessians = evaluate(body.compiled, points)
+    np.testing.assert_allclose(values, body.level(points), atol=1e-13)
+    np.testing.assert_allclose(gradients, body.gradient(points), atol=1e-12)
+    expected = np.stack([body.hessian(points)[:, i, j] for i, j in COLUMNS], axis=-1)
+    np.testing.assert_allclose(hessians, expected, atol=1e-11)
+
+
+def test_sphere_map_and_its_compiled_twins(rng):
+    body = gridded(32)
+    sphere_map, s = body.atlas.sphere_map, directions(rng, 200)
+    points = sphere_map.forward(s)
+    np.testing.assert_allclose(body.level(points), 0, atol=1e-13)
+    np.testing.assert_allclose(sphere_map.inverse(points), s, atol=1e-14)
+    derivative = sphere_map.derivative(s)
+    # along the sphere only: psi is given there
+    for _ in range(2):
+        t = np.cross(s, directions(rng, 200))
+        ahead, back = s + 1e-6 * t, s - 1e-6 * t
+        ahead, back = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (ahead, back))
+        difference = (sphere_map.forward(ahead) - sphere_map.forward(back)) / 2e-6
+        np.testing.assert_allclose((derivative @ t[..., None])[..., 0], difference, atol=1e-8)
+
+    forward, inverse = sphere_map.compiled_forward, sphere_map.compiled_inverse
+    assert (forward.kind, inverse.kind) == ("forward", "inverse")
+    x, d, back = np.empty((3, 200)), np.empty((9, 200)), np.empty((3, 200))
+    call(forward.function, np.ascontiguousarray(s.T), x, d, forward.parameters)
+    np.testing.assert_allclose(x.T, points, atol=1e-14)
+    np.testing.assert_allclose(d.T.reshape(-1, 3, 3), derivative, atol=1e-13)
+    call(inverse.function, x, back, inverse.parameters)
+    np.testing.assert_allclose(back.T, s, atol=1e-14)
+
+
+def test_compiled_locator_equals_numpy(rng):
+    body = gridded(32)
+    locator = body.atlas.compiled
+    for number, chart in enumerate(body.atlas.charts):
+        uv = rng.uniform(0.001, 0.999, (40, 2))
+        points = chart.point(uv)
+        found, found_uv, frame = np.empty(40, np.int64), np.empty((2, 40)), np.empty((6, 40))
+        call(locator.function, np.ascontiguousarray(points.T), found, found_uv, frame, locator.parameters)
+        assert np.all(found == number)
+        np.testing.assert_allclose(found_uv.T, uv, atol=1e-13)
+        expected = polar_frame(chart.tangents(uv))
+        np.testing.assert_allclose(frame.reshape(2, 3, 40), np.moveaxis(expected, 0, -1).swapaxes(0, 1), atol=1e-12)
+
+
+def test_points_off_the_grid_stay_bounded_and_nan_stays_nan():
+    body = gridded(32)
+    far = np.array([[1e300, 0, 0], [-np.inf, np.inf, 0], [0, 0, 50.0], [0.58, 0.9, -1.2]])
+    values, gradients, hessians = evaluate(body.compiled, far)
+    assert np.all(np.isfinite(values)) and np.all(np.isfinite(gradients)) and np.all(np.isfinite(hessians))
+    np.testing.assert_allclose(values, body.level(far), rtol=1e-9)
+    np.testing.assert_allclose(gradients, body.gradient(far), rtol=1e-9, atol=1e-9)
+    nowhere = np.array([[np.nan, 0, 0], [0, np.nan, 0], [0, 0, np.nan], [np.nan, np.nan, np.nan]])
+    values, gradients, _ = evaluate(body.compiled, nowhere)
+    assert np.all(np.isnan(values)) and np.all(np.isnan(body.level(nowhere)))
+    forward = body.atlas.sphere_map.compiled_forward
+    x, d = np.empty((3, 4)), np.empty((9, 4))
+    call(forward.function, np.ascontiguousarray(nowhere.T), x, d, forward.parameters)
+    assert np.all(np.isnan(x).any(axis=0)) and np.all(np.isnan(body.atlas.sphere_map.forward(nowhere)).any(axis=-1))
+
+
+def test_bounds_contain_the_body_and_parameters_are_angles(rng):
+    body = gridded(24)
+    points = body.atlas.sphere_map.forward(directions(rng, 5000))
+    assert np.all(points > body.bounds[0]) and np.all(points < body.bounds[1])
+    theta, phi = np.moveaxis(body.parameters(points), -1, 0)
+    s = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    np.testing.assert_allclose(body.atlas.sphere_map.forward(s), points, atol=1e-12)
+
+
+def test_speed_and_fingerprint():
+    body = sc.Gridded.sampled(sc.Sphere(speed="2 + x"), 12)
+    assert body.speed.value(np.zeros((1, 3))) == 2.0
+    prints = {
+        body.fingerprint,
+        sc.Gridded.sampled(sc.Sphere(), 12).fingerprint,
+        sc.Gridded.sampled(sc.Sphere(), 13).fingerprint,
+        sc.Gridded.sampled(sc.Sphere(), 12, 0.2).fingerprint,
+        sc.Gridded.sampled(sc.Sphere(), 12, centre=(0.1, 0, 0)).fingerprint,
+    }
+    assert len(prints) == 5
+    assert body.fingerprint == sc.Gridded.sampled(sc.Sphere(speed="2 + x"), 12).fingerprint
+
+    class Unnamed:
+        def value(self, points):
+            return np.ones(points.shape[:-1])
+
+        def gradient(self, points):
+            return np.zeros(points.shape)
+
+    assert sc.Gridded.sampled(sc.Sphere(speed=Unnamed()), 12).fingerprint is None
+
+
+def samples(shape=(10, 10, 10)):
+    x, y, z = np.meshgrid(*(np.linspace(-1.5, 1.5, n) for n in shape), indexing="ij")
+    return x**2 + y**2 + z**2 - 1
+
+
+BOX = [[-1.5] * 3, [1.5] * 3]
+
+
+def spoilt(value):
+    f = samples()
+    f[3, 4, 5] = value
+    return f
+
+
+@pytest.mark.parametrize(
+    "make, message",
+    [
+        (lambda: sc.Gridded(samples()[0], BOX), "shape"),
+        (lambda: sc.Gridded(samples((7, 10, 10)), BOX), "at least 8"),
+        (lambda: sc.Gridded("none", BOX), "not numbers"),
+        (lambda: sc.Gridded(spoilt(np.nan), BOX), "1 of 1000 samples are not finite"),
+        (lambda: sc.Gridded(samples() + 5, BOX), "none of 1000"),
+        (lambda: sc.Gridded(-samples(), BOX), "faces"),
+        (lambda: sc.Gridded(samples() - 2, BOX), "widen the box"),
+        (lambda: sc.Gridded(samples(), BOX[::-1]), "no box"),
+        (lambda: sc.Gridded(samples(), [[0, 0, 0]]), "bounds"),
+        (lambda: sc.Gridded(samples(), BOX, centre=(0, 0)), "centre"),
+        (lambda: sc.Gridded(samples(), BOX, centre=(2, 0, 0)), "not inside"),
+        (lambda: sc.Gridded.sampled(sc.Torus(), 24), "not inside"),
+        (lambda: sc.Gridded.sampled(sc.Torus(), 24, centre=(1, 0, 0)), "not star-shaped"),
+        (lambda: sc.Gridded.sampled(sc.Sphere(), 4), "nodes = 4"),
+        (lambda: sc.Gridded.sampled(sc.Sphere(), (9, 9)), "nodes"),
+        (lambda: sc.Gridded.sampled(sc.Sphere(), 12, -0.1), "margin"),
+        (lambda: sc.Gridded.sampled(sc.Sphere(), 12, float("nan")), "margin"),
+    ],
+)
+def test_bad_input_is_named(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()

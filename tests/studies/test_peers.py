@@ -1,0 +1,88 @@
+"""The peers solve the problem that the engine solves: their times would mean nothing otherwise."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import scatterers as sc
+from creeping.phaseflow.bundle import random_bundle_points
+from creeping.phaseflow.geodesic import normal_curvature
+from creeping.phaseflow.tracing import pack, trace_states
+from studies._peers import HeyokaFlow, heyoka_at_error, measured, scipy_flow
+
+BODIES = {"triaxial": sc.Ellipsoid(1.0, 0.8, 0.6), "torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}
+TIMES = np.array([0.0, 0.7, 2.0])
+RAYS = 9
+"""One more than a batch, so that the last batch is filled up."""
+
+
+@cache
+def traced(name):
+    """States at 0, the flow with J and J' in lanes 6 and 7, and A at the last time."""
+    body = BODIES[name]
+    states = pack(*random_bundle_points(body, RAYS, rng=np.random.default_rng(0)), jacobi=True)
+    fine = np.linspace(0, TIMES[-1], 8001)
+    rays = trace_states(body, states, fine, rtol=1e-12)
+    decay = np.maximum(normal_curvature(body, rays[..., :3], rays[..., 3:6]), 0) ** (2 / 3)
+    return states, trace_states(body, states, TIMES, rtol=1e-12), np.trapezoid(decay, fine, axis=1)
+
+
+@pytest.mark.parametrize("riding", [False, True])
+@pytest.mark.parametrize("name", BODIES)
+def test_scipy_agrees(name, riding):
+    states, exact, decay = traced(name)
+    found = scipy_flow(BODIES[name], states, TIMES, rtol=1e-9, riding=riding)
+    assert found.shape == (RAYS, 3, 9 if riding else 6)
+    lanes = 8 if riding else 6
+    np.testing.assert_allclose(found[..., :lanes], exact[..., :lanes], atol=2e-7)
+    if riding:
+        # error estimates of order 8 see the kink of max(kappa_n, 0)^(2/3) poorly
+        np.testing.assert_allclose(found[:, -1, 8], decay, atol=1e-7 if name == "triaxial" else 1e-4)
+    last = scipy_flow(BODIES[name], states, TIMES[-1:], rtol=1e-9, riding=riding)
+    np.testing.assert_allclose(last[:, 0, :lanes], exact[:, -1, :lanes], atol=2e-7)
+
+
+@pytest.mark.parametrize("riding", [False, True])
+@pytest.mark.parametrize("name", BODIES)
+def test_heyoka_agrees(name, riding):
+    pytest.importorskip("heyoka", exc_type=ImportError)
+    states, exact, decay = traced(name)
+    peer = HeyokaFlow(BODIES[name], tolerance=1e-14, riding=riding)
+    assert peer.lanes == (6 if not riding else 9 if name == "triaxial" else 8)
+    lanes = min(peer.lanes, 8)
+    for outputs in (slice(None), slice(1, None), slice(2, None)):
+        found = peer.flow(states, TIMES[outputs])
+        assert found.shape == (RAYS, len(TIMES[outputs]), peer.lanes)
+        np.testing.assert_allclose(found[..., :lanes], exact[:, outputs, :lanes], atol=1e-9)
+        if peer.lanes == 9:
+            np.testing.assert_allclose(found[:, -1, 8], decay, atol=1e-7)
+
+
+def test_heyoka_meets_an_error_and_no_more():
+    pytest.importorskip("heyoka", exc_type=ImportError)
+    states, exact, _ = traced("twisted")
+    peer = heyoka_at_error(BODIES["twisted"], states, TIMES, exact, 1e-6, False)
+
+    def rms(flow):
+        gap = flow.flow(states, TIMES)[:, -1] - exact[:, -1, :6]
+        return np.sqrt(np.mean(np.sum(gap**2, axis=1)))
+
+    looser = HeyokaFlow(BODIES["twisted"], tolerance=peer.tolerance * np.exp(2), riding=False)
+    assert looser.order == peer.order - 1
+    assert rms(peer) <= 1e-6 < rms(looser)
+    with pytest.raises(ValueError, match="no order"):
+        heyoka_at_error(BODIES["twisted"], states, TIMES, exact, 1e-20, False)
+
+
+def test_peers_refuse_what_they_have_no_equations_for():
+    states = np.zeros((1, 6))
+    for body in (sc.Sphere(), sc.Ellipsoid(1.2, 0.8, 0.8, speed="1 + x / 4")):
+        with pytest.raises(TypeError, match=r"closed form|plain flow"):
+            scipy_flow(body, states, TIMES, rtol=1e-6)
+
+
+def test_measured_warms_up():
+    calls = []
+    assert measured(lambda: calls.append(1), 3) >= 0
+    assert len(calls) == 4
