@@ -10,7 +10,7 @@ from creeping._version import __version__
 
 _HOMES = {
     "CreepingError": "creeping._errors",
-    "DirectFlow": "creeping.phaseflow.tracing",
+    "DirectFlow": "creeping.phaseflow.direct",
     "FarField": "creeping.field.far",
     "Impedance": "creeping.field.coefficients",
     "IsoPhaseCurve": "creeping.rays.isophase",
@@ -67,9 +67,10 @@ if TYPE_CHECKING:
     from creeping.field.on_surface import surface_field
     from creeping.phaseflow.caching import load_phase_map
     from creeping.phaseflow.choosing import choose_flow
+    from creeping.phaseflow.direct import DirectFlow
     from creeping.phaseflow.phase_map import Growth, PhaseMap
     from creeping.phaseflow.request import build_phase_map
-    from creeping.phaseflow.tracing import DirectFlow, MapError, trace
+    from creeping.phaseflow.tracing import MapError, trace
     from creeping.rays.fan import RayFan, RayStatus, launch
     from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
     from creeping.rays.shadow import ShadowLine, shadow_line

@@ -4,16 +4,17 @@ Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`_rotations`)
 is a table of their displacement; a ray enters the model once, is composed there, and leaves it for an output.
 """
 
-import math
-
 import numpy as np
 from numba import njit
 
 from creeping.phaseflow import _angles, _rotations
+from creeping.phaseflow._attenuation import extend
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 from creeping.phaseflow._stencils import cells_and_fractions, interpolate, weights
 
 ROTATION, ANGLES = 0, 1
+SAMPLES = 15
+"""Rows of work space that `extend` needs."""
 
 _enter_rotation, _enter_angles = _rotations.enter, _angles.enter
 _leave_rotation, _leave_angles = _rotations.leave, _angles.leave
@@ -22,7 +23,17 @@ _move_rotation, _move_angles = _rotations.move, _angles.move
 
 
 @njit(**options)
-def _enter(kind, there, there_par, back, back_par, x, p, work, r):
+def move(kind, r, d, centre):
+    """Move coordinates r (4, BLOCK) by displacements d (BLOCK, 4), both flat."""
+    if kind == ROTATION:
+        _move_rotation(r, d, centre)
+    else:
+        _move_angles(r, d, centre)
+
+
+@njit(**options)
+def enter(kind, there, there_par, back, back_par, x, p, work, r):
+    """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
     if kind == ROTATION:
         _enter_rotation(there, there_par, back, back_par, x, p, work, r)
     else:
@@ -30,7 +41,8 @@ def _enter(kind, there, there_par, back, back_par, x, p, work, r):
 
 
 @njit(**options)
-def _leave(kind, there, there_par, r, work, x, p):
+def leave(kind, there, there_par, r, work, x, p):
+    """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
     if kind == ROTATION:
         _leave_rotation(there, there_par, r, work, x, p)
     else:
@@ -38,8 +50,8 @@ def _leave(kind, there, there_par, r, work, x, p):
 
 
 @njit(**options)
-def _stencils(kind, r, work, table, degree, scale, shift, uva, w, place, cell):
-    """Number of the first coefficient and weights of a block's stencils.
+def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
+    """Number of the first coefficient of a block's stencils and, in uva (3, BLOCK), the fractions of their cells.
 
     Grid coordinates are shift + scale times the coordinates of `locate`.
     """
@@ -53,29 +65,31 @@ def _stencils(kind, r, work, table, degree, scale, shift, uva, w, place, cell):
         for i in range(BLOCK):
             t[i] = b + a * t[i]
         cells_and_fractions(t, table.shape[axis + 1] - degree - 1, cell)
-        weights(t, degree, w[6 * axis : 6 * axis + 6].reshape(-1))
         n = table.shape[axis + 1]
         for i in range(BLOCK):
             place[i] = place[i] * n + cell[i]
 
 
 @njit(**options)
-def _advance(kind, table, centre, jacobi, matrix, riding, degree, scale, shift, leaps, count, r, m, scratch):
-    """Compose the map ``leaps`` times on r (4, BLOCK) and the Jacobi matrices m (4, BLOCK)."""
-    work, uva, w, d, place = scratch
-    first, cell = place[:BLOCK], place[BLOCK:]
-    rf, df, mf = r.reshape(-1), d.reshape(-1), m.reshape(-1)
+def leap_block(kind, leap, riding, degree, uva, place, count, r, m, w, d):
+    """Move r (4, BLOCK) and the Jacobi matrices m (4, BLOCK) by one leap, their stencils being placed.
+
+    ``leap`` is (table, centre, jacobi, matrix, curvature). d (4 BLOCK, 4) keeps what is interpolated: displacements,
+    matrices, and for riding = 2 the curvatures.
+    """
+    table, centre, jacobi, matrix, curvature = leap
+    rf, df, ef = r.reshape(-1), d[:BLOCK].reshape(-1), d[BLOCK : 2 * BLOCK].reshape(-1)
     wu, wv, wa = w[0:6].reshape(-1), w[6:12].reshape(-1), w[12:18].reshape(-1)
-    for _ in range(leaps):
-        _stencils(kind, rf, work, table, degree, scale, shift, uva, w, first, cell)
-        interpolate(table, degree, first, wu, wv, wa, count, df)
-        if kind == ROTATION:
-            _move_rotation(rf, df, centre)
-        else:
-            _move_angles(rf, df, centre)
-        if riding:
-            interpolate(jacobi, degree, first, wu, wv, wa, count, df)
-            _carry_jacobi(df, matrix, mf)
+    weights(uva[0], degree, wu)
+    weights(uva[1], degree, wv)
+    weights(uva[2], degree, wa)
+    interpolate(table, degree, place, wu, wv, wa, count, df)
+    move(kind, rf, df, centre)
+    if riding:
+        interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
+        _carry_jacobi(ef, matrix, m.reshape(-1))
+    if riding > 1:
+        interpolate(curvature, degree, place, wu, wv, wa, count, d[2 * BLOCK :].reshape(-1))
 
 
 @njit(**options)
@@ -90,130 +104,40 @@ def _carry_jacobi(d, matrix, m):
 
 
 @njit(**options)
-def flow(
-    kind, there, there_par, back, back_par, table, centre, jacobi, matrix, degree, scale, shift, states, counts, out
-):
-    """Compose the map counts[0], then counts[1], ... times on states (n, 6 or 10) into out (n, m, the same).
+def flow(kind, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out):
+    """Compose the map counts[0], then counts[1], ... times on states (n, 6, 10 or 12) into out (n, m, the same).
 
-    ``table`` (charts, nu, nv, na, 4) holds the displacement less its mean ``centre``, ``jacobi`` of the same shape the
-    Jacobi matrix less its mean ``matrix`` (4,). ``there`` takes the model to the body, ``back`` the body to the model.
+    ``leap`` is (table, centre, jacobi, matrix, curvature): table (charts, nu, nv, na, 4) holds the displacement less
+    its mean ``centre``, jacobi the Jacobi matrix less its mean ``matrix`` (4,), curvature (..., 8) that of
+    `_attenuation`, as are the ``rules``. ``there`` takes the model to the body, ``back`` the body to the model.
     """
     n, lanes = states.shape
-    x, p, r, m = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(4, BLOCK)
-    work, uva, w, d = aligned(27, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((BLOCK, 4))
-    place = np.zeros(2 * BLOCK, np.int64)
-    scratch = (work, uva, w, d, place)
-    riding = lanes > 6
+    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
+    # Jacobi matrix, attenuation, time of detachment
+    m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
+    work, uva, w, d = aligned(27, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
+    place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    riding = 0 if lanes == 6 else (1 if lanes == 10 else 2)
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(BLOCK):
             source = start + min(i, count - 1)
             for k in range(3):
                 x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
-            if riding:
-                for k in range(4):
-                    m[k, i] = states[source, 6 + k]
-        _enter(kind, there, there_par, back, back_par, x, p, work, r)
+            for k in range(6, lanes):
+                m[k - 6, i] = states[source, k]
+        enter(kind, there, there_par, back, back_par, x, p, work, r)
+        now = 0.0
         for output in range(counts.shape[0]):
-            leaps = counts[output]
-            _advance(kind, table, centre, jacobi, matrix, riding, degree, scale, shift, leaps, count, r, m, scratch)
-            _leave(kind, there, there_par, r, work, x, p)
+            for _ in range(counts[output]):
+                place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
+                leap_block(kind, leap, riding, degree, uva, place, count, r, m, w, d)
+                if riding > 1:
+                    extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
+                now += time
+            leave(kind, there, there_par, r, work, x, p)
             for i in range(count):
                 for k in range(3):
                     out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
-                if riding:
-                    for k in range(4):
-                        out[start + i, output, 6 + k] = m[k, i]
-
-
-@njit(**options)
-def double(kind, table, centre, jacobi, matrix, degree, scale, shift, nodes, displacement, matrices):
-    """Displacement (n, 4) and Jacobi matrix less 1 (n, 4) of two leaps from the nodes (n, 4)."""
-    r, m, d = aligned(4, BLOCK), aligned(4, BLOCK), np.zeros((BLOCK, 4))
-    work, uva, w = aligned(27, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK)
-    place = np.zeros(2 * BLOCK, np.int64)
-    n = nodes.shape[0]
-    riding = matrices.shape[0] > 0
-    whole = np.empty((4, BLOCK))
-    for start in range(0, n, BLOCK):
-        count = min(BLOCK, n - start)
-        for i in range(BLOCK):
-            for k in range(4):
-                r[k, i] = nodes[start + min(i, count - 1), k]
-            m[0, i], m[1, i], m[2, i], m[3, i] = 1.0, 0.0, 0.0, 1.0
-            # the displacement from the identity is what two moves make of it
-            whole[0, i], whole[1, i], whole[2, i], whole[3, i] = 1.0 if kind == ROTATION else 0.0, 0.0, 0.0, 0.0
-        for _ in range(2):
-            _stencils(kind, r.reshape(-1), work, table, degree, scale, shift, uva, w, place[:BLOCK], place[BLOCK:])
-            wu, wv, wa = w[0:6].reshape(-1), w[6:12].reshape(-1), w[12:18].reshape(-1)
-            interpolate(table, degree, place[:BLOCK], wu, wv, wa, count, d.reshape(-1))
-            if kind == ROTATION:
-                _move_rotation(r.reshape(-1), d.reshape(-1), centre)
-                _move_rotation(whole.reshape(-1), d.reshape(-1), centre)
-            else:
-                _move_angles(r.reshape(-1), d.reshape(-1), centre)
-                _move_angles(whole.reshape(-1), d.reshape(-1), centre)
-            if riding:
-                interpolate(jacobi, degree, place[:BLOCK], wu, wv, wa, count, d.reshape(-1))
-                _carry_jacobi(d.reshape(-1), matrix, m.reshape(-1))
-        for i in range(count):
-            for k in range(4):
-                displacement[start + i, k] = whole[k, i]
-                if riding:
-                    matrices[start + i, k] = m[k, i]
-
-
-@njit(**options)
-def to_body(kind, there, there_par, model, out):
-    """States (n, 6) of model coordinates (n, 4)."""
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(27, BLOCK)
-    n = model.shape[0]
-    for start in range(0, n, BLOCK):
-        count = min(BLOCK, n - start)
-        for i in range(BLOCK):
-            for k in range(4):
-                r[k, i] = model[start + min(i, count - 1), k]
-        _leave(kind, there, there_par, r, work, x, p)
-        for i in range(count):
-            for k in range(3):
-                out[start + i, k], out[start + i, 3 + k] = x[k, i], p[k, i]
-
-
-@njit(**options)
-def displacements(kind, there, there_par, back, back_par, nodes, traced, out):
-    """Displacement (n, 4) from nodes (n, 4) along traced states (n, m, lanes), followed continuously.
-
-    A rotation is that of two quaternions, an angle known up to turns: successive states must be near enough to tell
-    which. Returns the least |cosine| (ROTATION) or 1 - 2 |turns| (ANGLES) between successive displacements.
-    """
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(27, BLOCK)
-    n, steps = traced.shape[:2]
-    surest = 1.0
-    for start in range(0, n, BLOCK):
-        count = min(BLOCK, n - start)
-        for m in range(steps):
-            for i in range(BLOCK):
-                source = start + min(i, count - 1)
-                for k in range(3):
-                    x[k, i], p[k, i] = traced[source, m, k], traced[source, m, 3 + k]
-            _enter(kind, there, there_par, back, back_par, x, p, work, r)
-            for i in range(count):
-                node, d = nodes[start + i], out[start + i]
-                if kind == ROTATION:
-                    w, a, b, c = node[0], -node[1], -node[2], -node[3]
-                    rw, rx, ry, rz = r[0, i], r[1, i], r[2, i], r[3, i]
-                    qw, qx = w * rw - a * rx - b * ry - c * rz, w * rx + a * rw + b * rz - c * ry
-                    qy, qz = w * ry - a * rz + b * rw + c * rx, w * rz + a * ry - b * rx + c * rw
-                    cosine = qw if m == 0 else qw * d[0] + qx * d[1] + qy * d[2] + qz * d[3]
-                    sign = -1.0 if cosine < 0.0 else 1.0
-                    surest = min(surest, abs(cosine))
-                    d[0], d[1], d[2], d[3] = sign * qw, sign * qx, sign * qy, sign * qz
-                else:
-                    for k in range(3):
-                        before = 0.0 if m == 0 else d[k]
-                        step = r[k, i] - node[k] - before
-                        step -= math.floor(step + 0.5)
-                        surest = min(surest, 1.0 - 2.0 * abs(step))
-                        d[k] = before + step
-                    d[3] = 0.0
-    return surest
+                for k in range(6, lanes):
+                    out[start + i, output, k] = m[k - 6, i]

@@ -10,6 +10,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.phaseflow._threads import in_threads
+from creeping.phaseflow.attenuation import extend
 from creeping.phaseflow.bundle import project_bundle
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.splines import evaluate
@@ -92,17 +93,25 @@ class AmbientModel:
         d = evaluate(leap.state, chart, place, grid.degree)
         out = np.empty_like(states)
         out[:, :3], out[:, 3:6] = project_bundle(self.body, x + leap.time * p + d[:, :3], p + d[:, 3:6])
-        carry_jacobi(grid, leap, chart, place, states, out)
+        carry_riding(grid, leap, chart, place, states, out)
         return out
 
 
-def carry_jacobi(
+def carry_riding(
     grid: Grid, leap: Leap, chart: IntArray, place: FloatArray, states: FloatArray, out: FloatArray
 ) -> None:
-    """Fill lanes 6 to 9 of out with M times those of states."""
-    if states.shape[1] > 6:
+    """Fill lanes 6 to 9 of out with M times those of states, lanes 10 and 11 with attenuation and detachment.
+
+    Times of detachment count from the start of the leap.
+    """
+    lanes = states.shape[1]
+    if lanes > 6:
         m = evaluate(leap.jacobi, chart, place, grid.degree) + leap.matrix
         for first in (6, 8):
             i, j = states[:, first], states[:, first + 1]
             out[:, first] = m[:, 0] * i + m[:, 2] * j
             out[:, first + 1] = m[:, 1] * i + m[:, 3] * j
+    if lanes > 10:
+        out[:, 10:] = states[:, 10:]
+        values = evaluate(leap.curvature, chart, place, grid.degree)
+        extend(values, leap.time, np.zeros(len(states)), out[:, 10], out[:, 11])

@@ -13,8 +13,9 @@ from time import perf_counter as clock
 import numpy as np
 
 from creeping._errors import ToleranceError
-from creeping._typing import FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.phaseflow.ambient import AmbientModel
+from creeping.phaseflow.attenuation import NODES, chebyshev_times, curvature_values
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.compiled_models import CompiledModel
 from creeping.phaseflow.geodesic import principal_curvature_bound, speed_values
@@ -62,24 +63,25 @@ def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol
     doublings = plan.doublings if isinstance(model, CompiledModel) else 0
     now = plan.horizon / 2**doublings
     say(f"tracing {len(nodes)} nodes to {now:g}")
-    values, matrices = _traced(body, model, nodes, now, plan.ride_along, rtol)
-    leap = _leap(values, matrices, plan.grid, now, model, single=plan.single and doublings == 0)
+    values = _traced(body, model, nodes, now, plan.ride_along, rtol)
+    leap = _leap(values, plan.grid, now, model, single=plan.single and doublings == 0)
     for k in range(doublings):
         assert isinstance(model, CompiledModel)
         say(f"doubling to {2 * now:g}")
-        values, matrices = model.doubled(plan.grid, leap, nodes)
+        values = model.doubled(plan.grid, leap, nodes)
         now *= 2
-        leap = _leap(values, matrices, plan.grid, now, model, single=plan.single and k == doublings - 1)
+        leap = _leap(values, plan.grid, now, model, single=plan.single and k == doublings - 1)
     parameters = {"method": "direct", "doublings": doublings, "seconds": round(clock() - start, 3)}
     return PhaseMap(body, model, plan.grid, (leap,), UNMEASURED, None, parameters)
 
 
 def _traced(
     body: Surface, model: Model, nodes: FloatArray, time: float, ride_along: bool, rtol: float
-) -> tuple[FloatArray, FloatArray]:
-    """Displacements (n, lanes) and Jacobi matrices (n or 0, 4) at the nodes."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Displacements (n, lanes), Jacobi matrices (n or 0, 4) and curvatures (n or 0, 8) at the nodes."""
     values = np.empty((len(nodes), model.lanes))
     matrices = np.empty((len(nodes) if ride_along else 0, 4))
+    curvatures = np.empty((len(nodes) if ride_along else 0, NODES))
     steps = 1
     for first in range(0, len(nodes), CHUNK):
         part = slice(first, first + CHUNK)
@@ -88,7 +90,9 @@ def _traced(
             states = pack(states[:, :3], states[:, 3:], jacobi=True)
         while True:
             times = time * np.arange(1, steps + 1) / steps
-            traced = trace_states(body, states, times, rtol=rtol, step=time / max(4, steps))
+            if ride_along:
+                times = np.unique(np.concatenate([times, time * chebyshev_times()]))
+            traced = trace_states(body, states, times, rtol=rtol, step=time / 4)
             try:
                 values[part] = model.displacement(nodes[part], traced, times)
             except ToleranceError:
@@ -100,7 +104,9 @@ def _traced(
             break
         if ride_along:
             matrices[part] = traced[:, -1, 6:]
-    return values, matrices
+            inside = traced[:, np.searchsorted(times, time * chebyshev_times())]
+            curvatures[part] = curvature_values(body, inside.reshape(-1, 10)).reshape(-1, NODES)
+    return values, matrices, curvatures
 
 
 def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: int, say: Progress) -> PhaseMap:
@@ -118,26 +124,34 @@ def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: 
             reached = PhaseMap(body, model, grid, tuple(leaps), UNMEASURED).leap(states, base)[:, None]
         now = time_step * base**level
         values = model.displacement(nodes, reached, np.array([now]))
-        leaps.append(_leap(values, reached[:, 0, 6:], grid, now, model))
+        leaps.append(_leap((values, reached[:, 0, 6:], np.empty((0, NODES))), grid, now, model))
     parameters = {"method": "tower", "time_step": time_step, "stages": stages, "base": base}
     parameters["seconds"] = round(clock() - start, 3)
     return PhaseMap(body, model, grid, tuple(leaps), UNMEASURED, None, parameters)
 
 
 def _leap(
-    values: FloatArray, matrices: FloatArray, grid: Grid, time: float, model: Model, *, single: bool = False
+    quantities: tuple[FloatArray, FloatArray, FloatArray],
+    grid: Grid,
+    time: float,
+    model: Model,
+    *,
+    single: bool = False,
 ) -> Leap:
-    """Spline coefficients of the stored quantities."""
+    """Spline coefficients of displacements, Jacobi matrices and curvatures at the nodes."""
+    values, matrices, curvatures = quantities
     kind = np.float32 if single else np.float64
     # means go out of what is stored in single precision, so that its rounding is relative to what varies
     centre = values.mean(axis=0) if single else np.zeros(model.lanes)
     matrix = matrices.mean(axis=0) if single and len(matrices) else np.array([1.0, 0.0, time, 1.0])
-    state = prefilter((values - centre).reshape(model.charts, *grid.nodes, -1), grid.degree, grid.periodic)
-    if len(matrices):
-        jacobi = prefilter((matrices - matrix).reshape(model.charts, *grid.nodes, 4), grid.degree, grid.periodic)
-    else:
-        jacobi = np.zeros((0, *grid.sides, 4))
-    return Leap(time, np.asarray(state, dtype=kind), centre, np.asarray(jacobi, dtype=kind), matrix)
+
+    def fitted(quantity: FloatArray) -> Any:
+        if not len(quantity):
+            return np.zeros((0, *grid.sides, quantity.shape[1]), dtype=kind)
+        nodes = quantity.reshape(model.charts, *grid.nodes, quantity.shape[1])
+        return np.asarray(prefilter(nodes, grid.degree, grid.periodic), dtype=kind)
+
+    return Leap(time, fitted(values - centre), centre, fitted(matrices - matrix), matrix, fitted(curvatures))
 
 
 def measure(flow: PhaseMap, *, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> MapError:

@@ -60,6 +60,7 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
                 np.array([float(value) for value in content["centres"][k]]),
                 open_array(folder, f"jacobi-{k}.npy", content),
                 np.array([float(value) for value in content["matrices"][k]]),
+                open_array(folder, f"curvature-{k}.npy", content),
             )
             for k, time in enumerate(content["times"])
         )
@@ -80,6 +81,7 @@ def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Mode
     for leap in leaps:
         fits = leap.state.shape == (*whole, model.lanes) and grid.degree in (3, 5)
         fits &= leap.centre.shape == (model.lanes,) and leap.matrix.shape == (4,)
+        fits &= leap.curvature.shape in ((*whole, 8), (0, *grid.sides, 8)) and leap.curvature.dtype == leap.state.dtype
         fits &= leap.jacobi.shape in ((*whole, 4), (0, *grid.sides, 4)) and leap.jacobi.dtype == leap.state.dtype
         if not fits:
             raise StoredMapError(f"{folder}: tables {leap.state.shape} do not fit grid {grid.nodes}; rebuild the map")

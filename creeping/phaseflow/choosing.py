@@ -16,10 +16,11 @@ from creeping.phaseflow.building import Progress
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.caching import cached_phase_map, is_cached
 from creeping.phaseflow.compiled_models import CompiledModel
+from creeping.phaseflow.direct import DirectFlow
 from creeping.phaseflow.models import model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.request import Request
-from creeping.phaseflow.tracing import DirectFlow, MapError, pack, trace_states
+from creeping.phaseflow.tracing import MapError, pack, trace_states
 from creeping.phaseflow.tuning import candidates, tracing_cost, tuned_map
 from creeping.surface import Surface, check_surface, size
 

@@ -8,7 +8,8 @@ import numpy as np
 from creeping._errors import ToleranceError
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.phaseflow._threads import in_threads
-from creeping.phaseflow.ambient import carry_jacobi
+from creeping.phaseflow.ambient import carry_riding
+from creeping.phaseflow.attenuation import chebyshev_times, gauss_rule, halves, sampling, searching
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.quaternions import quaternion_product, quaternions
 from creeping.phaseflow.splines import evaluate
@@ -16,6 +17,12 @@ from creeping.surface import Surface, polar_frame
 
 REACH = float(np.sqrt(2) - 1)
 """Stereographic coordinate of a chart's edge; see `_rotations`."""
+ORDERED = 16_384
+"""Rays from which on composing them in the order of their cells pays,"""
+NEAR = 4_000_000
+"""if the table has so many bytes: it is more than the nearest caches hold."""
+SHARE = 65_536
+"""Rays ordered at a time."""
 SUREST = 0.3
 """Least cosine between successive displacements of a rotation that leaves no doubt about its sign."""
 
@@ -42,7 +49,7 @@ class CompiledModel:
 
     def states(self, coordinates: FloatArray) -> FloatArray:
         """See `Model`."""
-        from creeping.phaseflow._composition import to_body
+        from creeping.phaseflow._nodes import to_body
 
         out = np.empty((len(coordinates), 6))
         to_body(self.kind, *self._there, coordinates, out)
@@ -56,7 +63,7 @@ class CompiledModel:
         ToleranceError
             If the states are too far apart in time to follow.
         """
-        from creeping.phaseflow._composition import displacements
+        from creeping.phaseflow._nodes import displacements
 
         out = np.empty((len(nodes), 4))
         surest = displacements(self.kind, *self._there, *self._back, nodes, traced, out)
@@ -70,31 +77,42 @@ class CompiledModel:
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
         """See `Model`."""
         from creeping.phaseflow._composition import flow
+        from creeping.phaseflow._ordered import flow_ordered
 
         out = np.empty((len(states), len(counts), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
         counts = np.asarray(counts, dtype=np.int64)
-        tables = leap.state, leap.centre, leap.jacobi, leap.matrix, grid.degree, *self.placement(grid)
+        rules = sampling(), searching(), *gauss_rule(), chebyshev_times()
+        tables = _tables(leap), leap.time, rules, grid.degree, *self.placement(grid)
+        many = len(states) >= ORDERED and leap.state.nbytes > NEAR and int(counts.sum()) > 0
+        kernel = flow_ordered if many else flow
 
         def run(part: slice) -> None:
-            flow(self.kind, *self._there, *self._back, *tables, states[part], counts, out[part])
+            # shares of a thread stay small, so that what is known of their rays stays in the cache
+            for start in range(part.start, part.stop, SHARE):
+                some = slice(start, min(start + SHARE, part.stop))
+                kernel(self.kind, *self._there, *self._back, *tables, states[some], counts, out[some])
 
         in_threads(run, len(states))
         return out
 
-    def doubled(self, grid: Grid, leap: Leap, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Displacement (n, 4) and Jacobi matrix (n, 4; empty without ride-along) of two leaps from the nodes."""
-        from creeping.phaseflow._composition import double
+    def doubled(self, grid: Grid, leap: Leap, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Displacement (n, 4), Jacobi matrix (n, 4) and curvatures (n, 8) of two leaps from the nodes.
+
+        The last two are empty if the leap does not carry them.
+        """
+        from creeping.phaseflow._nodes import double
 
         out = np.empty((len(nodes), 4))
         matrices = np.empty((len(nodes) if leap.rides else 0, 4))
-        tables = leap.state, leap.centre, leap.jacobi, leap.matrix, grid.degree, *self.placement(grid)
+        curvatures = np.empty((len(nodes) if leap.attenuates else 0, 16))
+        tables = _tables(leap), grid.degree, *self.placement(grid)
 
         def run(part: slice) -> None:
-            double(self.kind, *tables, nodes[part], out[part], matrices[part] if leap.rides else matrices)
+            double(self.kind, *tables, nodes[part], out[part], matrices[part], curvatures[part])
 
         in_threads(run, len(nodes))
-        return out, matrices
+        return out, matrices, curvatures @ halves().T
 
     def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
         raise NotImplementedError
@@ -110,7 +128,7 @@ class CompiledModel:
         d = evaluate(leap.state, chart, place, grid.degree) + leap.centre
         out = np.empty_like(states)
         out[:, :3], out[:, 3:6] = self._move_numpy(inner, d)
-        carry_jacobi(grid, leap, chart, place, states, out)
+        carry_riding(grid, leap, chart, place, states, out)
         return out
 
 
@@ -202,6 +220,11 @@ class AngleModel(CompiledModel):
         frame = polar_frame(chart.tangents(moved[:, :2]))
         angle = 2 * np.pi * moved[:, 2:]
         return chart.point(moved[:, :2]), np.cos(angle) * frame[..., 0] + np.sin(angle) * frame[..., 1]
+
+
+def _tables(leap: Leap) -> tuple[Any, ...]:
+    """Arrays of a leap in the order of the kernels."""
+    return leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature
 
 
 def _across(s: FloatArray) -> FloatArray:

@@ -56,6 +56,8 @@ class Leap:
         Coefficients of M less ``matrix``; no charts if the map does not carry M.
     matrix : (4,)
         Mean of (M11, M21, M12, M22); (1, 0, t, 1) if there is none.
+    curvature : (charts, nu, nv, na, 8), of the same type
+        Coefficients of c^(3/2) kappa_n at Chebyshev times (`attenuation`); no charts if the map does not carry it.
     """
 
     time: float
@@ -63,10 +65,11 @@ class Leap:
     centre: FloatArray
     jacobi: Any
     matrix: FloatArray
+    curvature: Any
 
     def __post_init__(self) -> None:
         # read-only like the arrays of a stored map: kernels are compiled for one kind of array
-        for table in (self.state, self.jacobi):
+        for table in (self.state, self.jacobi, self.curvature):
             table.flags.writeable = False
 
     @property
@@ -75,6 +78,11 @@ class Leap:
         return len(self.jacobi) > 0
 
     @property
+    def attenuates(self) -> bool:
+        """Whether the curvatures ride along too."""
+        return len(self.curvature) > 0
+
+    @property
     def nbytes(self) -> int:
         """Memory of the tables."""
-        return int(self.state.nbytes + self.jacobi.nbytes)
+        return int(self.state.nbytes + self.jacobi.nbytes + self.curvature.nbytes)

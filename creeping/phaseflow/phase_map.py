@@ -14,6 +14,7 @@ import numpy as np
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping._version import __version__
+from creeping.phaseflow.attenuation import with_attenuation
 from creeping.phaseflow.bundle import bundle_points
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.models import Model
@@ -148,9 +149,10 @@ class PhaseMap:
         return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6 or 10) to the ascending times (m,): (n, m, 6 or 10).
+        """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same).
 
-        Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c.
+        Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c, 10 and 11 the attenuation integral and the
+        time of detachment (`attenuation`; inf before).
 
         Raises
         ------
@@ -159,6 +161,8 @@ class PhaseMap:
         """
         states = np.array(states, dtype=float, order="C")
         times = np.asarray(times, dtype=float)
+        if states.shape[1] > 10 and not self._attenuates_at(times):
+            return with_attenuation(self.body, states, times, self.transport, rtol=self._rtol)
         # a time that misses a multiple of the horizon by rounding is that multiple
         whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12).astype(np.int64)
         rest = np.maximum(times - whole * self.horizon, 0.0)
@@ -173,6 +177,11 @@ class PhaseMap:
             if len(mine):
                 out[:, mine] = self._remainder(at[:, k], rest[mine])
         return out
+
+    def _attenuates_at(self, times: FloatArray) -> bool:
+        """Whether the map itself carries the attenuation to the times: multiples of its horizon."""
+        leaps = times / self.horizon
+        return self.leaps[-1].attenuates and bool(np.all(np.abs(leaps - np.round(leaps)) < 1e-11 * (1 + leaps)))
 
     def _remainder(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance by times below the horizon: down the tower, then by direct integration."""
@@ -237,4 +246,5 @@ class PhaseMap:
         }
         states = {f"state-{k}.npy": leap.state for k, leap in enumerate(self.leaps)}
         jacobis = {f"jacobi-{k}.npy": leap.jacobi for k, leap in enumerate(self.leaps)}
-        return write_folder(folder, content, states | jacobis)
+        curvatures = {f"curvature-{k}.npy": leap.curvature for k, leap in enumerate(self.leaps)}
+        return write_folder(folder, content, states | jacobis | curvatures)

@@ -138,13 +138,15 @@ def unpack(states: FloatArray, shape: tuple[int, ...], scalar: bool) -> tuple[Fl
     return states[..., :3].copy(), states[..., 3:].copy()
 
 
-def pack(points: FloatArray, directions: FloatArray, *, jacobi: bool = False, attenuation: bool = False) -> FloatArray:
-    """States from (..., 3) points and directions: (n, 6), (n, 10) with the identity as Jacobi matrix, or (n, 11)."""
+def pack(points: FloatArray, directions: FloatArray, *, jacobi: bool = False, lanes: int = 6) -> FloatArray:
+    """States (n, lanes) from (..., 3) points and directions.
+
+    6 lanes are (x, p); lanes 6 to 9 the identity as Jacobi matrix (``jacobi`` asks for 10), lane 10 the attenuation
+    integral 0, lane 11 the time of detachment inf.
+    """
     states = np.concatenate([points.reshape(-1, 3), directions.reshape(-1, 3)], axis=1)
-    if jacobi or attenuation:
-        riding = [1.0, 0.0, 0.0, 1.0, 0.0][: 5 if attenuation else 4]
-        states = np.concatenate([states, np.tile(riding, (len(states), 1))], axis=1)
-    return states
+    riding = [1.0, 0.0, 0.0, 1.0, 0.0, np.inf][: (10 if jacobi else lanes) - 6]
+    return np.concatenate([states, np.tile(riding, (len(states), 1))], axis=1) if riding else states
 
 
 def trace_states(
@@ -283,43 +285,3 @@ def _step_numpy(
     denominator = np.sqrt((sum5 + 0.01 * sum3) * y.shape[1])
     error = np.divide(h * sum5, denominator, out=np.zeros_like(sum5), where=denominator != 0)
     return new, float(np.max(error))
-
-
-@dataclass(frozen=True)
-class DirectFlow:
-    """The flow by direct integration, with the protocol of a phase map (apply, flow, transport, horizon, error).
-
-    Parameters
-    ----------
-    body : Surface
-    rtol : float
-        Relative tolerance per step; the step adapts to the worst of 64 rays.
-    horizon : float
-        Time of one `apply`, L.
-    step : float, optional, L
-        Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
-    error : MapError, optional
-        At the end of rays, if `choose_flow` has measured it.
-    """
-
-    body: Surface
-    rtol: float = 1e-10
-    horizon: float = 1.0
-    step: float | None = None
-    error: MapError | None = None
-
-    def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Advance by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
-        return self.flow(points, directions, self.horizon)
-
-    def flow(self, points: ArrayLike, directions: ArrayLike, times: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Advance to times >= 0; same shapes as `trace`."""
-        values, scalar = as_times(times)
-        x, p = bundle_points(self.body, points, directions)
-        return unpack(self.transport(pack(x, p), values), x.shape, scalar)
-
-    def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6 or 10) to the ascending times (m,): (n, m, 6 or 10)."""
-        if self.step is not None:
-            return trace_states(self.body, states, times, rtol=0.0, step=self.step)
-        return trace_states(self.body, states, times, rtol=self.rtol)

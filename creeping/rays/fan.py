@@ -26,7 +26,6 @@ from creeping.phaseflow.geodesic import (
 )
 from creeping.phaseflow.storing import fingerprint
 from creeping.phaseflow.tracing import MapError, pack, trace_states
-from creeping.rays.detachment import detachment_times
 from creeping.rays.launch_points import (
     Arc,
     launch_positions,
@@ -63,7 +62,7 @@ class Flow(Protocol):
         ...
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 10) to ascending times (m,): (n, m, 10)."""
+        """Advance states (n, 12) to ascending times (m,): (n, m, 12)."""
         ...
 
 
@@ -102,6 +101,8 @@ class RayFan:
         J and J'.
     curvature : (rays, steps), 1/L
         kappa_n.
+    attenuation : (rays, steps), L^(1/3)
+        Integral of c max(kappa_n, 0)^(2/3) over travel time; it stays from where the ray detaches.
     caustic_index : (rays, steps)
         Zeros of J passed.
     status : (rays,)
@@ -129,6 +130,7 @@ class RayFan:
     spreading: FloatArray
     spreading_rate: FloatArray
     curvature: FloatArray
+    attenuation: FloatArray
     caustic_index: IntArray
     status: IntArray
     detachment: FloatArray
@@ -245,11 +247,11 @@ def _starts(line: ShadowLine, arcs: list[Arc], arc: IntArray, arclength: FloatAr
 
 
 def _carry(flow: Flow, line: ShadowLine, points: FloatArray, times: FloatArray) -> FloatArray:
-    """States with Jacobi matrices along the rays: (rays, steps, 10)."""
+    """States with all that rides along: (rays, steps, 12)."""
     if not len(points):
-        return np.empty((0, len(times), 10))
+        return np.empty((0, len(times), 12))
     directions = np.broadcast_to(line.direction, points.shape)
-    return flow.transport(pack(points, directions, jacobi=True), times)
+    return flow.transport(pack(points, directions, lanes=12), times)
 
 
 def _assemble(
@@ -266,7 +268,7 @@ def _assemble(
     points, directions = states[..., :3].copy(), states[..., 3:6].copy()
     spreading, rate, stalled = _spreading(body, line, starts, states)
     curvature = normal_curvature(body, points, directions)
-    detachment = detachment_times(body, points, directions, curvature, times)
+    detachment = states[:, -1, 11].copy()
     status = np.array([LINE_STATUS[one] for one in position_statuses(line, arcs, arc, arclength)], dtype=np.int64)
     # a ray that never was a creeping ray keeps the reason
     status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
@@ -283,6 +285,7 @@ def _assemble(
         spreading=spreading,
         spreading_rate=rate,
         curvature=curvature,
+        attenuation=states[..., 10].copy(),
         caustic_index=_zeros_passed(spreading),
         status=status,
         detachment=detachment,

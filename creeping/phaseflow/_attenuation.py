@@ -1,0 +1,111 @@
+"""Compiled twins of `attenuation`: curvatures of a block, and the attenuation integral over one leap."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from creeping.phaseflow._integrator import BLOCK, aligned, options, two_thirds
+
+
+@njit(**options)
+def curvatures(level, level_par, speed, speed_par, weighted, states, out):
+    """c^(3/2) kappa_n of states (n, 6 or more) into out (n,)."""
+    n = states.shape[0]
+    x, geometry = aligned(3, BLOCK), aligned(10, BLOCK)
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        for i in range(BLOCK):
+            for k in range(3):
+                x[k, i] = states[start + min(i, count - 1), k]
+        level(x, geometry[0], geometry[1:4], geometry[4:], level_par)
+        for i in range(count):
+            px, py, pz = states[start + i, 3], states[start + i, 4], states[start + i, 5]
+            bent = px * px * geometry[4, i] + py * py * geometry[5, i] + pz * pz * geometry[6, i]
+            bent += 2 * (py * pz * geometry[7, i] + px * pz * geometry[8, i] + px * py * geometry[9, i])
+            out[start + i] = bent / math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
+        if weighted:
+            speed(x, geometry[0], geometry[1:4], geometry[4:], speed_par)
+            for i in range(count):
+                c = geometry[0, i]
+                out[start + i] *= c * math.sqrt(c)
+
+
+@njit(**options)
+def extend(values, rules, time, now, a, sampled, count):
+    """Carry A and the time of detachment, rows of a (2, BLOCK), over one leap; see `attenuation.extend`.
+
+    values (BLOCK, 8), flat, are c^(3/2) kappa_n at the Chebyshev times; ``rules`` are the sampling and the searching
+    matrix, Gauss points and weights, and the Chebyshev points. sampled (15, BLOCK) is work space.
+    """
+    sampling, searching, points, weights, nodes = rules
+    gauss = points.shape[0]
+    least = sampled[gauss + 2]
+    for i in range(BLOCK):
+        least[i] = 1e300
+    for g in range(gauss + 2):
+        row = sampled[g]
+        c = sampling[g]
+        c0, c1, c2, c3, c4, c5, c6, c7 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
+        for i in range(BLOCK):
+            at = 8 * i
+            total = c0 * values[at] + c1 * values[at + 1] + c2 * values[at + 2] + c3 * values[at + 3]
+            total += c4 * values[at + 4] + c5 * values[at + 5] + c6 * values[at + 6] + c7 * values[at + 7]
+            row[i] = total
+        for i in range(BLOCK):
+            least[i] = min(least[i], row[i])
+    for g in range(gauss):
+        two_thirds(sampled[g], weights[g] * time)
+    for g in range(1, gauss):
+        for i in range(BLOCK):
+            sampled[0, i] += sampled[g, i]
+    for i in range(count):
+        if a[1, i] == math.inf:
+            if least[i] > 0.0:
+                a[0, i] += sampled[0, i]
+            else:
+                _detach(values[8 * i : 8 * i + 8], searching, points, weights, nodes, time, now, a, i)
+
+
+@njit(**options)
+def _detach(values, searching, points, weights, nodes, time, now, a, i):
+    """The leap in which kappa_n reaches 0, or dips near an end."""
+    steps = searching.shape[0] - 1
+    root = math.inf
+    for k in range(steps + 1):
+        total = 0.0
+        for j in range(8):
+            total += searching[k, j] * values[j]
+        if total <= 0.0:
+            low, high = max(k - 1, 0) / steps, k / steps
+            for _ in range(50 if k > 0 else 0):
+                middle = 0.5 * (low + high)
+                if _polynomial(values, nodes, middle) > 0.0:
+                    low = middle
+                else:
+                    high = middle
+            root = high
+            break
+    part = min(root, 1.0)
+    total = 0.0
+    for g in range(points.shape[0]):
+        s = points[g]
+        value = _polynomial(values, nodes, part * (1.0 - s * s * s))
+        if value > 0.0:
+            total += weights[g] * s * s * value ** (2 / 3)
+    a[0, i] += 3.0 * part * time * total
+    if root <= 1.0:
+        a[1, i] = now + root * time
+
+
+@njit(**options)
+def _polynomial(values, nodes, t):
+    """Polynomial through values at the nodes, by Neville's scheme."""
+    work = np.empty(8)
+    for j in range(8):
+        work[j] = values[j]
+    for width in range(1, 8):
+        for j in range(8 - width):
+            span = nodes[j] - nodes[j + width]
+            work[j] = ((t - nodes[j + width]) * work[j] + (nodes[j] - t) * work[j + 1]) / span
+    return work[0]

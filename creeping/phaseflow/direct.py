@@ -1,0 +1,51 @@
+"""Direct integration as a flow, interchangeable with a phase map."""
+
+from dataclasses import dataclass
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.phaseflow.attenuation import with_attenuation
+from creeping.phaseflow.bundle import bundle_points
+from creeping.phaseflow.tracing import MapError, as_times, pack, trace_states, unpack
+from creeping.surface import Surface
+
+
+@dataclass(frozen=True)
+class DirectFlow:
+    """The flow by direct integration, with the protocol of a phase map (apply, flow, transport, horizon, error).
+
+    Parameters
+    ----------
+    body : Surface
+    rtol : float
+        Relative tolerance per step; the step adapts to the worst of 64 rays.
+    horizon : float
+        Time of one `apply`, L.
+    step : float, optional, L
+        Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
+    error : MapError, optional
+        At the end of rays, if `choose_flow` has measured it.
+    """
+
+    body: Surface
+    rtol: float = 1e-10
+    horizon: float = 1.0
+    step: float | None = None
+    error: MapError | None = None
+
+    def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Advance by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+        return self.flow(points, directions, self.horizon)
+
+    def flow(self, points: ArrayLike, directions: ArrayLike, times: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Advance to times >= 0; same shapes as `trace`."""
+        values, scalar = as_times(times)
+        x, p = bundle_points(self.body, points, directions)
+        return unpack(self.transport(pack(x, p), values), x.shape, scalar)
+
+    def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
+        """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same); see `PhaseMap.transport`."""
+        if states.shape[1] > 10:
+            return with_attenuation(self.body, states, times, self.transport, rtol=self.rtol)
+        if self.step is not None:
+            return trace_states(self.body, states, times, rtol=0.0, step=self.step)
+        return trace_states(self.body, states, times, rtol=self.rtol)
