@@ -73,8 +73,11 @@ def run(
     launch_from: Annotated[
         Literal["attached", "all"], Parameter(help="Points of the shadow line that launch.")
     ] = "attached",
-    tolerance: Annotated[float, Parameter(help="Rms error of one step of the phase map.")] = 1e-6,
-    flow: Annotated[Literal["map", "direct"], Parameter(help="Phase map or direct integration.")] = "map",
+    tolerance: Annotated[float, Parameter(help="Rms error of points and directions at the ends of rays.")] = 1e-6,
+    flow: Annotated[
+        Literal["auto", "map", "direct"],
+        Parameter(help="Phase map or direct integration; auto takes what is faster, its preparation included."),
+    ] = "auto",
     speed: SpeedOption = None,
     wavenumber: Annotated[float | None, Parameter(group=_field, help="k, 1/L: adds the field to the results.")] = None,
     boundary: Annotated[
@@ -112,19 +115,14 @@ def run(
     with _Progress(quiet=json_) as say:
         say("shadow line")
         line = cr.shadow_line(shape, direction)
-        say("phase map")
-        carrier: Any = (
-            cr.build_phase_map(shape, tolerance=tolerance, cache=cache, progress=say)
-            if flow == "map"
-            else cr.DirectFlow(shape)
-        )
+        length = length or (3 if job else 1.5) * size(shape)
+        say("flow")
+        carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, say)
         say("creeping rays")
-        fan = cr.launch(
-            carrier, line, length=length or (3 if job else 1.5) * size(shape), n_rays=rays, status=launch_from
-        )
+        fan = cr.launch(carrier, line, length=length, n_rays=rays, n_steps=steps, status=launch_from)
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
-        summary = _summary(body, speed, line, carrier, fan, curves, flow)
+        summary = _summary(body, speed, line, carrier, fan, curves)
         if job:
             say("field")
             far, field_seconds = job.far_field(fan)
@@ -193,9 +191,25 @@ def parse_body(text: str, speed: str | None = None) -> Any:
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
-def _summary(
-    body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any], flow: str
-) -> dict[str, Any]:
+def _carrier(
+    flow: str, shape: Any, line: Any, rays: int, length: float, tolerance: float, cache: bool, say: Any
+) -> tuple[Any, int]:
+    """Flow that carries the fan, and the number of its steps."""
+    import creeping as cr
+    from creeping.rays.fan import enough_steps
+
+    steps = enough_steps(shape, line, length)
+    if flow == "direct":
+        # errors of the steps add up and grow along the rays
+        return cr.DirectFlow(shape, rtol=min(max(1e-4 * tolerance, 1e-13), 1e-8)), steps
+    asked = {"length": length, "outputs": steps, "tolerance": tolerance, "cache": cache, "progress": say}
+    if flow == "map":
+        return cr.build_phase_map(shape, **asked), steps
+    # rays are inserted where neighbours part
+    return cr.choose_flow(shape, rays=2 * rays, **asked), steps
+
+
+def _summary(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any]) -> dict[str, Any]:
     import numpy as np
 
     from creeping.rays.fan import RayStatus
@@ -206,7 +220,7 @@ def _summary(
         "version": __version__,
         "direction": line.direction.tolist(),
         "shadow_line": [{"length": c.length, "fractions": c.fractions} for c in line.curves],
-        "flow": flow,
+        "flow": "map" if hasattr(carrier, "leaps") else "direct",
         "rays": len(fan.points),
         "steps": len(fan.travel_time),
         "length": fan.length,
@@ -216,13 +230,14 @@ def _summary(
         "iso_phase_curves": len(curves),
         "error_of_rays": {"rms": fan.error.rms, "max": fan.error.max, "rays_traced": fan.error.samples},
     }
-    if flow == "map":
+    if summary["flow"] == "map":
         summary["phase_map"] = {
             "horizon": carrier.horizon,
             "charts": len(carrier.leaps[-1].state),
             "nodes": list(carrier.grid.nodes),
             "degree": carrier.grid.degree,
             "megabytes": round(carrier.nbytes / 1e6, 1),
+            "type": str(carrier.leaps[-1].state.dtype),
             "rms": carrier.error.rms,
             "max": carrier.error.max,
             "samples": carrier.error.samples,
@@ -263,6 +278,8 @@ def _readable(summary: dict[str, Any], output: Path) -> str:
         rows.append(
             f"phase map: T0 = {m['horizon']:g}, {grid} nodes, degree {m['degree']}; rms error {m['rms']:.1e} a leap"
         )
+    else:
+        rows.append("direct integration of order 8")
     statuses = ", ".join(f"{n} {name}" for name, n in summary["ray_status"].items() if n)
     rows.append(f"rays: {summary['rays']} of length {summary['length']:g} ({statuses or 'none launched'})")
     error = summary["error_of_rays"]

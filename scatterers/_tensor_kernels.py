@@ -162,3 +162,9 @@ def evaluate(points, values, gradients, hessians, parameters):  # type: ignore[n
         gradients[0, i], gradients[1, i], gradients[2, i] = fx * px, fy * py, fz * pz
         hessians[0, i], hessians[1, i], hessians[2, i] = xx * px * px, yy * py * py, zz * pz * pz
         hessians[3, i], hessians[4, i], hessians[5, i] = yz * py * pz, xz * px * pz, xy * px * py
+
+
+@njit(cache=True)
+def call(function, points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
+    """Fill one block by a compiled level, which Python itself cannot call."""
+    function(points, values, gradients, hessians, parameters)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers._compile import Compiled
-from scatterers._spline_constants import BEYOND, OVERREAD, POWERS
+from scatterers._spline_constants import BEYOND, CENTRE, HEADER, OVERREAD, POWERS
 
 FloatArray = NDArray[np.float64]
 
@@ -117,9 +117,9 @@ class TensorSpline:
         rows = [np.stack(row, axis=-1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
         return np.stack(rows, axis=-2)
 
-    def flat(self, centre: FloatArray, half_axes: FloatArray) -> FloatArray:
-        """Parameters of the compiled functions: the header, with those of a radial map, and the coefficients."""
-        header = [np.array(self.coefficients.shape, dtype=float), self.origin, 1 / self.spacing, centre, half_axes]
+    def flat(self, of_map: FloatArray) -> FloatArray:
+        """Parameters of the compiled functions: the header, which ends with those of a map, and the coefficients."""
+        header = [np.array(self.coefficients.shape, dtype=float), self.origin, 1 / self.spacing, of_map]
         return np.concatenate([*header, self.coefficients.ravel(), np.zeros(OVERREAD)])
 
     @cached_property
@@ -127,4 +127,16 @@ class TensorSpline:
         """Compiled evaluator."""
         from scatterers._tensor_kernels import evaluate
 
-        return Compiled(evaluate, "level", self.flat(np.zeros(3), np.ones(3)))
+        return Compiled(evaluate, "level", self.flat(np.zeros(HEADER - CENTRE)))
+
+
+def evaluated(compiled: Compiled, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """F (...), its gradient (..., 3) and Hessian entries (..., 6), xx, yy, zz, yz, xz, xy, of a compiled spline."""
+    from scatterers._tensor_kernels import call
+
+    points = np.asarray(points, dtype=float)
+    columns = np.ascontiguousarray(points.reshape(-1, 3).T)
+    n, shape = columns.shape[1], points.shape[:-1]
+    values, gradients, hessians = np.empty(n), np.empty((3, n)), np.empty((6, n))
+    call(compiled.function, columns, values, gradients, hessians, compiled.parameters)
+    return values.reshape(shape), gradients.T.reshape(*shape, 3), hessians.T.reshape(*shape, 6)

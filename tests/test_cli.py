@@ -22,16 +22,29 @@ def creeping(*arguments, capsys=None):
     return caught.value.code, out.out, out.err
 
 
+def test_few_rays_are_integrated_directly_unless_a_map_is_asked_for(tmp_path, capsys):
+    options = ["--direction", 0, 0, 1, "--length", 0.5, "--rays", 16, "--backend", "matplotlib"]
+    code, out, _ = creeping("run", "sphere", *options, "-o", tmp_path / "out", capsys=capsys)
+    assert code == 0
+    assert "direct integration of order 8" in out
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["flow"] == "direct"
+    assert summary["error_of_rays"]["rms"] <= 1e-6
+
+
 def test_run_writes_everything_it_names(tmp_path, capsys):
     folder = tmp_path / "out"
     options = ["--direction", 1, -1, 0.5, "--length", 1, "--rays", 32, "--tolerance", 1e-4, "--backend", "matplotlib"]
-    code, out, err = creeping("run", "ellipsoid:a=1.2,b=0.8,c=0.8", *options, "-o", folder, capsys=capsys)
+    body = "ellipsoid:a=1.2,b=0.8,c=0.8"
+    code, out, err = creeping("run", body, *options, "--flow", "map", "-o", folder, capsys=capsys)
     assert code == 0
     assert "shadow line 1: length" in out
     assert "shadow line ..." in err
     summary = json.loads((folder / "summary.json").read_text())
     assert sorted(summary["files"]) == sorted(f.name for f in folder.iterdir())
+    assert summary["flow"] == "map"
     assert summary["phase_map"]["rms"] <= 1e-4
+    assert summary["error_of_rays"]["rms"] <= 1e-4
     assert summary["rays"] >= 32
     assert (folder / "rays.png").stat().st_size > 20_000
 
@@ -176,7 +189,7 @@ def test_cache_commands(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "maps"))
     assert "0 maps" in creeping("cache", "ls", capsys=capsys)[1]
     options = ["--direction", 1, 0, 0, "--length", 0.2, "--rays", 8, "--tolerance", 1e-2, "--backend", "matplotlib"]
-    assert creeping("run", "sphere", *options, "-o", tmp_path / "o", capsys=capsys)[0] == 0
+    assert creeping("run", "sphere", *options, "--flow", "map", "-o", tmp_path / "o", capsys=capsys)[0] == 0
     assert "1 maps" in creeping("cache", "ls", capsys=capsys)[1]
     assert len(json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])) == 1
     assert creeping("cache", "verify", capsys=capsys)[0] == 0

@@ -7,17 +7,20 @@ is a table of their displacement; a ray enters the model once, is composed there
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow import _angles, _rotations
+from creeping.phaseflow import _angles, _rotations, _surface_exits
 from creeping.phaseflow._attenuation import extend
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 from creeping.phaseflow._stencils import cells_and_fractions, interpolate, weights
 
 ROTATION, ANGLES = 0, 1
+WORK = 48
+"""Rows of work space for a block."""
 SAMPLES = 15
 """Rows of work space that `extend` needs."""
 
 _enter_rotation, _enter_angles = _rotations.enter, _angles.enter
 _leave_rotation, _leave_angles = _rotations.leave, _angles.leave
+_enter_by_table, _leave_by_table = _surface_exits.enter, _surface_exits.leave
 _locate_rotation, _locate_angles = _rotations.locate, _angles.locate
 _move_rotation, _move_angles = _rotations.move, _angles.move
 
@@ -32,18 +35,22 @@ def move(kind, r, d, centre):
 
 
 @njit(**options)
-def enter(kind, there, there_par, back, back_par, x, p, work, r):
+def enter(kind, exits, there, there_par, back, back_par, x, p, work, r):
     """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
-    if kind == ROTATION:
+    if kind == ROTATION and exits.shape[0] > 0:
+        _enter_by_table(exits, back, back_par, x, p, work, r)
+    elif kind == ROTATION:
         _enter_rotation(there, there_par, back, back_par, x, p, work, r)
     else:
         _enter_angles(there, there_par, back, back_par, x, p, work, r)
 
 
 @njit(**options)
-def leave(kind, there, there_par, r, work, x, p):
+def leave(kind, exits, there, there_par, r, work, x, p):
     """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
-    if kind == ROTATION:
+    if kind == ROTATION and exits.shape[0] > 0:
+        _leave_by_table(exits, r, work, x, p)
+    elif kind == ROTATION:
         _leave_rotation(there, there_par, r, work, x, p)
     else:
         _leave_angles(there, there_par, r, work, x, p)
@@ -104,18 +111,19 @@ def _carry_jacobi(d, matrix, m):
 
 
 @njit(**options)
-def flow(kind, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out):
+def flow(kind, exits, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out):
     """Compose the map counts[0], then counts[1], ... times on states (n, 6, 10 or 12) into out (n, m, the same).
 
     ``leap`` is (table, centre, jacobi, matrix, curvature): table (charts, nu, nv, na, 4) holds the displacement less
     its mean ``centre``, jacobi the Jacobi matrix less its mean ``matrix`` (4,), curvature (..., 8) that of
-    `_attenuation`, as are the ``rules``. ``there`` takes the model to the body, ``back`` the body to the model.
+    `_attenuation`, as are the ``rules``. ``there`` takes the model to the body, ``back`` the body to the model;
+    ``exits`` (6 or 0, n, n, 4) is a table of x(u, v) that replaces ``there``.
     """
     n, lanes = states.shape
     x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
     # Jacobi matrix, attenuation, time of detachment
     m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
-    work, uva, w, d = aligned(27, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
+    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     riding = 0 if lanes == 6 else (1 if lanes == 10 else 2)
     for start in range(0, n, BLOCK):
@@ -126,7 +134,7 @@ def flow(kind, there, there_par, back, back_par, leap, time, rules, degree, scal
                 x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
             for k in range(6, lanes):
                 m[k - 6, i] = states[source, k]
-        enter(kind, there, there_par, back, back_par, x, p, work, r)
+        enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
         now = 0.0
         for output in range(counts.shape[0]):
             for _ in range(counts[output]):
@@ -135,7 +143,7 @@ def flow(kind, there, there_par, back, back_par, leap, time, rules, degree, scal
                 if riding > 1:
                     extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
                 now += time
-            leave(kind, there, there_par, r, work, x, p)
+            leave(kind, exits, there, there_par, r, work, x, p)
             for i in range(count):
                 for k in range(3):
                     out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._composition import ROTATION, enter, leap_block, leave, move, place_block
+from creeping.phaseflow._composition import ROTATION, WORK, enter, leap_block, leave, move, place_block
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 
 
@@ -13,7 +13,7 @@ from creeping.phaseflow._integrator import BLOCK, aligned, options
 def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curvatures):
     """Displacement (n, 4), Jacobi matrix (n or 0, 4) and curvatures (n or 0, 16) of two leaps from the nodes (n, 4)."""
     r, m, d = aligned(4, BLOCK), aligned(4, BLOCK), np.zeros((4 * BLOCK, 4))
-    work, uva, w = aligned(27, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK)
+    work, uva, w = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK)
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     n = nodes.shape[0]
     riding = 0 if matrices.shape[0] == 0 else (1 if curvatures.shape[0] == 0 else 2)
@@ -43,29 +43,29 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
 
 
 @njit(**options)
-def to_body(kind, there, there_par, model, out):
+def to_body(kind, exits, there, there_par, model, out):
     """States (n, 6) of model coordinates (n, 4)."""
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(27, BLOCK)
+    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
     n = model.shape[0]
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(BLOCK):
             for k in range(4):
                 r[k, i] = model[start + min(i, count - 1), k]
-        leave(kind, there, there_par, r, work, x, p)
+        leave(kind, exits, there, there_par, r, work, x, p)
         for i in range(count):
             for k in range(3):
                 out[start + i, k], out[start + i, 3 + k] = x[k, i], p[k, i]
 
 
 @njit(**options)
-def displacements(kind, there, there_par, back, back_par, nodes, traced, out):
+def displacements(kind, exits, there, there_par, back, back_par, nodes, traced, out):
     """Displacement (n, 4) from nodes (n, 4) along traced states (n, m, lanes), followed continuously.
 
     A rotation is that of two quaternions, an angle known up to turns: successive states must be near enough to tell
     which. Returns the least |cosine| (ROTATION) or 1 - 2 |turns| (ANGLES) between successive displacements.
     """
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(27, BLOCK)
+    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
     n, steps = traced.shape[:2]
     surest = 1.0
     for start in range(0, n, BLOCK):
@@ -75,7 +75,7 @@ def displacements(kind, there, there_par, back, back_par, nodes, traced, out):
                 source = start + min(i, count - 1)
                 for k in range(3):
                     x[k, i], p[k, i] = traced[source, m, k], traced[source, m, 3 + k]
-            enter(kind, there, there_par, back, back_par, x, p, work, r)
+            enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
             for i in range(count):
                 node, d = nodes[start + i], out[start + i]
                 if kind == ROTATION:

@@ -10,19 +10,21 @@ import numpy as np
 from numba import njit
 
 from creeping.phaseflow._attenuation import extend
-from creeping.phaseflow._composition import SAMPLES, enter, leap_block, leave, place_block
+from creeping.phaseflow._composition import SAMPLES, WORK, enter, leap_block, leave, place_block
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 
 
 @njit(**options)
-def flow_ordered(kind, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out):
+def flow_ordered(
+    kind, exits, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out
+):
     """Do what `_composition.flow` does, for many rays."""
     n, lanes = states.shape
     table, more = leap[0], lanes - 6
     riding = 0 if lanes == 6 else (1 if lanes == 10 else 2)
     x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
     m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
-    work, uva, w, d = aligned(27, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
+    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     # coordinates, fractions of the cell, number of the stencil's first coefficient: one cache line
     ray = aligned(n, 8)
@@ -38,7 +40,7 @@ def flow_ordered(kind, there, there_par, back, back_par, leap, time, rules, degr
             source = start + min(i, count - 1)
             for k in range(3):
                 x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
-        enter(kind, there, there_par, back, back_par, x, p, work, r)
+        enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
         place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
         for i in range(count):
             order[start + i] = start + i
@@ -76,7 +78,7 @@ def flow_ordered(kind, there, there_par, back, back_par, leap, time, rules, degr
             for i in range(BLOCK):
                 for k in range(4):
                     r[k, i] = ray[start + min(i, count - 1), k]
-            leave(kind, there, there_par, r, work, x, p)
+            leave(kind, exits, there, there_par, r, work, x, p)
             for i in range(count):
                 for k in range(3):
                     out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]

@@ -22,7 +22,7 @@ REACH = math.sqrt(2) - 1
 
 
 @njit(**options)
-def _columns(r, s, q):
+def columns(r, s, q):
     """First two columns s, q (3, BLOCK) of the rotations r (4, BLOCK), all flat."""
     for i in range(BLOCK):
         w, x, y, z = r[i], r[BLOCK + i], r[2 * BLOCK + i], r[3 * BLOCK + i]
@@ -35,10 +35,8 @@ def _columns(r, s, q):
 
 
 @njit(**options)
-def locate(r, work, chart, u, v, angle):
-    """Chart, u/REACH, v/REACH in [-1, 1] and angle in turns of a block."""
-    s, q = work[0:3].reshape(-1), work[3:6].reshape(-1)
-    _columns(r, s, q)
+def face(s, q, chart, u, v, along, across):
+    """Chart, u and v of s, and the components of q along the coordinate lines there; all of a block, s and q flat."""
     for i in range(BLOCK):
         sx, sy, sz = s[i], s[BLOCK + i], s[2 * BLOCK + i]
         qx, qy, qz = q[i], q[BLOCK + i], q[2 * BLOCK + i]
@@ -56,8 +54,21 @@ def locate(r, work, chart, u, v, angle):
         inverse = 1.0 / (1.0 + abs(sa))
         one, other = sb * inverse, sc * inverse
         chart[i] = (0 if is_x else (2 if is_y else 4)) + (1 if sa < 0.0 else 0)
-        u[i], v[i] = one * (1 / REACH), other * (1 / REACH)
-        angle[i] = turns(qc - other * qa, qb - one * qa)
+        u[i], v[i] = one, other
+        along[i], across[i] = qb - one * qa, qc - other * qa
+
+
+@njit(**options)
+def locate(r, work, chart, u, v, angle):
+    """Chart, u/REACH, v/REACH in [-1, 1] and angle in turns of a block."""
+    s, q, along, across = work[0:3].reshape(-1), work[3:6].reshape(-1), work[6], work[7]
+    columns(r, s, q)
+    face(s, q, chart, u, v, along, across)
+    for i in range(BLOCK):
+        u[i] *= 1 / REACH
+        v[i] *= 1 / REACH
+    for i in range(BLOCK):
+        angle[i] = turns(across[i], along[i])
 
 
 @njit(**options)
@@ -131,11 +142,11 @@ def enter(forward, forward_par, inverse, inverse_par, x, p, work, r):
         qx = along * ex + across * (sy * ez - sz * ey)
         qy = along * ey + across * (sz * ex - sx * ez)
         qz = along * ez + across * (sx * ey - sy * ex)
-        _quaternion(sx, sy, sz, qx, qy, qz, r, i)
+        quaternion(sx, sy, sz, qx, qy, qz, r, i)
 
 
 @njit(**options)
-def _quaternion(sx, sy, sz, qx, qy, qz, r, i):
+def quaternion(sx, sy, sz, qx, qy, qz, r, i):
     """Quaternion of the rotation with columns s, q, s x q, from the largest of its four components."""
     bx, by, bz = sy * qz - sz * qy, sz * qx - sx * qz, sx * qy - sy * qx
     w, x, y, z = 1.0 + sx + qy + bz, 1.0 + sx - qy - bz, 1.0 - sx + qy - bz, 1.0 - sx - qy + bz
@@ -155,7 +166,7 @@ def _quaternion(sx, sy, sz, qx, qy, qz, r, i):
 def leave(forward, forward_par, r, work, x, p):
     """Points x and directions p (3, BLOCK) of rotations r (4, BLOCK)."""
     s, q, first, second, root = work[0:3], work[3:6], work[18:21], work[21:24], work[24:27]
-    _columns(r.reshape(-1), s.reshape(-1), q.reshape(-1))
+    columns(r.reshape(-1), s.reshape(-1), q.reshape(-1))
     forward(s, x, work[9:18], forward_par)
     one, other, m, pf = first.reshape(-1), second.reshape(-1), root.reshape(-1), p.reshape(-1)
     _shape(work[9:18].reshape(-1), s.reshape(-1), q.reshape(-1), one, other, m)

@@ -92,7 +92,7 @@ def _traced(
             times = time * np.arange(1, steps + 1) / steps
             if ride_along:
                 times = np.unique(np.concatenate([times, time * chebyshev_times()]))
-            traced = trace_states(body, states, times, rtol=rtol, step=time / 4)
+            traced = trace_states(body, states, times, rtol=rtol, step=time)
             try:
                 values[part] = model.displacement(nodes[part], traced, times)
             except ToleranceError:

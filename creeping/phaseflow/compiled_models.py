@@ -3,6 +3,8 @@
 Formulas are those of `_rotations` and `_angles`.
 """
 
+from time import process_time as clock
+
 import numpy as np
 
 from creeping._errors import ToleranceError
@@ -12,8 +14,8 @@ from creeping.phaseflow.ambient import carry_riding
 from creeping.phaseflow.attenuation import chebyshev_times, gauss_rule, halves, sampling, searching
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.quaternions import quaternion_product, quaternions
-from creeping.phaseflow.splines import evaluate
-from creeping.surface import Surface, polar_frame
+from creeping.phaseflow.splines import evaluate, interpolation_operator
+from creeping.surface import Surface, polar_frame, size
 
 REACH = float(np.sqrt(2) - 1)
 """Stereographic coordinate of a chart's edge; see `_rotations`."""
@@ -23,6 +25,11 @@ NEAR = 4_000_000
 """if the table has so many bytes: it is more than the nearest caches hold."""
 SHARE = 65_536
 """Rays ordered at a time."""
+DEAR = 1e-7
+"""Seconds of one evaluation of psi from which on a table of it pays."""
+EXIT_SIDES = (48, 72, 108, 160)
+EXIT_ERROR = 1e-9
+"""Rms error of (x, p) by such a table, x in body sizes."""
 SUREST = 0.3
 """Least cosine between successive displacements of a rotation that leaves no doubt about its sign."""
 
@@ -42,6 +49,7 @@ class CompiledModel:
         there, back = source.compiled_forward, source.compiled_inverse
         self._there = there.function, there.parameters
         self._back = back.function, back.parameters
+        self._exits = np.zeros((0, 1, 1, 4))
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """Scale and shift from the coordinates of ``locate`` to those of the grid."""
@@ -52,7 +60,7 @@ class CompiledModel:
         from creeping.phaseflow._nodes import to_body
 
         out = np.empty((len(coordinates), 6))
-        to_body(self.kind, *self._there, coordinates, out)
+        to_body(self.kind, self._exits, *self._there, coordinates, out)
         return out
 
     def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
@@ -66,7 +74,7 @@ class CompiledModel:
         from creeping.phaseflow._nodes import displacements
 
         out = np.empty((len(nodes), 4))
-        surest = displacements(self.kind, *self._there, *self._back, nodes, traced, out)
+        surest = displacements(self.kind, self._exits, *self._there, *self._back, nodes, traced, out)
         if not surest >= SUREST:
             raise ToleranceError(
                 f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {surest:.2f}); "
@@ -91,7 +99,7 @@ class CompiledModel:
             # shares of a thread stay small, so that what is known of their rays stays in the cache
             for start in range(part.start, part.stop, SHARE):
                 some = slice(start, min(start + SHARE, part.stop))
-                kernel(self.kind, *self._there, *self._back, *tables, states[some], counts, out[some])
+                kernel(self.kind, self._exits, *self._there, *self._back, *tables, states[some], counts, out[some])
 
         in_threads(run, len(states))
         return out
@@ -138,6 +146,10 @@ class RotationModel(CompiledModel):
     name = "rotation"
     kind = 0
     charts = 6
+
+    def __init__(self, body: Surface) -> None:
+        super().__init__(body)
+        self._exits = exit_table(body, self)
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""
@@ -225,6 +237,35 @@ class AngleModel(CompiledModel):
 def _tables(leap: Leap) -> tuple[Any, ...]:
     """Arrays of a leap in the order of the kernels."""
     return leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature
+
+
+def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
+    """Coefficients (6, n, n, 4) of x(u, v) on the charts where psi is dear to evaluate, none (0, 1, 1, 4) elsewhere."""
+    rng = np.random.default_rng(0)
+    chart = rng.integers(6, size=2048)
+    one, other, angle = rng.random((3, 2048))
+    at = np.concatenate([model.at(c, one[chart == c], other[chart == c], angle[chart == c]) for c in range(6)])
+    model.states(at[:64])
+    start = clock()
+    exact = model.states(at)
+    found = np.zeros((0, 1, 1, 4))
+    if clock() - start < DEAR * len(at):
+        return found
+    for side in EXIT_SIDES:
+        grid = Grid((side, side, 1), 5, (False, False))
+        u, v = (values.ravel() for values in np.meshgrid(*grid.axes()[:2], indexing="ij"))
+        points = np.stack([model.states(model.at(c, u, v, np.zeros_like(u)))[:, :3] for c in range(6)])
+        values = np.zeros((6, side, side, 4))
+        values[..., :3] = points.reshape(6, side, side, 3)
+        for axis in (1, 2):
+            operator = interpolation_operator(side, 5, False)
+            values = np.moveaxis(np.tensordot(operator, values, axes=(1, axis)), 0, axis)
+        model._exits = np.ascontiguousarray(values)
+        error = (model.states(at) - exact) / np.array([size(body)] * 3 + [1.0] * 3)
+        model._exits = found
+        if float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) < EXIT_ERROR:
+            return np.ascontiguousarray(values)
+    return found
 
 
 def _across(s: FloatArray) -> FloatArray:

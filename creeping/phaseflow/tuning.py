@@ -44,13 +44,13 @@ CELLS = 192
 STRIDES = (2, 3, 4, 6, 8, 12, 16, 24)
 NODE, DOUBLING = 6e-7, 4e-7
 """Seconds that a node takes of a build besides tracing, and of a doubling."""
-COARSE = 300_000
+COARSE = 1_500_000
 """Nodes from which on a coarser map is built first, to measure how errors grow."""
-BUDGET = 0.4
-"""Seconds that probing may take, where F is dear."""
+BUDGET, SHARE = (0.02, 0.4), 0.02
+"""Least and most seconds that one probe or measurement may take, as a share of direct integration of all rays."""
 SINGLE = 1.2e-8
 """Error of one leap, in units of (x, p), that float32 coefficients leave room for: their rounding makes as much."""
-SAFE = 0.7
+SAFE = 0.5
 """Share of the tolerance that is aimed at."""
 
 
@@ -125,9 +125,15 @@ def _measured(built: PhaseMap, request: "Request", cost: float) -> PhaseMap:
     """The map with its errors; where F is dear on fewer rays, and against a reference only so much better."""
     length = request.length or built.horizon
     assert request.tolerance is not None
-    samples = int(np.clip(BUDGET / (cost * length), 400, 2000))
-    dear = 4 * cost * length * samples > BUDGET
+    budget = _budget(request, cost)
+    samples = int(np.clip(budget / (cost * length), 400, 2000))
+    dear = 4 * cost * length * samples > budget
     return measured(built, request.length, samples=samples, rtol=1e-3 * request.tolerance if dear else 1e-12)
+
+
+def _budget(request: "Request", cost: float) -> float:
+    """Seconds that one probe or measurement may take."""
+    return float(np.clip(SHARE * request.rays * cost * (request.length or 1.0), *BUDGET))
 
 
 def tracing_cost(body: Surface) -> float:
@@ -154,10 +160,12 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
     horizons = _horizons(request, natural, cost)
     probe = _Probe(body, model, horizons, request.periodic)
     orders = (request.order,) if request.order else (3, 5)
+    rays = int(np.clip(_budget(request, cost) / (2 * cost * (request.length or natural)), 48, 512))
+    stretch = amplification(body, request.length or natural, rays)
     found = []
     fewest = (np.inf, 0.0)
     for k, horizon in enumerate(horizons):
-        gain = growth_factor(body, horizon, request.length, cost) if request.length else 1.0
+        gain = growth_factor(*stretch, horizon) if request.length else 1.0
         target = SAFE * tolerance / gain
         single = request.precision == "single" or (
             request.precision is None and isinstance(model, CompiledModel) and target > SINGLE * np.hypot(1, size(body))
@@ -201,7 +209,7 @@ def _horizons(request: "Request", natural: float, cost: float) -> list[float]:
     if not request.length:
         return [natural]
     # probing a horizon traces some 14 000 rays that far
-    longest = max(natural, min(16 * natural, BUDGET / (cost * 3 * LINES * CELLS)))
+    longest = max(natural, min(16 * natural, 4 * _budget(request, cost) / (cost * 3 * LINES * CELLS)))
     distance = request.length / request.outputs
     leaps = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
     found = [distance / m for m in leaps if 0.4 * natural <= distance / m <= longest]
@@ -218,20 +226,25 @@ def _doublings(horizon: float, natural: float, cost: float) -> int:
     return d
 
 
-def growth_factor(body: Surface, horizon: float, length: float, cost: float) -> float:
-    """G: what errors of the leaps add up to at the end of a ray, in units of one leap's error."""
-    count = max(1, round(length / horizon))
-    rays = int(np.clip(BUDGET / (2 * cost * length), 64, 512))
-    times = length * np.arange(1, count + 1) / count
+def amplification(body: Surface, length: float, rays: int) -> tuple[FloatArray, FloatArray]:
+    """Times t along rays, and how much an error made at t is stretched on the way to their end: (m,), (m,)."""
+    times = length * np.arange(1, 65) / 64
     x, p = random_bundle_points(body, rays, rng=np.random.default_rng(1))
-    m = trace_states(body, pack(x, p, jacobi=True), times, rtol=1e-6, step=min(horizon, 0.05 * size(body)))[:, :, 6:]
+    m = trace_states(body, pack(x, p, jacobi=True), times, rtol=1e-6, step=0.05 * size(body))[:, :, 6:]
     # columns (m11, m21), (m12, m22); the inverse needs no division since det M = 1
     scale = size(body)
     a, c, b, d = m[:, -1:, 0], scale * m[:, -1:, 1], m[:, -1:, 2] / scale, m[:, -1:, 3]
     e, g, f, h = m[:, :, 0], scale * m[:, :, 1], m[:, :, 2] / scale, m[:, :, 3]
     square = (a * h - b * g) ** 2 + (b * e - a * f) ** 2 + (c * h - d * g) ** 2 + (d * e - c * f) ** 2
     # the geometric mean: a few rays of a chaotic flow would swamp any other
-    return float(np.exp(0.5 * np.mean(np.log(np.sum(0.5 * square, axis=1)))))
+    return times, np.asarray(np.exp(0.5 * np.mean(np.log(0.5 * square), axis=0)))
+
+
+def growth_factor(times: FloatArray, stretch: FloatArray, horizon: float) -> float:
+    """G: what errors of the leaps add up to at the end of a ray, in units of one leap's error."""
+    count = max(1, round(times[-1] / horizon))
+    at = times[-1] * np.arange(1, count + 1) / count
+    return float(np.sqrt(np.sum(np.exp(2 * np.interp(at, times, np.log(stretch))))))
 
 
 class _Probe:

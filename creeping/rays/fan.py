@@ -206,7 +206,7 @@ def launch(
     gap = 0.1 * size(body) if max_gap is None else float(max_gap)
     if not gap > 0:
         raise InvalidInputError(f"max_gap = {max_gap!r} is not positive; give inf for no refinement")
-    times = np.linspace(0.0, length, (n_steps or _enough_steps(body, line, length)) + 1)
+    times = np.linspace(0.0, length, (n_steps or enough_steps(body, line, length)) + 1)
     arcs = launching_arcs(line, every=status == "all")
     arc, arclength = launch_positions(line, arcs, n_rays)
     starts = _starts(line, arcs, arc, arclength)
@@ -224,8 +224,11 @@ def launch(
     return _assemble(flow, line, arcs, arc, arclength, starts, states, times)
 
 
-def _enough_steps(body: Surface, line: ShadowLine, length: float) -> int:
-    """At least 64, and four between two zeros of J (they are at least pi/sqrt(max K) apart)."""
+def enough_steps(body: Surface, line: ShadowLine, length: float) -> int:
+    """Steps of a fan unless their number is given: at least 64, and four between two zeros of J.
+
+    Zeros are at least pi/sqrt(max K) apart.
+    """
     coarse = np.concatenate([curve.points for curve in line.curves] or [np.zeros((0, 3))])
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 17)] * 2), axis=-1).reshape(-1, 2)
     points = np.concatenate([coarse, *(chart.point(uv) for chart in body.atlas.charts)])

@@ -10,9 +10,28 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.phaseflow.bundle import random_bundle_points
+from creeping.phaseflow.choosing import tuned_direct
 from creeping.phaseflow.tracing import pack, trace_states
 
 BODIES = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "twisted": sc.TwistedEllipsoid()}
+LENGTH = 8.0
+ENDS = np.array([LENGTH])
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    """Maps for rays of length 8 within 1e-6, built once: tuned(body, outputs)."""
+    kept = {}
+
+    def get(body, outputs=1):
+        key = repr(body), outputs
+        if key not in kept:
+            kept[key] = cr.build_phase_map(
+                body, tolerance=1e-6, length=LENGTH, outputs=outputs, ride_along=outputs > 1, cache=False
+            )
+        return kept[key]
+
+    return get
 
 
 @pytest.fixture(params=BODIES)
@@ -36,6 +55,42 @@ def test_one_leap(benchmark, states, phase_map):
 def test_direct_integration_over_the_same_time(benchmark, states, phase_map):
     body, points = states
     benchmark(trace_states, body, points, np.array([phase_map(body).horizon]), rtol=1e-7)
+
+
+def test_long_leaps(benchmark, states, tuned):
+    body, points = states
+    benchmark(tuned(body).transport, points, ENDS)
+
+
+def test_direct_integration_of_equal_error(benchmark, states, tuned):
+    body, points = states
+    direct, _ = tuned_direct(body, LENGTH, 1, tuned(body).growth.rms[-1], False)
+    benchmark(direct.transport, points, ENDS)
+
+
+def test_leap_on_a_body_given_by_samples(benchmark):
+    body = sc.Gridded.sampled(sc.TwistedEllipsoid(), 32)
+    flow = cr.build_phase_map(body, horizon=0.5, grid=(32, 48), ride_along=False, cache=False)
+    points = pack(*random_bundle_points(body, 20_000, rng=np.random.default_rng(0)))
+    benchmark(flow.leap, points, 1)
+
+
+def test_fan_of_64_outputs(benchmark, states, tuned):
+    body, points = states
+    riding = pack(points[:4096, :3], points[:4096, 3:], jacobi=True)
+    benchmark(tuned(body, 64).transport, riding, LENGTH * np.arange(1, 65) / 64)
+
+
+def test_opening_a_stored_map(benchmark, states, tuned, tmp_path):
+    body, _ = states
+    benchmark(cr.load_phase_map, tuned(body).save(tmp_path / "map"), body)
+
+
+@pytest.mark.parametrize("rays", [1000, 1_000_000])
+@pytest.mark.parametrize("which", BODIES)
+def test_choice_of_a_flow(benchmark, which, rays):
+    options = {"rays": rays, "length": LENGTH, "ride_along": False, "cache": False}
+    benchmark.pedantic(cr.choose_flow, (BODIES[which],), options, rounds=3, warmup_rounds=1)
 
 
 @pytest.mark.parametrize("which", BODIES)

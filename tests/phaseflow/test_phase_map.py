@@ -165,3 +165,30 @@ def test_direct_flow_has_the_same_protocol(rng):
     np.testing.assert_allclose(flow.apply(x, p)[0], cr.trace(body, x, p, flow.horizon)[0], atol=1e-9)
     assert flow.error is None
     assert isinstance(cr.build_phase_map(body, horizon=0.2, grid=(10, 12), order=3, cache=False), PhaseMap)
+
+
+def test_table_of_the_body_stands_in_for_a_dear_psi(rng):
+    body = sc.Gridded.sampled(sc.Ellipsoid(1.2, 0.8, 0.8), 24)
+    model = model_of(body)
+    assert len(model._exits) == 6
+    exact = model_of(body)
+    exact._exits = np.zeros((0, 1, 1, 4))
+    for chart in range(6):
+        at = model.at(chart, rng.random(200), rng.random(200), 2 * np.pi * rng.random(200))
+        states = model.states(at)
+        error = np.linalg.norm(states - exact.states(at), axis=1)
+        assert np.sqrt(np.mean(error**2)) < 3e-9
+        # in again by the same table
+        back = model.displacement(at, states[:, None], np.array([0.0]))
+        np.testing.assert_allclose(back, np.broadcast_to([1.0, 0, 0, 0], (200, 4)), atol=1e-8)
+        np.testing.assert_allclose(exact.displacement(at, states[:, None], np.array([0.0])), back, atol=1e-8)
+
+
+def test_map_of_a_gridded_body(rng):
+    body = sc.Gridded.sampled(sc.Ellipsoid(1.2, 0.8, 0.8), 24)
+    flow = cr.build_phase_map(body, tolerance=1e-5, length=2.0, outputs=4, cache=False)
+    states = pack(*random_bundle_points(body, 100, rng=rng), lanes=12)
+    times = np.array([0.5, 1.0, 2.0])
+    got, exact = flow.transport(states, times), cr.DirectFlow(body, rtol=1e-12).transport(states, times)
+    assert rms(got[:, 2, :6], exact[:, 2, :6]) < 1e-5
+    np.testing.assert_allclose(got[..., 6:11], exact[..., 6:11], rtol=1e-3, atol=1e-3)

@@ -1,0 +1,73 @@
+"""The tables of costs say what they claim: rows, errors beside them, tolerances met; never how fast."""
+
+import json
+import math
+
+import pytest
+
+from studies import _flow_cases as cases
+from studies import flow_speed
+
+ELLIPSOID = ("ellipsoid",)
+
+
+def test_long_leaps_compare_equal_errors():
+    (row,) = flow_speed.long_leaps(ELLIPSOID, count=64, samples=100)
+    assert row["body"] == "ellipsoid"
+    for flow in ("map", "order 8", "heyoka", "scipy"):
+        cost, error = row[flow], row[f"{flow} error"]
+        assert flow == "heyoka" or not math.isnan(cost)
+        assert math.isnan(cost) or (cost > 0 and 0 < error <= 1e-6)
+    assert row["pencils"] > 0
+    assert row["T0"] > 0 and row["MB"] > 0 and row["grid"].startswith("6x")
+
+
+def test_break_even_needs_a_map_that_is_faster():
+    rows = flow_speed.break_even(ELLIPSOID, tuned=(1e6,), count=64)
+    assert [row["tuned for"] for row in rows] == [1e6]
+    for row in rows:
+        assert 0 < row["map error"] <= 1e-6
+        # equal steps that meet the error on other rays
+        assert row["order 8 error"] <= 2 * row["map error"]
+        assert row["build s"] > 0
+        assert (row["rays"] == math.inf) == (row["order 8"] <= row["map"])
+        assert row["least"] == "*"
+
+
+def test_requested_tolerances_are_met():
+    rows = flow_speed.requested(ELLIPSOID, exponents=(3, 6), samples=400)
+    assert [row["requested"] for row in rows] == [1e-3, 1e-6]
+    for row in rows:
+        assert 0 < row["median"] <= row["achieved"] <= row["worst"] <= row["requested"]
+        assert row["ratio"] == pytest.approx(row["achieved"] / row["requested"])
+
+
+def test_refusals_keep_their_reason(monkeypatch):
+    from creeping._errors import ToleranceError
+
+    def none(*_args):
+        raise ToleranceError("no map")
+
+    monkeypatch.setattr(cases, "built", none)
+    (row,) = flow_speed.requested(ELLIPSOID, exponents=(9,), samples=10)
+    assert math.isnan(row["achieved"]) and row["remark"] == "refused: no map"
+
+
+def test_tables_are_printed_stored_and_drawn(capsys, tmp_path):
+    rows = [
+        {"body": "a", "requested": 1e-3, "achieved": 5e-4},
+        {"body": "a", "requested": 1e-4, "achieved": math.nan, "remark": "refused: it is too dear"},
+    ]
+    cases.show("Table", rows)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "Table" and lines[2].split() == ["body", "requested", "achieved", "remark"]
+    assert lines[3].split() == ["a", "0.001", "5.0e-04"] and lines[4].endswith("-  refused: it is too dear")
+    assert json.loads(json.dumps(cases.plain(rows), allow_nan=False))[1]["achieved"] is None
+    cases.draw(rows, tmp_path / "requested.png")
+    assert (tmp_path / "requested.png").stat().st_size > 0
+
+
+def test_powers_are_fitted():
+    (cost, error, build) = flow_speed.sizes((100, 200), nodes=(12, 16))
+    assert cost["quantity"] == "map s" and build["quantity"] == "build s"
+    assert -12 < error["exponent"] < -4
