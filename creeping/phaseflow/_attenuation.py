@@ -109,3 +109,19 @@ def _polynomial(values, nodes, t):
             span = nodes[j] - nodes[j + width]
             work[j] = ((t - nodes[j + width]) * work[j] + (nodes[j] - t) * work[j + 1]) / span
     return work[0]
+
+
+@njit(**options)
+def extend_all(values, rules, time, now, total, end):
+    """What `extend` does, for values (n, 8), integrals and times of detachment (n,)."""
+    n = values.shape[0]
+    a, sampled, block = aligned(2, BLOCK), aligned(15, BLOCK), np.ones((BLOCK, 8))
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        for i in range(count):
+            for k in range(8):
+                block[i, k] = values[start + i, k]
+            a[0, i], a[1, i] = total[start + i], end[start + i]
+        extend(block.reshape(-1), rules, time, now, a, sampled, count)
+        for i in range(count):
+            total[start + i], end[start + i] = a[0, i], a[1, i]

@@ -70,6 +70,12 @@ def halves() -> FloatArray:
     return out
 
 
+@cache
+def kernel_rules() -> tuple[FloatArray, ...]:
+    """What the kernels need to know of all this: see `_attenuation.extend`."""
+    return (sampling(), searching(), *gauss_rule(), chebyshev_times())
+
+
 def curvature_values(body: Surface, states: FloatArray) -> FloatArray:
     """c^(3/2) kappa_n at states (n, 6 or more): (n,)."""
     compiled = compiled_parts(body)
@@ -137,6 +143,8 @@ def with_attenuation(
     rtol: float,
 ) -> FloatArray:
     """Advance states (n, 12) by a transport of ten lanes, tracing again between the times for the last two."""
+    from creeping.phaseflow._attenuation import extend_all
+
     out = np.empty((len(states), len(times), 12))
     out[..., :10] = transport(states[:, :10], times)
     total, end = states[:, 10].copy(), states[:, 11].copy()
@@ -146,7 +154,7 @@ def with_attenuation(
         if step > 0:
             inside = trace_states(body, before, step * chebyshev_times(), rtol=rtol, step=step)
             values = curvature_values(body, inside.reshape(-1, 6)).reshape(len(states), NODES)
-            extend(values, step, np.full(len(states), now), total, end)
+            extend_all(values, kernel_rules(), step, now, total, end)
         out[:, k, 10], out[:, k, 11] = total, end
         before, now = out[:, k, :6], float(time)
     return out

@@ -3,6 +3,7 @@
 Formulas are those of `_rotations` and `_angles`.
 """
 
+from functools import cached_property
 from time import process_time as clock
 
 import numpy as np
@@ -11,7 +12,7 @@ from creeping._errors import ToleranceError
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.phaseflow._threads import in_threads
 from creeping.phaseflow.ambient import carry_riding
-from creeping.phaseflow.attenuation import chebyshev_times, gauss_rule, halves, sampling, searching
+from creeping.phaseflow.attenuation import halves, kernel_rules
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.quaternions import quaternion_product, quaternions
 from creeping.phaseflow.splines import evaluate, interpolation_operator
@@ -49,7 +50,11 @@ class CompiledModel:
         there, back = source.compiled_forward, source.compiled_inverse
         self._there = there.function, there.parameters
         self._back = back.function, back.parameters
-        self._exits = np.zeros((0, 1, 1, 4))
+
+    @cached_property
+    def _exits(self) -> FloatArray:
+        """Table of x(u, v) for the kernels, none if psi itself is to be used."""
+        return np.zeros((0, 1, 1, 4))
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """Scale and shift from the coordinates of ``locate`` to those of the grid."""
@@ -90,8 +95,7 @@ class CompiledModel:
         out = np.empty((len(states), len(counts), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
         counts = np.asarray(counts, dtype=np.int64)
-        rules = sampling(), searching(), *gauss_rule(), chebyshev_times()
-        tables = _tables(leap), leap.time, rules, grid.degree, *self.placement(grid)
+        tables = _tables(leap), leap.time, kernel_rules(), grid.degree, *self.placement(grid)
         many = len(states) >= ORDERED and leap.state.nbytes > NEAR and int(counts.sum()) > 0
         kernel = flow_ordered if many else flow
 
@@ -147,9 +151,9 @@ class RotationModel(CompiledModel):
     kind = 0
     charts = 6
 
-    def __init__(self, body: Surface) -> None:
-        super().__init__(body)
-        self._exits = exit_table(body, self)
+    @cached_property
+    def _exits(self) -> FloatArray:
+        return exit_table(self.body, self)
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""
@@ -241,6 +245,8 @@ def _tables(leap: Leap) -> tuple[Any, ...]:
 
 def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
     """Coefficients (6, n, n, 4) of x(u, v) on the charts where psi is dear to evaluate, none (0, 1, 1, 4) elsewhere."""
+    found = np.zeros((0, 1, 1, 4))
+    model._exits = found
     rng = np.random.default_rng(0)
     chart = rng.integers(6, size=2048)
     one, other, angle = rng.random((3, 2048))
@@ -248,7 +254,6 @@ def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
     model.states(at[:64])
     start = clock()
     exact = model.states(at)
-    found = np.zeros((0, 1, 1, 4))
     if clock() - start < DEAR * len(at):
         return found
     for side in EXIT_SIDES:

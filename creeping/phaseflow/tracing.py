@@ -49,12 +49,12 @@ class Tableau(NamedTuple):
     def packed(self) -> tuple[IntArray, IntArray, FloatArray]:
         """Nonzero weights row by row, for the compiled tracer: numbers of them, their places, themselves.
 
-        Rows are those of a, then b, e3 and e5.
+        Rows are those of a, then b, e3 and e5; a zero makes the number of each even and positive.
         """
         stages = len(self.b)
         rows = [*self.a, self.b, self.e3, self.e5]
-        terms = np.array([np.count_nonzero(row) for row in rows])
-        index, weights = np.zeros((len(rows), stages + 1), dtype=np.int64), np.zeros((len(rows), stages + 1))
+        terms = np.array([max(2, 2 * ((np.count_nonzero(row) + 1) // 2)) for row in rows])
+        index, weights = np.zeros((len(rows), stages + 2), dtype=np.int64), np.zeros((len(rows), stages + 2))
         for number, row in enumerate(rows):
             places = np.flatnonzero(row)
             index[number, : len(places)], weights[number, : len(places)] = places, row[places]
