@@ -36,21 +36,25 @@ def extend(values, rules, time, now, a, sampled, count):
     """Carry A and the time of detachment, rows of a (2, BLOCK), over one leap; see `attenuation.extend`.
 
     values (BLOCK, 8), flat, are c^(3/2) kappa_n at the Chebyshev times; ``rules`` are the sampling and the searching
-    matrix, Gauss points and weights, and the Chebyshev points. sampled (15, BLOCK) is work space.
+    matrix, Gauss points and weights, and the Chebyshev points. sampled (23, BLOCK) is work space.
     """
     sampling, searching, points, weights, nodes = rules
     gauss = points.shape[0]
-    least = sampled[gauss + 2]
+    least, rows = sampled[gauss + 2], sampled[gauss + 3 : gauss + 11]
+    # by rows: reading every eighth number would be what takes the time
+    for i in range(BLOCK):
+        for k in range(8):
+            rows[k, i] = values[8 * i + k]
     for i in range(BLOCK):
         least[i] = 1e300
     for g in range(gauss + 2):
         row = sampled[g]
         c = sampling[g]
         c0, c1, c2, c3, c4, c5, c6, c7 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
+        v = rows.reshape(-1)
         for i in range(BLOCK):
-            at = 8 * i
-            total = c0 * values[at] + c1 * values[at + 1] + c2 * values[at + 2] + c3 * values[at + 3]
-            total += c4 * values[at + 4] + c5 * values[at + 5] + c6 * values[at + 6] + c7 * values[at + 7]
+            total = c0 * v[i] + c1 * v[BLOCK + i] + c2 * v[2 * BLOCK + i] + c3 * v[3 * BLOCK + i]
+            total += c4 * v[4 * BLOCK + i] + c5 * v[5 * BLOCK + i] + c6 * v[6 * BLOCK + i] + c7 * v[7 * BLOCK + i]
             row[i] = total
         for i in range(BLOCK):
             least[i] = min(least[i], row[i])
@@ -115,7 +119,7 @@ def _polynomial(values, nodes, t):
 def extend_all(values, rules, time, now, total, end):
     """What `extend` does, for values (n, 8), integrals and times of detachment (n,)."""
     n = values.shape[0]
-    a, sampled, block = aligned(2, BLOCK), aligned(15, BLOCK), np.ones((BLOCK, 8))
+    a, sampled, block = aligned(2, BLOCK), aligned(23, BLOCK), np.ones((BLOCK, 8))
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(count):

@@ -15,7 +15,7 @@ from creeping.phaseflow._stencils import cells_and_fractions, interpolate, weigh
 ROTATION, ANGLES = 0, 1
 WORK = 48
 """Rows of work space for a block."""
-SAMPLES = 15
+SAMPLES = 23
 """Rows of work space that `extend` needs."""
 
 _enter_rotation, _enter_angles = _rotations.enter, _angles.enter

@@ -23,8 +23,9 @@ from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.models import Model, nodes_of
 from creeping.phaseflow.phase_map import Growth, PhaseMap
 from creeping.phaseflow.splines import prefilter
+from creeping.phaseflow.storing import fingerprint
 from creeping.phaseflow.tracing import MapError, pack, runge_kutta_4, trace_states
-from creeping.surface import Surface
+from creeping.surface import Surface, check_surface
 
 Progress = Callable[[str], None]
 SAMPLES = 2000
@@ -156,31 +157,63 @@ def _leap(
 
 def measure(flow: PhaseMap, *, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> MapError:
     """Error of one g_T0 against `trace` at 1e-12, over random points of T1Q (seed 0 without ``rng``)."""
-    return _errors(flow, np.array([flow.horizon]), samples, rng)[0]
+    errors = _errors(flow, np.array([flow.horizon]), samples, rng or np.random.default_rng(0), 1e-12)[:, 0]
+    return MapError(float(np.sqrt(np.mean(errors**2))), float(errors.max()), samples)
 
 
-def measured(flow: PhaseMap, length: float | None = None, *, samples: int = SAMPLES, rtol: float = 1e-12) -> PhaseMap:
-    """The map with its error of one g_T0 and of rays up to ``length``, 8 horizons if not given."""
+def measured(
+    flow: PhaseMap, length: float | None = None, *, samples: int = SAMPLES, rtol: float = 1e-12, most: int = 1
+) -> PhaseMap:
+    """The map with its error of one g_T0 and of rays up to ``length``, 8 horizons if not given.
+
+    Where few of the rays carry most of the error, up to ``most`` times as many are taken.
+    """
     count = max(1, round(length / flow.horizon)) if length else 8
     leaps = [m for m in (1, 2, 4, 8, 16, 32, 64, 128, 256) if m < count] + [count]
     times = flow.horizon * np.array(leaps, dtype=float)
     if length:
         times[-1] = length
-    errors = _errors(flow, times, samples, None, rtol)
-    growth = Growth(tuple(times.tolist()), tuple(e.rms for e in errors), tuple(e.max for e in errors))
-    first = errors[0] if leaps[0] == 1 and times[0] == flow.horizon else measure(flow, samples=samples)
+    rng = np.random.default_rng(0)
+    errors = settled(lambda number: _errors(flow, times, number, rng, rtol), samples, most)
+    rms, largest = np.sqrt(np.mean(errors**2, axis=0)), errors.max(axis=0)
+    growth = Growth(tuple(times.tolist()), tuple(rms.tolist()), tuple(largest.tolist()), upper_bound(errors[:, -1]))
+    first = MapError(float(rms[0]), float(largest[0]), len(errors))
+    if times[0] != flow.horizon:
+        first = measure(flow, samples=samples)
     return replace(flow, error=first, growth=growth)
 
 
-def _errors(
-    flow: PhaseMap, times: FloatArray, samples: int, rng: np.random.Generator | None, rtol: float = 1e-12
-) -> list[MapError]:
-    x, p = random_bundle_points(flow.body, samples, rng=rng or np.random.default_rng(0))
-    states = pack(x, p)
+def settled(sample: Callable[[int], FloatArray], count: int, most: int) -> FloatArray:
+    """Errors (n, m) of so many random rays, doubled up to ``most`` times that while the last column's rms scatters."""
+    errors = sample(count)
+    limit = count * most
+    while 2 * len(errors) <= limit and upper_bound(errors[:, -1]) > 1.2 * np.sqrt(np.mean(errors[:, -1] ** 2)):
+        errors = np.concatenate([errors, sample(len(errors))])
+    return errors
+
+
+def upper_bound(errors: FloatArray) -> float:
+    """Rms of errors (n,), two standard errors of their squares above it."""
+    square = errors**2
+    return float(np.sqrt(np.mean(square) + 2 * np.std(square) / np.sqrt(len(square))))
+
+
+def _errors(flow: PhaseMap, times: FloatArray, samples: int, rng: np.random.Generator, rtol: float) -> FloatArray:
+    """|(x, p) - (x, p)_traced| of random rays: (samples, m)."""
+    states = pack(*random_bundle_points(flow.body, samples, rng=rng))
     exact = trace_states(flow.body, states, times, rtol=rtol, step=flow.horizon / 8)
-    error = np.linalg.norm(flow.transport(states, times) - exact, axis=2)
-    rms = np.sqrt(np.mean(error**2, axis=0))
-    return [MapError(float(r), float(m), samples) for r, m in zip(rms, error.max(axis=0), strict=True)]
+    return np.asarray(np.linalg.norm(flow.transport(states, times) - exact, axis=2))
+
+
+_CHECKED: set[str] = set()
+
+
+def require_checked(body: Surface) -> None:
+    """Raise what `check_surface` finds, once a body."""
+    name = fingerprint(body)
+    if name not in _CHECKED:
+        check_surface(body).require()
+        _CHECKED.add(name)
 
 
 def natural_horizon(body: Surface) -> float:

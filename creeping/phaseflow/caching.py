@@ -52,7 +52,8 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     try:
         grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
         error = MapError(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
-        growth = content["growth"] and Growth(*(tuple(map(float, row)) for row in content["growth"]))
+        rows = content["growth"] and [tuple(map(float, row)) for row in content["growth"]]
+        growth = Growth(rows[0], rows[1], rows[2], rows[3][0]) if rows else None
         leaps = tuple(
             Leap(
                 float(time),
@@ -72,7 +73,7 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     if model.name != content["model"]:
         raise StoredMapError(f"{folder} is stored as {content['model']!r}, which {body!r} does not offer; rebuild it")
     _check_shapes(folder, grid, leaps, model)
-    return PhaseMap(body, model, grid, leaps, error, growth or None, content["parameters"])
+    return PhaseMap(body, model, grid, leaps, error, growth, content["parameters"])
 
 
 def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Model) -> None:

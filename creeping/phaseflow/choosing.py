@@ -5,6 +5,7 @@ to build and c_m a ray. For N rays the map is chosen if b + N c_m < N c_d, with 
 the build, and c_m measured after it.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from time import process_time as clock
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from creeping._errors import IntegrationError, InvalidInputError, ToleranceError
 from creeping._typing import FloatArray
-from creeping.phaseflow.building import Progress
+from creeping.phaseflow.building import Progress, natural_horizon, require_checked, settled, upper_bound
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.caching import cached_phase_map, is_cached
 from creeping.phaseflow.compiled_models import CompiledModel
@@ -21,13 +22,17 @@ from creeping.phaseflow.models import model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.request import Request
 from creeping.phaseflow.tracing import MapError, pack, trace_states
-from creeping.phaseflow.tuning import candidates, tracing_cost, tuned_map
-from creeping.surface import Surface, check_surface, size
+from creeping.phaseflow.tuning import Candidate, candidates, tracing_cost, tuned_map
+from creeping.surface import Surface, size
 
 SAMPLES = 512
 """Rays on which direct integration is measured and both are timed, fewer where F is dear."""
 BUDGET = 0.2
 """Seconds that one measurement may take."""
+QUICK = 0.05
+"""Seconds of direct integration below which nothing is tuned."""
+SMALLEST = 60_000
+"""Nodes of the smallest map that is worth estimating."""
 
 
 def choose_flow(
@@ -79,42 +84,78 @@ def choose_flow(
     bounded = max(tolerance, 1e-9)
     request = Request(body, bounded, length, outputs, None, None, None, None, ride_along, "direct", None, None)
     say = progress or (lambda _: None)
-    check_surface(body).require()
-    direct, each = tuned_direct(body, length, outputs, tolerance, ride_along)
+    require_checked(body)
     request.rays = int(rays)
-    if tolerance < 1e-9:
-        say("direct integration: no map reaches such a tolerance")
-        return direct
-    stored = cache is not False and is_cached(body, request.key(), folder=cache)
+    cost = tracing_cost(body)
+    stored = cache is not False and tolerance >= 1e-9 and is_cached(body, request.key(), folder=cache)
+    if rays * length * cost < QUICK and not stored:
+        say(f"direct integration: {rays} rays take about {rays * length * cost:.1g} s")
+        return _untuned_direct(body, length, outputs, tolerance)
+    direct, each = tuned_direct(body, length, outputs, tolerance, ride_along)
     if not stored:
-        # a map takes some hundredths of a second to probe, let alone to build
-        if rays * each < 0.05 or not isinstance(model_of(body), CompiledModel):
-            say(f"direct integration: {rays} rays take {rays * each:.2g} s")
+        found, reason = _worth_building(request, rays * each, cost, tolerance)
+        if reason:
+            say(f"direct integration: {reason}")
             return direct
-        try:
-            best = candidates(request, model_of(body), tracing_cost(body))[0]
-        except ToleranceError as error:
-            say(f"direct integration: {error}")
-            return direct
-        expected = best.seconds(rays, length)
-        if expected > rays * each:
-            say(f"direct integration: {rays} rays take {rays * each:.2g} s, with a map about {expected:.2g} s")
-            return direct
+    else:
+        found = None
     try:
-        found = (
-            tuned_map(request, say)
+        flow = (
+            tuned_map(request, say, found)
             if cache is False
-            else cached_phase_map(body, request.key(), lambda: tuned_map(request, say), folder=cache, progress=say)
+            else cached_phase_map(
+                body, request.key(), lambda: tuned_map(request, say, found), folder=cache, progress=say
+            )
         )
     except ToleranceError as error:
         say(f"direct integration: {error}")
         return direct
-    composed = _seconds_per_ray(found, body, length, outputs, ride_along, each)
+    composed = _seconds_per_ray(flow, body, length, outputs, ride_along, each)
     if composed > each:
         say(f"direct integration: {1e6 * each:.2g} us a ray, with the map {1e6 * composed:.2g}")
         return direct
     say(f"phase map: {1e6 * composed:.2g} us a ray, direct integration {1e6 * each:.2g}")
-    return found
+    return flow
+
+
+def _worth_building(request: Request, direct: float, cost: float, tolerance: float) -> tuple[list[Candidate], str]:
+    """Candidates for a map, and the reason to build none of them, if there is one; ``direct`` in seconds."""
+    body = request.body
+    said = f"{request.rays} rays take {direct:.2g} s"
+    if tolerance < 1e-9:
+        return [], f"no map reaches such a tolerance; {said}"
+    # what the smallest map takes, so that probing is not begun in vain
+    least = 0.15 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if request.ride_along else 1.0)
+    if direct < least or not isinstance(model_of(body), CompiledModel):
+        return [], said
+    try:
+        found = candidates(request, model_of(body), cost)
+    except ToleranceError as error:
+        return [], str(error)
+    assert request.length is not None
+    expected = found[0].seconds(request.rays, request.length)
+    return found, f"{said}, with a map about {expected:.2g} s" if expected > direct else ""
+
+
+def _untuned_direct(body: Surface, length: float, outputs: int, tolerance: float) -> DirectFlow:
+    """Direct flow with adapted steps, measured on a few rays: for so little work that tuning would take longer."""
+    states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(2)))
+    times = np.array([length])
+    exact = trace_states(body, states, times, rtol=float(np.clip(1e-4 * tolerance, 1e-14, 1e-10)))[:, 0]
+    rtol = float(np.clip(0.1 * tolerance, 1e-14, 1e-3))
+    while True:
+        flow = DirectFlow(body, rtol, length / outputs)
+        error = np.linalg.norm(flow.transport(states, times)[:, 0] - exact, axis=1)
+        rms = float(np.sqrt(np.mean(error**2)))
+        if rms <= 0.3 * tolerance:
+            return replace(flow, error=MapError(rms, float(error.max()), len(states)))
+        if rtol <= 1e-14:
+            raise ToleranceError(
+                f"direct integration reaches rms {rms:.1e} after {length:g}, not {tolerance:.1e}; "
+                "rounding grows along such rays: shorten them or loosen the tolerance",
+                rms=rms,
+            )
+        rtol = max(0.1 * rtol, 1e-14)
 
 
 def tuned_direct(
@@ -130,21 +171,28 @@ def tuned_direct(
     horizon = length / outputs
     cost = tracing_cost(body)
     count = int(np.clip(BUDGET / (cost * length), 32, SAMPLES))
-    states = pack(*random_bundle_points(body, count, rng=np.random.default_rng(2)))
     times = np.array([length])
-    exact = trace_states(body, states, times, rtol=float(np.clip(1e-3 * tolerance, 1e-14, 1e-9)))[:, 0]
+    reference = float(np.clip(1e-3 * tolerance, 1e-14, 1e-9))
+    rng = np.random.default_rng(2)
+
+    def errors(number: int) -> FloatArray:
+        states = pack(*random_bundle_points(body, number, rng=rng))
+        exact = trace_states(body, states, times, rtol=reference)
+        found = trace_states(body, states, times, rtol=0.0, step=length / steps)
+        return np.asarray(np.linalg.norm(found - exact, axis=2))
+
     # equal steps serve compiled bodies only: numpy's tracer adapts one step for all rays anyway
     steps = max(1, int(np.ceil(length / (0.3 * size(body)))))
+    reached = np.inf
     for _ in range(12):
-        step = length / steps
         try:
-            error = np.linalg.norm(trace_states(body, states, times, rtol=0.0, step=step)[:, 0] - exact, axis=1)
-            reached = float(np.sqrt(np.mean(error**2)))
+            error = settled(errors, count, 1 if 4 * cost * length * count > BUDGET else 16)[:, 0]
+            reached = upper_bound(error)
         except IntegrationError:
             reached = np.inf
-        if reached <= 0.8 * tolerance:
-            measured = MapError(reached, float(error.max()), count)
-            flow = DirectFlow(body, float(np.clip(1e-2 * tolerance, 1e-13, 1e-8)), horizon, step, measured)
+        if reached <= tolerance:
+            measured = MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(error))
+            flow = DirectFlow(body, float(np.clip(1e-2 * tolerance, 1e-13, 1e-8)), horizon, length / steps, measured)
             return flow, _seconds_per_ray(flow, body, length, outputs, ride_along, cost * length)
         # an order below the method's own while it has not set in
         factor = (reached / (0.5 * tolerance)) ** (1 / 7.5) if np.isfinite(reached) else 2.0

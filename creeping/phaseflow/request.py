@@ -6,13 +6,21 @@ import numpy as np
 
 from creeping._errors import InvalidInputError, SurfaceError, ToleranceError
 from creeping._typing import Any
-from creeping.phaseflow.building import Plan, Progress, build_direct, build_tower, measured, natural_horizon
+from creeping.phaseflow.building import (
+    Plan,
+    Progress,
+    build_direct,
+    build_tower,
+    measured,
+    natural_horizon,
+    require_checked,
+)
 from creeping.phaseflow.caching import cached_phase_map
 from creeping.phaseflow.grids import Grid
 from creeping.phaseflow.models import model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.tuning import RAYS, tuned_map
-from creeping.surface import Surface, check_surface
+from creeping.surface import Surface
 
 
 def build_phase_map(
@@ -156,7 +164,7 @@ class Request:
 
     def build(self, say: Progress) -> PhaseMap:
         """Build with the parameters given, choosing the missing ones."""
-        check_surface(self.body).require()
+        require_checked(self.body)
         if self.nodes is None:
             return tuned_map(self, say)
         grid = Grid(self.nodes, self.order or 5, self.periodic)

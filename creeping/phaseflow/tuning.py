@@ -44,6 +44,8 @@ CELLS = 192
 STRIDES = (2, 3, 4, 6, 8, 12, 16, 24)
 NODE, DOUBLING = 6e-7, 4e-7
 """Seconds that a node takes of a build besides tracing, and of a doubling."""
+FIXED = 0.1
+"""Seconds of a build that do not depend on its size."""
 COARSE = 1_500_000
 """Nodes from which on a coarser map is built first, to measure how errors grow."""
 BUDGET, SHARE = (0.02, 0.4), 0.02
@@ -79,16 +81,17 @@ class Candidate:
         return self.build + rays * length * self.leap
 
 
-def tuned_map(request: "Request", say: Progress) -> PhaseMap:
-    """Build the fastest map that meets the request's tolerance."""
+def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None = None) -> PhaseMap:
+    """Build the fastest map that meets the request's tolerance, of the candidates if these are known already."""
     body, tolerance = request.body, request.tolerance
     assert tolerance is not None
     model = model_of(body)
     cost = tracing_cost(body)
-    say("probing horizons and grids")
-    found = candidates(request, model, cost)[:3]
+    if found is None:
+        say("probing horizons and grids")
+        found = candidates(request, model, cost)
     best: tuple[float, PhaseMap] | None = None
-    for candidate in found:
+    for candidate in found[:3]:
         plan, before = candidate.plan, np.inf
         if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
             plan = _scaled(plan, 0.6)
@@ -97,10 +100,10 @@ def tuned_map(request: "Request", say: Progress) -> PhaseMap:
             built = build_direct(body, model, plan, say, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-9)))
             result = _measured(built, request, cost)
             assert result.growth is not None
-            reached = result.growth.rms[-1] if request.length else result.error.rms
+            reached = result.growth.bound if request.length else result.error.rms
             if best is None or reached < best[0]:
                 best = reached, result
-            if reached <= 0.85 * tolerance:
+            if reached <= tolerance:
                 result.parameters.update(tolerance=tolerance, length=request.length)
                 return result
             if plan.single and request.precision is None and reached > 0.5 * before:
@@ -128,7 +131,8 @@ def _measured(built: PhaseMap, request: "Request", cost: float) -> PhaseMap:
     budget = _budget(request, cost)
     samples = int(np.clip(budget / (cost * length), 400, 2000))
     dear = 4 * cost * length * samples > budget
-    return measured(built, request.length, samples=samples, rtol=1e-3 * request.tolerance if dear else 1e-12)
+    rtol = 1e-3 * request.tolerance if dear else 1e-12
+    return measured(built, request.length, samples=samples, rtol=rtol, most=1 if dear else 16)
 
 
 def _budget(request: "Request", cost: float) -> float:
@@ -179,8 +183,13 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
                 continue
             plan = Plan(horizon, grid, single, request.ride_along, _doublings(horizon, natural, cost))
             traced = cost * horizon / 2**plan.doublings
-            build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (1.8 if request.ride_along else 1.0)
-            found.append(Candidate(plan, leap_seconds(order, nbytes) / horizon, build, target))
+            build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if request.ride_along else 1.0)
+            build += FIXED + 2 * _budget(request, cost)
+            leap = leap_seconds(order, nbytes)
+            if request.ride_along:
+                # lanes are four times as many, and the attenuation is summed
+                leap = 4 * leap + 40e-9
+            found.append(Candidate(plan, leap / horizon, build, target))
     if not found:
         raise ToleranceError(
             f"no map of at most {MAX_NODES} nodes is expected to reach rms {tolerance:.1e}"

@@ -80,7 +80,8 @@ def test_order_of_composition_changes_nothing(lanes, rng, monkeypatch):
     monkeypatch.setattr(compiled_models, "ORDERED", 100)
     monkeypatch.setattr(compiled_models, "NEAR", 0)
     monkeypatch.setattr(compiled_models, "SHARE", 300)
-    np.testing.assert_array_equal(flow.transport(states, times), plain)
+    # two kernels: they may fuse multiplications and additions differently
+    np.testing.assert_allclose(flow.transport(states, times), plain, rtol=1e-9, atol=1e-12)
 
 
 def test_threads_change_nothing(rng, monkeypatch):
