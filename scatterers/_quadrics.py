@@ -90,6 +90,11 @@ class BentEllipsoid(Body):
     def _compiled(self, source: Callable[..., None], kind: Kind) -> Compiled:
         return Compiled(source, kind, np.array(self._shape(), dtype=float))
 
+    @property
+    def mirrors(self) -> bool:
+        """Whether the three coordinate planes are mirrors of the body and of its sphere map."""
+        return self._shape()[3] == 0.0
+
     @cached_property
     def compiled(self) -> Compiled:
         """Compiled level evaluator."""

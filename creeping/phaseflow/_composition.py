@@ -1,7 +1,8 @@
 """Compiled composition of phase maps in the model coordinates of a body; the numpy twins are in `models`.
 
 Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`_rotations`), and ANGLES, turns (`_angles`). A map
-is a table of their displacement; a ray enters the model once, is composed there, and leaves it for an output.
+is a table of their displacement; a ray enters the model once, is composed there, and leaves it for an output. FOLDED
+are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from creeping.phaseflow._attenuation import extend
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 from creeping.phaseflow._stencils import cells_and_fractions, interpolate, weights
 
-ROTATION, ANGLES = 0, 1
+ROTATION, ANGLES, FOLDED = 0, 1, 2
 WORK = 48
 """Rows of work space for a block."""
 SAMPLES = 23
@@ -22,38 +23,38 @@ _enter_rotation, _enter_angles = _rotations.enter, _angles.enter
 _leave_rotation, _leave_angles = _rotations.leave, _angles.leave
 _enter_by_table, _leave_by_table = _surface_exits.enter, _surface_exits.leave
 _locate_rotation, _locate_angles = _rotations.locate, _angles.locate
-_move_rotation, _move_angles = _rotations.move, _angles.move
+_move_rotation, _move_angles, _unfold = _rotations.move, _angles.move, _rotations.unfold
 
 
 @njit(**options)
 def move(kind, r, d, centre):
     """Move coordinates r (4, BLOCK) by displacements d (BLOCK, 4), both flat."""
-    if kind == ROTATION:
-        _move_rotation(r, d, centre)
-    else:
+    if kind == ANGLES:
         _move_angles(r, d, centre)
+    else:
+        _move_rotation(r, d, centre)
 
 
 @njit(**options)
 def enter(kind, exits, there, there_par, back, back_par, x, p, work, r):
     """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
-    if kind == ROTATION and exits.shape[0] > 0:
-        _enter_by_table(exits, back, back_par, x, p, work, r)
-    elif kind == ROTATION:
-        _enter_rotation(there, there_par, back, back_par, x, p, work, r)
-    else:
+    if kind == ANGLES:
         _enter_angles(there, there_par, back, back_par, x, p, work, r)
+    elif exits.shape[0] > 0:
+        _enter_by_table(exits, back, back_par, x, p, work, r)
+    else:
+        _enter_rotation(there, there_par, back, back_par, x, p, work, r)
 
 
 @njit(**options)
 def leave(kind, exits, there, there_par, r, work, x, p):
     """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
-    if kind == ROTATION and exits.shape[0] > 0:
-        _leave_by_table(exits, r, work, x, p)
-    elif kind == ROTATION:
-        _leave_rotation(there, there_par, r, work, x, p)
-    else:
+    if kind == ANGLES:
         _leave_angles(there, there_par, r, work, x, p)
+    elif exits.shape[0] > 0:
+        _leave_by_table(exits, r, work, x, p)
+    else:
+        _leave_rotation(there, there_par, r, work, x, p)
 
 
 @njit(**options)
@@ -63,10 +64,10 @@ def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
     Grid coordinates are shift + scale times the coordinates of `locate`.
     """
     u, v, angle = uva[0], uva[1], uva[2]
-    if kind == ROTATION:
-        _locate_rotation(r, work, place, u, v, angle)
-    else:
+    if kind == ANGLES:
         _locate_angles(r, place, u, v, angle)
+    else:
+        _locate_rotation(r, work, place, u, v, angle, kind == FOLDED)
     for axis in range(3):
         t, a, b = uva[axis], scale[axis], shift[axis]
         for i in range(BLOCK):
@@ -78,11 +79,11 @@ def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
 
 
 @njit(**options)
-def leap_block(kind, leap, riding, degree, uva, place, count, r, m, w, d):
+def leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d):
     """Move r (4, BLOCK) and the Jacobi matrices m (4, BLOCK) by one leap, their stencils being placed.
 
     ``leap`` is (table, centre, jacobi, matrix, curvature). d (4 BLOCK, 4) keeps what is interpolated: displacements,
-    matrices, and for riding = 2 the curvatures.
+    matrices, and for riding = 2 the curvatures; ``odd`` says what was reflected.
     """
     table, centre, jacobi, matrix, curvature = leap
     rf, df, ef = r.reshape(-1), d[:BLOCK].reshape(-1), d[BLOCK : 2 * BLOCK].reshape(-1)
@@ -91,6 +92,8 @@ def leap_block(kind, leap, riding, degree, uva, place, count, r, m, w, d):
     weights(uva[1], degree, wv)
     weights(uva[2], degree, wa)
     interpolate(table, degree, place, wu, wv, wa, count, df)
+    if kind == FOLDED:
+        _unfold(df, odd)
     move(kind, rf, df, centre)
     if riding:
         interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
@@ -139,7 +142,7 @@ def flow(kind, exits, there, there_par, back, back_par, leap, time, rules, degre
         for output in range(counts.shape[0]):
             for _ in range(counts[output]):
                 place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
-                leap_block(kind, leap, riding, degree, uva, place, count, r, m, w, d)
+                leap_block(kind, leap, riding, degree, uva, place, work[7], count, r, m, w, d)
                 if riding > 1:
                     extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
                 now += time

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._composition import ROTATION, WORK, enter, leap_block, leave, move, place_block
+from creeping.phaseflow._composition import ANGLES, WORK, enter, leap_block, leave, move, place_block
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 
 
@@ -25,10 +25,10 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
                 r[k, i] = nodes[start + min(i, count - 1), k]
             m[0, i], m[1, i], m[2, i], m[3, i] = 1.0, 0.0, 0.0, 1.0
             # the displacement from the identity is what two moves make of it
-            whole[0, i], whole[1, i], whole[2, i], whole[3, i] = 1.0 if kind == ROTATION else 0.0, 0.0, 0.0, 0.0
+            whole[0, i], whole[1, i], whole[2, i], whole[3, i] = 0.0 if kind == ANGLES else 1.0, 0.0, 0.0, 0.0
         for half in range(2):
             place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
-            leap_block(kind, leap, riding, degree, uva, place, count, r, m, w, d)
+            leap_block(kind, leap, riding, degree, uva, place, work[7], count, r, m, w, d)
             move(kind, whole.reshape(-1), d[:BLOCK].reshape(-1), leap[1])
             if riding > 1:
                 kappa = d[2 * BLOCK :].reshape(BLOCK, 8)
@@ -78,7 +78,7 @@ def displacements(kind, exits, there, there_par, back, back_par, nodes, traced, 
             enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
             for i in range(count):
                 node, d = nodes[start + i], out[start + i]
-                if kind == ROTATION:
+                if kind != ANGLES:
                     w, a, b, c = node[0], -node[1], -node[2], -node[3]
                     rw, rx, ry, rz = r[0, i], r[1, i], r[2, i], r[3, i]
                     qw, qx = w * rw - a * rx - b * ry - c * rz, w * rx + a * rw + b * rz - c * ry

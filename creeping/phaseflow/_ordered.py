@@ -26,7 +26,9 @@ def flow_ordered(
     m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
     work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
-    # coordinates, fractions of the cell, number of the stencil's first coefficient: one cache line
+    odd = np.zeros(BLOCK)
+    # coordinates, fractions of the cell, number of the stencil's first coefficient plus 1/2 where an odd number of
+    # mirrors has folded the ray: one cache line
     ray = aligned(n, 8)
     flat = ray.reshape(-1)
     carried = np.empty((n, more))
@@ -46,7 +48,7 @@ def flow_ordered(
             order[start + i] = start + i
             for k in range(more):
                 carried[start + i, k] = states[start + i, 6 + k]
-        _put(flat, order[start : start + count], r, uva, place, inverse, bucket, ends)
+        _put(flat, order[start : start + count], r, uva, place, work[7], inverse, bucket, ends)
     now = 0.0
     for output in range(counts.shape[0]):
         for _ in range(counts[output]):
@@ -60,15 +62,16 @@ def flow_ordered(
                     r[0, i], r[1, i], r[2, i], r[3, i] = flat[at], flat[at + 1], flat[at + 2], flat[at + 3]
                     uva[0, i], uva[1, i], uva[2, i] = flat[at + 4], flat[at + 5], flat[at + 6]
                     place[i] = np.int64(flat[at + 7])
+                    odd[i] = 2.0 * (flat[at + 7] - place[i])
                 for i in range(BLOCK):
                     at = mine[min(i, count - 1)]
                     for k in range(more):
                         m[k, i] = carried[at, k]
-                leap_block(kind, leap, riding, degree, uva, place, count, r, m, w, d)
+                leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d)
                 if riding > 1:
                     extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
                 place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
-                _put(flat, mine, r, uva, place, inverse, bucket, ends)
+                _put(flat, mine, r, uva, place, work[7], inverse, bucket, ends)
                 for i in range(count):
                     for k in range(more):
                         carried[mine[i], k] = m[k, i]
@@ -87,12 +90,17 @@ def flow_ordered(
 
 
 @njit(**options)
-def _put(flat, mine, r, uva, place, inverse, bucket, ends):
+def _put(flat, mine, r, uva, place, odd, inverse, bucket, ends):
     """Keep a block's rays, and count them into ends[1:] by bucket."""
     for i in range(mine.shape[0]):
         at = 8 * mine[i]
         flat[at], flat[at + 1], flat[at + 2], flat[at + 3] = r[0, i], r[1, i], r[2, i], r[3, i]
-        flat[at + 4], flat[at + 5], flat[at + 6], flat[at + 7] = uva[0, i], uva[1, i], uva[2, i], place[i]
+        flat[at + 4], flat[at + 5], flat[at + 6], flat[at + 7] = (
+            uva[0, i],
+            uva[1, i],
+            uva[2, i],
+            place[i] + 0.5 * odd[i],
+        )
     for i in range(mine.shape[0]):
         number = np.int32(place[i] * inverse)
         bucket[mine[i]] = number

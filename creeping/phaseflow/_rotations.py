@@ -59,11 +59,49 @@ def face(s, q, chart, u, v, along, across):
 
 
 @njit(**options)
-def locate(r, work, chart, u, v, angle):
-    """Chart, u/REACH, v/REACH in [-1, 1] and angle in turns of a block."""
-    s, q, along, across = work[0:3].reshape(-1), work[3:6].reshape(-1), work[6], work[7]
+def _fold(s, q, odd):
+    """Reflect a block's s and q (3, BLOCK), flat, to s >= 0; odd (BLOCK,) is 1 where the number of mirrors is odd."""
+    for i in range(BLOCK):
+        odd[i] = 0.0
+    for axis in range(3):
+        at = axis * BLOCK
+        for i in range(BLOCK):
+            turned = s[at + i] < 0.0
+            s[at + i] = abs(s[at + i])
+            q[at + i] = -q[at + i] if turned else q[at + i]
+            odd[i] = 1.0 - odd[i] if turned else odd[i]
+
+
+@njit(**options)
+def unfold(d, odd):
+    """Turn displacements d (BLOCK, 4), flat, of reflected rays into those of the rays themselves.
+
+    With the mirrors' product D = diag(1, 1, -1) in the ray's own frame it is D Q D, the quaternion (w, -x, -y, z).
+    """
+    for i in range(BLOCK):
+        sign = 1.0 - 2.0 * odd[i]
+        d[4 * i + 1] *= sign
+        d[4 * i + 2] *= sign
+
+
+@njit(**options)
+def locate(r, work, chart, u, v, angle, folded):
+    """Chart, u/REACH, v/REACH in [-1, 1] and angle in turns of a block.
+
+    Folded, only the charts around +x, +y and +z are left, numbered 0 to 2, with u, v >= 0; row 7 of the work space
+    says which rays an odd number of mirrors has reflected.
+    """
+    s, q, along, across = work[0:3].reshape(-1), work[3:6].reshape(-1), work[6], work[8]
     columns(r, s, q)
+    if folded:
+        _fold(s, q, work[7])
     face(s, q, chart, u, v, along, across)
+    if folded:
+        for i in range(BLOCK):
+            chart[i] = chart[i] // 2
+    else:
+        for i in range(BLOCK):
+            work[7, i] = 0.0
     for i in range(BLOCK):
         u[i] *= 1 / REACH
         v[i] *= 1 / REACH

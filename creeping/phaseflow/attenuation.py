@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.phaseflow.geodesic import normal_curvature, speed_of, speed_values
+from creeping.phaseflow.geodesic import natural_horizon, normal_curvature, speed_of, speed_values
 from creeping.phaseflow.tracing import compiled_parts, trace_states
 from creeping.surface import Surface
 
@@ -148,13 +148,18 @@ def with_attenuation(
     out = np.empty((len(states), len(times), 12))
     out[..., :10] = transport(states[:, :10], times)
     total, end = states[:, 10].copy(), states[:, 11].copy()
+    longest = natural_horizon(body)
     before, now = states[:, :6], 0.0
     for k, time in enumerate(times):
-        step = float(time) - now
-        if step > 0:
-            inside = trace_states(body, before, step * chebyshev_times(), rtol=rtol, step=step)
-            values = curvature_values(body, inside.reshape(-1, 6)).reshape(len(states), NODES)
-            extend_all(values, kernel_rules(), step, now, total, end)
+        parts = int(np.ceil((float(time) - now) / longest - 1e-9))
+        if parts > 0:
+            step = (float(time) - now) / parts
+            inside = step * (np.arange(parts)[:, None] + chebyshev_times()).ravel()
+            traced = trace_states(body, before, inside, rtol=rtol, step=step)
+            values = curvature_values(body, traced.reshape(-1, 6)).reshape(len(states), parts, NODES)
+            for part in range(parts):
+                one = np.ascontiguousarray(values[:, part])
+                extend_all(one, kernel_rules(), step, now + part * step, total, end)
         out[:, k, 10], out[:, k, 11] = total, end
         before, now = out[:, k, :6], float(time)
     return out

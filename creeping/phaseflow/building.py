@@ -18,7 +18,7 @@ from creeping.phaseflow.ambient import AmbientModel
 from creeping.phaseflow.attenuation import NODES, chebyshev_times, curvature_values
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.compiled_models import CompiledModel
-from creeping.phaseflow.geodesic import principal_curvature_bound, speed_values
+from creeping.phaseflow.geodesic import natural_horizon
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.models import Model, nodes_of
 from creeping.phaseflow.phase_map import Growth, PhaseMap
@@ -64,7 +64,9 @@ def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol
     doublings = plan.doublings if isinstance(model, CompiledModel) else 0
     now = plan.horizon / 2**doublings
     say(f"tracing {len(nodes)} nodes to {now:g}")
-    values = _traced(body, model, nodes, now, plan.ride_along, rtol)
+    # over longer leaps the Chebyshev times do not resolve the curvature
+    curved = plan.horizon <= 1.01 * natural_horizon(body)
+    values = _traced(body, model, nodes, now, plan.ride_along, curved, rtol)
     leap = _leap(values, plan.grid, now, model, single=plan.single and doublings == 0)
     for k in range(doublings):
         assert isinstance(model, CompiledModel)
@@ -77,12 +79,12 @@ def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol
 
 
 def _traced(
-    body: Surface, model: Model, nodes: FloatArray, time: float, ride_along: bool, rtol: float
+    body: Surface, model: Model, nodes: FloatArray, time: float, ride_along: bool, curved: bool, rtol: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Displacements (n, lanes), Jacobi matrices (n or 0, 4) and curvatures (n or 0, 8) at the nodes."""
     values = np.empty((len(nodes), model.lanes))
     matrices = np.empty((len(nodes) if ride_along else 0, 4))
-    curvatures = np.empty((len(nodes) if ride_along else 0, NODES))
+    curvatures = np.empty((len(nodes) if ride_along and curved else 0, NODES))
     steps = 1
     for first in range(0, len(nodes), CHUNK):
         part = slice(first, first + CHUNK)
@@ -91,7 +93,7 @@ def _traced(
             states = pack(states[:, :3], states[:, 3:], jacobi=True)
         while True:
             times = time * np.arange(1, steps + 1) / steps
-            if ride_along:
+            if len(curvatures):
                 times = np.unique(np.concatenate([times, time * chebyshev_times()]))
             traced = trace_states(body, states, times, rtol=rtol, step=time)
             try:
@@ -105,6 +107,7 @@ def _traced(
             break
         if ride_along:
             matrices[part] = traced[:, -1, 6:]
+        if len(curvatures):
             inside = traced[:, np.searchsorted(times, time * chebyshev_times())]
             curvatures[part] = curvature_values(body, inside.reshape(-1, 10)).reshape(-1, NODES)
     return values, matrices, curvatures
@@ -144,6 +147,9 @@ def _leap(
     kind = np.float32 if single else np.float64
     # means go out of what is stored in single precision, so that its rounding is relative to what varies
     centre = values.mean(axis=0) if single else np.zeros(model.lanes)
+    if model.name == "octant":
+        # these change sign with the mirrors
+        centre[1:3] = 0.0
     matrix = matrices.mean(axis=0) if single and len(matrices) else np.array([1.0, 0.0, time, 1.0])
 
     def fitted(quantity: FloatArray) -> Any:
@@ -214,11 +220,3 @@ def require_checked(body: Surface) -> None:
     if name not in _CHECKED:
         check_surface(body).require()
         _CHECKED.add(name)
-
-
-def natural_horizon(body: Surface) -> float:
-    """Power of two next to the time a ray takes over the smallest radius of curvature."""
-    uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
-    points = np.concatenate([chart.point(uv) for chart in body.atlas.charts])
-    fastest = float(np.max(speed_values(body, points)))
-    return float(2.0 ** np.round(np.log2(1 / (principal_curvature_bound(body, points) * fastest))))

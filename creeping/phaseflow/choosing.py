@@ -13,16 +13,17 @@ import numpy as np
 
 from creeping._errors import IntegrationError, InvalidInputError, ToleranceError
 from creeping._typing import FloatArray
-from creeping.phaseflow.building import Progress, natural_horizon, require_checked, settled, upper_bound
+from creeping.phaseflow.building import Progress, require_checked, settled, upper_bound
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.caching import cached_phase_map, is_cached
 from creeping.phaseflow.compiled_models import CompiledModel
 from creeping.phaseflow.direct import DirectFlow
+from creeping.phaseflow.geodesic import natural_horizon
 from creeping.phaseflow.models import model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.request import Request
 from creeping.phaseflow.tracing import MapError, pack, trace_states
-from creeping.phaseflow.tuning import Candidate, candidates, tracing_cost, tuned_map
+from creeping.phaseflow.tuning import RAYS, Candidate, candidates, tracing_cost, tuned_map
 from creeping.surface import Surface, size
 
 SAMPLES = 512
@@ -88,6 +89,11 @@ def choose_flow(
     request.rays = int(rays)
     cost = tracing_cost(body)
     stored = cache is not False and tolerance >= 1e-9 and is_cached(body, request.key(), folder=cache)
+    if not stored and cache is not False and tolerance >= 1e-9:
+        # one tuned for the usual number of rays will do
+        request.rays = RAYS
+        stored = is_cached(body, request.key(), folder=cache)
+        request.rays = request.rays if stored else int(rays)
     if rays * length * cost < QUICK and not stored:
         say(f"direct integration: {rays} rays take about {rays * length * cost:.1g} s")
         return _untuned_direct(body, length, outputs, tolerance)

@@ -22,8 +22,8 @@ REACH = float(np.sqrt(2) - 1)
 """Stereographic coordinate of a chart's edge; see `_rotations`."""
 ORDERED = 16_384
 """Rays from which on composing them in the order of their cells pays,"""
-NEAR = 4_000_000
-"""if the table has so many bytes: it is more than the nearest caches hold."""
+NEAR = 24_000_000
+"""if what a leap reads has so many bytes: more than the caches hold."""
 SHARE = 65_536
 """Rays ordered at a time."""
 DEAR = 1e-7
@@ -96,7 +96,8 @@ class CompiledModel:
         states = np.ascontiguousarray(states, dtype=float)
         counts = np.asarray(counts, dtype=np.int64)
         tables = _tables(leap), leap.time, kernel_rules(), grid.degree, *self.placement(grid)
-        many = len(states) >= ORDERED and leap.state.nbytes > NEAR and int(counts.sum()) > 0
+        used = leap.state.nbytes if states.shape[1] == 6 else leap.nbytes
+        many = len(states) >= ORDERED and used > NEAR and int(counts.sum()) > 0
         kernel = flow_ordered if many else flow
 
         def run(part: slice) -> None:
@@ -205,6 +206,44 @@ class RotationModel(CompiledModel):
         q = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1)
         basis = np.stack([q, np.cross(s, q)], axis=-1)
         return source.forward(s), polar_frame(source.derivative(s) @ basis)[..., 0]
+
+
+class OctantModel(RotationModel):
+    """Rotations on a body with the three coordinate planes as mirrors: the table covers s >= 0 only.
+
+    A mirror sends R to D_1 R D_2, D_2 = diag(1, 1, -1), and a displacement Q of the reflected ray is D_2 Q D_2 of the
+    ray. Splines reach beyond the mirrors by their margin, so nothing is assumed there.
+    """
+
+    name = "octant"
+    kind = 2
+    charts = 3
+
+    @cached_property
+    def _exits(self) -> FloatArray:
+        return RotationModel(self.body)._exits
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """See `CompiledModel`."""
+        return grid.cells, np.array([*grid.origin, 0.0])
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`; u and v in [0, 1] are those in [1/2, 1] of the whole chart."""
+        return super().at(2 * chart, 0.5 + 0.5 * np.asarray(u), 0.5 + 0.5 * np.asarray(v), angle)
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        source: Any = self.body.atlas
+        s = source.sphere_map.inverse(states[:, :3])
+        mirrors = np.where(s < 0, -1.0, 1.0)
+        _, chart, located = super()._locate_numpy(states[:, :6] * np.tile(mirrors, 2))
+        inner, _, _ = super()._locate_numpy(states)
+        return (inner, np.prod(mirrors, axis=1)), chart // 2, located
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rotation, parity = inner
+        own = d.copy()
+        own[:, 1:3] *= parity[:, None]
+        return super()._move_numpy(rotation, own)
 
 
 class AngleModel(CompiledModel):

@@ -67,6 +67,14 @@ def principal_curvature_bound(body: Surface, points: FloatArray) -> float:
     return float(np.max(np.abs(np.linalg.eigvalsh(shape))))
 
 
+def natural_horizon(body: Surface) -> float:
+    """Power of two next to the time a ray takes over the smallest radius of curvature."""
+    uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = np.concatenate([chart.point(uv) for chart in body.atlas.charts])
+    fastest = float(np.max(speed_values(body, points)))
+    return float(2.0 ** np.round(np.log2(1 / (principal_curvature_bound(body, points) * fastest))))
+
+
 def metric_curvature(body: Surface, points: FloatArray) -> FloatArray:
     """Curvature G of the metric ds/c, 1/time^2; the Gaussian K without a weight: (..., 3) -> (...)."""
     gauss = gaussian_curvature(body, points)

@@ -4,6 +4,7 @@ A model says where a ray lies on the grid, what displacement is stored there, an
 
     AmbientModel    (x, p) itself; any atlas. Stored: x' - x - t p and p' - p. Each leap ends back on T1Q.
     RotationModel   x = psi(s), s on the unit sphere: the rotation R = [s, q, s x q]. Stored: the quaternion of R^-1 R'.
+    OctantModel     the same on an eighth of the sphere, if the coordinate planes are mirrors of the body.
     AngleModel      one doubly periodic chart: (u, v, angle) in turns. Stored: their differences.
 
 The last two stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
@@ -15,10 +16,10 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.phaseflow.ambient import AmbientModel
-from creeping.phaseflow.compiled_models import AngleModel, RotationModel
+from creeping.phaseflow.compiled_models import AngleModel, OctantModel, RotationModel
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.tracing import compiled_parts
-from creeping.surface import Surface
+from creeping.surface import Surface, size
 
 
 class Model(Protocol):
@@ -68,15 +69,27 @@ def nodes_of(model: Model, grid: Grid) -> FloatArray:
 
 def model_of(body: Surface, name: str | None = None) -> Model:
     """Model of a body: the one named, or the fastest it allows."""
-    atlas: Any = body.atlas
-    sphere_map = getattr(atlas, "sphere_map", None)
-    if name in (None, "rotation", "angles") and compiled_parts(body) is not None:
-        if hasattr(sphere_map, "compiled_forward") and name != "angles":
-            return RotationModel(body)
-        if (
-            getattr(atlas, "compiled_forward", None) is not None
-            and all(atlas.charts[0].periodic)
-            and name != "rotation"
-        ):
+    if name != "ambient" and compiled_parts(body) is not None:
+        atlas: Any = body.atlas
+        if hasattr(getattr(atlas, "sphere_map", None), "compiled_forward"):
+            folds = name == "octant" or (name is None and has_mirrors(body))
+            return OctantModel(body) if folds else RotationModel(body)
+        if getattr(atlas, "compiled_forward", None) is not None and all(atlas.charts[0].periodic):
             return AngleModel(body)
     return AmbientModel(body)
+
+
+def has_mirrors(body: Surface) -> bool:
+    """Whether the body says that the coordinate planes are its mirrors, and its F and its charts agree.
+
+    A speed has no say in it: a weighted flow is not folded.
+    """
+    if not getattr(body, "mirrors", False) or getattr(body, "speed", None) is not None:
+        return False
+    sphere_map: Any = getattr(body.atlas, "sphere_map", None)
+    s = np.random.default_rng(0).normal(size=(50, 3))
+    s /= np.linalg.norm(s, axis=1, keepdims=True)
+    points = sphere_map.forward(s)
+    flips = 1.0 - 2.0 * np.eye(3)
+    gaps = [np.abs(sphere_map.forward(s * flip) - points * flip).max() for flip in flips]
+    return bool(max(gaps) <= 1e-13 * size(body))

@@ -12,10 +12,10 @@ from creeping.phaseflow.building import (
     build_direct,
     build_tower,
     measured,
-    natural_horizon,
     require_checked,
 )
 from creeping.phaseflow.caching import cached_phase_map
+from creeping.phaseflow.geodesic import natural_horizon
 from creeping.phaseflow.grids import Grid
 from creeping.phaseflow.models import model_of
 from creeping.phaseflow.phase_map import PhaseMap
@@ -29,6 +29,7 @@ def build_phase_map(
     tolerance: float | None = None,
     length: float | None = None,
     outputs: int = 1,
+    rays: int = RAYS,
     horizon: float | None = None,
     grid: tuple[int, int] | tuple[int, int, int] | None = None,
     order: int | None = None,
@@ -52,6 +53,8 @@ def build_phase_map(
         Length of the rays that shall meet the tolerance; the horizon is as long as pays.
     outputs : int
         Equally spaced points of a ray that are wanted, with ``length``: the horizon divides their distance.
+    rays : int
+        Rays to come, in all: what a build may cost follows from it.
     horizon : float, optional
         T0, L (travel time for a weighted body).
     grid : (nodes, angles) or (nodes_u, nodes_v, angles), optional
@@ -91,6 +94,9 @@ def build_phase_map(
     request = Request(
         body, tolerance, length, outputs, horizon, grid, order, precision, ride_along, method, time_step, stages
     )
+    if not isinstance(rays, (int, np.integer)) or rays < 1:
+        raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
+    request.rays = int(rays)
     say = progress or (lambda _: None)
     if cache is False:
         return request.build(say)
@@ -152,6 +158,8 @@ class Request:
             "tolerance": self.tolerance,
             "length": self.length,
             "outputs": self.outputs,
+            # the magnitude only, or hardly a map would be found again
+            "rays": round(float(np.log10(self.rays))),
             "horizon": self.horizon,
             "nodes": self.nodes and list(self.nodes),
             "degree": self.order,

@@ -18,9 +18,10 @@ import numpy as np
 
 from creeping._errors import ToleranceError
 from creeping._typing import FloatArray
-from creeping.phaseflow.building import Plan, Progress, build_direct, measured, natural_horizon
+from creeping.phaseflow.building import Plan, Progress, build_direct, measured
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.compiled_models import CompiledModel
+from creeping.phaseflow.geodesic import natural_horizon
 from creeping.phaseflow.grids import MARGIN, Grid
 from creeping.phaseflow.models import Model, model_of
 from creeping.phaseflow.phase_map import PhaseMap
@@ -262,7 +263,7 @@ class _Probe:
     def __init__(self, body: Surface, model: Model, horizons: list[float], periodic: tuple[bool, bool]) -> None:
         self.periodic = (*periodic, True)
         # errors in the units of (x, p) from those of the coordinates
-        unit = {"ambient": 1.0, "rotation": 2.0, "angles": 2 * np.pi}[model.name]
+        unit = {"ambient": 1.0, "rotation": 2.0, "octant": 2.0, "angles": 2 * np.pi}[model.name]
         self.scale = unit * (1.0 if model.name == "ambient" else float(np.hypot(1, size(body))))
         step = horizons[0] / max(1, np.ceil(horizons[0] / (0.5 * size(body))))
         times = step * np.arange(1, round(horizons[-1] / step) + 1)

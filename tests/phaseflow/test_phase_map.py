@@ -6,8 +6,10 @@ from tolerances import COMPOSED, MAP
 
 import creeping as cr
 import scatterers as sc
+from creeping.phaseflow.building import Plan, build_direct
 from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.models import model_of
+from creeping.phaseflow.grids import Grid
+from creeping.phaseflow.models import has_mirrors, model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.tracing import pack, trace_states
 
@@ -58,7 +60,36 @@ def test_kernel_equals_numpy_twin_in_space(body, order, rng):
 
 def test_models_of_bodies(body):
     name = cr.build_phase_map(body, horizon=0.3, grid=(12, 16), order=3).model.name
-    assert name == ("angles" if isinstance(body, sc.Torus) else "rotation")
+    mirrored = body.speed is None and isinstance(body, sc.Sphere | sc.Ellipsoid)
+    assert name == ("angles" if isinstance(body, sc.Torus) else "octant" if mirrored else "rotation")
+
+
+def test_folded_map_equals_the_whole(rng):
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    states = pack(*random_bundle_points(body, 500, rng=rng), lanes=12)
+    times = np.array([0.5, 2.0])
+    exact = cr.DirectFlow(body, rtol=1e-12).transport(states, times)
+    for name, nodes in (("rotation", (27, 27, 36)), ("octant", (16, 16, 36))):
+        plan = Plan(0.5, Grid(nodes, 5, (False, False)), doublings=1)
+        flow = build_direct(body, model_of(body, name), plan, lambda _: None, rtol=1e-11)
+        assert flow.model.name == name
+        got = flow.transport(states, times)
+        for k in range(2):
+            assert rms(got[:, k, :6], exact[:, k, :6]) < 2e-7
+            assert rms(got[:, k, 6:11], exact[:, k, 6:11]) < 5e-6
+
+
+def test_mirrors_are_verified():
+    class Shifted(sc.Ellipsoid):
+        """Says that it has mirrors, but its sphere map has none."""
+
+        def forward(self, s):
+            return super().forward(s) + np.array([0.1, 0, 0])
+
+    assert has_mirrors(sc.Ellipsoid(1.0, 0.8, 0.6))
+    assert not has_mirrors(Shifted(1.0, 0.8, 0.6))
+    assert not has_mirrors(sc.TwistedEllipsoid())
+    assert not has_mirrors(sc.Sphere(speed="1 + x"))
 
 
 def test_model_coordinates_and_states_are_inverse(body, rng):
@@ -72,7 +103,7 @@ def test_model_coordinates_and_states_are_inverse(body, rng):
     # no displacement at all
     np.testing.assert_allclose(
         model.displacement(model.at(chart, u, v, angle), states[:, None], np.array([0.0])),
-        np.broadcast_to([1.0, 0, 0, 0] if model.name == "rotation" else 0.0, (50, 4)),
+        np.broadcast_to(0.0 if model.name == "angles" else [1.0, 0, 0, 0], (50, 4)),
         atol=1e-13,
     )
 
@@ -145,7 +176,7 @@ def test_body_without_compiled_parts_gives_the_same_map(rng):
     plain = Plain()
     options = {"horizon": 0.25, "grid": (10, 12), "order": 3, "cache": False}
     one, other = cr.build_phase_map(plain, **options), cr.build_phase_map(compiled, **options)
-    assert (one.model.name, other.model.name) == ("ambient", "rotation")
+    assert (one.model.name, other.model.name) == ("ambient", "octant")
     x, p = random_bundle_points(compiled, 10, rng=rng)
     # two splines of different quantities: both err by the coarseness of the grid
     bound = one.growth.max[0] + other.growth.max[0]
