@@ -88,7 +88,7 @@ def doctor() -> int:
             missing += name != "sympy"
             print(f"  {name} is not installed" + (" (needed for expressions)" if name == "sympy" else ""))
     started = time.perf_counter()
-    import creeping.phaseflow._kernels  # noqa: F401
+    import creeping.phaseflow._integrator  # noqa: F401
 
     print(f"  compiled kernels: import {time.perf_counter() - started:.1f} s")
     probe = gl_available()

@@ -32,6 +32,8 @@ BUDGET = 0.2
 """Seconds that one measurement may take."""
 QUICK = 0.05
 """Seconds of direct integration below which nothing is tuned."""
+WORTH, PATIENCE = 0.85, 0.25
+"""Shares of the time of direct integration: a map must be expected to stay below the one, its tuning below the other."""
 SMALLEST = 60_000
 """Nodes of the smallest map that is worth estimating."""
 
@@ -103,16 +105,15 @@ def choose_flow(
         if reason:
             say(f"direct integration: {reason}")
             return direct
+        request.patience = max(PATIENCE * rays * each, 0.1)
     else:
         found = None
+
+    def build() -> PhaseMap:
+        return tuned_map(request, say, found)
+
     try:
-        flow = (
-            tuned_map(request, say, found)
-            if cache is False
-            else cached_phase_map(
-                body, request.key(), lambda: tuned_map(request, say, found), folder=cache, progress=say
-            )
-        )
+        flow = build() if cache is False else cached_phase_map(body, request.key(), build, folder=cache, progress=say)
     except ToleranceError as error:
         say(f"direct integration: {error}")
         return direct
@@ -131,7 +132,7 @@ def _worth_building(request: Request, direct: float, cost: float, tolerance: flo
     if tolerance < 1e-9:
         return [], f"no map reaches such a tolerance; {said}"
     # what the smallest map takes, so that probing is not begun in vain
-    least = 0.15 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if request.ride_along else 1.0)
+    least = 0.3 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if request.ride_along else 1.0)
     if direct < least or not isinstance(model_of(body), CompiledModel):
         return [], said
     try:
@@ -140,7 +141,8 @@ def _worth_building(request: Request, direct: float, cost: float, tolerance: flo
         return [], str(error)
     assert request.length is not None
     expected = found[0].seconds(request.rays, request.length)
-    return found, f"{said}, with a map about {expected:.2g} s" if expected > direct else ""
+    # estimates err, and so do the gains that they promise
+    return found, f"{said}, with a map about {expected:.2g} s" if expected > WORTH * direct else ""
 
 
 def _untuned_direct(body: Surface, length: float, outputs: int, tolerance: float) -> DirectFlow:

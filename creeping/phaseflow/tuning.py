@@ -51,8 +51,9 @@ COARSE = 1_500_000
 """Nodes from which on a coarser map is built first, to measure how errors grow."""
 BUDGET, SHARE = (0.02, 0.4), 0.02
 """Least and most seconds that one probe or measurement may take, as a share of direct integration of all rays."""
-SINGLE = 1.2e-8
-"""Error of one leap, in units of (x, p), that float32 coefficients leave room for: their rounding makes as much."""
+SINGLE, RISKY = 4e-9, 1.2e-8
+"""Errors of one leap, in units of (x, p): float32 coefficients are tried down to the first, and given up at the first
+failure below the second; their rounding makes about 1e-8."""
 SAFE = 0.5
 """Share of the tolerance that is aimed at."""
 
@@ -92,6 +93,7 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
         say("probing horizons and grids")
         found = candidates(request, model, cost)
     best: tuple[float, PhaseMap] | None = None
+    started = clock()
     for candidate in found[:3]:
         plan, before = candidate.plan, np.inf
         if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
@@ -107,13 +109,20 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
             if reached <= tolerance:
                 result.parameters.update(tolerance=tolerance, length=request.length)
                 return result
-            if plan.single and request.precision is None and reached > 0.5 * before:
+            doubtful = candidate.target < RISKY * np.hypot(1, size(body)) or reached > 0.5 * before
+            if plan.single and request.precision is None and doubtful:
                 # the grid is no longer what limits it
                 plan, before = replace(plan, single=False), np.inf
             else:
+                full = model.charts * int(np.prod(plan.grid.nodes)) > 0.9 * MAX_NODES
                 plan, before = _finer(plan, reached / (SAFE * tolerance)), reached
-            if model.charts * int(np.prod(plan.grid.nodes)) > MAX_NODES:
-                break
+                most = MAX_NODES / (model.charts * int(np.prod(plan.grid.nodes)))
+                if full:
+                    break
+                if most < 1.0:
+                    plan = _scaled(plan, 0.97 * most ** (1 / 3))
+            if clock() - started > request.patience:
+                raise ToleranceError(f"tuning took longer than {request.patience:.2g} s; direct integration is near")
     assert best is not None
     reached, result = best
     what = f"rays of length {request.length:g}" if request.length else "one g_T0"
@@ -183,7 +192,8 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
             if nodes > MAX_NODES or nbytes > MAX_BYTES:
                 continue
             plan = Plan(horizon, grid, single, request.ride_along, _doublings(horizon, natural, cost))
-            traced = cost * horizon / 2**plan.doublings
+            # the curvatures are wanted at several times of each leap
+            traced = cost * horizon / 2**plan.doublings * (6.0 if request.ride_along else 1.0)
             build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if request.ride_along else 1.0)
             build += FIXED + 2 * _budget(request, cost)
             leap = leap_seconds(order, nbytes)
