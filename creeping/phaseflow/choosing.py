@@ -33,7 +33,7 @@ BUDGET = 0.2
 QUICK = 0.05
 """Seconds of direct integration below which nothing is tuned."""
 WORTH, PATIENCE = 0.85, 0.25
-"""Shares of the time of direct integration: a map must be expected to stay below the one, its tuning below the other."""
+"""Shares of direct integration: a map must be expected to take less than the one, its tuning less than the other."""
 SMALLEST = 60_000
 """Nodes of the smallest map that is worth estimating."""
 
