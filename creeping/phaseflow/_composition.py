@@ -1,4 +1,4 @@
-"""Compiled composition of phase maps in the model coordinates of a body; the numpy twins are in `models`.
+"""Compiled composition of phase maps in the model coordinates of a body; the numpy twins are in `compiled_models`.
 
 Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`_rotations`), and ANGLES, turns (`_angles`). A map
 is a table of their displacement; a ray enters the model once, is composed there, and leaves it for an output. FOLDED
@@ -66,6 +66,9 @@ def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
     u, v, angle = uva[0], uva[1], uva[2]
     if kind == ANGLES:
         _locate_angles(r, place, u, v, angle)
+        # no mirrors
+        for i in range(BLOCK):
+            work[7, i] = 0.0
     else:
         _locate_rotation(r, work, place, u, v, angle, kind == FOLDED)
     for axis in range(3):

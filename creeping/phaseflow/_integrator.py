@@ -261,7 +261,7 @@ def integrate(
                         row = stages + 1 + e
                         _add_stages(terms[row], weights[row], index[row], k, zero, estimates[e])
                     error = _error_norm(estimates, sums, y, z, scale, rtol, trial)
-                if used > limit or trial < 1e-12 * step:
+                if used > limit or (trial < 1e-12 * step and trial < left):
                     good = False
                 elif not error < 1.0 and rtol > 0.0:
                     h = trial * (max(0.2, 0.9 * error ** (-0.125)) if error < 1e300 else 0.2)

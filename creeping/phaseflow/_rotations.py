@@ -1,4 +1,4 @@
-"""Compiled composition of maps on bodies x = psi(s), s on the unit sphere; the numpy twin is `rotations`.
+"""Compiled composition of maps on bodies x = psi(s), s on the unit sphere; the numpy twin is `compiled_models.RotationModel`.
 
 The state of a ray is the unit quaternion r = (w, x, y, z) of the rotation R = [s, q, s x q], q the isometric direction
 

@@ -17,8 +17,6 @@ from creeping.phaseflow._stencils import cells_and_fractions, weights
 from creeping.phaseflow._surface_spline import DEGREE, slopes, tangents
 
 MARGIN = 2.0
-ROWS = 64
-"""Rows of work space."""
 
 
 @njit(**options)

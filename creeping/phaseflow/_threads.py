@@ -40,5 +40,5 @@ def in_threads(work: Callable[[slice], None], count: int) -> None:
     chunk = -(-count // (4 * threads * CHUNK)) * CHUNK
     parts = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
     # consume the results, or an exception of a chunk would be lost
-    for _ in _pool(threads).map(work, parts):
+    for _ in _pool(thread_count()).map(work, parts):
         pass

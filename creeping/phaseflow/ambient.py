@@ -43,11 +43,11 @@ class AmbientModel:
         return np.concatenate([one.point(uv), directions], axis=1)
 
     def states(self, coordinates: FloatArray) -> FloatArray:
-        """The same."""
+        """States are the coordinates themselves: (n, 6) -> (n, 6)."""
         return coordinates
 
     def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
-        """D and E, padded to eight lanes."""
+        """x' - x - t p and p' - p, padded to eight lanes: (n, 8)."""
         values = np.zeros((len(nodes), 8))
         values[:, :6] = traced[:, -1, :6] - nodes
         values[:, :3] -= times[-1] * nodes[:, 3:]

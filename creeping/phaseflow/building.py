@@ -65,7 +65,7 @@ def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol
     now = plan.horizon / 2**doublings
     say(f"tracing {len(nodes)} nodes to {now:g}")
     # over longer leaps the Chebyshev times do not resolve the curvature
-    curved = plan.horizon <= 1.01 * natural_horizon(body)
+    curved = isinstance(model, CompiledModel) and plan.horizon <= 1.01 * natural_horizon(body)
     values = _traced(body, model, nodes, now, plan.ride_along, curved, rtol)
     leap = _leap(values, plan.grid, now, model, single=plan.single and doublings == 0)
     for k in range(doublings):
@@ -146,11 +146,12 @@ def _leap(
     values, matrices, curvatures = quantities
     kind = np.float32 if single else np.float64
     # means go out of what is stored in single precision, so that its rounding is relative to what varies
-    centre = values.mean(axis=0) if single else np.zeros(model.lanes)
+    apart = single and isinstance(model, CompiledModel)
+    centre = values.mean(axis=0) if apart else np.zeros(model.lanes)
+    matrix = matrices.mean(axis=0) if apart and len(matrices) else np.array([1.0, 0.0, time, 1.0])
     if model.name == "octant":
         # these change sign with the mirrors
         centre[1:3] = 0.0
-    matrix = matrices.mean(axis=0) if single and len(matrices) else np.array([1.0, 0.0, time, 1.0])
 
     def fitted(quantity: FloatArray) -> Any:
         if not len(quantity):

@@ -71,7 +71,7 @@ def choose_flow(
     Returns
     -------
     PhaseMap or DirectFlow
-        Its horizon is ``length/outputs`` or divides it.
+        Its horizon is ``length/outputs`` or divides it. Always direct for bodies without kernels.
 
     Raises
     ------
@@ -133,7 +133,9 @@ def _worth_building(request: Request, direct: float, cost: float, tolerance: flo
         return [], f"no map reaches such a tolerance; {said}"
     # what the smallest map takes, so that probing is not begun in vain
     least = 0.3 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if request.ride_along else 1.0)
-    if direct < least or not isinstance(model_of(body), CompiledModel):
+    if not isinstance(model_of(body), CompiledModel):
+        return [], f"{body!r} has no compiled sphere map nor a doubly periodic chart"
+    if direct < least:
         return [], said
     try:
         found = candidates(request, model_of(body), cost)
@@ -189,7 +191,6 @@ def tuned_direct(
         found = trace_states(body, states, times, rtol=0.0, step=length / steps)
         return np.asarray(np.linalg.norm(found - exact, axis=2))
 
-    # equal steps serve compiled bodies only: numpy's tracer adapts one step for all rays anyway
     steps = max(1, int(np.ceil(length / (0.3 * size(body)))))
     reached = np.inf
     for _ in range(12):
@@ -232,4 +233,5 @@ def _seconds_per_ray(
 
 
 def _random_states(body: Surface, count: int, ride_along: bool) -> FloatArray:
-    return pack(*random_bundle_points(body, count, rng=np.random.default_rng(3)), jacobi=ride_along)
+    # what a fan carries, or a flow
+    return pack(*random_bundle_points(body, count, rng=np.random.default_rng(3)), lanes=12 if ride_along else 6)

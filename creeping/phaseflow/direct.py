@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from creeping._errors import InvalidInputError
 from creeping._typing import ArrayLike, FloatArray
 from creeping.phaseflow.attenuation import with_attenuation
 from creeping.phaseflow.bundle import bundle_points
@@ -18,9 +21,9 @@ class DirectFlow:
     body : Surface
     rtol : float
         Relative tolerance per step; the step adapts to the worst of 64 rays.
-    horizon : float
-        Time of one `apply`, L.
-    step : float, optional, L
+    horizon : float, L (travel time for a weighted body)
+        Time of one `apply`.
+    step : float, optional, L (travel time for a weighted body)
         Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
     error : MapError, optional
         At the end of rays, if `choose_flow` has measured it.
@@ -31,6 +34,13 @@ class DirectFlow:
     horizon: float = 1.0
     step: float | None = None
     error: MapError | None = None
+
+    def __post_init__(self) -> None:
+        if not 1e-14 <= self.rtol <= 1e-2:
+            raise InvalidInputError(f"rtol = {self.rtol!r} is not between 1e-14 and 1e-2")
+        for name, value in (("horizon", self.horizon), ("step", self.step)):
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
 
     def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Advance by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""

@@ -7,7 +7,7 @@ A model says where a ray lies on the grid, what displacement is stored there, an
     OctantModel     the same on an eighth of the sphere, if the coordinate planes are mirrors of the body.
     AngleModel      one doubly periodic chart: (u, v, angle) in turns. Stored: their differences.
 
-The last two stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
+The last three stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
 """
 
 from typing import Protocol
@@ -53,11 +53,11 @@ class Model(Protocol):
         ...
 
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
-        """Compose counts[0], then counts[1], ... maps on states (n, 6 or 10): (n, m, the same)."""
+        """Compose counts[0], then counts[1], ... maps on states (n, 6, 10 or 12): (n, m, the same)."""
         ...
 
     def leap_numpy(self, grid: Grid, leap: Leap, states: FloatArray) -> FloatArray:
-        """One map on states (n, 6 or 10), by numpy alone."""
+        """One map on states (n, 6, 10 or 12), by numpy alone."""
         ...
 
 
@@ -80,7 +80,7 @@ def model_of(body: Surface, name: str | None = None) -> Model:
 
 
 def has_mirrors(body: Surface) -> bool:
-    """Whether the body says that the coordinate planes are its mirrors, and its F and its charts agree.
+    """Whether the body says that the coordinate planes are its mirrors, and its sphere map agrees.
 
     A speed has no say in it: a weighted flow is not folded.
     """

@@ -1,7 +1,7 @@
 """The phase map g_T0 of a body's geodesic flow, and the composition of maps to any time.
 
 A point (x, p) of T1Q has coordinates (chart, u, v, angle). A map stores, as splines in (u, v, angle), the displacement
-of the time-t flow in the coordinates of its model (`models`), and of its Jacobi matrix M - [[1, t], [0, 1]];
+of the time-t flow in the coordinates of its model (`models`), its Jacobi matrix and the curvatures along it;
 g_(m T0) = g_T0 o ... o g_T0 [YC06a, Algorithm 2]. The remainder of a time below T0 is covered by the shorter maps of
 the tower, if there is one, and below those by the order-8 integrator.
 """
@@ -171,6 +171,9 @@ class PhaseMap:
         whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12).astype(np.int64)
         rest = np.maximum(times - whole * self.horizon, 0.0)
         rest[rest < 1e-12 * self.horizon] = 0.0
+        if states.shape[1] > 10:
+            # multiples of the horizon they are, but for rounding
+            whole, rest = np.round(times / self.horizon).astype(np.int64), np.zeros_like(times)
         stops, place = np.unique(whole, return_inverse=True)
         at = self._composed(states, self.leaps[-1], np.diff(stops, prepend=0))
         if stops[0] == 0:

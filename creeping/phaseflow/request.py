@@ -155,12 +155,12 @@ class Request:
     def key(self) -> dict[str, Any]:
         """Parameters that decide the result, for the cache."""
         return {
-            "tolerance": self.tolerance,
-            "length": self.length,
+            "tolerance": self.tolerance and float(self.tolerance),
+            "length": self.length and float(self.length),
             "outputs": self.outputs,
             # the magnitude only, or hardly a map would be found again
             "rays": round(float(np.log10(self.rays))),
-            "horizon": self.horizon,
+            "horizon": self.horizon and float(self.horizon),
             "nodes": self.nodes and list(self.nodes),
             "degree": self.order,
             "precision": self.precision,

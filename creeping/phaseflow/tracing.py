@@ -168,6 +168,8 @@ def trace_states(
     IntegrationError
         If a ray does not reach its end; ``failed`` lists the rays.
     """
+    if states.shape[1] > 11:
+        raise InvalidInputError(f"states of {states.shape[1]} lanes; at most 11 are traced, see `attenuation`")
     method = tableau or dormand_prince_8()
     if step is None:
         step = 0.05 * size(body)
@@ -194,7 +196,11 @@ def trace_states(
         raise IntegrationError(
             f"{len(failed)} of {len(states)} rays left the finite numbers or needed more than {MAX_STEPS} steps "
             f"(first: ray {failed[0]}); "
-            + (f"shorten the step {step:.3g}" if rtol == 0 else "check the body with check_surface"),
+            + (
+                f"shorten the step {step:.3g}, unless that many are needed"
+                if rtol == 0
+                else "check the body with check_surface"
+            ),
             failed=failed,
         )
     return out
@@ -220,7 +226,7 @@ def _scale(body: Surface, lanes: int) -> FloatArray:
 
 
 def derivative_numpy(body: Surface, states: FloatArray) -> FloatArray:
-    """Time derivative of states (n, 6 or 10); the numpy twin of the compiled right-hand side."""
+    """Time derivative of states (n, 6, 10 or 11); the numpy twin of the compiled right-hand side."""
     k = np.empty_like(states)
     k[:, :3], k[:, 3:6] = vector_field(body, states[:, :3], states[:, 3:6])
     if states.shape[1] > 6:
@@ -250,7 +256,11 @@ def trace_numpy(
             with np.errstate(all="ignore"):
                 new, error = _step_numpy(body, y, trial, method, rtol, scale)
             used += 1
-            if used > MAX_STEPS or trial < 1e-12 * step or (rtol == 0 and not np.all(np.isfinite(new))):
+            if (
+                used > MAX_STEPS
+                or (trial < 1e-12 * step and trial < left)
+                or (rtol == 0 and not np.all(np.isfinite(new)))
+            ):
                 return out
             if rtol > 0 and not error < 1:
                 h = trial * (max(0.2, 0.9 * error**-0.125) if np.isfinite(error) else 0.2)

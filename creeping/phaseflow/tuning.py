@@ -2,12 +2,12 @@
 
 Rows of points along one axis of the grid at a time are traced to every horizon in question. Splines through every 2nd,
 3rd, ... of them give the error of each axis against its cells, e_u, e_v, e_a. Errors of leaps are carried to the end of
-the ray by the Jacobi matrices, with G(T0)^2 = sum_k mean |M(L) M(k T0)^-1|^2/2, so a map must reach
+the ray by the Jacobi matrices: G(T0)^2 = sum_k |M(L) M(k T0)^-1|^2/2, geometric mean over rays. A map must reach
 
     e_u^2 + e_v^2 + e_a^2 <= (tolerance/G)^2,   all three equal where nodes are fewest.
 
-Of all horizons the one that composes fastest is built, measured at the end of rays, and refined until it meets the
-tolerance.
+Of all candidates the one that is cheapest for the rays to come, its build included, is built, measured at the end of
+rays, and refined until it meets the tolerance; three at most in turn.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 RAYS = 1_000_000
 """Rays for which a map is tuned unless their number is known: what a build may cost follows from it."""
 MAX_NODES = 4_000_000
-"""Nodes of the largest grid that is built: 8 numbers each."""
+"""Nodes of the largest grid that is built."""
 MAX_BYTES = 150e6
 """Largest table that composes at a useful speed: beyond the cache every stencil is 36 reads from memory."""
 LINES = 24
@@ -147,7 +147,7 @@ def _measured(built: PhaseMap, request: "Request", cost: float) -> PhaseMap:
 
 def _budget(request: "Request", cost: float) -> float:
     """Seconds that one probe or measurement may take."""
-    return float(np.clip(SHARE * request.rays * cost * (request.length or 1.0), *BUDGET))
+    return float(np.clip(SHARE * request.rays * cost * (request.length or natural_horizon(request.body)), *BUDGET))
 
 
 def tracing_cost(body: Surface) -> float:
@@ -229,7 +229,9 @@ def _horizons(request: "Request", natural: float, cost: float) -> list[float]:
     if not request.length:
         return [natural]
     # probing a horizon traces some 14 000 rays that far
-    longest = max(natural, min(16 * natural, 4 * _budget(request, cost) / (cost * 3 * LINES * CELLS)))
+    # over longer leaps than the natural one the curvatures do not ride along
+    reach = natural if request.ride_along else 16 * natural
+    longest = max(natural, min(reach, 4 * _budget(request, cost) / (cost * 3 * LINES * CELLS)))
     distance = request.length / request.outputs
     leaps = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
     found = [distance / m for m in leaps if 0.4 * natural <= distance / m <= longest]

@@ -223,3 +223,15 @@ def test_map_of_a_gridded_body(rng):
     got, exact = flow.transport(states, times), cr.DirectFlow(body, rtol=1e-12).transport(states, times)
     assert rms(got[:, 2, :6], exact[:, 2, :6]) < 1e-5
     np.testing.assert_allclose(got[..., 6:11], exact[..., 6:11], rtol=1e-3, atol=1e-3)
+
+
+def test_maps_in_space_carry_what_others_do(rng):
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    states = pack(*random_bundle_points(body, 50, rng=rng), lanes=12)
+    times = np.array([0.4, 0.8])
+    exact = cr.DirectFlow(body, rtol=1e-12).transport(states, times)
+    for single in (False, True):
+        plan = Plan(0.4, Grid((24, 24, 32), 5, (False, False)), single)
+        flow = build_direct(body, model_of(body, "ambient"), plan, lambda _: None, rtol=1e-11)
+        got = flow.transport(states, times)
+        np.testing.assert_allclose(got[..., :11], exact[..., :11], atol=2e-4)

@@ -98,3 +98,8 @@ def test_random_points_are_uniform_by_area():
     outer = np.mean(np.hypot(x[:, 0], x[:, 1]) > 1)
     assert outer == pytest.approx((np.pi / 2 + 0.5) / np.pi, abs=0.015)
     np.testing.assert_allclose(np.linalg.norm(p, axis=1), 1, atol=1e-14)
+
+
+def test_times_that_differ_by_rounding():
+    x, _ = cr.trace(sc.Sphere(), (1, 0, 0), (0, 1, 0), [0.3, 0.1 * 3])
+    np.testing.assert_allclose(x[0], x[1], atol=1e-15)

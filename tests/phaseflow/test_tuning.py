@@ -71,8 +71,8 @@ def test_doubling_agrees_with_tracing(body, rng):
 
 
 @pytest.mark.parametrize("lanes", [6, 10, 12])
-def test_order_of_composition_changes_nothing(lanes, rng, monkeypatch):
-    body = sc.TwistedEllipsoid()
+@pytest.mark.parametrize("body", [sc.TwistedEllipsoid(), sc.Torus(), sc.Ellipsoid(1.0, 0.8, 0.6)], ids=repr)
+def test_order_of_composition_changes_nothing(body, lanes, rng, monkeypatch):
     flow = cr.build_phase_map(body, horizon=0.25, grid=(20, 32))
     states = pack(*random_bundle_points(body, 1000, rng=rng), lanes=lanes)
     times = np.array([0.25, 1.0])
@@ -160,3 +160,16 @@ def test_bad_numbers_are_named(options, match):
 def test_length_and_outputs_belong_together(options):
     with pytest.raises(cr.CreepingError, match="length"):
         cr.build_phase_map(sc.Sphere(), cache=False, **options)
+
+
+@pytest.mark.parametrize("options", [{"rtol": 0.0}, {"rtol": float("nan")}, {"step": 0.0}, {"horizon": -1.0}])
+def test_direct_flow_refuses_what_it_cannot_do(options):
+    with pytest.raises(cr.CreepingError, match=next(iter(options))):
+        cr.DirectFlow(sc.Sphere(), **options)
+
+
+def test_numbers_of_numpy_name_the_same_map(tmp_path):
+    options = {"tolerance": np.float64(1e-4), "outputs": np.int64(2), "cache": tmp_path}
+    cr.build_phase_map(sc.Sphere(), length=np.int64(2), **options)
+    cr.build_phase_map(sc.Sphere(), length=2.0, **options)
+    assert len(list(tmp_path.glob("*/manifest.json"))) == 1
