@@ -224,6 +224,8 @@ class PhaseMap:
     def _composed(self, states: FloatArray, level: Leap, counts: IntArray) -> FloatArray:
         if states.shape[1] > 6 and not level.rides:
             raise InvalidInputError("this map carries no Jacobi matrix; build it with ride_along=True")
+        if states.shape[1] > 10 and not level.attenuates:
+            raise InvalidInputError("this map carries no curvatures over a leap; use transport, which traces for them")
         return self.model.flow(self.grid, level, states, counts)
 
     def leap_numpy(self, states: FloatArray, level: Leap | None = None) -> FloatArray:

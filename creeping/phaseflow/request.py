@@ -136,7 +136,9 @@ class Request:
             raise InvalidInputError(f"precision = {precision!r} is neither 'single' nor 'double'")
         if method not in ("direct", "tower"):
             raise InvalidInputError(f"method = {method!r} is neither 'direct' nor 'tower'")
-        self.body, self.tolerance, self.length, self.horizon = body, tolerance, length, horizon
+        # plain numbers, which can be stored
+        self.body, self.tolerance = body, tolerance and float(tolerance)
+        self.length, self.horizon = length and float(length), horizon and float(horizon)
         self.outputs = int(outputs)
         self.order, self.precision, self.ride_along, self.method = order, precision, ride_along, method
         self.periodic = _common_periodicity(body)
@@ -155,12 +157,12 @@ class Request:
     def key(self) -> dict[str, Any]:
         """Parameters that decide the result, for the cache."""
         return {
-            "tolerance": self.tolerance and float(self.tolerance),
-            "length": self.length and float(self.length),
+            "tolerance": self.tolerance,
+            "length": self.length,
             "outputs": self.outputs,
             # the magnitude only, or hardly a map would be found again
             "rays": round(float(np.log10(self.rays))),
-            "horizon": self.horizon and float(self.horizon),
+            "horizon": self.horizon,
             "nodes": self.nodes and list(self.nodes),
             "degree": self.order,
             "precision": self.precision,
