@@ -7,6 +7,9 @@ from numba import njit
 
 from creeping.phaseflow._integrator import BLOCK, aligned, options, two_thirds
 
+SAMPLES = 23
+"""Rows of work space of `extend`: twelve Gauss points, both ends, the least of them, eight Chebyshev times."""
+
 
 @njit(**options)
 def curvatures(level, level_par, speed, speed_par, weighted, states, out):
@@ -36,7 +39,7 @@ def extend(values, rules, time, now, a, sampled, count):
     """Carry A and the time of detachment, rows of a (2, BLOCK), over one leap; see `attenuation.extend`.
 
     values (BLOCK, 8), flat, are c^(3/2) kappa_n at the Chebyshev times; ``rules`` are the sampling and the searching
-    matrix, Gauss points and weights, and the Chebyshev points. sampled (23, BLOCK) is work space.
+    matrix, Gauss points and weights, and the Chebyshev points. sampled (SAMPLES, BLOCK) is work space.
     """
     sampling, searching, points, weights, nodes = rules
     gauss = points.shape[0]
@@ -119,7 +122,7 @@ def _polynomial(values, nodes, t):
 def extend_all(values, rules, time, now, total, end):
     """What `extend` does, for values (n, 8), integrals and times of detachment (n,)."""
     n = values.shape[0]
-    a, sampled, block = aligned(2, BLOCK), aligned(23, BLOCK), np.ones((BLOCK, 8))
+    a, sampled, block = aligned(2, BLOCK), aligned(SAMPLES, BLOCK), np.ones((BLOCK, 8))
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(count):

@@ -9,15 +9,13 @@ import numpy as np
 from numba import njit
 
 from creeping.phaseflow import _angles, _rotations, _surface_exits
-from creeping.phaseflow._attenuation import extend
+from creeping.phaseflow._attenuation import SAMPLES, extend
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 from creeping.phaseflow._stencils import cells_and_fractions, interpolate, weights
 
 ROTATION, ANGLES, FOLDED = 0, 1, 2
 WORK = 48
 """Rows of work space for a block."""
-SAMPLES = 23
-"""Rows of work space that `extend` needs."""
 
 _enter_rotation, _enter_angles = _rotations.enter, _angles.enter
 _leave_rotation, _leave_angles = _rotations.leave, _angles.leave

@@ -9,8 +9,8 @@ cache line.
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._attenuation import extend
-from creeping.phaseflow._composition import SAMPLES, WORK, enter, leap_block, leave, place_block
+from creeping.phaseflow._attenuation import SAMPLES, extend
+from creeping.phaseflow._composition import WORK, enter, leap_block, leave, place_block
 from creeping.phaseflow._integrator import BLOCK, aligned, options
 
 
