@@ -11,12 +11,17 @@ numba is imported at the first use, for a quick start: plain Python that several
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers._freshness import discard_stale
+
 Kind = Literal["level", "locator", "forward", "inverse"]
+discard_stale(Path(__file__).parent)
+
 F = TypeVar("F", bound=Callable[..., Any])
 # products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}

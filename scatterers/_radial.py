@@ -108,12 +108,15 @@ class RadialMap:
     centre, half_axes : (3,), L
         Of the body with upright spine.
     spine : Spine
+    iterative : bool
+        That psi is a search for a root: users who evaluate it often had better tabulate it.
     """
 
     spline: TensorSpline
     centre: FloatArray
     half_axes: FloatArray
     spine: Spine
+    iterative = True
 
     @cached_property
     def box(self) -> FloatArray:

@@ -9,11 +9,15 @@ M(t) = [[I_1, I_2], [I_1', I_2']] with I'' + G I = 0, M(0) = 1, det M = 1; and l
 """
 
 import math
+from pathlib import Path
 
 import numpy as np
 from numba import njit
 
 from creeping.phaseflow._combination import combination
+from creeping.phaseflow._freshness import discard_stale
+
+discard_stale(Path(__file__).parent)
 
 BLOCK = 64
 

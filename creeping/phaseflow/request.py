@@ -96,6 +96,8 @@ def build_phase_map(
     )
     if not isinstance(rays, (int, np.integer)) or rays < 1:
         raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
+    if not isinstance(cache, (bool, str, Path)):
+        raise InvalidInputError(f"cache = {cache!r} is neither True, False nor a folder")
     request.rays = int(rays)
     say = progress or (lambda _: None)
     if cache is False:

@@ -67,6 +67,12 @@ def test_contradictions_are_named(options, match):
         cr.build_phase_map(sc.Sphere(), cache=False, **options)
 
 
+@pytest.mark.parametrize("cache", [None, 0, 1])
+def test_cache_is_a_switch_or_a_folder(cache):
+    with pytest.raises(cr.InvalidInputError, match="cache"):
+        cr.build_phase_map(sc.Sphere(), tolerance=1e-3, cache=cache)
+
+
 def test_grid_too_coarse_for_the_tolerance_says_which_does():
     body = sc.TwistedEllipsoid()
     with pytest.raises(cr.CreepingError, match=r"about \(\d+, \d+, \d+\) should do") as caught:
