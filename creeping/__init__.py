@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from creeping._version import __version__
 
 _HOMES = {
+    "BodyError": "creeping.rays.body_error",
     "CreepingError": "creeping._errors",
     "DirectFlow": "creeping.phaseflow.direct",
     "FarField": "creeping.field.far",
@@ -20,10 +21,12 @@ _HOMES = {
     "RayFan": "creeping.rays.fan",
     "RayStatus": "creeping.rays.fan",
     "ShadowLine": "creeping.rays.shadow",
+    "body_error": "creeping.rays.body_error",
     "build_phase_map": "creeping.phaseflow.request",
     "check_surface": "creeping.surface",
     "choose_flow": "creeping.phaseflow.choosing",
     "far_field": "creeping.field.far",
+    "far_field_uncertainty": "creeping.field.uncertainty",
     "iso_phase_curves": "creeping.rays.isophase",
     "launch": "creeping.rays.fan",
     "load_phase_map": "creeping.phaseflow.caching",
@@ -34,6 +37,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "BodyError",
     "CreepingError",
     "DirectFlow",
     "FarField",
@@ -46,10 +50,12 @@ __all__ = [
     "RayStatus",
     "ShadowLine",
     "__version__",
+    "body_error",
     "build_phase_map",
     "check_surface",
     "choose_flow",
     "far_field",
+    "far_field_uncertainty",
     "iso_phase_curves",
     "launch",
     "load_phase_map",
@@ -65,12 +71,14 @@ if TYPE_CHECKING:
     from creeping.field.far import FarField, far_field
     from creeping.field.near import near_field
     from creeping.field.on_surface import surface_field
+    from creeping.field.uncertainty import far_field_uncertainty
     from creeping.phaseflow.caching import load_phase_map
     from creeping.phaseflow.choosing import choose_flow
     from creeping.phaseflow.direct import DirectFlow
     from creeping.phaseflow.phase_map import Growth, PhaseMap
     from creeping.phaseflow.request import build_phase_map
     from creeping.phaseflow.tracing import MapError, trace
+    from creeping.rays.body_error import BodyError, body_error
     from creeping.rays.fan import RayFan, RayStatus, launch
     from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
     from creeping.rays.shadow import ShadowLine, shadow_line

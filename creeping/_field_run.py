@@ -13,6 +13,7 @@ from creeping._errors import CreepingError, InvalidInputError
 from creeping._typing import FloatArray
 from creeping.field.coefficients import BoundaryLike, Impedance
 from creeping.field.far import FarField, checked, far_field
+from creeping.field.uncertainty import far_field_uncertainty
 from creeping.plotting.ffe import grid_directions
 from creeping.rays.fan import RayFan
 from creeping.surface import unit_direction
@@ -66,6 +67,15 @@ class Job:
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
         }
+        uncertain = far_field_uncertainty(
+            fan, far.directions, wavenumber=self.wavenumber, boundary=self.boundary, order=ORDER
+        )
+        if uncertain is not None:
+            known = uncertain[np.isfinite(uncertain)]
+            entry["uncertain_by"] = {
+                "rms": float(np.sqrt(np.mean(known**2))) if len(known) else None,
+                "max": float(np.max(known, initial=0.0)),
+            }
         return entry, names
 
     def _write(self, far: FarField, fan: RayFan, output: Path, backend: str) -> list[str]:

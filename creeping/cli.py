@@ -13,15 +13,9 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Group, Parameter
 
-from creeping import _upkeep
+from creeping import _checking, _upkeep
+from creeping._body_argument import AllowRough, Body, SpeedOption, Units, parse_body
 from creeping._version import __version__
-
-BODIES = {
-    "sphere": "Sphere",
-    "ellipsoid": "Ellipsoid",
-    "torus": "Torus",
-    "twisted-ellipsoid": "TwistedEllipsoid",
-}
 
 app = App(
     name="creeping",
@@ -35,10 +29,8 @@ app.command(cache_app)
 
 _output = Group("Output")
 _field = Group("Field")
-Body = Annotated[str, Parameter(help="Name with parameters, e.g. torus or ellipsoid:a=1.2,b=0.8,c=0.8.")]
 Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
-SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -79,6 +71,8 @@ def run(
         Parameter(help="Phase map or direct integration; auto takes what is faster, its preparation included."),
     ] = "auto",
     speed: SpeedOption = None,
+    units: Units = None,
+    allow_rough: AllowRough = False,
     wavenumber: Annotated[float | None, Parameter(group=_field, help="k, 1/L: adds the field to the results.")] = None,
     boundary: Annotated[
         str | None, Parameter(group=_field, help="soft (if not given), hard, pec or impedance:ETA, e.g. 0.5+0.2j.")
@@ -103,16 +97,16 @@ def run(
     import numpy as np
 
     import creeping as cr
-    from creeping import _field_run
+    from creeping import _field_run, _run_results
     from creeping.surface import size
 
     started = time.perf_counter()
-    shape = parse_body(body, speed)
     for name, value in (("length", length), ("spacing", spacing)):
         if value is not None and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
     job = _field_run.job(wavenumber, boundary, observe, direction, weighted=speed is not None)
     with _Progress(quiet=json_) as say:
+        shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, say=say)
         say("shadow line")
         line = cr.shadow_line(shape, direction)
         length = length or (3 if job else 1.5) * size(shape)
@@ -122,12 +116,12 @@ def run(
         fan = cr.launch(carrier, line, length=length, n_rays=rays, n_steps=steps, status=launch_from)
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
-        summary = _summary(body, speed, line, carrier, fan, curves)
+        summary = _run_results.summary_of(body, speed, line, carrier, fan, curves)
         if job:
             say("field")
             far, field_seconds = job.far_field(fan)
         say("pictures and files")
-        summary["files"], summary["drawn_by"] = _write_results(output, line, fan, curves, backend)
+        summary["files"], summary["drawn_by"] = _run_results.write_results(output, line, fan, curves, backend)
         if job:
             summary["field"], names = job.write(far, fan, output, backend)
             summary["field"]["seconds"] = field_seconds
@@ -136,7 +130,7 @@ def run(
         from creeping.plotting import write_text
 
         write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
-    print(json.dumps(summary, indent=1) if json_ else _readable(summary, output))
+    print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))
     return 0
 
 
@@ -156,41 +150,6 @@ def levels_of(fan: Any, step: float, of: str) -> Any:
     return step * np.arange(first, last + 1)
 
 
-def parse_body(text: str, speed: str | None = None) -> Any:
-    """Make a body from ``name`` or ``name:key=value,...``.
-
-    Raises
-    ------
-    InvalidInputError
-        Names the unknown body, parameter or value, and what is known.
-    """
-    import scatterers
-    from creeping._errors import InvalidInputError
-
-    name, _, rest = text.partition(":")
-    if name not in BODIES:
-        raise InvalidInputError(
-            f"unknown body {name!r}; known are {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8"
-        )
-    values: dict[str, Any] = {}
-    for item in filter(None, rest.split(",")):
-        key, equals, number = item.partition("=")
-        try:
-            values[key.strip()] = float(number)
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise InvalidInputError(f"body parameter {item!r} is not of the form name=number")
-    if speed is not None:
-        values["speed"] = speed
-    try:
-        return getattr(scatterers, BODIES[name])(**values)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{name}: {error}") from error
-    except ModuleNotFoundError as error:
-        raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
-
-
 def _carrier(
     flow: str, shape: Any, line: Any, rays: int, length: float, tolerance: float, cache: bool, say: Any
 ) -> tuple[Any, int]:
@@ -207,108 +166,6 @@ def _carrier(
         return cr.build_phase_map(shape, **asked), steps
     # rays are inserted where neighbours part
     return cr.choose_flow(shape, rays=2 * rays, **asked), steps
-
-
-def _summary(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any]) -> dict[str, Any]:
-    import numpy as np
-
-    from creeping.rays.fan import RayStatus
-
-    summary: dict[str, Any] = {
-        "body": body,
-        "speed": speed,
-        "version": __version__,
-        "direction": line.direction.tolist(),
-        "shadow_line": [{"length": c.length, "fractions": c.fractions} for c in line.curves],
-        "flow": "map" if hasattr(carrier, "leaps") else "direct",
-        "rays": len(fan.points),
-        "steps": len(fan.travel_time),
-        "length": fan.length,
-        "ray_status": {s.name: int(np.sum(fan.status == s)) for s in RayStatus},
-        "earliest_detachment": float(fan.detachment.min()) if np.isfinite(fan.detachment).any() else None,
-        "caustics_passed": int(fan.caustic_index.max(initial=0)),
-        "iso_phase_curves": len(curves),
-        "error_of_rays": {"rms": fan.error.rms, "max": fan.error.max, "rays_traced": fan.error.samples},
-    }
-    if summary["flow"] == "map":
-        summary["phase_map"] = {
-            "horizon": carrier.horizon,
-            "charts": len(carrier.leaps[-1].state),
-            "nodes": list(carrier.grid.nodes),
-            "degree": carrier.grid.degree,
-            "megabytes": round(carrier.nbytes / 1e6, 1),
-            "type": str(carrier.leaps[-1].state.dtype),
-            "rms": carrier.error.rms,
-            "max": carrier.error.max,
-            "samples": carrier.error.samples,
-        }
-    return summary
-
-
-def _write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend: str) -> tuple[list[str], str]:
-    from creeping import plotting
-    from creeping._errors import InvalidInputError
-
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
-    drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend)
-    plotting.parameter_picture(output / "parameters.png", line, fan, curves)
-    plotting.write_vtp(output / "line.vtp", line=line)
-    plotting.write_vtp(output / "rays.vtp", fan=fan)
-    plotting.write_vtp(output / "curves.vtp", curves=curves)
-    plotting.write_csv(output / "line.csv", line=line)
-    plotting.write_csv(output / "rays.csv", fan=fan)
-    plotting.write_csv(output / "curves.csv", curves=curves)
-    names = ["rays.png", "parameters.png"] + [
-        f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")
-    ]
-    return [*names, "summary.json"], str(drawn_by)
-
-
-def _readable(summary: dict[str, Any], output: Path) -> str:
-    rows = [f"{summary['body']}, d = ({', '.join(f'{v:.4f}' for v in summary['direction'])})"]
-    for k, curve in enumerate(summary["shadow_line"]):
-        shares = ", ".join(f"{100 * v:.1f} % {name}" for name, v in curve["fractions"].items() if v > 0)
-        rows.append(f"shadow line {k + 1}: length {curve['length']:.10f}, {shares}")
-    if "phase_map" in summary:
-        m = summary["phase_map"]
-        grid = " x ".join(map(str, [m["charts"], *m["nodes"]]))
-        rows.append(
-            f"phase map: T0 = {m['horizon']:g}, {grid} nodes, degree {m['degree']}; rms error {m['rms']:.1e} a leap"
-        )
-    else:
-        rows.append("direct integration of order 8")
-    statuses = ", ".join(f"{n} {name}" for name, n in summary["ray_status"].items() if n)
-    rows.append(f"rays: {summary['rays']} of length {summary['length']:g} ({statuses or 'none launched'})")
-    error = summary["error_of_rays"]
-    rows.append(f"error at their ends against direct integration: rms {error['rms']:.1e}, max {error['max']:.1e}")
-    if "field" in summary:
-        f = summary["field"]
-        rows.append(
-            f"field: k = {f['wavenumber']:g}, {f['boundary']}, {f['directions']} directions, "
-            f"|f| up to {f['largest']:.4g}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
-        )
-    rows.append(f"{summary['iso_phase_curves']} iso-phase curves; 3-D picture by {summary['drawn_by']}")
-    rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
-    return "\n".join(rows)
-
-
-@app.command
-def check(body: Body, *, speed: SpeedOption = None, json_: Json = False) -> int:
-    """Verify a body: derivatives, closedness, orientation, cover and overlap of its charts."""
-    from dataclasses import asdict
-
-    from creeping import check_surface
-
-    report = check_surface(parse_body(body, speed))
-    if json_:
-        rows = [asdict(c) | {"ok": c.ok} for c in report.checks]
-        print(json.dumps({"ok": report.ok, "genus": report.genus, "area": report.area, "checks": rows}, indent=1))
-    else:
-        print(report)
-    return 0 if report.ok else 3
 
 
 @app.command
@@ -346,6 +203,7 @@ def figure(
     return 0
 
 
+app.command(_checking.check)
 cache_app.command(_upkeep.list_maps, name="ls")
 cache_app.command(_upkeep.verify_maps, name="verify")
 cache_app.command(_upkeep.clear_maps, name="clear")

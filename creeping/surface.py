@@ -81,7 +81,10 @@ class Surface(Protocol):
     """A smooth closed body.
 
     Optional members: ``speed`` (a `Speed`), ``compiled`` (a `Compiled` level), ``fingerprint`` (a string that
-    changes with the body), and ``compiled`` of its atlas (a locator).
+    changes with the body), of its atlas ``compiled`` (a locator) and ``margin`` (how far charts reach beyond their unit
+    squares, in half widths; without bound if not given), ``rough(points)`` (where it is not smooth enough for
+    creeping rays, (..., 3) -> (...)), and ``coarser`` (the same body known less well, a `Surface`: what differs on it
+    is uncertain).
     """
 
     @property

@@ -1,9 +1,10 @@
 """Block evaluators of the bodies, compiled to functions that kernels call by address.
 
 A *level evaluator* fills, for a block of n points, F, grad F and the six Hessian entries
-(xx, yy, zz, yz, xz, xy); a *locator* fills chart number, chart variables and the isometric frame
-(rows e1x, e1y, e1z, e2x, e2y, e2z). Of a sphere map x = psi(s), a *forward* function fills x and the nine
-entries of d psi/ds by rows (xx, xy, xz, yx, ...), an *inverse* function fills s, of unit length.
+(xx, yy, zz, yz, xz, xy); a *locator* is given the points with grad F there, and fills chart number, chart
+variables and the isometric frame (rows e1x, e1y, e1z, e2x, e2y, e2z). Of a sphere map x = psi(s), a *forward*
+function fills x and the nine entries of d psi/ds by rows (xx, xy, xz, yx, ...), an *inverse* function fills s,
+of unit length.
 Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.
 numba is imported at the first use, for a quick start: plain Python that several of them call is marked by `helper`.
 """
@@ -43,7 +44,7 @@ class Compiled:
     source : callable
         Plain Python of the function, with the arguments
         ``(points (3, n), values (n,), gradients (3, n), hessians (6, n), parameters)`` for a level or a speed,
-        ``(points (3, n), chart (n,), uv (2, n), frame (6, n), parameters)`` for a locator,
+        ``(points (3, n), gradients (3, n), chart (n,), uv (2, n), frame (6, n), parameters)`` for a locator,
         ``(s (3, n), points (3, n), derivatives (9, n), parameters)`` for a forward sphere map,
         ``(points (3, n), s (3, n), parameters)`` for its inverse.
     kind : {"level", "locator", "forward", "inverse"}
@@ -70,7 +71,7 @@ def _compile(source: Callable[..., None], kind: str) -> Any:
     row, rows = types.float64[::1], types.float64[:, ::1]
     signature = {
         "level": types.void(rows, row, rows, rows, row),
-        "locator": types.void(rows, types.int64[::1], rows, rows, row),
+        "locator": types.void(rows, rows, types.int64[::1], rows, rows, row),
         "forward": types.void(rows, rows, rows, row),
         "inverse": types.void(rows, rows, row),
     }[kind]

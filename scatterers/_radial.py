@@ -11,8 +11,10 @@ The root is found by Newton steps from r = 1, halved into the bracket when they 
 outside the body. `scatterers._radial_kernels` is the compiled twin.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -20,11 +22,29 @@ from numpy.typing import NDArray
 
 from scatterers._compile import Compiled
 from scatterers._spline_constants import DEGREE, ITERATIONS, REACH, SMALL
-from scatterers._tensor_spline import TensorSpline, evaluated
+from scatterers._tensor_spline import evaluated
 
 FloatArray = NDArray[np.float64]
 # centroids this near to a parallel of the axis, in half widths, make no spine
 UPRIGHT = 0.01
+
+
+class SpaceLevel(Protocol):
+    """F in a box of space, as a sphere map needs it."""
+
+    @property
+    def box(self) -> FloatArray:
+        """Box (2, 3) in which F is known, L."""
+        ...
+
+    def flat(self, of_map: FloatArray) -> FloatArray:
+        """Parameters of the compiled functions, those of a map among them."""
+        ...
+
+    @property
+    def sources(self) -> Mapping[str, Callable[..., None]]:
+        """Plain Python of its "level" and of the "forward" sphere map over it; see `scatterers._compile.Compiled`."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +120,11 @@ class Spine:
 
 @dataclass(frozen=True, eq=False)
 class RadialMap:
-    """The map for a body whose F is a spline; satisfies `scatterers._charts.SphereMap`.
+    """The map over an F known in a box; satisfies `scatterers._charts.SphereMap`.
 
     Attributes
     ----------
-    spline : TensorSpline
+    space : SpaceLevel
     centre, half_axes : (3,), L
         Of the body with upright spine.
     spine : Spine
@@ -112,7 +132,7 @@ class RadialMap:
         That psi is a search for a root: users who evaluate it often had better tabulate it.
     """
 
-    spline: TensorSpline
+    space: SpaceLevel
     centre: FloatArray
     half_axes: FloatArray
     spine: Spine
@@ -123,7 +143,7 @@ class RadialMap:
         """Box (2, 3) about the centre that contains the sheared grid, L."""
         ends = np.repeat(np.linspace(-REACH, REACH, 129)[:, None], 3, axis=1) * self.spine.half + self.spine.middle
         shift = self.spine.shift(ends)
-        return np.asarray(self.spline.box - self.centre - np.stack([shift.max(0), shift.min(0)]))
+        return np.asarray(self.space.box - self.centre - np.stack([shift.max(0), shift.min(0)]))
 
     def radius(self, s: FloatArray) -> FloatArray:
         """Root r of the rays along unit vectors: (..., 3) -> (...); NaN where none is found."""
@@ -155,7 +175,7 @@ class RadialMap:
         x = w + self.spine.shift(w)
         value, gradient, _ = evaluated(self.compiled_level, x)
         if not self.spine.upright:
-            box = self.spline.box
+            box = self.space.box
             value = np.where(np.any((x < box[0]) | (x > box[1]), axis=-1), np.inf, value)
         return value, np.sum(self.spine.pulled(w, gradient) * y, axis=-1)
 
@@ -189,7 +209,7 @@ class RadialMap:
     @cached_property
     def parameters(self) -> FloatArray:
         """Parameters that all compiled functions share."""
-        return self.spline.flat(self.header)
+        return self.space.flat(self.header)
 
     @cached_property
     def header(self) -> FloatArray:
@@ -202,16 +222,12 @@ class RadialMap:
     @cached_property
     def compiled_level(self) -> Compiled:
         """Compiled F, grad F and Hessian."""
-        from scatterers._tensor_kernels import evaluate
-
-        return Compiled(evaluate, "level", self.parameters)
+        return Compiled(self.space.sources["level"], "level", self.parameters)
 
     @cached_property
     def compiled_forward(self) -> Compiled:
         """Compiled psi and its derivative."""
-        from scatterers._radial_kernels import forward
-
-        return Compiled(forward, "forward", self.parameters)
+        return Compiled(self.space.sources["forward"], "forward", self.parameters)
 
     @cached_property
     def compiled_inverse(self) -> Compiled:

@@ -166,7 +166,7 @@ def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
         s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z
 
 
-def locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
+def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
     """Chart, chart variables and isometric frame of points on the body; the compiled twin of locate and polar_frame.
 
     The frame does not see the factor r of d psi/ds, nor the length of y, so w - c serves for y.
@@ -174,9 +174,8 @@ def locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def
     a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
     for i in range(points.shape[1]):
         x, y, z = points[0, i], points[1, i], points[2, i]
-        _, gx, gy, gz = value_and_gradient(x, y, z, parameters)
         shift, slope = _spine((x, y, z), parameters)
-        gx, gy, gz = _pulled((gx, gy, gz), slope, parameters)
+        gx, gy, gz = _pulled((gradients[0, i], gradients[1, i], gradients[2, i]), slope, parameters)
         x -= shift[0] + parameters[CENTRE]
         y -= shift[1] + parameters[CENTRE + 1]
         z -= shift[2] + parameters[CENTRE + 2]

@@ -117,8 +117,43 @@ def _contraction(order: int) -> Any:
     return contract
 
 
-_contract_first = _contraction(1)
+contract_first = _contraction(1)
 _contract_second = _contraction(2)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def scatter(typing: Any, table: Any, start: Any, sx: Any, sy: Any, tx: Any, ty: Any, tz: Any, r: Any) -> Any:
+    """Adjoint of `contract_first`: add r[0] w_a w_b w_c + r[1] w_a' w_b w_c + ... to a stencil of the table, in cells.
+
+    The two lanes beyond a row get a zero added.
+    """
+    signature = types.void(table, start, sx, sy, tx, ty, tz, r)
+
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
+        rows = context.make_array(sig.args[0])(context, builder, args[0]).data
+        first, stride_x, stride_y = args[1:4]
+        (wx, dx), (wy, dy), (wz, dz) = (_weights(builder, t, 1) for t in args[4:7])
+        value, slope_x, slope_y, slope_z = (_spread(builder, builder.extract_value(args[7], k)) for k in range(4))
+
+        def lane(vector: Any, index: int) -> Any:
+            return _spread(builder, builder.extract_element(vector, ir.Constant(_lane, index)))
+
+        along = _multiply_add(builder, builder.fmul(value, wx), slope_x, dx)
+        across_y, across_z = builder.fmul(slope_y, wx), builder.fmul(slope_z, wx)
+        for a in range(6):
+            plane = builder.add(first, builder.mul(stride_x, ir.Constant(_index, a)))
+            p = _multiply_add(builder, builder.fmul(lane(along, a), wy), lane(across_y, a), dy)
+            q = builder.fmul(lane(across_z, a), wy)
+            for b in range(6):
+                row = builder.add(plane, builder.mul(stride_y, ir.Constant(_index, b)))
+                place = builder.bitcast(builder.gep(rows, [row]), _vector.as_pointer())
+                total = builder.load(place)
+                total.align = 8
+                total = _multiply_add(builder, _multiply_add(builder, total, lane(p, b), wz), lane(q, b), dz)
+                builder.store(total, place).align = 8
+        return context.get_dummy_value()
+
+    return signature, codegen
 
 
 @njit(**OPTIONS)
@@ -148,7 +183,7 @@ def _stencil(x, y, z, parameters):  # type: ignore[no-untyped-def]
 def value_and_gradient(x, y, z, parameters):  # type: ignore[no-untyped-def]
     """F, F_x, F_y, F_z at a point."""
     start, stride_x, stride_y, tx, ty, tz = _stencil(x, y, z, parameters)
-    f, fx, fy, fz = _contract_first(parameters, start, stride_x, stride_y, tx, ty, tz)
+    f, fx, fy, fz = contract_first(parameters, start, stride_x, stride_y, tx, ty, tz)
     return f, fx * parameters[6], fy * parameters[7], fz * parameters[8]
 
 

@@ -9,6 +9,7 @@ the grid the outermost cell's polynomial goes on for one cell; from there on t i
 `scatterers._tensor_kernels` is the compiled twin.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -76,6 +77,15 @@ class TensorSpline:
         cells = np.array(self.coefficients.shape) - 5
         return np.stack([self.origin, self.origin + cells * self.spacing])
 
+    def at_nodes(self) -> FloatArray:
+        """F at the nodes: (n0, n1, n2)."""
+        values = self.coefficients
+        for axis in range(3):
+            nodes = values.shape[axis] - 4
+            shifted = [w * np.take(values, range(k, k + nodes), axis) for k, w in enumerate((1, 26, 66, 26, 1))]
+            values = np.sum(shifted, axis=0) / 120
+        return values
+
     def _derivatives(self, points: FloatArray, order: int) -> FloatArray:
         """All mixed derivatives with up to ``order`` along each axis: (..., 3) -> (..., order + 1, thrice)."""
         points = np.asarray(points, dtype=float)
@@ -122,12 +132,18 @@ class TensorSpline:
         header = [np.array(self.coefficients.shape, dtype=float), self.origin, 1 / self.spacing, of_map]
         return np.concatenate([*header, self.coefficients.ravel(), np.zeros(OVERREAD)])
 
+    @property
+    def sources(self) -> dict[str, Callable[..., None]]:
+        """Plain Python of the compiled functions; see `scatterers._radial.SpaceLevel`."""
+        from scatterers._radial_kernels import forward
+        from scatterers._tensor_kernels import evaluate
+
+        return {"level": evaluate, "forward": forward}
+
     @cached_property
     def compiled(self) -> Compiled:
         """Compiled evaluator."""
-        from scatterers._tensor_kernels import evaluate
-
-        return Compiled(evaluate, "level", self.flat(np.zeros(HEADER - CENTRE)))
+        return Compiled(self.sources["level"], "level", self.flat(np.zeros(HEADER - CENTRE)))
 
 
 def evaluated(compiled: Compiled, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,29 +1,22 @@
 """Body whose F is given by samples on a Cartesian grid: F = quintic tensor-product B-spline through them.
 
-F and its derivatives are those of the spline, exactly; the body has to be star-shaped about a centre, once a bent or
-slanted one is sheared upright, which gives it the sphere map of `scatterers._radial` and by it six charts.
+F and its derivatives are those of the spline, exactly.
 """
 
 import hashlib
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers._body import Body
-from scatterers._charts import CubeSphereAtlas
-from scatterers._compile import Compiled
-from scatterers._radial import RadialMap, Spine
-from scatterers._tensor_spline import TensorSpline, coefficients, evaluated
+from scatterers._level_body import LevelBody
+from scatterers._samples import Samples
+from scatterers._star import star_map
+from scatterers._tensor_spline import TensorSpline, coefficients
 
 FloatArray = NDArray[np.float64]
 FEWEST = 8
-# points of the body at which the centre is checked
-CHECKED = 20000
-# where xx, yy, zz, yz, xz, xy stand in a matrix
-SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
 class Level(Protocol):
@@ -39,8 +32,8 @@ class Level(Protocol):
         ...
 
 
-class Gridded(Body):
-    """Star-shaped body from samples of F on a grid.
+class Gridded(LevelBody):
+    """Body from samples of F on a grid.
 
     Parameters
     ----------
@@ -51,6 +44,7 @@ class Gridded(Body):
     centre : (3,) array_like, optional
         Point that sees the whole body from within, L; by default the middle of the body's box. A body whose slices
         across its longest side are shifted against each other is sheared upright first, if that leaves it star-shaped.
+        A body that is not star-shaped needs no centre.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
@@ -58,7 +52,7 @@ class Gridded(Body):
     ------
     ValueError
         If the samples are too few or not finite, no node is inside, nodes of the grid's faces are not outside, or
-        the body is not star-shaped about the centre.
+        the body is not star-shaped about a given centre.
     """
 
     def __init__(
@@ -69,18 +63,20 @@ class Gridded(Body):
             raise ValueError(f"bounds {box.tolist()} are no box; give ((x0, y0, z0), (x1, y1, z1)) with x0 < x1 etc.")
         nodes = _checked(samples)
         spacing = (box[1] - box[0]) / (np.array(nodes.shape) - 1)
-        inside = np.stack([np.array(np.nonzero(nodes < 0)).min(1), np.array(np.nonzero(nodes < 0)).max(1)])
-        inside = box[0] + inside * spacing
         given = None if centre is None else _numbers("centre", centre, (3,))
         self.speed = speed
         self._set_speed()
-        self._spline = TensorSpline(coefficients(nodes), box[0], spacing)
-        self._map = _star(self._spline, nodes, given)
-        reach = np.stack([inside[0] - 1.5 * spacing, inside[1] + 1.5 * spacing])
-        self._bounds: FloatArray = np.clip(reach, box[0], box[1])
+        spline = TensorSpline(coefficients(nodes), box[0], spacing)
+        sampled = Samples(nodes, box[0], spacing)
+        sphere_map, failure = star_map(spline, sampled, given)
+        if sphere_map is None and given is not None:
+            raise ValueError(failure)
+        self._place(spline, sampled, sphere_map)
+        self._spline = spline
         digest = hashlib.blake2b(nodes.tobytes(), digest_size=8)
         # what is stored by the sphere map depends on it, too
-        digest.update(np.concatenate([box.ravel(), self._map.header, np.array(nodes.shape, dtype=float)]).tobytes())
+        header = np.zeros(0) if sphere_map is None else sphere_map.header
+        digest.update(np.concatenate([box.ravel(), header, np.array(nodes.shape, dtype=float)]).tobytes())
         self._digest = digest.hexdigest()
 
     @classmethod
@@ -126,89 +122,8 @@ class Gridded(Body):
         nodes = " x ".join(str(n - 4) for n in self._spline.coefficients.shape)
         return f"Gridded({nodes} nodes, {self._digest}, speed={self.speed!r})"
 
-    @property
-    def fingerprint(self) -> str | None:
-        """Text that changes with the shape or the speed; None if the speed cannot be named."""
-        if self.speed is None:
-            return f"Gridded({self._digest})"
-        named = getattr(self.speed, "fingerprint", None)
-        return None if named is None else f"Gridded({self._digest}, speed={named})"
-
-    @property
-    def bounds(self) -> FloatArray:
-        """Box (2, 3) that contains the body with some slack, L."""
-        return self._bounds
-
-    def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: (..., 3) -> (...)."""
-        return evaluated(self.compiled, points)[0]
-
-    def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: (..., 3) -> (..., 3)."""
-        return evaluated(self.compiled, points)[1]
-
-    def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: (..., 3) -> (..., 3, 3)."""
-        return evaluated(self.compiled, points)[2][..., SYMMETRIC]
-
-    def parameters(self, points: FloatArray) -> FloatArray:
-        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi] of psi^-1(x): (..., 3) -> (..., 2)."""
-        s = self._map.inverse(points)
-        theta = np.arctan2(np.hypot(s[..., 0], s[..., 1]), s[..., 2])
-        return np.stack([theta, np.arctan2(s[..., 1], s[..., 0])], axis=-1)
-
-    @property
-    def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
-        return self._map.compiled_level
-
-    @cached_property
-    def atlas(self) -> CubeSphereAtlas:
-        """Six charts."""
-        return CubeSphereAtlas(self._map, self._map.compiled_locator)
-
-
-def _star(spline: TensorSpline, nodes: FloatArray, centre: FloatArray | None) -> RadialMap:
-    """Sphere map with a spine if the body is not upright and that does, without one otherwise, or ValueError."""
-    points = _crossings(spline, nodes)
-    spines = [Spine.through(nodes < 0, spline.origin, spline.spacing), Spine.none()]
-    failure = ""
-    for spine in spines[spines[0].upright :]:
-        upright = points - spine.shift(points)
-        low, high = upright.min(0), upright.max(0)
-        middle = 0.5 * (low + high) if centre is None else centre - spine.shift(centre)
-        sphere_map = RadialMap(spline, middle, 0.5 * (high - low), spine)
-        if not (failure := _hidden(sphere_map, points)):
-            return sphere_map
-    raise ValueError(failure)
-
-
-def _crossings(spline: TensorSpline, nodes: FloatArray) -> FloatArray:
-    """Points (n, 3) where edges of the grid cross the body, by linear interpolation."""
-    found = []
-    for axis in range(3):
-        last = nodes.shape[axis] - 1
-        f, g = np.take(nodes, range(last), axis), np.take(nodes, range(1, last + 1), axis)
-        crossed = (f < 0) != (g < 0)
-        index = np.argwhere(crossed).astype(float)
-        index[:, axis] += f[crossed] / (f[crossed] - g[crossed])
-        found.append(index)
-    return np.asarray(spline.origin + np.concatenate(found) * spline.spacing)
-
-
-def _hidden(sphere_map: RadialMap, points: FloatArray) -> str:
-    """What is wrong unless F < 0 at the centre and rays from it leave the body at its points."""
-    box, centre = sphere_map.spline.box, sphere_map.centre + sphere_map.spine.shift(sphere_map.centre)
-    remedy = "give a centre from which every point of the body is in sight, or another body"
-    where = tuple(centre.round(6).tolist())
-    inside = np.all(centre > box[0]) and np.all(centre < box[1])
-    if not inside or not evaluated(sphere_map.compiled_level, centre)[0] < 0:
-        return f"the centre {where} is not inside the body; {remedy}"
-    points = points[:: -(-len(points) // CHECKED)]
-    hidden = int(np.sum(~(sphere_map.facing(points) > 0)))
-    if not hidden:
-        return ""
-    return f"the body is not star-shaped about {where}: {hidden} of {len(points)} directions fail; {remedy}"
+    def _identity(self) -> str:
+        return self._digest
 
 
 def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:

@@ -149,7 +149,7 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
         hessians[4, i] = 0.0
 
 
-def _locate(points, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
+def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
     """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame."""
     turn = 1 / (2 * math.pi)
     for i in range(points.shape[1]):

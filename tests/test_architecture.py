@@ -72,6 +72,7 @@ def test_public_names_grow_on_purpose():
     import creeping
 
     assert creeping.__all__ == [
+        "BodyError",
         "CreepingError",
         "DirectFlow",
         "FarField",
@@ -84,10 +85,12 @@ def test_public_names_grow_on_purpose():
         "RayStatus",
         "ShadowLine",
         "__version__",
+        "body_error",
         "build_phase_map",
         "check_surface",
         "choose_flow",
         "far_field",
+        "far_field_uncertainty",
         "iso_phase_curves",
         "launch",
         "load_phase_map",

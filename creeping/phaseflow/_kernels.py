@@ -59,7 +59,8 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
     """Compose the map ``leaps`` times on states (n, 6 or 10), in place.
 
     table (charts, nu, nv, na, 8) holds x' - x - T0 p and p' - p, jacobi (charts, nu, nv, na, 4) M - [[1, T0], [0, 1]];
-    grid coordinates are origin + cells * (u, v, angle/2 pi). Afterwards x is brought back to |F| <= tolerance |grad F|.
+    grid coordinates are origin + cells * (u, v, angle/2 pi). Afterwards x is brought back to |F| <= tolerance |grad F|,
+    which leaves grad F for the locator of the next leap.
     """
     n, lanes = states.shape
     y, geometry = aligned(6, BLOCK), aligned(10, BLOCK)
@@ -73,8 +74,12 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
         for i in range(BLOCK):
             for lane in range(6):
                 y[lane, i] = states[start + min(i, count - 1), lane]
+        off = math.inf
         for _ in range(leaps):
-            locate(y[:3], chart, uv, frame, locate_par)
+            # else the last evaluation was within the tolerance of where the rays are
+            if not off <= tolerance:
+                level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+            locate(y[:3], geometry[1:4], chart, uv, frame, locate_par)
             for i in range(count):
                 px, py, pz = y[3, i], y[4, i], y[5, i]
                 across = px * frame[3, i] + py * frame[4, i] + pz * frame[5, i]

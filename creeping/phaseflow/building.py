@@ -48,6 +48,8 @@ class Plan:
     ride_along : bool
     doublings : int
         d: nodes are traced to T0/2^d only.
+    least_cells : int
+        Along u and v, if the grid is refined or thinned.
     """
 
     horizon: float
@@ -55,6 +57,7 @@ class Plan:
     single: bool = False
     ride_along: bool = True
     doublings: int = 0
+    least_cells: int = 1
 
 
 def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol: float) -> PhaseMap:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.surface import Surface
 
 MARGIN = 2
 """Nodes of a chart beyond each edge of its unit square: every point finds a chart two grid points from the edge."""
@@ -86,3 +87,9 @@ class Leap:
     def nbytes(self) -> int:
         """Memory of the tables."""
         return int(self.state.nbytes + self.jacobi.nbytes + self.curvature.nbytes)
+
+
+def least_cells(body: Surface) -> int:
+    """Cells of a chart's unit square at which the grid's margin ends within the chart."""
+    margin = getattr(body.atlas, "margin", None)
+    return 1 if margin is None else int(np.ceil(2 * MARGIN / margin - 1e-9))

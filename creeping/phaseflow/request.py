@@ -16,7 +16,7 @@ from creeping.phaseflow.building import (
 )
 from creeping.phaseflow.caching import cached_phase_map
 from creeping.phaseflow.geodesic import natural_horizon
-from creeping.phaseflow.grids import Grid
+from creeping.phaseflow.grids import MARGIN, Grid, least_cells
 from creeping.phaseflow.models import model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.tuning import RAYS, tuned_map
@@ -144,7 +144,7 @@ class Request:
         self.outputs = int(outputs)
         self.order, self.precision, self.ride_along, self.method = order, precision, ride_along, method
         self.periodic = _common_periodicity(body)
-        self.nodes = None if grid is None else _nodes(grid, order or 5, self.periodic)
+        self.nodes = None if grid is None else _nodes(grid, order or 5, self.periodic, least_cells(body))
         self.rays, self.patience = RAYS, np.inf
         self.burn_in, self.base, self.stages = time_step, 0, stages or 0
         if method == "tower":
@@ -207,7 +207,7 @@ def _common_periodicity(body: Surface) -> tuple[bool, bool]:
     return first, second
 
 
-def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool]) -> tuple[int, int, int]:
+def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool], cells: int) -> tuple[int, int, int]:
     try:
         nodes = tuple(int(n) for n in grid)
         whole = all(n == g for n, g in zip(nodes, grid, strict=True))
@@ -215,7 +215,7 @@ def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool]) -> t
         nodes, whole = (), False
     if len(nodes) == 2:
         nodes = (nodes[0], *nodes)
-    least = [degree + 1 if wraps else degree + 5 for wraps in periodic] + [degree + 1]
+    least = [degree + 1 if wraps else max(degree + 5, cells + 1 + 2 * MARGIN) for wraps in periodic] + [degree + 1]
     if len(nodes) != 3 or not whole or any(n < m for n, m in zip(nodes, least, strict=True)):
         raise InvalidInputError(
             f"grid = {grid!r}: give two or three whole numbers of at least {least} for order {degree}"

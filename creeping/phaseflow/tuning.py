@@ -20,9 +20,8 @@ from creeping._errors import ToleranceError
 from creeping._typing import FloatArray
 from creeping.phaseflow.building import Plan, Progress, build_direct, measured
 from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.compiled_models import CompiledModel
 from creeping.phaseflow.geodesic import natural_horizon
-from creeping.phaseflow.grids import MARGIN, Grid
+from creeping.phaseflow.grids import MARGIN, Grid, least_cells
 from creeping.phaseflow.models import Model, model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.splines import thinning_operator
@@ -182,7 +181,7 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
         gain = growth_factor(*stretch, horizon) if request.length else 1.0
         target = SAFE * tolerance / gain
         single = request.precision == "single" or (
-            request.precision is None and isinstance(model, CompiledModel) and target > SINGLE * np.hypot(1, size(body))
+            request.precision is None and target > SINGLE * np.hypot(1, size(body))
         )
         for order in orders:
             grid = probe.grid(k, order, target)
@@ -191,7 +190,8 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
             fewest = min(fewest, (nodes, horizon))
             if nodes > MAX_NODES or nbytes > MAX_BYTES:
                 continue
-            plan = Plan(horizon, grid, single, request.ride_along, _doublings(horizon, natural, cost))
+            doublings = _doublings(horizon, natural, cost)
+            plan = Plan(horizon, grid, single, request.ride_along, doublings, least_cells(body))
             # the curvatures are wanted at several times of each leap
             traced = cost * horizon / 2**plan.doublings * (6.0 if request.ride_along else 1.0)
             build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if request.ride_along else 1.0)
@@ -273,7 +273,7 @@ class _Probe:
     """Interpolation errors of rows of points along each axis, for several horizons."""
 
     def __init__(self, body: Surface, model: Model, horizons: list[float], periodic: tuple[bool, bool]) -> None:
-        self.periodic = (*periodic, True)
+        self.body, self.periodic = body, (*periodic, True)
         # errors in the units of (x, p) from those of the coordinates
         unit = {"ambient": 1.0, "rotation": 2.0, "octant": 2.0, "angles": 2 * np.pi}[model.name]
         self.scale = unit * (1.0 if model.name == "ambient" else float(np.hypot(1, size(body))))
@@ -329,12 +329,12 @@ class _Probe:
                 cells.append(float(n[-1]) * (e[-1] / wanted) ** (1 / (order + 1)))
             else:
                 cells.append(float(np.exp(np.interp(-np.log(wanted), -np.log(e), np.log(n)))))
-        return _grid(cells, order, self.periodic[:2])
+        return _grid(cells, order, self.periodic[:2], least_cells(self.body))
 
 
-def _grid(cells: list[float], order: int, periodic: tuple[bool, ...]) -> Grid:
+def _grid(cells: list[float], order: int, periodic: tuple[bool, ...], least: int) -> Grid:
     sides = [
-        max(int(np.ceil(c)) if wraps else int(np.ceil(c)) + 1 + 2 * MARGIN, order + (1 if wraps else 5))
+        max(int(np.ceil(c)) if wraps else max(int(np.ceil(c)), least) + 1 + 2 * MARGIN, order + (1 if wraps else 5))
         for c, wraps in zip(cells, periodic, strict=False)
     ]
     return Grid((sides[0], sides[1], max(4 * int(np.ceil(cells[2] / 4)), 8)), order, (periodic[0], periodic[1]))
@@ -347,4 +347,4 @@ def _finer(plan: Plan, excess: float) -> Plan:
 
 def _scaled(plan: Plan, factor: float) -> Plan:
     grid = plan.grid
-    return replace(plan, grid=_grid([factor * c for c in grid.cells], grid.degree, grid.periodic))
+    return replace(plan, grid=_grid([factor * c for c in grid.cells], grid.degree, grid.periodic, plan.least_cells))

@@ -16,14 +16,8 @@ from typing import Protocol
 import numpy as np
 
 from creeping._errors import InvalidInputError
-from creeping._typing import BoolArray, FloatArray, IntArray
-from creeping.phaseflow.geodesic import (
-    gaussian_curvature,
-    launch_spreading,
-    normal_curvature,
-    speed_of,
-    speed_values,
-)
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.phaseflow.geodesic import gaussian_curvature, normal_curvature, speed_values
 from creeping.phaseflow.storing import fingerprint
 from creeping.phaseflow.tracing import MapError, pack, trace_states
 from creeping.rays.launch_points import (
@@ -35,10 +29,13 @@ from creeping.rays.launch_points import (
     position_statuses,
 )
 from creeping.rays.shadow import ShadowLine
+from creeping.rays.spreading import spread, zeros_passed
 from creeping.surface import Surface, size
 
 MAX_RAYS = 200_000
 """Rays beyond which refinement stops."""
+ROUGH_SPACING = 0.005
+"""Spacing at which rays are looked at for rough ground, in sizes of the body."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
 
@@ -78,6 +75,8 @@ class RayStatus(IntEnum):
     """Launched on request from a point where kappa_n(d) <= 0: no creeping ray."""
     STALLED = 4
     """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
+    ROUGH = 5
+    """Came at ``RayFan.detachment`` to where the body is not smooth enough, by its own word; the field ends there."""
 
 
 LINE_STATUS = {"attached": RayStatus.OK, "occluded": RayStatus.OCCLUDED, "concave": RayStatus.CONCAVE}
@@ -108,7 +107,7 @@ class RayFan:
     status : (rays,)
         Codes of `RayStatus`.
     detachment : (rays,), L
-        Travel time at which kappa_n first falls to 0, inf if it does not.
+        Travel time at which kappa_n first falls to 0 or the ray comes to rough ground, inf if neither happens.
     curve_index, arc_index : (rays,)
         Curve of the shadow line, and arc: rays of one arc are neighbours; with ``status="all"`` an arc is a curve.
     arclength : (rays,), L
@@ -269,12 +268,15 @@ def _assemble(
 ) -> RayFan:
     body = line.body
     points, directions = states[..., :3].copy(), states[..., 3:6].copy()
-    spreading, rate, stalled = _spreading(body, line, starts, states)
+    spreading, rate, stalled = spread(body, starts, np.broadcast_to(line.direction, (len(starts), 3)), states)
     curvature = normal_curvature(body, points, directions)
     detachment = states[:, -1, 11].copy()
     status = np.array([LINE_STATUS[one] for one in position_statuses(line, arcs, arc, arclength)], dtype=np.int64)
     # a ray that never was a creeping ray keeps the reason
     status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
+    rough = _rough_from(body, points, times)
+    status[((status == RayStatus.OK) | (status == RayStatus.DETACHED)) & (rough < detachment)] = RayStatus.ROUGH
+    detachment = np.minimum(detachment, rough)
     status[stalled] = RayStatus.STALLED
     curve_index = np.array([arcs[k].curve for k in arc], dtype=np.int64)
     lengths = np.array([curve.length for curve in line.curves])
@@ -289,7 +291,7 @@ def _assemble(
         spreading_rate=rate,
         curvature=curvature,
         attenuation=states[..., 10].copy(),
-        caustic_index=_zeros_passed(spreading),
+        caustic_index=zeros_passed(spreading),
         status=status,
         detachment=detachment,
         curve_index=curve_index,
@@ -301,38 +303,21 @@ def _assemble(
     )
 
 
-def _spreading(
-    body: Surface, line: ShadowLine, starts: FloatArray, states: FloatArray
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """J, J' (rays, steps) and the rays whose launch point has no speed."""
-    first = launch_spreading(body, starts[:, :3], np.broadcast_to(line.direction, (len(starts), 3)), starts[:, 3:])
-    i, j = first[:, 0], first[:, 1]
-    x, p = states[..., :3], states[..., 3:6]
-    c = speed_values(body, x)
-    rate = np.zeros_like(c)
-    stalled = np.zeros(len(starts), dtype=bool)
-    if speed_of(body) is not None:
-        rate = np.sum(speed_of(body).gradient(x) * p, axis=-1)
-        stalled = c[:, 0] < 1e-12 * float(np.max(c, initial=0.0))
-        c0 = np.where(stalled, np.nan, c[:, 0])
-        i = i / c0
-        j = (j - rate[:, 0]) / c0
-    reduced = i[:, None] * states[..., 6] + j[:, None] * states[..., 8]
-    reduced_rate = i[:, None] * states[..., 7] + j[:, None] * states[..., 9]
-    # J' = c I' + (dc/dt) I with dc/dt = c grad c.p
-    return c * reduced, c * reduced_rate + c * rate * reduced, stalled
-
-
-def _zeros_passed(spreading: FloatArray) -> IntArray:
-    """Sign changes of J up to each step; a step that lands on a zero counts once it is passed."""
-    sign = np.sign(spreading)
-    count = np.zeros(sign.shape, dtype=np.int64)
-    last = sign[:, 0].copy() if sign.shape[1] else np.zeros(0)
-    for k in range(1, sign.shape[1]):
-        flipped = sign[:, k] * last < 0
-        count[:, k] = count[:, k - 1] + flipped
-        last = np.where(sign[:, k] != 0, sign[:, k], last)
-    return count
+def _rough_from(body: Surface, points: FloatArray, times: FloatArray) -> FloatArray:
+    """Travel time (rays,) of the last place before rough ground, inf on rays that do not come there."""
+    rough: Any = getattr(body, "rough", None)
+    if rough is None or not points.size:
+        return np.full(len(points), np.inf)
+    # between the steps on chords: rough places may be small
+    parts = int(np.ceil(np.max(np.diff(times), initial=0.0) / (ROUGH_SPACING * size(body)))) or 1
+    fine = np.interp(np.arange((len(times) - 1) * parts + 1) / parts, np.arange(len(times)), times)
+    found = np.full(len(points), np.inf)
+    for ray, path in enumerate(points):
+        dense = np.stack([np.interp(fine, times, path[:, axis]) for axis in range(3)], axis=1)
+        met = np.flatnonzero(rough(dense))
+        if len(met):
+            found[ray] = fine[max(met[0] - 1, 0)]
+    return found
 
 
 def _measure(body: Surface, starts: FloatArray, line: ShadowLine, states: FloatArray, times: FloatArray) -> MapError:

@@ -176,7 +176,7 @@ def ray_points(fan: RayFan) -> tuple[FloatArray, RayPoints]:
     lanes[..., 8] = np.unwrap(np.arctan2(-scale * lanes[..., 7], lanes[..., 6]), axis=1)
     if len(states):
         _along(fan, states, step, lanes)
-    launched = (fan.status == RayStatus.OK) | (fan.status == RayStatus.DETACHED)
+    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.ROUGH))
     alive = launched[:, None] & (times < fan.detachment[:, None])
     return times, RayPoints(lanes, _starts(fan, lanes), np.broadcast_to(times, alive.shape), alive, scale)
 

@@ -69,7 +69,7 @@ def test_contradictions_are_named(options, match):
 
 @pytest.mark.parametrize("cache", [None, 0, 1])
 def test_cache_is_a_switch_or_a_folder(cache):
-    with pytest.raises(cr.InvalidInputError, match="cache"):
+    with pytest.raises(cr.CreepingError, match="cache"):
         cr.build_phase_map(sc.Sphere(), tolerance=1e-3, cache=cache)
 
 

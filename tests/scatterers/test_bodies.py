@@ -52,7 +52,8 @@ def test_compiled_locator_equals_numpy(body, rng):
         points = chart.point(uv)
         found, found_uv, frame = np.empty(40, np.int64), np.empty((2, 40)), np.empty((6, 40))
         locator = body.atlas.compiled
-        locator.source(np.ascontiguousarray(points.T), found, found_uv, frame, locator.parameters)
+        gradients = np.ascontiguousarray(body.gradient(points).T)
+        locator.source(np.ascontiguousarray(points.T), gradients, found, found_uv, frame, locator.parameters)
         assert np.all(found == number)
         np.testing.assert_allclose(found_uv.T, uv, atol=1e-13)
         expected = polar_frame(chart.tangents(uv))
@@ -93,8 +94,9 @@ def test_compiled_functions_equal_their_source(body, kind, rng):
         return [np.empty((r, 37)) if r > 0 else np.empty(37, np.int64 if r else float) for r in rows]
 
     fast, plain = outputs(), outputs()
-    call(compiled.function, points, *fast, compiled.parameters)
-    compiled.source(points, *plain, compiled.parameters)
+    given = [points, np.ascontiguousarray(body.gradient(points.T).T)] if kind == "locator" else [points]
+    call(compiled.function, *given, *fast, compiled.parameters)
+    compiled.source(*given, *plain, compiled.parameters)
     for a, b in zip(fast, plain, strict=True):
         np.testing.assert_allclose(a, b, atol=2e-14)
 

@@ -8,7 +8,8 @@ from numba import njit
 
 import creeping as cr
 import scatterers as sc
-from creeping.surface import normal, polar_frame
+from creeping.phaseflow.bundle import project_bundle, random_bundle_points
+from creeping.surface import normal, polar_frame, project
 from scatterers._radial import Spine
 from scatterers._tensor_spline import TensorSpline, coefficients, interpolation_operator, weights
 
@@ -181,9 +182,12 @@ def test_slant_is_sheared_away(rng):
 def test_spine_admits_bodies_that_no_point_sees_whole(monkeypatch):
     banana = sc.TwistedEllipsoid(0.3, 0.3, 1.0, 0.6)
     assert cr.check_surface(sc.Gridded.sampled(banana, 40)).ok
+    middle = sc.Gridded.sampled(banana, 40).atlas.sphere_map.centre
     monkeypatch.setattr(Spine, "through", lambda *_: Spine.none())
     with pytest.raises(ValueError, match=r"is not inside|not star-shaped"):
-        sc.Gridded.sampled(banana, 40)
+        sc.Gridded.sampled(banana, 40, centre=middle)
+    # without a centre it is still a body
+    assert not sc.Gridded.sampled(banana, 40).star_shaped
 
 
 def test_spine_that_spoils_the_body_is_left_out(monkeypatch):
@@ -227,7 +231,8 @@ def test_compiled_locator_equals_numpy(rng, name):
         uv = rng.uniform(0.001, 0.999, (40, 2))
         points = chart.point(uv)
         found, found_uv, frame = np.empty(40, np.int64), np.empty((2, 40)), np.empty((6, 40))
-        call(locator.function, np.ascontiguousarray(points.T), found, found_uv, frame, locator.parameters)
+        rows = np.ascontiguousarray(points.T), np.ascontiguousarray(body.gradient(points).T)
+        call(locator.function, *rows, found, found_uv, frame, locator.parameters)
         assert np.all(found == number)
         np.testing.assert_allclose(found_uv.T, uv, atol=1e-13)
         expected = polar_frame(chart.tangents(uv))
@@ -258,6 +263,57 @@ def test_bounds_contain_the_body_and_parameters_are_angles(rng, name):
     theta, phi = np.moveaxis(body.parameters(points), -1, 0)
     s = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
     np.testing.assert_allclose(body.atlas.sphere_map.forward(s), points, atol=1e-12)
+
+
+@cache
+def ring(nodes):
+    return sc.Gridded.sampled(sc.Torus(), nodes)
+
+
+def test_torus_gets_charts_of_its_own():
+    body = ring(40)
+    assert not body.star_shaped and len(body.atlas.charts) > 6
+    report = cr.check_surface(body)
+    assert report.ok, report
+    assert report.genus == 1
+    assert report.area == pytest.approx(2 * np.pi**2, rel=4e-3)
+    points = project(body, sc.Torus().atlas.charts[0].point(np.random.default_rng(1).uniform(size=(200, 2))))
+    assert np.all(points > body.bounds[0]) and np.all(points < body.bounds[1])
+    number, uv = body.atlas.locate(points)
+    for k in np.unique(number):
+        np.testing.assert_allclose(body.atlas.charts[k].point(uv[number == k]), points[number == k], atol=1e-12)
+    other = sc.Gridded.sampled(sc.Torus(1.0, 0.45), 40)
+    assert len({body.fingerprint, other.fingerprint, ring(24).fingerprint}) == 3
+
+
+def test_rays_on_the_torus_converge_to_those_of_the_parent(rng):
+    x, p = random_bundle_points(sc.Torus(), 40, rng=rng)
+    exact = np.concatenate(cr.DirectFlow(sc.Torus(), rtol=1e-12).flow(x, p, 2.0), axis=-1)
+    off = []
+    for nodes in (24, 48):
+        body = ring(nodes)
+        start, tangent = project_bundle(body, x, p)
+        found = np.concatenate(cr.DirectFlow(body, rtol=1e-12).flow(start, tangent, 2.0), axis=-1)
+        off.append(np.median(np.linalg.norm(found - exact, axis=-1)))
+    # second derivatives of the spline converge with order 4, along a grid that is coarse in z first
+    assert off[1] < 2e-4
+    assert off[0] / off[1] > 8
+
+
+def test_shadow_line_of_the_torus():
+    lengths = [curve.length for curve in cr.shadow_line(ring(48), (1, 1, 1)).curves]
+    np.testing.assert_allclose(lengths, [8.9274357171, 4.6171835804], rtol=1e-4)
+
+
+@pytest.mark.slow
+def test_map_of_a_gridded_torus(rng):
+    body = ring(48)
+    built = cr.build_phase_map(body, tolerance=1e-4, cache=False)
+    assert built.error.rms <= 1e-4
+    x, p = random_bundle_points(sc.Torus(), 200, rng=rng)
+    found = np.concatenate(built.flow(*project_bundle(body, x, p), built.horizon), axis=-1)
+    exact = np.concatenate(cr.trace(sc.Torus(), x, p, built.horizon), axis=-1)
+    assert np.sqrt(np.mean(np.sum((found - exact) ** 2, axis=-1))) < 3e-4
 
 
 def test_speed_and_fingerprint():
@@ -311,7 +367,7 @@ def spoilt(value):
         (lambda: sc.Gridded(samples(), [[0, 0, 0]]), "bounds"),
         (lambda: sc.Gridded(samples(), BOX, centre=(0, 0)), "centre"),
         (lambda: sc.Gridded(samples(), BOX, centre=(2, 0, 0)), "not inside"),
-        (lambda: sc.Gridded.sampled(sc.Torus(), 24), "not inside"),
+        (lambda: sc.Gridded.sampled(sc.Torus(), 24, centre=(0, 0, 0)), "not inside"),
         (lambda: sc.Gridded.sampled(sc.Torus(), 24, centre=(1, 0, 0)), "not star-shaped"),
         (lambda: sc.Gridded.sampled(sc.Sphere(), 4), "nodes = 4"),
         (lambda: sc.Gridded.sampled(sc.Sphere(), (9, 9)), "nodes"),

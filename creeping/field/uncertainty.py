@@ -1,0 +1,43 @@
+"""How uncertain a far field is because its body is known only approximately."""
+
+import numpy as np
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.field.coefficients import BoundaryLike
+from creeping.field.far import far_field
+from creeping.rays.body_error import coarser_fan
+from creeping.rays.fan import RayFan
+
+
+def far_field_uncertainty(
+    fan: RayFan, observation: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> FloatArray | None:
+    """Change of the far field when the body is replaced by its coarser fit, the shadow line and rays anew.
+
+    It is about the error of the coarser body's field, two to four times that of the fan's own where grids resolve the
+    body. Nothing is said of the error of the asymptotic method.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Of a body from a file; see `creeping.rays.body_error`.
+    observation, wavenumber, boundary, order
+        As of `far_field`.
+
+    Returns
+    -------
+    (m,) or (m, 2, 2), L, or None
+        |f - f on the coarser body|; None for a body that is known exactly.
+
+    Raises
+    ------
+    InvalidInputError
+        As `far_field`.
+    """
+    other = coarser_fan(fan)
+    if other is None:
+        return None
+    mine, its = (
+        far_field(one, observation, wavenumber=wavenumber, boundary=boundary, order=order) for one in (fan, other)
+    )
+    return np.abs(mine.total - its.total)

@@ -1,0 +1,121 @@
+"""Bodies given by an F in a box of space, whatever its kind: charts, parameters, compiled level.
+
+A star-shaped body, upright or along a bent spine, has the sphere map of `scatterers._radial` and by it six charts; any
+other body has the Monge charts of `scatterers._monge_atlas`.
+"""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers._body import Body
+from scatterers._charts import CubeSphereAtlas
+from scatterers._compile import Compiled
+from scatterers._radial import RadialMap, SpaceLevel
+from scatterers._samples import Samples
+from scatterers._spline_constants import CENTRE, HEADER
+from scatterers._tensor_spline import evaluated
+
+if TYPE_CHECKING:
+    from scatterers._monge_atlas import MongeAtlas
+
+FloatArray = NDArray[np.float64]
+# where xx, yy, zz, yz, xz, xy stand in a matrix
+SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+CLOUD = 25_000
+"""Points of the body by which charts are chosen."""
+
+
+class LevelBody(Body):
+    """Base; a subclass calls `_place` when F is known, and gives its ``_identity``."""
+
+    _space: SpaceLevel
+    _map: RadialMap | None
+    _bounds: FloatArray
+    # places where the body is not smooth, and how far from them rays are not trusted
+    _rough: FloatArray = np.zeros((0, 3))
+    _reach: float = 0.0
+
+    def _place(self, space: SpaceLevel, samples: Samples, sphere_map: RadialMap | None) -> None:
+        """Take F, its samples and the sphere map, None for a body that has none."""
+        self._space, self._map = space, sphere_map
+        for made in ("compiled", "atlas"):
+            self.__dict__.pop(made, None)
+        low, high = samples.inside
+        reach = np.stack([low - 1.5 * samples.spacing, high + 1.5 * samples.spacing])
+        self._bounds = np.clip(reach, space.box[0], space.box[1])
+
+    def _identity(self) -> str:
+        """Text that changes with the shape."""
+        raise NotImplementedError
+
+    @property
+    def fingerprint(self) -> str | None:
+        """Text that changes with the shape or the speed; None if the speed cannot be named."""
+        speed = getattr(self, "speed", None)
+        if speed is None:
+            return f"{type(self).__name__}({self._identity()})"
+        named = getattr(speed, "fingerprint", None)
+        return None if named is None else f"{type(self).__name__}({self._identity()}, speed={named})"
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Box (2, 3) that contains the body with some slack, L."""
+        return self._bounds
+
+    @property
+    def star_shaped(self) -> bool:
+        """Whether the body has a sphere map."""
+        return self._map is not None
+
+    def level(self, points: FloatArray) -> FloatArray:
+        """F, positive outside: (..., 3) -> (...)."""
+        return evaluated(self.compiled, points)[0]
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of F: (..., 3) -> (..., 3)."""
+        return evaluated(self.compiled, points)[1]
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        return evaluated(self.compiled, points)[2][..., SYMMETRIC]
+
+    def rough(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Whether points (..., 3) lie where the body is not smooth enough for creeping rays: (...)."""
+        points = np.asarray(points, dtype=float)
+        if not len(self._rough):
+            return np.zeros(points.shape[:-1], dtype=bool)
+        from scipy.spatial import cKDTree
+
+        distance, _ = cKDTree(self._rough).query(points, distance_upper_bound=self._reach)
+        return np.asarray(np.isfinite(distance))
+
+    def parameters(self, points: FloatArray) -> FloatArray:
+        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi]: (..., 3) -> (..., 2).
+
+        Of psi^-1(x) on a star-shaped body; else of x as seen from the middle of the box, where several points of the
+        body may share their angles.
+        """
+        s = self._map.inverse(points) if self._map is not None else points - self._bounds.mean(0)
+        theta = np.arctan2(np.hypot(s[..., 0], s[..., 1]), s[..., 2])
+        return np.stack([theta, np.arctan2(s[..., 1], s[..., 0])], axis=-1)
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled level evaluator."""
+        if self._map is not None:
+            return self._map.compiled_level
+        return Compiled(self._space.sources["level"], "level", self._space.flat(np.zeros(HEADER - CENTRE)))
+
+    @cached_property
+    def atlas(self) -> "CubeSphereAtlas | MongeAtlas":
+        """Six charts over the sphere map, or Monge charts."""
+        if self._map is not None:
+            return CubeSphereAtlas(self._map, self._map.compiled_locator)
+        from scatterers._cloud import body_cloud
+        from scatterers._monge_atlas import MongeAtlas
+
+        cloud = body_cloud(self.level, self.gradient, self._bounds, CLOUD)
+        return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud)

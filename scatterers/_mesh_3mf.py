@@ -1,0 +1,127 @@
+"""Triangles of a 3MF file: a ZIP archive whose XML part `3D/3dmodel.model` lists objects, components and build items.
+
+A build item or component places an object by x' = x A + t, twelve numbers by rows [3MF Core Specification, 3.3];
+the unit is an attribute of the model, millimetre if left out. trimesh reads 3MF only with two further packages, hence
+this reader. Document types, and with them all entities, are refused, and so are parts beyond the limit of bytes.
+"""
+
+import io
+import zipfile
+from collections import defaultdict
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+PART = "3d/3dmodel.model"
+DEEPEST = 16
+MOST_PARTS = 1000
+
+
+def read_3mf(data: bytes, limit: int) -> tuple[FloatArray, IntArray, str]:
+    """Vertices (n, 3) in the file's unit, triangles (m, 3) and the unit's name.
+
+    Raises
+    ------
+    ValueError
+        If the archive or its model is broken, too large, or refers to parts that are not read.
+    """
+    model = _Model()
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.StartElementHandler = model.start
+    parser.StartDoctypeDeclHandler = model.refuse
+    try:
+        parser.Parse(_part(data, limit), True)
+    except expat.ExpatError as error:
+        raise ValueError(f"its model is broken XML ({error})") from None
+    except KeyError as error:
+        raise ValueError(f"an element of its model lacks the attribute {error}") from None
+    return model.placed()
+
+
+def _part(data: bytes, limit: int) -> bytes:
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            found = [info for info in archive.infolist() if info.filename.lower().lstrip("/") == PART]
+            if not found:
+                raise ValueError("it holds no part 3D/3dmodel.model")
+            if found[0].file_size > limit:
+                raise ValueError(f"its model unpacks to {found[0].file_size} bytes, more than {limit}")
+            with archive.open(found[0]) as stream:
+                return stream.read(limit)
+    except (zipfile.BadZipFile, EOFError, RuntimeError, NotImplementedError, OSError) as error:
+        raise ValueError(f"it is not a whole ZIP archive ({error})") from None
+    except Exception as error:  # zlib.error is no subclass of the above
+        raise ValueError(str(error)) from None
+
+
+class _Model:
+    """What the elements of the XML part say."""
+
+    def __init__(self) -> None:
+        self.unit = "millimeter"
+        self.vertices: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+        self.triangles: dict[str, list[tuple[int, int, int]]] = defaultdict(list)
+        self.components: dict[str, list[tuple[str, FloatArray]]] = defaultdict(list)
+        self.items: list[tuple[str, FloatArray]] = []
+        self.object = ""
+
+    def refuse(self, *_: Any) -> None:
+        raise ValueError("its model declares a document type, which is not read")
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        match tag.rpartition(" ")[2]:
+            case "model":
+                self.unit = attributes.get("unit", self.unit)
+            case "object":
+                self.object = attributes["id"]
+            case "vertex":
+                self.vertices[self.object].append(
+                    (float(attributes["x"]), float(attributes["y"]), float(attributes["z"]))
+                )
+            case "triangle":
+                self.triangles[self.object].append(
+                    (int(attributes["v1"]), int(attributes["v2"]), int(attributes["v3"]))
+                )
+            case "component" | "item" as kind:
+                if any(name.endswith("path") for name in attributes):
+                    raise ValueError("it refers to objects in other parts of the archive; export one body as one part")
+                placed = (attributes["objectid"], _matrix(attributes.get("transform")))
+                (self.items if kind == "item" else self.components[self.object]).append(placed)
+
+    def placed(self) -> tuple[FloatArray, IntArray, str]:
+        """All objects that are built, each where it is put."""
+        vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+        waiting = [(name, matrix, 0) for name, matrix in self.items]
+        parts = 0
+        while waiting:
+            name, matrix, depth = waiting.pop()
+            parts += 1
+            if depth > DEEPEST or parts > MOST_PARTS:
+                raise ValueError(f"its components are nested deeper than {DEEPEST} or more than {MOST_PARTS}")
+            waiting += [(inner, np.asarray(m @ matrix), depth + 1) for inner, m in self.components.get(name, [])]
+            if self.triangles.get(name):
+                points = np.array(self.vertices.get(name, []), dtype=float).reshape(-1, 3)
+                corners = np.array(self.triangles[name], dtype=np.int64)
+                if corners.min() < 0 or corners.max() >= len(points):
+                    raise ValueError(f"a triangle of object {name} refers to a vertex beyond its {len(points)}")
+                vertices.append(points @ matrix[:3, :3] + matrix[3, :3])
+                # a placement that mirrors turns the triangles inside out
+                corners = corners if np.linalg.det(matrix[:3, :3]) > 0 else corners[:, ::-1]
+                triangles.append(corners + count)
+                count += len(points)
+        return np.concatenate(vertices), np.concatenate(triangles), self.unit
+
+
+def _matrix(text: str | None) -> FloatArray:
+    """Row-vector transform (4, 4)."""
+    matrix = np.eye(4)
+    if text is not None:
+        numbers = [float(number) for number in text.split()]
+        if len(numbers) != 12:
+            raise ValueError(f"a transform of {len(numbers)} numbers instead of 12")
+        matrix[:, :3] = np.reshape(numbers, (4, 3))
+    return matrix

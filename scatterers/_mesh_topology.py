@@ -1,0 +1,210 @@
+"""Topology of a triangle mesh: equal vertices merged, edges counted, triangles turned to face outwards.
+
+Every edge of a closed surface has two triangles, and an oriented one runs along it once in each direction. Whether
+a mesh can be oriented is read off its double cover: triangle t twice, as it is and turned; neighbours that agree join
+like with like, others like with turned; it can be unless some t is joined with its own turned copy.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Note = Callable[[str], None]
+CLOSE = 1e-6
+"""Distance of vertices on open edges that are merged, in diagonals of the body: single precision and a few digits."""
+FLAT = 1e-9
+"""Volume over that of the cube of the diagonal, below which a mesh encloses nothing."""
+
+
+class Edges(NamedTuple):
+    """Edges of a mesh.
+
+    Attributes
+    ----------
+    ends : (e, 2)
+        Vertices, the lower number first.
+    faces : (e,)
+        Triangles at the edge.
+    number : (3 m,)
+        Edge that follows each corner.
+    forward : (3 m,)
+        Whether the triangle runs from the lower number to the higher.
+    """
+
+    ends: IntArray
+    faces: IntArray
+    number: IntArray
+    forward: NDArray[np.bool_]
+
+
+def edges_of(triangles: IntArray) -> Edges:
+    """Number the edges."""
+    first, last = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    low, high = np.minimum(first, last), np.maximum(first, last)
+    size = int(triangles.max()) + 1
+    code, number, count = np.unique(low * size + high, return_inverse=True, return_counts=True)
+    return Edges(np.stack([code // size, code % size], axis=1), count, number.ravel(), first < last)
+
+
+def cleaned(
+    name: str, vertices: FloatArray, triangles: IntArray, note_equal: Note, note: Note
+) -> tuple[FloatArray, IntArray]:
+    """Merge vertices, drop degenerate and double triangles and unused vertices.
+
+    ``note_equal`` is told of exactly equal vertices, which a format without vertex numbers has anyway.
+    """
+    used = np.unique(triangles)
+    # -0.0 and 0.0 are the same place
+    _, first, inverse = np.unique(vertices[used] + 0.0, axis=0, return_index=True, return_inverse=True)
+    merged = len(used) - len(first)
+    place = np.full(len(vertices), -1)
+    # in the order of their first appearance, so that a clean mesh stays as it is
+    rank = np.argsort(np.argsort(first))
+    place[used] = rank[inverse.ravel()]
+    points, corners = vertices[used][np.sort(first)], place[triangles]
+    if merged:
+        note_equal(f"{merged} of {len(used)} vertices of {name} were doubles of others; merged")
+    if len(triangles) != len(corners := _proper(name, corners, note)) and not len(corners):
+        raise ValueError(f"all {len(triangles)} triangles of {name} are degenerate; export it again")
+    return _close_gaps(name, points, corners, note)
+
+
+def _proper(name: str, triangles: IntArray, note: Note) -> IntArray:
+    """Triangles with three corners, each set of corners once."""
+    a, b, c = triangles.T
+    kept: IntArray = triangles[(a != b) & (b != c) & (c != a)]
+    if dropped := len(triangles) - len(kept):
+        note(f"{dropped} of {len(triangles)} triangles of {name} were degenerate (two equal corners); dropped")
+    if not len(kept):
+        return kept
+    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
+    if doubled := len(kept) - len(first):
+        note(f"{doubled} of {len(kept)} triangles of {name} were doubles of others; dropped")
+    return np.asarray(kept[np.sort(first)])
+
+
+def _close_gaps(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> tuple[FloatArray, IntArray]:
+    """Merge vertices of open edges that differ by rounding; drop what is no longer used."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    edges = edges_of(triangles)
+    border = np.unique(edges.ends[edges.faces == 1])
+    if len(border):
+        reach = CLOSE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+        # never over a sizeable part of an edge, however fine the mesh
+        length = np.linalg.norm(vertices[edges.ends[:, 0]] - vertices[edges.ends[:, 1]], axis=1)
+        pairs = border[
+            cKDTree(vertices[border]).query_pairs(min(reach, 0.01 * float(length.mean())), output_type="ndarray")
+        ]
+        if len(pairs):
+            n = len(vertices)
+            graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
+            _, label = connected_components(graph, directed=False)
+            _, first = np.unique(label, return_index=True)
+            note(f"{n - len(first)} of {n} vertices of {name} differed from others by rounding; merged")
+            triangles = _proper(name, first[label][triangles], note)
+            if not len(triangles):
+                raise ValueError(f"all triangles of {name} are degenerate; export it again")
+    used, corners = np.unique(triangles, return_inverse=True)
+    return vertices[used], corners.reshape(-1, 3).astype(np.int64)
+
+
+def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> IntArray:
+    """Triangles that face outwards, or ValueError unless the mesh is closed, one body and of two sides.
+
+    ``vertices`` are relative to the body's middle; where something is, is told relative to it.
+    """
+    edges = edges_of(triangles)
+    _check_edges(name, vertices, edges)
+    # the corners of both triangles at each edge, next to each other
+    order = np.argsort(edges.number, kind="stable").reshape(-1, 2)
+    _check_pieces(name, vertices, triangles, order, edges)
+    agree = edges.forward[order[:, 0]] != edges.forward[order[:, 1]]
+    if not agree.all():
+        turned = _turned(name, len(triangles), order // 3, agree)
+        triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
+        wrong = min(int(turned.sum()), len(triangles) - int(turned.sum()))
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    volume = float(np.sum(a * np.cross(b, c))) / 6
+    if not abs(volume) > FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0))) ** 3:
+        raise ValueError(f"{name} encloses no volume; give a body, not a sheet")
+    if not agree.all():
+        note(f"{wrong} of {len(triangles)} triangles of {name} faced the other way than their neighbours; turned")
+    elif volume < 0:
+        note(f"all {len(triangles)} triangles of {name} faced inwards; turned")
+    return triangles if volume > 0 else np.ascontiguousarray(triangles[:, ::-1])
+
+
+def _check_edges(name: str, vertices: FloatArray, edges: Edges) -> None:
+    for wrong, what, remedy in (
+        (edges.faces == 1, "are open", "it has holes or borders: close them"),
+        (edges.faces > 2, "have more than two triangles", "sheets meet there: remove inner or double walls"),
+    ):
+        if bad := int(wrong.sum()):
+            middles = vertices[edges.ends[wrong]].mean(axis=1)
+            place = np.round(middles[0], 6).tolist()
+            raise ValueError(
+                f"{bad} of {len(wrong)} edges of {name} {what}, the first near {place} from the middle of its box, "
+                f"in its own unit, the others within {np.ptp(middles, axis=0).max():.3g}; {remedy}"
+            )
+
+
+def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: IntArray, edges: Edges) -> None:
+    """ValueError unless the surface is one piece and no vertex joins two sheets."""
+    left, right = order[:, 0], order[:, 1]
+    pieces, label = _components(len(triangles), left // 3, right // 3)
+    if pieces > 1:
+        counts = np.sort(np.bincount(label))[::-1]
+        boxes = [vertices[triangles[label == k]].reshape(-1, 3) for k in range(min(pieces, 50))]
+        largest = max(boxes, key=lambda p: float(np.ptp(p, axis=0).max()))
+        low, high = largest.min(0), largest.max(0)
+        inner = sum(bool(np.all(p.min(0) > low) and np.all(p.max(0) < high)) for p in boxes)
+        hint = f" ({inner} of them within the box of the largest: cavities or inner parts?)" if inner else ""
+        raise ValueError(
+            f"{name} holds {pieces} separate surfaces{hint}, of {', '.join(map(str, counts[:5]))} "
+            f"{'... ' if pieces > 5 else ''}triangles; give one body at a time, without cavities"
+        )
+    # corners of one vertex that are joined through edges: the umbrellas
+    after = _next(left), _next(right)
+    same = edges.forward[left] == edges.forward[right]
+    starts = np.concatenate([left, after[0]])
+    ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
+    umbrellas, label = _components(3 * len(triangles), starts, ends)
+    if umbrellas > len(vertices):
+        _, corner = np.unique(label, return_index=True)
+        shared = np.bincount(triangles.ravel()[corner], minlength=len(vertices)) > 1
+        place = np.round(vertices[shared][0], 6).tolist()
+        raise ValueError(
+            f"{int(shared.sum())} vertices of {name} join sheets that touch in a point, the first near {place} from "
+            "the middle of its box, in its own unit; take them apart"
+        )
+
+
+def _next(corner: IntArray) -> IntArray:
+    return corner - corner % 3 + (corner + 1) % 3
+
+
+def _turned(name: str, count: int, pairs: IntArray, agree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Triangles to turn so that all agree with their neighbours."""
+    left, right = pairs.T
+    starts = np.concatenate([left, left + count])
+    ends = np.concatenate([np.where(agree, right, right + count), np.where(agree, right + count, right)])
+    _, label = _components(2 * count, starts, ends)
+    if np.any(label[:count] == label[count:]):
+        raise ValueError(f"{name} has one side only, like a Moebius strip or Klein bottle; give a body")
+    return np.asarray(label[:count] > label[count:])
+
+
+def _components(count: int, starts: IntArray, ends: IntArray) -> tuple[int, IntArray]:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(starts), np.int8), (starts, ends)), shape=(count, count))
+    found, label = connected_components(graph, directed=False)
+    return int(found), label.astype(np.int64)

@@ -1,0 +1,109 @@
+"""Body from a CAD file: points and exact normals of its faces by gmsh, and the fit of `scatterers._fitted_body`.
+
+gmsh is an optional library under the GPL: ``pip install 'creeping[cad]'``.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers._cad_files import read_cad
+from scatterers._fit_cache import key_of
+from scatterers._fitted_body import FittedBody, PointCloud
+from scatterers._jet_points import signed_distance
+from scatterers._jets import osculating_jets
+from scatterers._mesh_quality import MeshQuality, assess
+
+FloatArray = NDArray[np.float64]
+POINTS = 10_000
+"""Points of the body that are asked for."""
+SPACING = 2.0
+"""Spacing of the grid in units of the mean distance of neighbouring points."""
+
+
+class Cad(FittedBody):
+    """Smooth body of a STEP, IGES or BREP file, in metres.
+
+    Parameters
+    ----------
+    path : path
+        A closed body whose faces join smoothly.
+    units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
+        Unit of the numbers. STEP and IGES files state theirs, and another one is an error; BREP files do not.
+    points : int
+        Points of the body that are fitted; more for bodies with fine detail.
+    allow_rough : bool
+        Take a body that is not smooth everywhere; `rough` says where, and rays that come there end.
+    cache : bool or path
+        True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
+    speed : str or object with ``value`` and ``gradient``, optional
+        Speed c(x) of the weighted flow.
+    progress : callable, optional
+        Called with a line of text before each long step.
+
+    Attributes
+    ----------
+    quality : MeshQuality
+        Of the points.
+    fit : FitReport
+    coarser : SplineBody
+        The same body fitted on a coarser grid: what differs on it is uncertain.
+    edges : tuple of str
+        Edges and tips at which the faces do not join smoothly.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, is not one closed body, or has edges or tips.
+    ModuleNotFoundError
+        If gmsh is not installed.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        units: str | None = None,
+        *,
+        points: int = POINTS,
+        allow_rough: bool = False,
+        cache: bool | str | Path = True,
+        speed: Any = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> None:
+        if isinstance(points, bool) or not isinstance(points, int) or not 500 <= points <= 200_000:
+            raise ValueError(f"points = {points!r}; give a whole number from 500 to 200000")
+        say = progress or (lambda _: None)
+        try:
+            content = Path(path).suffix.lower().encode() + b"\0" + Path(path).read_bytes()
+        except (TypeError, OSError) as error:
+            raise ValueError(f"{path} cannot be read: {error}") from None
+        key = key_of("cad", content, units=units, points=points, allow_rough=bool(allow_rough))
+        self._open(key, cache, speed, lambda: self._points(Path(path), units, points, bool(allow_rough), say), say)
+        self.quality = MeshQuality.from_json(self._text["quality"])
+        self.repairs = tuple(self._text["repairs"])
+        self.edges = tuple(self._text["edges"])
+
+    def _points(
+        self, path: Path, units: str | None, points: int, allow_rough: bool, say: Callable[[str], None]
+    ) -> PointCloud:
+        say("reading the CAD file")
+        found = read_cad(path, units, points, say=say)
+        jets = osculating_jets(found.mesh.vertices, found.mesh.triangles)
+        quality = assess(found.mesh, jets)
+        self._made = {"quality": quality.to_json(), "repairs": list(found.mesh.repairs), "edges": list(found.edges)}
+        if found.edges and not allow_rough:
+            raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
+        if quality.verdict != "smooth" and not allow_rough:
+            raise ValueError(f"{path.name} is {quality.verdict}: {quality.reasons}")
+        rough = np.concatenate([found.mesh.vertices[quality.bad], found.rough])
+        edge = quality.edge_mean
+        normals = np.where(np.isfinite(found.normals), found.normals, jets.normals)
+        distance = partial(signed_distance, found.mesh.vertices, jets)
+        return PointCloud(found.mesh.vertices, normals, edge, SPACING * edge, 0.0, rough, distance)
+
+    def _notes(self) -> dict[str, Any]:
+        return self._made

@@ -1,0 +1,137 @@
+"""Body from a triangle mesh: checked, repaired where that is safe, and replaced by a smooth F.
+
+Vertices are taken to lie on the body. Their normals are those of osculating jets (`scatterers._jets`), which give
+points between them, too; to both a quintic tensor-product B-spline is fitted (`scatterers._fitting`), twice, on grids
+of different spacing: by their difference the curvatures' error is known.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers._fit_cache import key_of
+from scatterers._fitted_body import FittedBody, PointCloud
+from scatterers._jet_points import centroids, signed_distance
+from scatterers._jets import Jets, angle_weighted_normals, osculating_jets
+from scatterers._mesh_files import TriangleMesh, read_mesh
+from scatterers._mesh_quality import MeshQuality, assess
+
+FloatArray = NDArray[np.float64]
+CLEAN, NOISY = 1.3, 4.0
+"""Spacings of the grid in units of the mean edge: for vertices and the points between them, and for noisy vertices."""
+NOISE = 2e-4
+"""Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
+
+
+class Mesh(FittedBody):
+    """Smooth body through the vertices of a closed triangle mesh, in metres.
+
+    Parameters
+    ----------
+    source : path, or object with ``vertices`` and ``faces``
+        STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh.
+    units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
+        Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
+    allow_rough : bool
+        Take a mesh that is not smooth everywhere; `rough` says where, and rays that come there end.
+    cache : bool or path
+        True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
+    speed : str or object with ``value`` and ``gradient``, optional
+        Speed c(x) of the weighted flow.
+    progress : callable, optional
+        Called with a line of text before each long step and for each repair.
+
+    Attributes
+    ----------
+    quality : MeshQuality
+    fit : FitReport
+    coarser : SplineBody
+        The same body fitted on a coarser grid: what differs on it is uncertain.
+    repairs : tuple of str
+        What was changed in the mesh.
+
+    Raises
+    ------
+    ValueError
+        If the source is not one closed, smooth body that its triangles resolve; says what, how many and where.
+    """
+
+    def __init__(
+        self,
+        source: Any,
+        units: str | None = None,
+        *,
+        allow_rough: bool = False,
+        cache: bool | str | Path = True,
+        speed: Any = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> None:
+        say = progress or (lambda _: None)
+        key = key_of("mesh", _content(source), units=units, allow_rough=bool(allow_rough))
+        self._open(key, cache, speed, lambda: self._points(source, units, bool(allow_rough), say), say)
+        self.quality = MeshQuality.from_json(self._text["quality"])
+        self.repairs = tuple(self._text["repairs"])
+
+    def _points(self, source: Any, units: str | None, allow_rough: bool, say: Callable[[str], None]) -> PointCloud:
+        mesh, jets, quality = _examined(source, units, say)
+        self._made = {"quality": quality.to_json(), "repairs": list(mesh.repairs)}
+        if quality.verdict not in ("smooth", "noisy") and not allow_rough:
+            raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
+        if quality.bad.any():
+            # jets say nothing there, the triangles a little
+            usual = angle_weighted_normals(mesh.vertices, mesh.triangles)
+            normals = np.where(quality.bad[:, None], usual, jets.normals)
+            jets = replace(jets, fitted=jets.fitted & ~quality.bad, normals=normals)
+        points, normals, edge, rough = mesh.vertices, jets.normals, quality.edge_mean, mesh.vertices[quality.bad]
+        distance = partial(signed_distance, mesh.vertices, jets)
+        if quality.noise >= NOISE:
+            return PointCloud(points, normals, edge, NOISY * edge, quality.noise * edge, rough, distance)
+        more = centroids(mesh.vertices, mesh.triangles, jets)
+        points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])
+        return PointCloud(points, normals, edge, CLEAN * edge, 0.0, rough, distance)
+
+    def _notes(self) -> dict[str, Any]:
+        return self._made
+
+
+def examined_mesh(source: Any, units: str | None = None) -> tuple[TriangleMesh, MeshQuality]:
+    """Read a mesh as `Mesh` does, and judge it; also one that `Mesh` refuses as not smooth.
+
+    Raises
+    ------
+    ValueError
+        If the source is not one closed body.
+    """
+    mesh, _, quality = _examined(source, units, lambda _: None)
+    return mesh, quality
+
+
+def _examined(source: Any, units: str | None, say: Callable[[str], None]) -> tuple[TriangleMesh, Jets, MeshQuality]:
+    say("reading the mesh")
+    mesh = read_mesh(source, units, say=say)
+    say(f"normals of {len(mesh.vertices)} vertices")
+    jets = osculating_jets(mesh.vertices, mesh.triangles)
+    return mesh, jets, assess(mesh, jets)
+
+
+def _content(source: Any) -> bytes:
+    """What the fit depends on: the file's bytes, or the object's arrays."""
+    if hasattr(source, "vertices") and hasattr(source, "faces"):
+        try:
+            vertices = np.ascontiguousarray(source.vertices, dtype=float)
+            faces = np.ascontiguousarray(source.faces, dtype=np.int64)
+        except (TypeError, ValueError):
+            # what is wrong with it is said when it is read
+            return b""
+        stated = str(getattr(source, "units", None))
+        return json.dumps([stated, vertices.shape, faces.shape]).encode() + vertices.tobytes() + faces.tobytes()
+    try:
+        return Path(source).suffix.lower().encode() + b"\0" + Path(source).read_bytes()
+    except (TypeError, ValueError, OSError):
+        return b""

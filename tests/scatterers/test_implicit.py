@@ -1,0 +1,393 @@
+"""Bodies given by an expression: F and its derivatives, the box found, the sphere map and its compiled twins, rays."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numba import njit
+from tolerances import FRACTION, MAP, TRACE
+
+import creeping as cr
+import scatterers as sc
+from creeping.phaseflow.bundle import random_bundle_points
+from creeping.surface import polar_frame, project
+from scatterers._cloud import body_cloud
+from scatterers.implicit import Implicit
+
+COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+LENGTH = 1e-7
+"""Length of a shadow line against the ten digits of a second method, on another representation of the same body."""
+STEP = 1e-5
+"""Of central differences: rounding and curvature are then both about 1e-10 of the second derivatives."""
+
+
+def ring(x):
+    return f"(sqrt((sqrt((x - {x})**2 + y**2) - 0.7)**2 + z**2) - 0.3)"
+
+
+TEXTS = {
+    "ellipsoid": "x**2/1.44 + y**2/0.64 + z**2/0.64 - 1",
+    "torus": "((sqrt(x**2 + y**2) - 1)**2 + z**2)/0.25 - 1",
+    "peanut": "(x**2+y**2+z**2+.64)**2-4*.64*x**2-.9**4",
+    "genus 2": f"-log(exp(-12*{ring(-0.85)}) + exp(-12*{ring(0.85)}))/12",
+    "twisted": "4*x**2 + 4*(y - cos(pi*z)/5)**2 + z**2 - 1",
+    # found 2026-11-21: sympy.cse took the sums in the exponents for products
+    "two balls": "-log(exp(-30*(x**2+y**2+(z-.9)**2-1)) + exp(-30*(x**2+y**2+(z+.9)**2-1)))/30",
+    # no point sees it whole before it is sheared upright
+    "bent": "((x - 1.2*z**2)**2 + (y - 0.3*sin(2*z))**2)/0.09 + z**2 - 1",
+}
+GENUS = {"torus": 1, "genus 2": 2}
+EXACT = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}
+STARS = [name for name in TEXTS if name not in GENUS]
+every = pytest.mark.parametrize("name", TEXTS)
+stars = pytest.mark.parametrize("name", STARS)
+
+
+@cache
+def body_of(name):
+    return Implicit(TEXTS[name])
+
+
+@cache
+def points_of(name):
+    body = body_of(name)
+    return body_cloud(body.level, body.gradient, body.bounds, 2000)
+
+
+@njit
+def call(function, *arguments):
+    function(*arguments)
+
+
+def directions(rng, n):
+    s = rng.normal(size=(n, 3))
+    return s / np.linalg.norm(s, axis=-1, keepdims=True)
+
+
+@every
+def test_check_passes_and_counts_handles(name):
+    report = cr.check_surface(body_of(name))
+    assert report.ok, report
+    assert report.genus == GENUS.get(name, 0)
+
+
+@every
+def test_only_bodies_with_a_sphere_map_are_star_shaped(name):
+    body = body_of(name)
+    assert body.star_shaped == (name in STARS)
+    assert hasattr(body.atlas, "sphere_map") == body.star_shaped
+    if body.star_shaped:
+        assert body.atlas.sphere_map.spine.upright == (name not in ("bent", "twisted"))
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_derivatives_of_the_exact_bodies(name, rng):
+    body, exact = body_of(name), EXACT[name]
+    points = points_of(name) + 0.1 * rng.normal(size=points_of(name).shape)
+    np.testing.assert_allclose(body.level(points), exact.level(points), atol=1e-13)
+    np.testing.assert_allclose(body.gradient(points), exact.gradient(points), atol=1e-12)
+    np.testing.assert_allclose(body.hessian(points), exact.hessian(points), atol=1e-11)
+
+
+@every
+def test_values_are_those_of_the_text(name, rng):
+    points = points_of(name) + 0.1 * rng.normal(size=points_of(name).shape)
+    names = {name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "pi")}
+    expected = eval(TEXTS[name], names | dict(zip("xyz", points.T, strict=True)))
+    scale = np.max(np.abs(body_of(name).gradient(points)))
+    np.testing.assert_allclose(body_of(name).level(points), expected, atol=1e-13 * scale)
+
+
+@every
+def test_derivatives_are_those_of_differences(name, rng):
+    body = body_of(name)
+    points = points_of(name)[::7] + 0.05 * rng.normal(size=points_of(name)[::7].shape)
+    steps = STEP * np.eye(3)
+    scale = np.max(np.abs(body.hessian(points)))
+    slopes = [(body.level(points + h) - body.level(points - h)) / (2 * STEP) for h in steps]
+    np.testing.assert_allclose(body.gradient(points), np.stack(slopes, axis=-1), atol=1e-8 * scale)
+    bends = [(body.gradient(points + h) - body.gradient(points - h)) / (2 * STEP) for h in steps]
+    np.testing.assert_allclose(body.hessian(points), np.stack(bends, axis=-1), atol=1e-7 * scale)
+
+
+@every
+def test_compiled_level_equals_numpy(name, rng):
+    body = body_of(name)
+    functions, points = body._space.functions, points_of(name) + 0.05 * rng.normal(size=points_of(name).shape)
+    value, gradient, hessian = (
+        np.stack([np.broadcast_to(part, len(points)) for part in f(*points.T)], axis=-1)
+        for f in (functions.value, functions.gradient, functions.hessian)
+    )
+    scale = np.max(np.abs(hessian))
+    np.testing.assert_allclose(body.level(points), value[:, 0], atol=1e-13 * scale)
+    np.testing.assert_allclose(body.gradient(points), gradient, atol=1e-13 * scale)
+    np.testing.assert_allclose(
+        np.stack([body.hessian(points)[:, i, j] for i, j in COLUMNS], axis=-1), hessian, atol=1e-12 * scale
+    )
+
+
+@pytest.mark.parametrize("shape", [(4, 25), (0,), ()])
+def test_any_shape_of_points(shape, rng):
+    body, exact = body_of("ellipsoid"), EXACT["ellipsoid"]
+    points = rng.normal(size=(*shape, 3))
+    np.testing.assert_allclose(body.level(points), exact.level(points), atol=1e-12)
+    np.testing.assert_allclose(body.gradient(points), exact.gradient(points), atol=1e-12)
+    np.testing.assert_allclose(body.hessian(points), exact.hessian(points), atol=1e-12)
+
+
+@stars
+def test_sphere_map_and_its_compiled_twins(name, rng):
+    body, s = body_of(name), directions(rng, 200)
+    sphere_map = body.atlas.sphere_map
+    points, derivative = sphere_map.forward(s), sphere_map.derivative(s)
+    np.testing.assert_allclose(body.level(points), 0, atol=1e-13)
+    np.testing.assert_allclose(sphere_map.inverse(points), s, atol=1e-14)
+    # along the sphere only: psi is given there
+    t = np.cross(s, directions(rng, 200))
+    ahead, back = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (s + 1e-6 * t, s - 1e-6 * t))
+    difference = (sphere_map.forward(ahead) - sphere_map.forward(back)) / 2e-6
+    np.testing.assert_allclose((derivative @ t[..., None])[..., 0], difference, atol=1e-8)
+
+    forward, inverse = sphere_map.compiled_forward, sphere_map.compiled_inverse
+    x, d, back = np.empty((3, 200)), np.empty((9, 200)), np.empty((3, 200))
+    call(forward.function, np.ascontiguousarray(s.T), x, d, forward.parameters)
+    np.testing.assert_allclose(x.T, points, atol=1e-14)
+    np.testing.assert_allclose(d.T.reshape(-1, 3, 3), derivative, atol=1e-12)
+    call(inverse.function, x, back, inverse.parameters)
+    np.testing.assert_allclose(back.T, s, atol=1e-14)
+
+
+@every
+def test_compiled_locator_equals_numpy(name):
+    body, points = body_of(name), points_of(name)
+    locator, n = body.atlas.compiled, len(points_of(name))
+    found, uv, frame = np.empty(n, np.int64), np.empty((2, n)), np.empty((6, n))
+    rows = np.ascontiguousarray(points.T), np.ascontiguousarray(body.gradient(points).T)
+    call(locator.function, *rows, found, uv, frame, locator.parameters)
+    expected, expected_uv = body.atlas.locate(points)
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_allclose(uv.T, expected_uv, atol=1e-13)
+    for number in np.unique(found)[::20]:
+        mine, chart = found == number, body.atlas.charts[number]
+        np.testing.assert_allclose(chart.point(uv.T[mine]), points[mine], atol=1e-12)
+        frames = np.moveaxis(polar_frame(chart.tangents(uv.T[mine])), 0, -1).swapaxes(0, 1)
+        np.testing.assert_allclose(frame.reshape(2, 3, n)[..., mine], frames, atol=1e-11)
+
+
+@every
+def test_bounds_contain_the_body_closely(name):
+    low, high = points_of(name).min(0), points_of(name).max(0)
+    below, above = low - body_of(name).bounds[0], body_of(name).bounds[1] - high
+    assert np.all(below > 0) and np.all(above > 0)
+    assert np.all(np.maximum(below, above) < 0.1 * (high - low))
+
+
+@stars
+def test_parameters_are_angles_of_the_sphere(name, rng):
+    body, s = body_of(name), directions(rng, 500)
+    theta, phi = np.moveaxis(body.parameters(body.atlas.sphere_map.forward(s)), -1, 0)
+    found = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    np.testing.assert_allclose(found, s, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", GENUS)
+def test_parameters_of_other_bodies_are_angles_too(name):
+    theta, phi = np.moveaxis(body_of(name).parameters(points_of(name)), -1, 0)
+    assert np.all((theta >= 0) & (theta <= np.pi) & (phi > -np.pi) & (phi <= np.pi))
+
+
+@pytest.mark.parametrize("name, scale", [("ellipsoid", 1e-2), ("ellipsoid", 1e2), ("torus", 1e-2)])
+def test_scale_changes_nothing_but_lengths(name, scale):
+    text = TEXTS[name].replace("x", f"(x/{scale!r})").replace("y", f"(y/{scale!r})").replace("z", f"(z/{scale!r})")
+    body, unit = Implicit(text), body_of(name)
+    np.testing.assert_allclose(body.bounds, scale * unit.bounds, rtol=0.1)
+    report = cr.check_surface(body)
+    assert report.ok, report
+    assert report.area == pytest.approx(scale**2 * cr.check_surface(unit).area, rel=1e-2)
+    ours, theirs = (cr.shadow_line(one, (1, 1, 1)) for one in (body, unit))
+    lengths = [[curve.length for curve in line.curves] for line in (ours, theirs)]
+    np.testing.assert_allclose(lengths[0], np.multiply(scale, lengths[1]), rtol=1e-8)
+
+
+@pytest.mark.parametrize("name, given", [("ellipsoid", True), ("ellipsoid", False), ("torus", True)])
+def test_off_the_origin(name, given):
+    centre = np.array([3.0, -2.0, 1.5])
+    shifted = "".join(dict(zip("xyz", ("(x-3)", "(y+2)", "(z-1.5)"), strict=True)).get(c, c) for c in TEXTS[name])
+    # of different reach on every side
+    box = centre + np.array([[-2.1, -1.7, -0.9], [1.6, 2.2, 1.3]])
+    body = Implicit(shifted, box) if given else Implicit(shifted)
+    assert cr.check_surface(body).ok
+    assert body.star_shaped == (name == "ellipsoid")
+    if given:
+        assert np.all(body.bounds[0] >= box[0]) and np.all(body.bounds[1] <= box[1])
+    np.testing.assert_allclose(body.bounds, centre + body_of(name).bounds, atol=0.1)
+    line, exact = (cr.shadow_line(one, (1, 1, 1)) for one in (body, EXACT[name]))
+    np.testing.assert_allclose([c.length for c in line.curves], [c.length for c in exact.curves], atol=LENGTH)
+
+
+def test_body_far_from_the_origin_needs_bounds():
+    centre = np.array([1e4, 0.0, -300.0])
+    body = Implicit("(x-1e4)**2 + y**2 + (z+300)**2/4 - 1", centre + np.array([[-1.5, -1.5, -2.5], [1.5, 1.5, 2.5]]))
+    assert body.star_shaped and cr.check_surface(body).ok
+    np.testing.assert_allclose(body.atlas.sphere_map.centre, centre, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["ellipsoid", "torus"])
+def test_wide_bounds_are_tightened(name):
+    body = Implicit(TEXTS[name], [[-40, -50, -60], [70, 60, 50]])
+    np.testing.assert_allclose(body.bounds, body_of(name).bounds, atol=0.1)
+    assert body.star_shaped == (name == "ellipsoid")
+
+
+def test_bounds_leave_another_body_out():
+    text = "((x-1.5)**2 + y**2 + z**2 - 1)*((x+1.5)**2 + 2*y**2 + z**2 - 1)"
+    body = Implicit(text, [[0.1, -1.3, -1.3], [2.9, 1.3, 1.3]])
+    assert cr.check_surface(body).area == pytest.approx(4 * np.pi, rel=1e-2)
+
+
+PEAR = "where(z < 0, z**2/2, z**3 - z**2) + x**2 + y**2"
+"""A cone about the z axis at the origin, rounded off at z = 1."""
+
+
+def test_tips_are_rounded_off_on_request_only():
+    with pytest.raises(ValueError, match=r"grad F = 0 at 1 of its points, first \(0.0, 0.0, 0.0\); a tip"):
+        Implicit(PEAR)
+    body = Implicit(PEAR, allow_rough=True)
+    assert cr.check_surface(body).ok
+    reach = 0.025 * np.linalg.norm(body.bounds[1] - body.bounds[0])
+    z = np.linspace(0, 0.3, 400)
+    axis = np.stack([0 * z, 0 * z, z], axis=-1)
+    np.testing.assert_array_equal(body.rough(axis), z < reach)
+    cone = np.stack([z * np.sqrt(1 - z), 0 * z, z], axis=-1)
+    kept = np.linalg.norm(cone, axis=-1) > reach
+    np.testing.assert_allclose(body.level(cone[kept]), 0, atol=1e-13)
+    assert np.all(body.level(cone[z < 0.2 * reach]) > 0)
+
+
+@pytest.mark.parametrize("name", ["ellipsoid", "torus"])
+def test_smooth_bodies_have_no_rough_places(name):
+    body = Implicit(TEXTS[name], allow_rough=True)
+    assert not np.any(body.rough(points_of(name)))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x**2 + y**2 + 1e6*z**2 - 1",
+        "x**16 + y**16 + z**16 - 1",
+        "(sqrt(x**2 + y**2) - 1)**2 + z**2 - 0.999**2",
+        "sqrt(x**2 + 4*y**2 + 9*z**2) - 1",
+        "(x**2 + y**2)**1.5 + z**2 - 1",
+        "sqrt(x**2 + y**2 + 1e-6) - (1 - z**2)/2",
+    ],
+)
+def test_sharply_curved_bodies_are_no_kinks(text):
+    assert Implicit(text).expression == text
+
+
+def test_centre_is_taken():
+    body = Implicit(TEXTS["ellipsoid"], centre=(0.3, 0.1, -0.2))
+    np.testing.assert_array_equal(body.atlas.sphere_map.centre, (0.3, 0.1, -0.2))
+    assert cr.check_surface(body).ok
+    # without the spine that its own box suggests, no centre sees it
+    assert Implicit(TEXTS["bent"], centre=body_of("bent").atlas.sphere_map.centre).star_shaped
+
+
+def test_fingerprints_tell_bodies_apart_and_nothing_else():
+    text, box = TEXTS["ellipsoid"], [[-2, -1, -1], [2, 1, 1]]
+    make = {
+        "plain": lambda: Implicit(text),
+        "another F": lambda: Implicit(text.replace("1.44", "1.45")),
+        "bounds": lambda: Implicit(text, box),
+        "centre": lambda: Implicit(text, centre=(0.1, 0, 0)),
+        "speed": lambda: Implicit(text, speed="2 + x"),
+        "another speed": lambda: Implicit(text, speed="2 - x"),
+        "torus": lambda: Implicit(TEXTS["torus"]),
+        "torus in bounds": lambda: Implicit(TEXTS["torus"], [[-2, -2, -1], [2, 2, 1]]),
+    }
+    prints = {name: one().fingerprint for name, one in make.items()}
+    assert len(set(prints.values())) == len(make) and None not in prints.values()
+    assert all(one().fingerprint == prints[name] for name, one in make.items())
+
+    class Unnamed:
+        def value(self, points):
+            return np.ones(points.shape[:-1])
+
+        def gradient(self, points):
+            return np.zeros(points.shape)
+
+    assert Implicit(text, speed=Unnamed()).fingerprint is None
+    assert repr(body_of("ellipsoid")) == f"Implicit({text!r}, speed=None)"
+
+
+@pytest.mark.parametrize("name", ["ellipsoid", "torus"])
+def test_rays_are_those_of_the_exact_body(name, rng):
+    x, p = random_bundle_points(EXACT[name], 40, rng=rng)
+    for found, exact in zip(
+        *(cr.trace(b, x, p, [0.5, 2.0], rtol=1e-12) for b in (body_of(name), EXACT[name])), strict=True
+    ):
+        np.testing.assert_allclose(found, exact, atol=TRACE)
+
+
+def test_speed_bends_rays(rng):
+    body, exact = (
+        make(speed="1 + x/4 + y*z/2")
+        for make in (lambda **k: Implicit(TEXTS["ellipsoid"], **k), lambda **k: sc.Ellipsoid(1.2, 0.8, 0.8, **k))
+    )
+    x, p = random_bundle_points(exact, 20, rng=rng)
+    found, expected = (cr.trace(b, x, p, 1.5, rtol=1e-12)[0] for b in (body, exact))
+    np.testing.assert_allclose(found, expected, atol=TRACE)
+    assert np.max(np.abs(expected - cr.trace(body_of("ellipsoid"), x, p, 1.5)[0])) > 0.1
+
+
+@pytest.mark.slow
+def test_map_of_an_ellipsoid(rng):
+    body, exact = body_of("ellipsoid"), EXACT["ellipsoid"]
+    built = cr.build_phase_map(body, tolerance=1e-6, cache=False)
+    assert built.error.rms <= MAP
+    x, p = random_bundle_points(exact, 500, rng=rng)
+    found, expected = built.flow(x, p, built.horizon), cr.trace(exact, x, p, built.horizon, rtol=1e-12)
+    error = np.linalg.norm(np.concatenate(found, axis=-1) - np.concatenate(expected, axis=-1), axis=-1)
+    assert np.sqrt(np.mean(error**2)) < 1.5 * MAP
+    np.testing.assert_allclose(project(exact, found[0]), found[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name, direction, lengths",
+    [
+        ("torus", (1, 1, 1), [8.9274357171, 4.6171835804]),
+        ("peanut", (1, 0.5, 0.2), [6.3744816923]),
+        ("peanut", (0, 0, 1), [5.9629473823]),
+        ("twisted", (1, 1, 1), [5.1675274372]),
+        ("ellipsoid", (1, 1, 1), [6.1340508514]),
+    ],
+)
+def test_shadow_lines_of_published_length(name, direction, lengths):
+    line = cr.shadow_line(body_of(name), direction)
+    np.testing.assert_allclose([curve.length for curve in line.curves], lengths, atol=LENGTH)
+
+
+@pytest.mark.parametrize(
+    "name, direction, curve, shares",
+    [
+        ("torus", (1, 1, 1), 1, (0.55740772, 0.15522848, 0.28736380)),
+        ("peanut", (1, 0.5, 0.2), 0, (0.78261705, 0.05494849, 0.16243446)),
+    ],
+)
+def test_shares_of_shadow_lines(name, direction, curve, shares):
+    found = cr.shadow_line(body_of(name), direction).curves[curve].fractions
+    expected = dict(zip(("attached", "occluded", "concave"), shares, strict=True))
+    assert found == pytest.approx(expected, abs=FRACTION)
+
+
+def test_three_curves_on_the_peanut_along_its_axis():
+    # circles where the profile y(x) has y' = 0: the waist, and x^2 = c^2 - b^4/(4 c^2) twice
+    c, b = 0.8, 0.9
+    bulge, waist = b**2 / (2 * c), np.sqrt(b**2 - c**2)
+    along = cr.shadow_line(body_of("peanut"), (1, 0, 0))
+    np.testing.assert_allclose(
+        [k.length for k in along.curves], 2 * np.pi * np.array([bulge, bulge, waist]), atol=LENGTH
+    )
+    near = cr.shadow_line(body_of("peanut"), (1, 0.05, 0.02))
+    assert len(near.curves) == 3
+    assert near.curves[2].fractions["concave"] == pytest.approx(1)
