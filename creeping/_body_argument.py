@@ -60,7 +60,8 @@ def parse_body(
     try:
         if is_file:
             kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
-            return kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=say)
+            shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=say)
+            return _with_charts(shape, say)
         name, _, rest = text.partition(":")
         if name in BODIES:
             return _named(name, rest, speed)
@@ -71,12 +72,20 @@ def parse_body(
             )
         if say:
             say("examining the expression")
-        return scatterers.Implicit(text, speed=speed)
+        return _with_charts(scatterers.Implicit(text, speed=speed), say)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{text if len(text) < 60 else text[:57] + '...'}: {error}") from error
     except ModuleNotFoundError as error:
         extra, use = ("cad", "a CAD file") if error.name == "gmsh" else ("expr", "an expression")
         raise InvalidInputError(f"{use} needs {error.name}: pip install 'creeping[{extra}]'") from error
+
+
+def _with_charts(shape: Any, say: Say | None) -> Any:
+    """Body whose charts are made: every flow needs them, and of thin or sharp parts there may be none."""
+    if say:
+        say("charts")
+    _ = shape.atlas
+    return shape
 
 
 def _named(name: str, rest: str, speed: str | None) -> Any:

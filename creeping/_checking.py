@@ -89,12 +89,13 @@ def _mesh(
     texts += [*mesh.repairs, quality.summary(wavenumber)]
     if output is None:
         return
-    from creeping.plotting.mesh_picture import mesh_picture
+    from creeping.plotting.mesh_picture import MeshValues, mesh_picture
 
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
-    mesh_picture(output / "quality.png", mesh.vertices, mesh.triangles, quality.badness, bad=quality.bad)
+    shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)
+    mesh_picture(output / "quality.png", shown)
     answer["picture"] = str(output / "quality.png")
     texts.append(f"picture: {output / 'quality.png'}")

@@ -1,4 +1,4 @@
-"""Commands that look after an installation: stored maps, and what the machine offers."""
+"""Commands that look after an installation: stored maps and fitted bodies, and what the machine offers."""
 
 import json
 import time
@@ -9,11 +9,12 @@ from cyclopts import Parameter
 
 from creeping._version import __version__
 
+OPTIONAL = {"sympy": "expressions", "gmsh": "CAD files"}
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 
 
 def list_maps(*, json_: Json = False) -> int:
-    """List the stored maps."""
+    """List the stored maps and fitted bodies."""
     from creeping._errors import CreepingError
     from creeping.phaseflow import caching, storing
 
@@ -27,19 +28,24 @@ def list_maps(*, json_: Json = False) -> int:
             )
         except CreepingError as error:
             rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": f"unreadable: {error}", "error": None})
+    fits = [{"fit": file.stem, "MB": round(file.stat().st_size / 1e6, 1)} for file in _fits()]
     if json_:
-        print(json.dumps(rows, indent=1))
+        print(json.dumps([*rows, *fits], indent=1))
     else:
-        print(f"{caching.cache_folder()}: {len(rows)} maps, {sum(r['MB'] for r in rows):.1f} MB")
+        total = sum(float(r["MB"]) for r in (*rows, *fits))
+        print(f"{caching.cache_folder()}: {len(rows)} maps, {len(fits)} fitted bodies, {total:.1f} MB")
         for row in rows:
             print(f"  {row['map']}  {row['MB']:8.1f} MB  {row['body']}")
+        for row in fits:
+            print(f"  {row['fit']}  {row['MB']:8.1f} MB")
     return 0
 
 
 def verify_maps() -> int:
-    """Check every stored map against its digests; exit code 3 if one is damaged."""
+    """Check every stored map and fitted body against its digests; exit code 3 if one is damaged."""
     from creeping._errors import CreepingError
     from creeping.phaseflow import storing
+    from scatterers import _fit_cache
 
     damaged = 0
     for folder in _stored():
@@ -49,17 +55,23 @@ def verify_maps() -> int:
         except CreepingError as error:
             damaged += 1
             print(f"DAMAGED  {folder.name}: {error}")
+    for file in _fits():
+        whole = _fit_cache.load(file.parent, file.stem) is not None
+        damaged += not whole
+        print(f"ok       {file.stem}" if whole else f"DAMAGED  {file.stem}: it is fitted anew when it is asked for")
     return 3 if damaged else 0
 
 
 def clear_maps() -> int:
-    """Remove every stored map."""
+    """Remove every stored map and fitted body."""
     import shutil
 
-    folders = _stored()
+    folders, files = _stored(), _fits()
     for folder in folders:
         shutil.rmtree(folder)
-    print(f"removed {len(folders)} maps")
+    for file in files:
+        file.unlink(missing_ok=True)
+    print(f"removed {len(folders)} maps and {len(files)} fitted bodies")
     return 0
 
 
@@ -68,6 +80,13 @@ def _stored() -> list[Path]:
 
     root = caching.cache_folder()
     return sorted(p.parent for p in root.glob(f"*/{storing.MANIFEST}")) if root.is_dir() else []
+
+
+def _fits() -> list[Path]:
+    from scatterers import _fit_cache
+
+    root = _fit_cache.cache_folder()
+    return sorted(root.glob("*.npz")) if root.is_dir() else []
 
 
 def doctor() -> int:
@@ -81,12 +100,12 @@ def doctor() -> int:
 
     print(f"creeping {__version__}, Python {platform.python_version()}, {os.cpu_count()} cores")
     missing = 0
-    for name in ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "sympy"):
+    for name in ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh", "sympy", "gmsh"):
         try:
             print(f"  {name} {version(name)}")
         except PackageNotFoundError:
-            missing += name != "sympy"
-            print(f"  {name} is not installed" + (" (needed for expressions)" if name == "sympy" else ""))
+            missing += name not in OPTIONAL
+            print(f"  {name} is not installed" + (f" (needed for {OPTIONAL[name]})" if name in OPTIONAL else ""))
     started = time.perf_counter()
     import creeping.phaseflow._integrator  # noqa: F401
 

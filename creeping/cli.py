@@ -24,7 +24,7 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-cache_app = App(name="cache", help="Stored phase maps: list, verify, clear.")
+cache_app = App(name="cache", help="Stored phase maps and fitted bodies: list, verify, clear.")
 app.command(cache_app)
 
 _output = Group("Output")

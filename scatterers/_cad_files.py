@@ -154,7 +154,9 @@ def _meshed(path: Path, points: int) -> dict[str, NDArray[np.generic]]:
     """Run the worker and read what it wrote."""
     with tempfile.TemporaryDirectory(prefix="creeping-") as folder:
         out = Path(folder) / "points.npz"
-        command = [sys.executable, "-m", "scatterers._cad_worker", str(path.resolve()), str(points), str(out)]
+        # -P: modules that happen to lie in the working folder are not imported
+        worker = Path(__file__).with_name("_cad_worker.py")
+        command = [sys.executable, "-P", str(worker), str(path.resolve()), str(points), str(out)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, text=True)
         except subprocess.TimeoutExpired:

@@ -1,4 +1,4 @@
-"""What gmsh says of a CAD file, in a process of its own: ``python -m scatterers._cad_worker FILE POINTS OUT``.
+"""What gmsh says of a CAD file, in a process of its own: ``python -P _cad_worker.py FILE POINTS OUT``.
 
 gmsh keeps its state in the library, prints as it likes, and may end the process on a hostile file or where libraries
 of the system are missing. Lengths are in millimetres, to which it brings files that state their unit. OUT (npz):

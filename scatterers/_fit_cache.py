@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-SCHEMA = 1
+SCHEMA = 2
+"""Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
 
 

@@ -19,7 +19,7 @@ from scatterers._tensor_spline import TensorSpline, evaluated
 
 FloatArray = NDArray[np.float64]
 Say = Callable[[str], None]
-COARSER = 1.25
+COARSER = 1.35
 """Spacing of the second fit, in units of the first."""
 SMOOTHINGS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Tried in turn on noisy points, until the misfit exceeds the noise,"""
@@ -29,6 +29,8 @@ NORMAL_WEIGHT = 0.1
 """Of the normals of noisy points: from jets they are noisier than the points."""
 ROUGH = 2.0
 """Edges about a rough point within which nothing is trusted."""
+FEWEST = 0.1
+"""Share of the points that has to be farther off, for a fit to mean anything."""
 SLOPES = (0.5, 1.6)
 """|grad F| on the body: F is near a signed distance, or the fit has failed."""
 
@@ -51,6 +53,8 @@ class PointCloud:
         Points of the source where it is not smooth.
     distance : callable
         Signed distance from the body, (k, 3) -> (k,); NaN where it is not known.
+    mean_curvature : (n,), 1/L, or None
+        At the points, NaN where it is not known; None for noisy points.
     """
 
     points: FloatArray
@@ -60,6 +64,7 @@ class PointCloud:
     noise: float
     rough: FloatArray
     distance: Callable[[FloatArray], FloatArray]
+    mean_curvature: FloatArray | None
 
     @property
     def reach(self) -> float:
@@ -123,6 +128,7 @@ class FittedBody(SplineBody):
 
     def _fitted(self, cloud: PointCloud, say: Say) -> tuple[dict[str, FloatArray], dict[str, Any]]:
         """Arrays and text of the fits, checked."""
+        _require_smooth_points(cloud)
         fine, coarse, smoothing = fits(cloud, say)
         report = compared(cloud, fine, coarse, smoothing)
         if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.rough):
@@ -149,6 +155,7 @@ def fits(cloud: PointCloud, say: Say) -> tuple[Fitted, Fitted, float]:
             spacing,
             distance=cloud.distance,
             trusted=cloud.smooth if len(cloud.rough) else None,
+            mean_curvature=cloud.mean_curvature,
             smoothing=smoothing,
             normal_weight=weight,
             say=say,
@@ -210,6 +217,16 @@ def _curvatures(
     form = np.einsum("ani,nij,bnj->abn", t, entries[:, SYMMETRIC], t) / slope
     gauss = form[0, 0] * form[1, 1] - form[0, 1] ** 2
     return np.concatenate([form[0, 0], form[1, 1]]), gauss, slope
+
+
+def _require_smooth_points(cloud: PointCloud) -> None:
+    """ValueError if hardly a point is left when those about rough places are taken away."""
+    if not len(cloud.rough) or np.mean(cloud.smooth) >= FEWEST:
+        return
+    raise ValueError(
+        f"{np.sum(~cloud.smooth)} of {len(cloud.points)} points lie within {cloud.reach:.3g} m of places where the "
+        "body is not smooth, and nothing is known there; refine the mesh"
+    )
 
 
 def _require_one_body(samples: Samples) -> None:

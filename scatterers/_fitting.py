@@ -42,6 +42,8 @@ MAX_NODES = 8_000_000
 ITERATIONS = 480
 CHECKED = 60
 """Iterations from one look at the curvature to the next."""
+LOST = 2.5
+"""How much worse than the best the curvatures of the F that is taken may be: points and normals gain by every step."""
 WATCHED = 2000
 """Points at which it is looked at."""
 
@@ -79,6 +81,7 @@ def fit(
     *,
     distance: Callable[[FloatArray], FloatArray] | None = None,
     trusted: NDArray[np.bool_] | None = None,
+    mean_curvature: FloatArray | None = None,
     smoothing: float = SMOOTHING,
     normal_weight: float = 1.0,
     accuracy: float = 5e-5,
@@ -94,6 +97,9 @@ def fit(
         Signed distance from the body to start from, (m, 3) -> (m,); NaN where it is not known.
     trusted : (n,) bool, optional
         Points that are fitted, by default all; at the others F stays near the distance that it starts from.
+    mean_curvature : (n,), 1/L, optional
+        Mean curvature at the points by another route, NaN where it is not known. Steps towards the points first add
+        ripples and only then remove them: the last F is taken that agrees with it nearly as well as the best one.
     smoothing : float
         Weight of the fourth differences; noisy points need more.
     normal_weight : float
@@ -110,11 +116,12 @@ def fit(
     """
     equations = _Equations(points, normals, spacing, smoothing, normal_weight, trusted)
     c = equations.start(distance)
-    watched = equations.watched()
+    watch = _Watch(equations, mean_curvature)
     r = equations.residual(c, targets=True)
     z = equations.preconditioned(r)
     p, rz = z.copy(), float(np.vdot(r, z))
-    before, change, done = watched(c), np.inf, 0
+    before, change, done = watch.curvatures(c), np.inf, 0
+    best, kept = watch.off(before), c.copy()
     while done < ITERATIONS and rz > 0:
         q = equations.residual(p, targets=False)
         step = -rz / float(np.vdot(p, q))
@@ -124,15 +131,21 @@ def fit(
         last, rz = rz, float(np.vdot(r, z))
         p = z + (rz / last) * p
         done += 1
-        if done % CHECKED == 0:
-            now = watched(c)
-            change = float(np.sqrt(np.mean((now - before) ** 2)))
-            before = now
-            scale = float(np.sqrt(np.mean(now**2)))
-            say(f"fitting: {done} iterations, curvatures changing by {change / scale:.1e}")
-            if change <= accuracy * scale:
-                break
-    return equations.result(c, done, change / spacing)
+        if done % CHECKED:
+            continue
+        now = watch.curvatures(c)
+        change = float(np.sqrt(np.mean((now - before) ** 2)))
+        scale = float(np.sqrt(np.mean(now**2)))
+        say(f"fitting: {done} iterations, curvatures changing by {change / scale:.1e}")
+        before, off = now, watch.off(now)
+        best = min(best, off)
+        if off <= LOST * best:
+            kept = c.copy()
+        elif done > CHECKED:
+            break
+        if change <= accuracy * scale:
+            break
+    return equations.result(kept if watch.guided else c, done, change / spacing)
 
 
 class _Equations:
@@ -145,7 +158,7 @@ class _Equations:
         spacing: float,
         smoothing: float,
         normal_weight: float,
-        trusted: NDArray[np.bool_] | None,
+        trusted: NDArray[np.bool_] | None = None,
     ) -> None:
         from scipy.spatial import cKDTree
 
@@ -266,35 +279,47 @@ class _Equations:
                 total += np.bincount((node + 2) @ strides, np.maximum(hat, 0.0), minlength=size)
         return total.reshape(self.shape)
 
-    def _spline(self, c: FloatArray) -> TensorSpline:
+    def spline(self, c: FloatArray) -> TensorSpline:
         values = np.ascontiguousarray(c[:-OVERREAD].reshape(self.shape)) * self.spacing
         return TensorSpline(values, self.low, np.full(3, self.spacing))
 
-    def watched(self) -> Callable[[FloatArray], FloatArray]:
-        """Function of the coefficients: curvature along two tangents at some of the points, in 1/cells."""
-        at, n = self.points[self.fitted], self.normals[self.fitted]
-        some = slice(None, None, max(1, len(at) // WATCHED))
-        at, n = at[some], n[some]
-        e = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
-        e /= np.linalg.norm(e, axis=1, keepdims=True)
-        tangents = np.stack([e, np.cross(n, e)])
-        entries = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-
-        def curvatures(c: FloatArray) -> FloatArray:
-            _, gradient, hessian = evaluated(self._spline(c).compiled, at)
-            bent = np.einsum("kni,nij,knj->kn", tangents, hessian[:, entries], tangents)
-            return np.asarray(self.spacing * bent / np.linalg.norm(gradient, axis=1))
-
-        return curvatures
-
     def result(self, c: FloatArray, iterations: int, change: float) -> Fitted:
         """The spline, and what is left at the points."""
-        spline = self._spline(c)
+        spline = self.spline(c)
         value, gradient, _ = evaluated(spline.compiled, self.points[self.fitted])
         slope = np.linalg.norm(gradient, axis=1)
         turn = np.linalg.norm(gradient / slope[:, None] - self.normals[self.fitted], axis=1)
         misfit = float(np.sqrt(np.mean((value / slope) ** 2)))
         return Fitted(spline, self.spacing, iterations, change, misfit, float(np.sqrt(np.mean(turn**2))))
+
+
+class _Watch:
+    """Curvatures at some of the points, by which the progress of a fit is judged."""
+
+    def __init__(self, equations: _Equations, mean_curvature: FloatArray | None) -> None:
+        self.equations = equations
+        at, n = equations.points[equations.fitted], equations.normals[equations.fitted]
+        self.guided = mean_curvature is not None
+        guide = np.zeros(len(at)) if mean_curvature is None else mean_curvature[equations.fitted]
+        known = np.flatnonzero(np.isfinite(guide))
+        known = known[:: max(1, len(known) // WATCHED)]
+        self.at, n, self.guide = at[known], n[known], guide[known] * equations.spacing
+        e = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
+        e /= np.linalg.norm(e, axis=1, keepdims=True)
+        self.tangents = np.stack([e, np.cross(n, e)])
+
+    def curvatures(self, c: FloatArray) -> FloatArray:
+        """Curvature along two orthogonal tangents, in 1/cells: (2, n)."""
+        _, gradient, hessian = evaluated(self.equations.spline(c).compiled, self.at)
+        entries = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+        bent = np.einsum("kni,nij,knj->kn", self.tangents, hessian[:, entries], self.tangents)
+        return np.asarray(self.equations.spacing * bent / np.linalg.norm(gradient, axis=1))
+
+    def off(self, curvatures: FloatArray) -> float:
+        """Rms difference from the mean curvature that was given; 0 without one."""
+        if not self.guided:
+            return 0.0
+        return float(np.sqrt(np.mean((curvatures.mean(axis=0) - self.guide) ** 2)))
 
 
 def accumulate_numpy(

@@ -26,6 +26,8 @@ FloatArray = NDArray[np.float64]
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 CLOUD = 25_000
 """Points of the body by which charts are chosen."""
+MARGIN = 0.4
+"""How far charts reach beyond their squares: fewer charts than with more, for maps of at least 15 nodes a side."""
 
 
 class LevelBody(Body):
@@ -118,4 +120,4 @@ class LevelBody(Body):
         from scatterers._monge_atlas import MongeAtlas
 
         cloud = body_cloud(self.level, self.gradient, self._bounds, CLOUD)
-        return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud)
+        return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)

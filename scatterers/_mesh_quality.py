@@ -1,7 +1,8 @@
 """Whether a mesh is smooth enough for a smooth surface: figures of its triangles and jets, and a verdict.
 
 With e the mean edge, kappa the larger principal curvature, n_d, kappa_d and res_d normal, curvature and rms residual
-of the jet of degree d, a vertex is *bad* if max(|n_4 - n_6|, e |kappa_4 - kappa_6|/3) > 0.03, and
+of the jet of degree d, a vertex is *bad* if max(|n_4 - n_6|, e |kappa_4 - kappa_6|/3) > 0.03, or if n_6 is more than
+0.5 off the normals of its triangles, as at a tip, whose jet follows one side of it; and
 
     smooth           none of the following;
     sharp            edges of more than 40 degrees, and thrice the median, that follow each other;
@@ -23,12 +24,14 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers._jets import Jets
+from scatterers._jets import Jets, angle_weighted_normals
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
 BAD = 0.03
+ASTRAY = 0.5
+"""|n_6 - n| of a jet that does not follow its triangles; on slivers of smooth bodies it is below 0.2."""
 FEW = 100
 """Vertices below which no jet of degree 6 means anything."""
 RESOLVED = 0.3
@@ -85,7 +88,8 @@ class MeshQuality:
     jumps : int
         Vertices at which the curvature jumps.
     badness : (n,)
-        max(|n_4 - n_6|, e |kappa_4 - kappa_6| / 3) at the vertices, to be drawn on the mesh; empty if read back.
+        max(|n_4 - n_6|, e |kappa_4 - kappa_6| / 3) at the vertices, and |n_6 - n| where that exceeds 0.5, to be drawn
+        on the mesh; empty if read back.
     verdict : {"smooth", "noisy", "sharp", "curvature jumps", "too coarse"}
     reasons : str
         What the verdict rests on and what helps.
@@ -175,7 +179,8 @@ def assess(mesh: Mesh, jets: Jets) -> MeshQuality:
     ends, angles = _dihedrals(vertices, triangles)
     curvature = np.abs(jets.principal).max(axis=1)
     doubt = np.abs(jets.principal4 - jets.principal).max(axis=1)
-    badness = np.maximum(jets.tilt, edge * doubt / 3)
+    astray = np.linalg.norm(jets.normals - angle_weighted_normals(vertices, triangles), axis=1)
+    badness = np.maximum(np.maximum(jets.tilt, edge * doubt / 3), np.where(astray > ASTRAY, astray, 0.0))
     # below this a residual is rounding of the vertices
     floor = 1e-12 * edge
     second, fourth, sixth = np.maximum(jets.residuals, floor).T

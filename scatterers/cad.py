@@ -102,8 +102,9 @@ class Cad(FittedBody):
         rough = np.concatenate([found.mesh.vertices[quality.bad], found.rough])
         edge = quality.edge_mean
         normals = np.where(np.isfinite(found.normals), found.normals, jets.normals)
+        mean = np.where(jets.fitted & ~quality.bad, jets.mean, np.nan)
         distance = partial(signed_distance, found.mesh.vertices, jets)
-        return PointCloud(found.mesh.vertices, normals, edge, SPACING * edge, 0.0, rough, distance)
+        return PointCloud(found.mesh.vertices, normals, edge, SPACING * edge, 0.0, rough, distance, mean)
 
     def _notes(self) -> dict[str, Any]:
         return self._made

@@ -24,7 +24,9 @@ from scatterers._mesh_quality import MeshQuality, assess
 
 FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0
-"""Spacings of the grid in units of the mean edge: for vertices and the points between them, and for noisy vertices."""
+"""Spacings of the grid in units of the mean edge: for vertices and the points between them, and for noisy vertices,"""
+TURN = 0.5
+"""but these no more than so much over the curvature."""
 NOISE = 2e-4
 """Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
 
@@ -83,18 +85,22 @@ class Mesh(FittedBody):
         self._made = {"quality": quality.to_json(), "repairs": list(mesh.repairs)}
         if quality.verdict not in ("smooth", "noisy") and not allow_rough:
             raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
-        if quality.bad.any():
+        if quality.bad.any() and quality.verdict != "noisy":
             # jets say nothing there, the triangles a little
             usual = angle_weighted_normals(mesh.vertices, mesh.triangles)
             normals = np.where(quality.bad[:, None], usual, jets.normals)
             jets = replace(jets, fitted=jets.fitted & ~quality.bad, normals=normals)
-        points, normals, edge, rough = mesh.vertices, jets.normals, quality.edge_mean, mesh.vertices[quality.bad]
+        # noise is everywhere, and smoothed away
+        rough = mesh.vertices[quality.bad & (quality.verdict != "noisy")]
+        points, normals, edge = mesh.vertices, jets.normals, quality.edge_mean
         distance = partial(signed_distance, mesh.vertices, jets)
         if quality.noise >= NOISE:
-            return PointCloud(points, normals, edge, NOISY * edge, quality.noise * edge, rough, distance)
+            spacing = float(np.clip(TURN / max(quality.curvature, 1e-9), CLEAN, NOISY)) * edge
+            return PointCloud(points, normals, edge, spacing, quality.noise * edge, rough, distance, None)
         more = centroids(mesh.vertices, mesh.triangles, jets)
+        mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more[0]), np.nan)])
         points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])
-        return PointCloud(points, normals, edge, CLEAN * edge, 0.0, rough, distance)
+        return PointCloud(points, normals, edge, CLEAN * edge, 0.0, rough, distance, mean)
 
     def _notes(self) -> dict[str, Any]:
         return self._made

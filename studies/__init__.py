@@ -22,6 +22,7 @@ FIGURES = {
     "field-cut": "figure_field_cut",
     "field-body": "figure_field_body",
     "field-decay": "figure_field_decay",
+    "mesh-quality": "figure_mesh_quality",
 }
 """Name on the command line: module of this package."""
 

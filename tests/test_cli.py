@@ -74,6 +74,8 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     assert entry["observe"] == ["cut:30", "grid:45", "150,20"]
     assert entry["directions"] == sum(entry["methods"].values()) == 361 + 5 * 9 + 1
     assert entry["unresolved"] == entry["not_finite"] == 0
+    # known exactly, as are its rays
+    assert "uncertain_by" not in entry and not {"fit", "verdict", "error_of_body"} & set(summary)
     # the forward lobe of the hard sphere from its series; the cut passes a quarter of a degree from its top
     forward = abs(sphere.far_field(20.0, 1.0, [1.0], "hard")[0])
     assert entry["largest"] == pytest.approx(forward, rel=0.02)

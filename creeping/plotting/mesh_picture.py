@@ -1,10 +1,11 @@
-"""Picture of a triangle mesh coloured by a number at its vertices, from two opposite sides."""
+"""Pictures of triangle meshes coloured by a number at their vertices, each from two opposite sides."""
 
 import os
+from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.plotting._view import View
 from creeping.plotting.axes3d import brightness
 from creeping.plotting.pictures import new_figure, save_figure
@@ -13,32 +14,46 @@ VIEWS = (View(np.radians(-60.0), np.radians(25.0)), View(np.radians(120.0), np.r
 HIGHEST, SPAN = 0.0, (3.0, 6.0)
 """Power of ten at the upper end of the colours, and the fewest and most decades below it."""
 BAD_COLOUR = "#b3202a"
-SIZE = (7.2, 3.8)
+WIDTH, HEIGHT = 7.2, 3.4  # inches, of one mesh
+
+
+@dataclass(frozen=True)
+class MeshValues:
+    """One mesh to be drawn.
+
+    Attributes
+    ----------
+    vertices : (n, 3)
+    triangles : (m, 3)
+    values : (n,)
+        Positive; colours are of their logarithm.
+    bad : (n,) bool
+        Vertices that get a dot.
+    title : str
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    values: FloatArray
+    bad: BoolArray
+    title: str = ""
 
 
 def mesh_picture(
     path: str | os.PathLike[str],
-    vertices: FloatArray,
-    triangles: IntArray,
-    values: FloatArray,
-    *,
-    bad: BoolArray,
+    *meshes: MeshValues,
     label: str = "disagreement of jets of degree 4 and 6",
     dpi: int = 200,
 ) -> None:
-    """Write a PNG of a mesh coloured by values > 0 at its vertices, on a logarithmic scale.
+    """Write a PNG of meshes, one below the other.
 
     Parameters
     ----------
     path : str or path
         File to write.
-    vertices : (n, 3)
-    triangles : (m, 3)
-    values : (n,)
-    bad : (n,) bool
-        Vertices that get a dot.
+    meshes : MeshValues
     label : str
-        Of the colour bar.
+        Of the colour bars.
     dpi : int
 
     Raises
@@ -46,20 +61,27 @@ def mesh_picture(
     CreepingError
         If the file cannot be written.
     """
+    figure = new_figure((WIDTH, HEIGHT * len(meshes)))
+    for row, mesh in enumerate(meshes):
+        _draw(figure, 1 - (row + 1) / len(meshes), 1 / len(meshes), mesh, label)
+    save_figure(figure, path, dpi)
+
+
+def _draw(figure: Any, bottom: float, height: float, mesh: MeshValues, label: str) -> None:
+    """Draw one mesh into a band of the figure."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import Normalize
 
-    decade = np.log10(np.maximum(values, 10.0 ** (HIGHEST - SPAN[1])))
+    decade = np.log10(np.maximum(mesh.values, 10.0 ** (HIGHEST - SPAN[1])))
     lowest = float(np.clip(np.floor(np.percentile(decade, 1)), HIGHEST - SPAN[1], HIGHEST - SPAN[0]))
     colours = ScalarMappable(Normalize(lowest, HIGHEST), "viridis")
-    corners = vertices[triangles]
+    corners = mesh.vertices[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    paint = colours.to_rgba(decade[triangles].mean(axis=1))[:, :3]
-    figure = new_figure(SIZE)
+    paint = colours.to_rgba(decade[mesh.triangles].mean(axis=1))[:, :3]
     for k, view in enumerate(VIEWS):
-        ax = figure.add_axes((0.01 + 0.43 * k, 0.06, 0.42, 0.9))
+        ax = figure.add_axes((0.01 + 0.43 * k, bottom + 0.04 * height, 0.42, 0.86 * height))
         facing = normals @ view.toward
         front = np.flatnonzero(facing > 0)
         # the far ones first, so that the near ones cover them
@@ -68,17 +90,19 @@ def mesh_picture(
         flat = view.project(corners[front])
         # edges in the colour of the face close the hairlines between triangles
         ax.add_collection(PolyCollection(list(flat), facecolors=shade, edgecolors=shade, linewidths=0.3))
-        seen = np.intersect1d(np.flatnonzero(bad), triangles[front])
-        ax.plot(*view.project(vertices[seen]).T, ".", color=BAD_COLOUR, markersize=2.5, label=f"{int(bad.sum())} rough")
+        seen = np.intersect1d(np.flatnonzero(mesh.bad), mesh.triangles[front])
+        ax.plot(*view.project(mesh.vertices[seen]).T, ".", color=BAD_COLOUR, markersize=2.5)
         ax.autoscale_view()
         ax.set_aspect("equal")
         ax.set_axis_off()
-    if np.any(bad):
-        figure.axes[0].legend(loc="lower left", fontsize=8, frameon=False, markerscale=3)
-    bar = figure.colorbar(colours, cax=figure.add_axes((0.885, 0.1, 0.018, 0.8)), extend="min")
-    bar.set_label(label, fontsize=8)
+    rough = f"{int(mesh.bad.sum())} of {len(mesh.vertices)} vertices rough"
+    figure.text(0.02, bottom + 0.94 * height, mesh.title, fontsize=9, va="center")
+    figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=BAD_COLOUR)
+    bar = figure.colorbar(
+        colours, cax=figure.add_axes((0.885, bottom + 0.1 * height, 0.018, 0.76 * height)), extend="min"
+    )
+    bar.set_label(label, fontsize=7)
     ticks = np.arange(lowest, HIGHEST + 1)
     bar.set_ticks(ticks, labels=[f"$10^{{{int(t)}}}$" for t in ticks])
     bar.ax.tick_params(labelsize=8, width=0.5)
     bar.outline.set_linewidth(0.5)
-    save_figure(figure, path, dpi)

@@ -59,7 +59,7 @@ def test_twisted_ellipsoid_is_bounded_and_says_where_it_fails(boundary):
 
 
 @pytest.mark.parametrize("name", ["triaxial", pytest.param("twisted", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("boundary", ["soft", "hard"])
+@pytest.mark.parametrize("boundary", [pytest.param("soft", marks=pytest.mark.slow), "hard"])
 def test_reciprocity(name, boundary):
     """Within the error of the field itself: 1 per cent, 2 on the body that is not convex."""
     assert bodies.reciprocity(name, boundary, 20.0) < (1.0 if name == "triaxial" else 2.0)

@@ -10,7 +10,7 @@ import scatterers as sc
 from scatterers._jets import osculating_jets
 from scatterers._mesh_files import TriangleMesh
 from scatterers._mesh_quality import MeshQuality, assess
-from studies._meshes import capsule, geodesic_sphere, noisy, slivers, torus_grid
+from studies._meshes import almond, capsule, geodesic_sphere, noisy, slivers, torus_grid
 
 make = trimesh.creation
 
@@ -112,6 +112,14 @@ def test_rims_are_where_the_badness_is():
     distance = np.sort(0.5 - np.abs(body.vertices), axis=1)[:, 1]
     assert quality.bad[distance < 1e-9].mean() > 0.9
     assert not quality.bad[distance > 0.3].any()
+
+
+def test_tips_are_bad():
+    """Jets at a tip may follow one side of it, both degrees alike; the almond's tip passed as smooth."""
+    points, triangles = almond(4000)
+    quality = judged(points, triangles[:, ::-1])
+    tip = int(np.argmax(points[:, 0]))
+    assert quality.bad[tip] and quality.badness[tip] > 0.5
 
 
 def test_summary_and_json():

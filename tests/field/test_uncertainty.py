@@ -1,0 +1,95 @@
+"""What the uncertainty of a body does to its far field."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.rays.body_error import coarser_fan
+from studies._meshes import on_body
+
+D, K = (0.3, 0.2, 0.9), 20.0
+LENGTH, RAYS = 3.0, 96
+
+
+def grid(count=12):
+    """Directions all about, none of them along the wave."""
+    theta, phi = np.meshgrid(np.linspace(0.1, 3.0, count), np.linspace(0, 2 * np.pi, count, endpoint=False))
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1).reshape(-1, 3)
+
+
+@cache
+def fan_of(body):
+    line = cr.shadow_line(body, D)
+    return cr.launch(cr.DirectFlow(body), line, length=LENGTH, n_rays=RAYS, n_steps=60, max_gap=np.inf)
+
+
+class Unsure:
+    """An ellipsoid that knows of a coarser one."""
+
+    def __init__(self, body, coarser):
+        for name in ("level", "gradient", "hessian", "bounds", "atlas", "parameters", "compiled"):
+            setattr(self, name, getattr(body, name))
+        self.coarser = coarser
+
+
+BODY, COARSER = sc.Ellipsoid(1.0, 0.8, 0.6), sc.Ellipsoid(1.001, 0.799, 0.6005)
+UNSURE = Unsure(BODY, COARSER)
+
+
+def test_bodies_known_exactly_have_none():
+    assert cr.far_field_uncertainty(fan_of(BODY), grid(3), wavenumber=K) is None
+    assert coarser_fan(fan_of(BODY)) is None
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard", "pec"])
+def test_uncertainty_is_the_difference_of_two_fields(boundary):
+    at = grid(4)
+    found = cr.far_field_uncertainty(fan_of(UNSURE), at, wavenumber=K, boundary=boundary)
+    mine, its = (cr.far_field(fan_of(body), at, wavenumber=K, boundary=boundary).total for body in (BODY, COARSER))
+    assert found.shape == mine.shape
+    # the rays of the coarser body are integrated to 1e-10 here, to the flow's own tolerance there
+    np.testing.assert_allclose(found, np.abs(mine - its), atol=1e-6 * np.abs(mine).max())
+    assert np.all(np.isfinite(found)) and found.max() > 1e-4
+
+
+def test_the_other_fan_is_of_the_coarser_body():
+    fan, other = fan_of(UNSURE), coarser_fan(fan_of(UNSURE))
+    assert other.body is COARSER and other.points.shape == fan.points.shape
+    np.testing.assert_allclose(other.line.direction, fan.line.direction)
+    np.testing.assert_allclose(COARSER.level(other.points), 0, atol=1e-9)
+    assert 0 < np.abs(BODY.level(other.points)).max() < 1e-2
+
+
+def test_order_is_that_of_the_field():
+    at = grid(3)
+    first, second = (cr.far_field_uncertainty(fan_of(UNSURE), at, wavenumber=K, order=order) for order in (1, 2))
+    mine, its = (cr.far_field(fan_of(body), at, wavenumber=K, order=1).total for body in (BODY, COARSER))
+    np.testing.assert_allclose(first, np.abs(mine - its), atol=1e-6 * np.abs(mine).max())
+    assert not np.allclose(first, second, rtol=1e-3)
+
+
+def test_bad_requests_are_those_of_the_field():
+    with pytest.raises(cr.CreepingError, match="wavenumber"):
+        cr.far_field_uncertainty(fan_of(UNSURE), grid(2), wavenumber=-1.0)
+    with pytest.raises(cr.CreepingError):
+        cr.far_field_uncertainty(fan_of(UNSURE), grid(2), wavenumber=K, boundary="firm")
+
+
+class Triangles:
+    def __init__(self, vertices, faces):
+        self.vertices, self.faces = vertices, faces
+
+
+def test_the_field_of_a_mesh_agrees_within_its_uncertainty():
+    exact, vertices, faces = on_body("ellipsoid", 2000)
+    mesh = sc.Mesh(Triangles(vertices, faces), cache=False)
+    at = grid()
+    reported = cr.far_field_uncertainty(fan_of(mesh), at, wavenumber=K)
+    fields = [cr.far_field(fan_of(body), at, wavenumber=K).total for body in (mesh, exact)]
+    off, size = (float(np.sqrt(np.mean(np.abs(v) ** 2))) for v in (fields[0] - fields[1], fields[1]))
+    estimate = float(np.sqrt(np.mean(reported**2)))
+    assert off < 2 * estimate
+    assert estimate < 2e-3 * size

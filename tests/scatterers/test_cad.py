@@ -1,0 +1,298 @@
+"""Bodies from STEP and BREP files made by gmsh: points and normals, units, edges, and files that are none."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.surface import normal, project
+from scatterers import _cad_files
+from scatterers._cad_files import read_cad
+
+pytest.importorskip("gmsh", exc_type=ImportError)
+
+# gmsh keeps its state in the library, hence a process of its own
+MAKER = """
+import os, sys, gmsh
+os.chdir(sys.argv[1])
+gmsh.initialize(readConfigFiles=False, interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+make = gmsh.model.occ
+def write(*names):
+    make.synchronize()
+    for name in names:
+        gmsh.write(name)
+    gmsh.model.remove()
+    gmsh.model.add("next")
+ball = make.addSphere(0, 0, 0, 1)
+make.dilate([(3, ball)], 0, 0, 0, 1.2, 0.8, 0.8)
+write("ellipsoid.brep")
+ball = make.addSphere(0, 0, 0, 1)
+make.dilate([(3, ball)], 0, 0, 0, 1200, 800, 800)
+write("ellipsoid.step")
+make.addTorus(0, 0, 0, 1000, 500)
+write("torus.step")
+make.addBox(0, 0, 0, 1, 1, 1)
+write("box.brep")
+make.addCone(0, 0, 0, 0, 0, 2, 1, 0)
+write("cone.brep")
+rod = make.addCylinder(0, 0, -1, 0, 0, 2, 0.5)
+ends = [(3, make.addSphere(0, 0, z, 0.5)) for z in (-1, 1)]
+make.fuse([(3, rod)], ends)
+write("capsule.brep")
+make.addSphere(0, 0, 0, 1)
+make.addSphere(3, 0, 0, 1)
+write("two.brep")
+"""
+EXACT = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "torus": sc.Torus()}
+CLOSED = ("ellipsoid.step", "ellipsoid.brep", "torus.step")
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cad")
+    done = subprocess.run([sys.executable, "-c", MAKER, str(folder)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@cache
+def points_of(path):
+    return read_cad(path, "m" if path.suffix == ".brep" else None, 2000, say=lambda _: None)
+
+
+@cache
+def opened(path):
+    return sc.Cad(path, points=2000, cache=False)
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_points_lie_on_the_body_with_its_normals(files, name):
+    found, body = points_of(files / name), EXACT[name.split(".")[0]]
+    at = found.mesh.vertices
+    assert 1500 < len(at) < 3000
+    assert found.edges == () and len(found.rough) == 0 and found.mesh.repairs == ()
+    assert np.max(np.abs(body.level(at)) / np.linalg.norm(body.gradient(at), axis=1)) < 1e-12
+    # at a pole of its parameters a face has none
+    known = np.isfinite(found.normals).all(axis=1)
+    assert np.sum(~known) <= 2
+    np.testing.assert_allclose(found.normals[known], normal(body, at)[known], atol=1e-9)
+
+
+@pytest.mark.parametrize("points", [500, 4000])
+def test_as_many_points_as_asked(files, points):
+    found = read_cad(files / "torus.step", None, points, say=lambda _: None)
+    assert len(found.mesh.vertices) == pytest.approx(points, rel=0.15)
+
+
+def test_step_files_state_their_unit(files, tmp_path):
+    stated = read_cad(files / "torus.step", "mm", 500, say=lambda _: None)
+    np.testing.assert_allclose(np.ptp(stated.mesh.vertices[:, 2]), 1, atol=1e-3)
+    for unit in ("m", "in"):
+        with pytest.raises(ValueError, match=rf"torus.step is in mm, not in {unit}; leave units out"):
+            read_cad(files / "torus.step", unit, 500, say=lambda _: None)
+    # the same numbers, said to be metres
+    text = (files / "torus.step").read_text()
+    large = tmp_path / "large.STP"
+    large.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT($,.METRE.)"))
+    assert text.count("SI_UNIT(.MILLI.,.METRE.)") == 1
+    metres = read_cad(large, "m", 500, say=lambda _: None)
+    np.testing.assert_allclose(np.ptp(metres.mesh.vertices[:, 2]), 1000, atol=1)
+
+
+def test_brep_files_need_a_unit(files):
+    with pytest.raises(ValueError, match=r'box.brep does not state its unit; give e\.g\. units="mm"'):
+        sc.Cad(files / "box.brep", cache=False)
+    with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
+        sc.Cad(files / "box.brep", "yard", cache=False)
+    inches = read_cad(files / "ellipsoid.brep", "in", 500, say=lambda _: None)
+    np.testing.assert_allclose(np.ptp(inches.mesh.vertices, axis=0), 0.0254 * np.array([2.4, 1.6, 1.6]), rtol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "head, unit",
+    [
+        ("SI_UNIT ( .CENTI. ,\n .METRE. )", "cm"),
+        ("CONVERSION_BASED_UNIT('INCH',#7)", "in"),
+        ("CONVERSION_BASED_UNIT ( 'Foot' , #7 )", "ft"),
+        ("SI_UNIT(.NANO.,.METRE.)", None),
+        ("", None),
+    ],
+)
+def test_units_of_step_files(tmp_path, head, unit):
+    (tmp_path / "a.step").write_text(f"ISO-10303-21;\n{head}")
+    assert _cad_files._stated(tmp_path / "a.step", "STEP") == unit
+
+
+@pytest.mark.parametrize("flag, unit", [(1, "in"), (2, "mm"), (6, "m"), (3, None)])
+def test_units_of_iges_files(tmp_path, flag, unit):
+    # the names hold commas and an H, which do not separate
+    text = f"1H,,1H;,4HPart,9Ha,b;c,5Hd,5Hmaker,1H1,32,38,6,308,15,4HPart,1.,{flag},2HMM,1,0.01;"
+    lines = [f"{text[k : k + 72]:72}G{k // 72 + 1:7}" for k in range(0, len(text), 72)]
+    (tmp_path / "a.igs").write_text("\n".join([f"{'':72}S      1", *lines]))
+    assert _cad_files._kind(tmp_path / "a.igs") == "IGES"
+    assert _cad_files._stated(tmp_path / "a.igs", "IGES") == unit
+
+
+REFUSED = {
+    "box.brep": r"box.brep is not smooth: edge between faces 1 and \d: 90 deg at \d+ points; .*; round its edges off",
+    "cone.brep": r"cone.brep is not smooth: edge between faces 1 and 2: 117 deg at \d+ points",
+    "capsule.brep": r"capsule.brep is curvature jumps: the curvature jumps at \d+ of \d+ vertices",
+    "two.brep": r"two.brep holds 2 separate surfaces, .*; give one body at a time",
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_smooth_body_is_refused(files, tmp_path, name):
+    with pytest.raises(ValueError, match=REFUSED[name]):
+        sc.Cad(files / name, "m", points=2000, cache=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_edges_are_where_they_are(files):
+    found = points_of(files / "box.brep")
+    assert len(found.edges) == 12 and all("90 deg" in line for line in found.edges)
+    off = np.sort(np.minimum(found.rough, 1 - found.rough), axis=1)
+    np.testing.assert_allclose(off[:, :2], 0, atol=1e-12)
+    rim = points_of(files / "cone.brep")
+    np.testing.assert_allclose(rim.rough[:, 2], 0, atol=1e-12)
+    assert points_of(files / "capsule.brep").edges == ()
+
+
+def cut(folder, files):
+    data = (files / "torus.step").read_bytes()
+    (folder / "cut.step").write_bytes(data[: len(data) // 2])
+
+
+def written(name, data):
+    return lambda folder, files: (folder / name).write_bytes(data)
+
+
+BAD = {
+    "missing.step": (lambda folder, files: None, "missing.step cannot be read: .*No such file"),
+    "cut.step": (cut, "cut.step: gmsh cannot read or mesh it .*; repair the body or export it anew"),
+    "empty.step": (written("empty.step", b""), "empty.step has 0 bytes"),
+    "noise.step": (written("noise.step", bytes(range(256)) * 9), "noise.step does not begin as STEP files do"),
+    "noise.igs": (written("noise.igs", b"what is this"), "noise.igs does not begin as IGES files do"),
+    "noise.brep": (written("noise.brep", b"#!/bin/sh"), "noise.brep does not begin as BREP files do"),
+    "hollow.step": (written("hollow.step", b"ISO-10303-21;\nEND-ISO-10303-21;\n"), "gmsh cannot read or mesh it"),
+    "hull.sldprt": (written("hull.sldprt", b"x"), r"hull.sldprt is none of \.step, .*; export the body as STEP"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_files_are_named(files, tmp_path, name):
+    make, message = BAD[name]
+    make(tmp_path, files)
+    with pytest.raises(ValueError, match=message) as caught:
+        sc.Cad(tmp_path / name, "m" if name.endswith(".brep") else None, cache=False)
+    assert "Traceback" not in str(caught.value)
+
+
+def test_a_path_is_asked_for(tmp_path):
+    for source in (None, 7, tmp_path):
+        with pytest.raises(ValueError, match="cannot be read"):
+            sc.Cad(source, cache=False)
+    for points in (100, 10**7, 2000.0, True, "many"):
+        with pytest.raises(ValueError, match=r"points = .*; give a whole number from 500 to 200000"):
+            sc.Cad(tmp_path / "a.step", points=points)
+
+
+def test_gmsh_that_is_not_installed_is_named_with_its_extra(files, monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == "gmsh" else find(name, *a))
+    with pytest.raises(ModuleNotFoundError, match=r"CAD files need gmsh: pip install 'creeping\[cad\]'") as caught:
+        sc.Cad(files / "torus.step", cache=False)
+    assert caught.value.name == "gmsh"
+
+
+def program(folder, text):
+    path = folder / "python"
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+LIBRARY = "OSError: libGLU.so.1: cannot open shared object file: No such file or directory"
+DEATHS = {
+    "killed": ("kill -KILL $$", "gmsh cannot read or mesh it .it ended with code -9.; repair"),
+    "says why": ("echo 'Error: no faces' >&2; exit 3", "cannot read or mesh it .Error: no faces."),
+    "writes nothing": ("exit 0", "it ended with code 0"),
+    "library": (
+        f"echo '{LIBRARY}' >&2; exit 1",
+        "gmsh does not start: OSError: libGLU.*; on Debian: apt install libglu1",
+    ),
+}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the stand-in is a shell script")
+@pytest.mark.parametrize("name", DEATHS)
+def test_a_worker_that_dies_is_an_error_of_the_file(files, tmp_path, monkeypatch, name):
+    text, message = DEATHS[name]
+    monkeypatch.setattr(sys, "executable", program(tmp_path, text))
+    with pytest.raises(ValueError, match=message):
+        sc.Cad(files / "torus.step", cache=False)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the stand-in is a shell script")
+def test_a_worker_that_hangs_is_ended(files, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "executable", program(tmp_path, "exec sleep 60"))
+    monkeypatch.setattr(_cad_files, "TIMEOUT", 0.2)
+    with pytest.raises(ValueError, match=r"torus.step: gmsh did not mesh it within 0.2 s; simplify the body"):
+        sc.Cad(files / "torus.step", cache=False)
+
+
+def test_modules_of_the_working_folder_are_not_imported(files, tmp_path, monkeypatch):
+    for module in ("numpy", "gmsh", "scatterers"):
+        (tmp_path / f"{module}.py").write_text("raise SystemExit('imported by accident')")
+    monkeypatch.chdir(tmp_path)
+    assert len(read_cad(files / "torus.step", None, 500, say=lambda _: None).mesh.vertices) > 400
+
+
+def test_ellipsoid_against_the_exact_one(files):
+    body, exact = opened(files / "ellipsoid.step"), EXACT["ellipsoid"]
+    assert body.quality.verdict == "smooth" and body.edges == () and body.repairs == ()
+    rng = np.random.default_rng(4)
+    s = rng.normal(size=(2000, 3))
+    points = exact.forward(s / np.linalg.norm(s, axis=1, keepdims=True))
+    found = project(body, points)
+    n = normal(exact, points)
+    along = np.cross(n, rng.normal(size=n.shape))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    kappa = [
+        np.einsum("ni,nij,nj->n", along, b.hessian(x), along) / np.linalg.norm(b.gradient(x), axis=1)
+        for b, x in ((body, found), (exact, points))
+    ]
+    # twice what was measured
+    assert np.sqrt(np.mean(np.sum((found - points) ** 2, axis=1))) < 1e-6
+    assert np.sqrt(np.mean(np.sum((normal(body, found) - n) ** 2, axis=1))) < 2e-5
+    off = float(np.sqrt(np.mean((kappa[0] - kappa[1]) ** 2)))
+    assert off < 4e-4
+    assert off < body.fit.normal_curvature_error < 10 * off
+    lines = [cr.shadow_line(b, (1.0, 1.0, 1.0)).curves[0].length for b in (body, exact)]
+    assert lines[0] == pytest.approx(lines[1], abs=1e-5)
+
+
+def test_second_opening_takes_the_fit_from_the_cache(files, tmp_path, monkeypatch):
+    said = [], []
+    path = files / "ellipsoid.step"
+    first = sc.Cad(path, points=2000, cache=tmp_path, progress=said[0].append)
+    assert said[0][0] == "reading the CAD file" and any("fitting" in line for line in said[0])
+
+    def forbidden(*_, **__):
+        raise AssertionError("gmsh was asked")
+
+    monkeypatch.setattr(_cad_files, "_meshed", forbidden)
+    second = sc.Cad(str(path), points=2000, cache=tmp_path, progress=said[1].append)
+    assert said[1] == [] and second.fingerprint == first.fingerprint and second.fit == first.fit
+    # other points are another fit
+    with pytest.raises(AssertionError, match="gmsh was asked"):
+        sc.Cad(path, points=2100, cache=tmp_path)
+    assert Path(tmp_path / f"{first._identity()}.npz").is_file()
