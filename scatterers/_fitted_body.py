@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from scatterers._samples import Samples
 from scatterers._star import star_map
 from scatterers._tensor_spline import TensorSpline, evaluated
 
+if TYPE_CHECKING:
+    from scatterers._monge_atlas import MongeAtlas
+
 FloatArray = NDArray[np.float64]
 Say = Callable[[str], None]
 COARSER = 1.35
@@ -27,6 +30,7 @@ EXCESS = 1.01
 """by this factor."""
 NORMAL_WEIGHT = 0.1
 """Of the normals of noisy points: from jets they are noisier than the points."""
+CHARTS = "charts-"
 ROUGH = 2.0
 """Edges about a rough point within which nothing is trusted."""
 FEWEST = 0.1
@@ -114,17 +118,20 @@ class FittedBody(SplineBody):
         """Take the fit from the cache, or make the points and fit them."""
         folder = _fit_cache.cache_folder() if cache is True else Path(str(cache)) if cache else None
         found = None if folder is None else _fit_cache.load(folder, key)
-        if found is None:
-            arrays, text = self._fitted(make(), say)
-            if folder is not None and (trouble := _fit_cache.store(folder, key, arrays, text)):
-                say(trouble)
-        else:
-            arrays, text = found
+        arrays, text = found or self._fitted(make(), say)
         self.fit = FitReport.from_json(text["fit"])
         self._text = text
         self._rough, self._reach = arrays["rough"], float(text["reach"])
+        self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(_unpacked(arrays, "fine"), key, speed)
         self.coarser = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
+        if found is None and folder is not None:
+            if not self.star_shaped:
+                say("charts")
+                charts = cast("MongeAtlas", self.atlas).arrays()
+                arrays |= {CHARTS + name: array for name, array in charts.items()}
+            if trouble := _fit_cache.store(folder, key, arrays, text):
+                say(trouble)
 
     def _fitted(self, cloud: PointCloud, say: Say) -> tuple[dict[str, FloatArray], dict[str, Any]]:
         """Arrays and text of the fits, checked."""

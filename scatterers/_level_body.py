@@ -4,8 +4,10 @@ A star-shaped body, upright or along a bent spine, has the sphere map of `scatte
 other body has the Monge charts of `scatterers._monge_atlas`.
 """
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +41,8 @@ class LevelBody(Body):
     # places where the body is not smooth, and how far from them rays are not trusted
     _rough: FloatArray = np.zeros((0, 3))
     _reach: float = 0.0
+    # charts found before
+    _charts: Mapping[str, FloatArray] = MappingProxyType({})
 
     def _place(self, space: SpaceLevel, samples: Samples, sphere_map: RadialMap | None) -> None:
         """Take F, its samples and the sphere map, None for a body that has none."""
@@ -56,11 +60,17 @@ class LevelBody(Body):
     @property
     def fingerprint(self) -> str | None:
         """Text that changes with the shape or the speed; None if the speed cannot be named."""
+        parts = [self._identity()]
+        if self._map is None:
+            # what is stored on charts belongs to these charts
+            parts.append(f"charts={cast('MongeAtlas', self.atlas).digest}")
         speed = getattr(self, "speed", None)
-        if speed is None:
-            return f"{type(self).__name__}({self._identity()})"
-        named = getattr(speed, "fingerprint", None)
-        return None if named is None else f"{type(self).__name__}({self._identity()}, speed={named})"
+        if speed is not None:
+            named = getattr(speed, "fingerprint", None)
+            if named is None:
+                return None
+            parts.append(f"speed={named}")
+        return f"{type(self).__name__}({', '.join(parts)})"
 
     @property
     def bounds(self) -> FloatArray:
@@ -119,5 +129,7 @@ class LevelBody(Body):
         from scatterers._cloud import body_cloud
         from scatterers._monge_atlas import MongeAtlas
 
+        if self._charts:
+            return MongeAtlas.restored(self.level, self.gradient, self._charts)
         cloud = body_cloud(self.level, self.gradient, self._bounds, CLOUD)
         return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)

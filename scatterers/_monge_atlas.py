@@ -8,7 +8,7 @@ least rotation that takes N to n,
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -124,6 +124,19 @@ class MongeAtlas:
             best[some], chart[some], uv[some] = score[valid], number[valid], 0.5 + 0.5 * t[valid]
         uv = uv.clip(0.5 - 0.5 * p[OUTSIDE], 0.5 + 0.5 * p[OUTSIDE])
         return chart.reshape(points.shape[:-1]), uv.reshape(*points.shape[:-1], 2)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """All that `restored` needs besides F."""
+        graphs = self.graphs
+        found = {"centres": graphs.centres, "axes": graphs.axes, "half": graphs.half, "bend": graphs.bend}
+        return found | {"parameters": self.parameters}
+
+    @classmethod
+    def restored(cls, level: Field, gradient: Field, arrays: Mapping[str, FloatArray]) -> "MongeAtlas":
+        """The atlas whose `arrays` these are, of the same F."""
+        parts = (np.ascontiguousarray(arrays[name], dtype=float) for name in ("centres", "axes", "half", "bend"))
+        graphs = MongeCharts(level, gradient, *parts)
+        return cls(graphs, np.ascontiguousarray(arrays["parameters"], dtype=float))
 
     @property
     def digest(self) -> str:

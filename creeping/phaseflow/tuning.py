@@ -99,7 +99,7 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
             plan = _scaled(plan, 0.6)
         for _ in range(6):
             say(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
-            built = build_direct(body, model, plan, say, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-9)))
+            built = build_direct(body, model, plan, say, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
             result = _measured(built, request, cost)
             assert result.growth is not None
             reached = result.growth.bound if request.length else result.error.rms
