@@ -125,6 +125,7 @@ class FittedBody(SplineBody):
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(_unpacked(arrays, "fine"), key, speed)
         self.coarser = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
+        self.coarser._rough, self.coarser._reach = self._rough, self._reach
         if found is None and folder is not None:
             if not self.star_shaped:
                 say("charts")

@@ -263,7 +263,7 @@ def _check_whole(name: str, suffix: str, data: bytes) -> None:
     elif suffix == ".off":
         lines = [line for line in (raw.partition(b"#")[0].split() for raw in data.splitlines()) if line]
         numbers = [word for line in lines[:2] for word in line if word.isdigit()]
-        held = len(lines) - (1 if len(lines[0]) > 1 else 2)
+        held = len(lines) - (1 if lines and len(lines[0]) > 1 else 2)
         if len(numbers) >= 2 and held < int(numbers[0]) + int(numbers[1]):
             raise ValueError(f"{cut}: its header states {int(numbers[0]) + int(numbers[1])} rows, it has {held}")
 
