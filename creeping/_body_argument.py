@@ -29,7 +29,7 @@ Units = Annotated[
     Parameter(help="Unit of a file's numbers: m, mm, cm, um, in, ft or km; lengths are metres from there on."),
 ]
 AllowRough = Annotated[
-    bool, Parameter(negative="", help="Take a file that is not smooth everywhere: rays end where it is not.")
+    bool, Parameter(negative="", help="Take a body with tips or other rough places: rays end there.")
 ]
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
 
@@ -57,22 +57,26 @@ def parse_body(
     is_file = suffix in MESHES + CAD
     if units is not None and not is_file:
         raise InvalidInputError(f"--units belongs to a file; {text!r} is none")
+    name, _, rest = text.partition(":")
+    if name in BODIES and allow_rough:
+        raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is smooth")
+    if not (is_file or name in BODIES or _like_expression(text)):
+        raise InvalidInputError(
+            f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
+            f"({', '.join(MESHES + CAD)}), or an expression in x, y, z"
+        )
     try:
         if is_file:
             kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
             shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=say)
             return _with_charts(shape, say)
-        name, _, rest = text.partition(":")
         if name in BODIES:
             return _named(name, rest, speed)
-        if not _like_expression(text):
-            raise InvalidInputError(
-                f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
-                f"({', '.join(MESHES + CAD)}), or an expression in x, y, z"
-            )
         if say:
             say("examining the expression")
-        return _with_charts(scatterers.Implicit(text, speed=speed), say)
+        return _with_charts(scatterers.Implicit(text, allow_rough=allow_rough, speed=speed), say)
+    except InvalidInputError:
+        raise
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{text if len(text) < 60 else text[:57] + '...'}: {error}") from error
     except ModuleNotFoundError as error:

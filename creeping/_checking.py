@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping._body_argument import MESHES, AllowRough, Body, SpeedOption, Units, parse_body
+from creeping._body_argument import CAD, MESHES, AllowRough, Body, SpeedOption, Units, parse_body
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 Wavenumber = Annotated[float | None, Parameter(help="k, 1/L: the size of a file's body in wavelengths, too.")]
@@ -34,9 +34,14 @@ def check(
 
     if wavenumber is not None and not 0 < wavenumber < float("inf"):
         raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
+    suffix = Path(body).suffix.lower()
+    if output is not None and suffix not in MESHES:
+        raise InvalidInputError(f"-o is for the picture of a mesh ({', '.join(MESHES)}); {body!r} is none")
+    if wavenumber is not None and suffix not in MESHES + CAD:
+        raise InvalidInputError(f"--wavenumber tells the size of a file's body; {body!r} is no file")
     answer: dict[str, Any] = {}
     texts: list[str] = []
-    if Path(body).suffix.lower() in MESHES:
+    if suffix in MESHES:
         _mesh(body, units, wavenumber, output, answer, texts)
     ok = True
     try:

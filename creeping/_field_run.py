@@ -67,16 +67,22 @@ class Job:
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
         }
-        uncertain = far_field_uncertainty(
-            fan, far.directions, wavenumber=self.wavenumber, boundary=self.boundary, order=ORDER
-        )
-        if uncertain is not None:
-            known = uncertain[np.isfinite(uncertain)]
-            entry["uncertain_by"] = {
-                "rms": float(np.sqrt(np.mean(known**2))) if len(known) else None,
-                "max": float(np.max(known, initial=0.0)),
-            }
+        if hasattr(fan.body, "coarser"):
+            entry["uncertain_by"] = self._uncertainty(far, fan)
         return entry, names
+
+    def _uncertainty(self, far: FarField, fan: RayFan) -> dict[str, Any]:
+        """Rms and largest change on the coarser body, or why there is none to tell."""
+        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
+        try:
+            change = far_field_uncertainty(fan, far.directions, **asked)
+        except CreepingError as error:
+            # the coarser body may have a shadow line that cannot be followed
+            return {"rms": None, "max": None, "reason": str(error)}
+        known = np.zeros(0) if change is None else change[np.isfinite(change)]
+        if not len(known):
+            return {"rms": None, "max": None, "reason": "no direction has a finite field on both bodies"}
+        return {"rms": float(np.sqrt(np.mean(known**2))), "max": float(known.max()), "reason": None}
 
     def _write(self, far: FarField, fan: RayFan, output: Path, backend: str) -> list[str]:
         names = ["far.csv"]

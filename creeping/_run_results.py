@@ -119,10 +119,9 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             f"|f| up to {f['largest']:.4g}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
         )
         if "uncertain_by" in f:
-            rows.append(
-                f"error of the field because of the body: rms {f['uncertain_by']['rms']:.1e}, max "
-                f"{f['uncertain_by']['max']:.1e}"
-            )
+            off = f["uncertain_by"]
+            known = off["reason"] or f"rms {off['rms']:.1e}, max {off['max']:.1e}"
+            rows.append(f"error of the field because of the body: {known}")
     rows.append(f"{summary['iso_phase_curves']} iso-phase curves; 3-D picture by {summary['drawn_by']}")
     rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
     return "\n".join(rows)

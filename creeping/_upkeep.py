@@ -66,10 +66,15 @@ def clear_maps() -> int:
     """Remove every stored map and fitted body."""
     import shutil
 
+    from scatterers import _fit_cache
+
     folders, files = _stored(), _fits()
     for folder in folders:
         shutil.rmtree(folder)
     for file in files:
+        file.unlink(missing_ok=True)
+    # of processes that were ended while they wrote
+    for file in _fit_cache.cache_folder().glob(".writing-*"):
         file.unlink(missing_ok=True)
     print(f"removed {len(folders)} maps and {len(files)} fitted bodies")
     return 0

@@ -65,11 +65,12 @@ def read_cad(path: Path, units: str | None, points: int, *, say: Callable[[str],
     """
     from scatterers._mesh_topology import cleaned, oriented
 
-    kind = _kind(path)
-    scale = _scale(path, kind, units)
+    kind = kind_of(path)
     if importlib.util.find_spec("gmsh") is None:
         raise ModuleNotFoundError("CAD files need gmsh: pip install 'creeping[cad]'", name="gmsh")
     found = _meshed(path, points)
+    # a file cut short may have lost its unit: gmsh says more of it
+    scale = _scale(path, kind, units)
     number = np.zeros(int(found["nodes"].max(initial=0)) + 1, dtype=np.int64)
     number[found["nodes"]] = np.arange(len(found["nodes"]))
     used, triangles = np.unique(number[found["triangles"]], return_inverse=True)
@@ -91,10 +92,13 @@ def read_cad(path: Path, units: str | None, points: int, *, say: Callable[[str],
     return CadPoints(mesh, normals, edges, mesh.vertices[sharp])
 
 
-def _kind(path: Path) -> str:
+def kind_of(path: Path) -> str:
+    """STEP, IGES or BREP, by name and beginning, or ValueError; nothing else of the file is read."""
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
         raise ValueError(f"{path.name} is none of {', '.join(SUFFIXES)}; export the body as STEP")
+    if not path.is_file():
+        raise ValueError(f"{path} is no file; give the path of a CAD file")
     size = path.stat().st_size
     if size == 0 or size > LARGEST:
         raise ValueError(f"{path.name} has {size} bytes; give a CAD file of at most {LARGEST}")
@@ -115,7 +119,11 @@ def _scale(path: Path, kind: str, units: str | None) -> float:
             raise ValueError(f'{path.name} does not state its unit; give e.g. units="mm"')
         # nothing is converted where nothing is stated
         return UNITS[units]
-    if units is not None and stated is not None and stated != units:
+    if stated is None:
+        raise ValueError(
+            f"{path.name} does not state its unit of length, or one that is none of {', '.join(UNITS)}; export it again"
+        )
+    if units is not None and stated != units:
         raise ValueError(f"{path.name} is in {stated}, not in {units}; leave units out")
     return MILLIMETRE
 

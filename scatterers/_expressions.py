@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
 MAX_LENGTH = 2000
 MAX_POWER = 64
-MAX_DEPTH = 60
+MAX_DEPTH = 120
 LARGEST = 1e12
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-SCHEMA = 3
+SCHEMA = 4
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
+ARRAYS = {"rough", "badness", "fine-coefficients", "fine-grid", "coarse-coefficients", "coarse-grid"}
 
 
 def cache_folder() -> Path:
@@ -46,7 +47,9 @@ def load(folder: Path, key: str) -> tuple[dict[str, FloatArray], dict[str, Any]]
         with np.load(io.BytesIO(whole[DIGEST:]), allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         text = json.loads(arrays.pop("text").tobytes())
-    except (OSError, ValueError, KeyError):
+        if not (ARRAYS <= arrays.keys() and {"fit", "reach", "quality", "repairs"} <= text.keys()):
+            return None
+    except (OSError, ValueError, KeyError, AttributeError):
         return None
     return arrays, text
 

@@ -1,6 +1,7 @@
 """Bodies fitted to points and normals: two fits, their difference, and the checks before anything is traced."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -59,6 +60,8 @@ class PointCloud:
         Signed distance from the body, (k, 3) -> (k,); NaN where it is not known.
     mean_curvature : (n,), 1/L, or None
         At the points, NaN where it is not known; None for noisy points.
+    badness : (k,)
+        Of the source's points; see `scatterers._mesh_quality.MeshQuality`.
     """
 
     points: FloatArray
@@ -69,6 +72,7 @@ class PointCloud:
     rough: FloatArray
     distance: Callable[[FloatArray], FloatArray]
     mean_curvature: FloatArray | None
+    badness: FloatArray
 
     @property
     def reach(self) -> float:
@@ -116,12 +120,15 @@ class FittedBody(SplineBody):
 
     def _open(self, key: str, cache: bool | str | Path, speed: Any, make: Callable[[], PointCloud], say: Say) -> None:
         """Take the fit from the cache, or make the points and fit them."""
+        self.speed = speed
+        # before the fit: it may take minutes
+        self._set_speed()
         folder = _fit_cache.cache_folder() if cache is True else Path(str(cache)) if cache else None
         found = None if folder is None else _fit_cache.load(folder, key)
         arrays, text = found or self._fitted(make(), say)
         self.fit = FitReport.from_json(text["fit"])
         self._text = text
-        self._rough, self._reach = arrays["rough"], float(text["reach"])
+        self._rough, self._reach, self._badness = arrays["rough"], float(text["reach"]), arrays["badness"]
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(_unpacked(arrays, "fine"), key, speed)
         self.coarser = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
@@ -129,8 +136,10 @@ class FittedBody(SplineBody):
         if found is None and folder is not None:
             if not self.star_shaped:
                 say("charts")
-                charts = cast("MongeAtlas", self.atlas).arrays()
-                arrays |= {CHARTS + name: array for name, array in charts.items()}
+                # a body without them can still be looked at; who needs them is told
+                with suppress(ValueError):
+                    charts = cast("MongeAtlas", self.atlas).arrays()
+                    arrays |= {CHARTS + name: array for name, array in charts.items()}
             if trouble := _fit_cache.store(folder, key, arrays, text):
                 say(trouble)
 
@@ -144,12 +153,29 @@ class FittedBody(SplineBody):
                 f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
                 "of 1; it is too thin or too curved for the distance of its points: refine the mesh there"
             )
-        arrays = {"rough": cloud.rough} | _packed(fine.spline, "fine") | _packed(coarse.spline, "coarse")
+        arrays = (
+            {"rough": cloud.rough, "badness": cloud.badness}
+            | _packed(fine.spline, "fine")
+            | _packed(coarse.spline, "coarse")
+        )
         return arrays, {"fit": report.to_json(), "reach": cloud.reach} | self._notes()
 
     def _notes(self) -> dict[str, Any]:
         """What a subclass keeps beside the fit."""
         return {}
+
+
+def checked_options(units: Any, allow_rough: Any, cache: Any, progress: Any) -> Say:
+    """What to call with progress; ValueError or TypeError on options that are none."""
+    if units is not None and not isinstance(units, str):
+        raise ValueError(f'units = {units!r} is no text; give e.g. units="mm"')
+    if not isinstance(allow_rough, bool):
+        raise ValueError(f"allow_rough = {allow_rough!r} is neither True nor False")
+    if not isinstance(cache, (bool, str, Path)):
+        raise ValueError(f"cache = {cache!r} is neither True, False nor a folder")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress = {progress!r} cannot be called; give a function of one text")
+    return progress or (lambda _: None)
 
 
 def fits(cloud: PointCloud, say: Say) -> tuple[Fitted, Fitted, float]:
@@ -243,9 +269,9 @@ def _require_one_body(samples: Samples) -> None:
     if len(bodies) == 1 and not samples.has_cavity() and np.all(samples.on_faces() > 0):
         return
     raise ValueError(
-        f"the fit has failed: F = 0 falls into {len(bodies)} parts"
+        f"the fit has failed: F = 0 falls into {len(bodies)} parts on a grid of spacing {samples.spacing[0]:.3g} m"
         + (" with a cavity" if samples.has_cavity() else "")
-        + "; the mesh is too coarse for parts of the body: refine it"
+        + "; parts of the body are too thin for its mesh, or it has edges: refine it, round them off"
     )
 
 

@@ -7,7 +7,7 @@ other body has the Monge charts of `scatterers._monge_atlas`.
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 # where xx, yy, zz, yz, xz, xy stand in a matrix
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-CLOUD = 25_000
-"""Points of the body by which charts are chosen."""
+CLOUDS = (25_000, 100_000)
+"""Points of the body by which charts are chosen, the more if the fewer do not do."""
 MARGIN = 0.4
 """How far charts reach beyond their squares: fewer charts than with more, for maps of at least 15 nodes a side."""
 
@@ -47,7 +47,7 @@ class LevelBody(Body):
     def _place(self, space: SpaceLevel, samples: Samples, sphere_map: RadialMap | None) -> None:
         """Take F, its samples and the sphere map, None for a body that has none."""
         self._space, self._map = space, sphere_map
-        for made in ("compiled", "atlas"):
+        for made in ("compiled", "atlas", "_rough_tree"):
             self.__dict__.pop(made, None)
         low, high = samples.inside
         reach = np.stack([low - 1.5 * samples.spacing, high + 1.5 * samples.spacing])
@@ -97,12 +97,18 @@ class LevelBody(Body):
     def rough(self, points: FloatArray) -> NDArray[np.bool_]:
         """Whether points (..., 3) lie where the body is not smooth enough for creeping rays: (...)."""
         points = np.asarray(points, dtype=float)
-        if not len(self._rough):
-            return np.zeros(points.shape[:-1], dtype=bool)
+        found = np.zeros(points.shape[:-1], dtype=bool)
+        if len(self._rough):
+            finite = np.all(np.isfinite(points), axis=-1)
+            distance, _ = self._rough_tree.query(points[finite], distance_upper_bound=self._reach)
+            found[finite] = np.isfinite(distance)
+        return found
+
+    @cached_property
+    def _rough_tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        distance, _ = cKDTree(self._rough).query(points, distance_upper_bound=self._reach)
-        return np.asarray(np.isfinite(distance))
+        return cKDTree(self._rough)
 
     def parameters(self, points: FloatArray) -> FloatArray:
         """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi]: (..., 3) -> (..., 2).
@@ -131,5 +137,15 @@ class LevelBody(Body):
 
         if self._charts:
             return MongeAtlas.restored(self.level, self.gradient, self._charts)
-        cloud = body_cloud(self.level, self.gradient, self._bounds, CLOUD)
-        return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)
+        for count in CLOUDS[:-1]:
+            cloud = body_cloud(self.level, self.gradient, self._bounds, count)
+            try:
+                return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)
+            except ValueError:
+                # parts may be finer than the points
+                continue
+        cloud = body_cloud(self.level, self.gradient, self._bounds, CLOUDS[-1])
+        try:
+            return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)
+        except ValueError as error:
+            raise ValueError(f"the body is too thin, or too sharply curved, in places for charts: {error}") from None

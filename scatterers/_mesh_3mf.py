@@ -21,7 +21,7 @@ DEEPEST = 16
 MOST_PARTS = 1000
 
 
-def read_3mf(data: bytes, limit: int) -> tuple[FloatArray, IntArray, str]:
+def read_3mf(data: bytes, limit: int, most_triangles: int) -> tuple[FloatArray, IntArray, str]:
     """Vertices (n, 3) in the file's unit, triangles (m, 3) and the unit's name.
 
     Raises
@@ -39,7 +39,7 @@ def read_3mf(data: bytes, limit: int) -> tuple[FloatArray, IntArray, str]:
         raise ValueError(f"its model is broken XML ({error})") from None
     except KeyError as error:
         raise ValueError(f"an element of its model lacks the attribute {error}") from None
-    return model.placed()
+    return model.placed(most_triangles)
 
 
 def _part(data: bytes, limit: int) -> bytes:
@@ -92,17 +92,22 @@ class _Model:
                 placed = (attributes["objectid"], _matrix(attributes.get("transform")))
                 (self.items if kind == "item" else self.components[self.object]).append(placed)
 
-    def placed(self) -> tuple[FloatArray, IntArray, str]:
+    def placed(self, most_triangles: int) -> tuple[FloatArray, IntArray, str]:
         """All objects that are built, each where it is put."""
         vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
         waiting = [(name, matrix, 0) for name, matrix in self.items]
-        parts = 0
+        parts, repeated = 0, 0
         while waiting:
             name, matrix, depth = waiting.pop()
             parts += 1
-            if depth > DEEPEST or parts > MOST_PARTS:
+            inside = self.components.get(name, [])
+            if depth > DEEPEST or parts + len(waiting) + len(inside) > MOST_PARTS:
                 raise ValueError(f"its components are nested deeper than {DEEPEST} or more than {MOST_PARTS}")
-            waiting += [(inner, np.asarray(m @ matrix), depth + 1) for inner, m in self.components.get(name, [])]
+            # each placement repeats its triangles
+            repeated += len(self.triangles.get(name, ()))
+            if repeated > most_triangles:
+                raise ValueError(f"its objects, each where it is placed, have more than {most_triangles} triangles")
+            waiting += [(inner, np.asarray(m @ matrix), depth + 1) for inner, m in inside]
             if self.triangles.get(name):
                 points = np.array(self.vertices.get(name, []), dtype=float).reshape(-1, 3)
                 corners = np.array(self.triangles[name], dtype=np.int64)

@@ -147,6 +147,25 @@ def _from_object(source: Any) -> _Raw:
 
 
 def _from_file(source: Any) -> _Raw:
+    path, data = mesh_bytes(source)
+    name, suffix = path.name, path.suffix.lower()
+    _check_whole(name, suffix, data)
+    try:
+        vertices, triangles, stated = _loaded(data, suffix)
+    except Exception as error:  # the loaders raise whatever their parsing runs into
+        text = str(error) or type(error).__name__
+        raise ValueError(f"{name} cannot be read as {suffix[1:].upper()}: {text}; export it again") from None
+    return _Raw(name, vertices, triangles, stated, suffix != ".stl")
+
+
+def mesh_bytes(source: Any) -> tuple[Path, bytes]:
+    """Path of a mesh file and what it holds, read only if it is a file of a known kind and size.
+
+    Raises
+    ------
+    ValueError
+        If it is not.
+    """
     try:
         path = Path(source)
     except TypeError:
@@ -169,13 +188,7 @@ def _from_file(source: Any) -> _Raw:
         raise ValueError(f"{name} cannot be opened: {error.strerror}") from None
     if not data:
         raise ValueError(f"{name} is empty; export it again")
-    _check_whole(name, suffix, data)
-    try:
-        vertices, triangles, stated = _loaded(data, suffix)
-    except Exception as error:  # the loaders raise whatever their parsing runs into
-        text = str(error) or type(error).__name__
-        raise ValueError(f"{name} cannot be read as {suffix[1:].upper()}: {text}; export it again") from None
-    return _Raw(name, vertices, triangles, stated, suffix != ".stl")
+    return path, data
 
 
 @contextmanager
@@ -202,7 +215,7 @@ class _Nothing:
 def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None]:
     """Vertices and triangles of everything in the file, and the unit it states."""
     if suffix == ".3mf":
-        return read_3mf(data, MOST_BYTES)
+        return read_3mf(data, MOST_BYTES, MOST_TRIANGLES)
     import trimesh
 
     with warnings.catch_warnings(), _quiet("trimesh"):
@@ -218,8 +231,13 @@ def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None]
         )
     vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
     stated = {getattr(geometry, "units", None) for geometry in scene.geometry.values()}
+    placed = 0
     for node in scene.graph.nodes_geometry:
         matrix, key = scene.graph[node]
+        # each placement repeats its triangles
+        placed += len(getattr(scene.geometry[key], "faces", ()))
+        if placed > MOST_TRIANGLES:
+            raise ValueError(f"its meshes, each where it is placed, have more than {MOST_TRIANGLES} triangles")
         if len(getattr(scene.geometry[key], "faces", ())):
             points = np.array(scene.geometry[key].vertices, dtype=float)
             corners = np.array(scene.geometry[key].faces, dtype=np.int64)

@@ -89,7 +89,7 @@ class MeshQuality:
         Vertices at which the curvature jumps.
     badness : (n,)
         max(|n_4 - n_6|, e |kappa_4 - kappa_6| / 3) at the vertices, and |n_6 - n| where that exceeds 0.5, to be drawn
-        on the mesh; empty if read back.
+        on the mesh.
     verdict : {"smooth", "noisy", "sharp", "curvature jumps", "too coarse"}
     reasons : str
         What the verdict rests on and what helps.
@@ -127,12 +127,12 @@ class MeshQuality:
         return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in found.items()}
 
     @classmethod
-    def from_json(cls, content: dict[str, Any]) -> "MeshQuality":
-        """The figures again, with no ``badness``."""
+    def from_json(cls, content: dict[str, Any], badness: FloatArray) -> "MeshQuality":
+        """The figures again, with the ``badness`` that is kept apart."""
         values: dict[str, Any] = {
             name: np.array(v, dtype=float) if isinstance(v, list) else v for name, v in content.items()
         }
-        return cls(**values, badness=np.empty(0))
+        return cls(**values, badness=badness)
 
     def summary(self, wavenumber: float | None = None) -> str:
         """Table of the figures, in wavelengths, too, for a wavenumber in 1/m.

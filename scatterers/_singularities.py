@@ -1,4 +1,4 @@
-"""Places of F = 0 that are not smooth: where grad F = 0, and where the curvature has no bound."""
+"""Places of F = 0 that are not smooth: where grad F = 0, where the normal jumps, where the curvature has no bound."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ FloatArray = NDArray[np.float64]
 SINGULAR = 1e-6
 """|grad F| on the body, relative to its median there, below which a point is singular."""
 SUSPECTS = 200
+HALVINGS = 30
+CLOSE, EDGE = 1e-6, 1e-3
+"""Cells between two points, and the turn of the normal, radians, from one to the other that makes an edge."""
 CLOSER = 60
 """Steps of the search for kinks, each 0.7 times as wide as the last: it ends 1e-10 cells from where it leads."""
 SHARPEST = 1e8
@@ -46,6 +49,53 @@ def singular_points(compiled: Compiled, points: FloatArray, size: float) -> Floa
     found = at[near & flat & (np.abs(value) < SINGULAR * typical * size)]
     _, first = np.unique((found / (1e-6 * size)).round(), axis=0, return_index=True)
     return np.asarray(found[first])
+
+
+def refuse_edges(compiled: Compiled, points: FloatArray, spacing: float) -> None:
+    """ValueError if the normals on both sides of a place do not come together, as pieces of F that do not join do.
+
+    Between neighbours whose normals differ most, the body is halved again and again, towards the larger turn.
+    """
+    from scipy.spatial import cKDTree
+
+    points = _onto(compiled, points, spacing)
+    points = points[np.all(np.isfinite(points), axis=1)]
+    _, near = cKDTree(points).query(points, k=min(7, len(points)))
+    a, b = (v.ravel() for v in np.broadcast_arrays(near[:, :1], near[:, 1:]))
+    turn = np.linalg.norm(_normals(compiled, points[a]) - _normals(compiled, points[b]), axis=1)
+    most = np.argsort(-np.nan_to_num(turn))[:SUSPECTS]
+    a, b = points[a[most]], points[b[most]]
+    for _ in range(HALVINGS):
+        middle = _onto(compiled, 0.5 * (a + b), spacing)
+        n = [_normals(compiled, one) for one in (a, middle, b)]
+        first = np.linalg.norm(n[1] - n[0], axis=1) >= np.linalg.norm(n[2] - n[1], axis=1)
+        a, b = np.where(first[:, None], a, middle), np.where(first[:, None], middle, b)
+    left = np.linalg.norm(_normals(compiled, a) - _normals(compiled, b), axis=1)
+    # across a thin part the middle may lead elsewhere, and nothing is learnt
+    left[~(np.linalg.norm(a - b, axis=1) < CLOSE * spacing)] = 0.0
+    if np.any(bad := left > EDGE):
+        at = tuple(a[np.argmax(np.nan_to_num(left))].round(6).tolist())
+        raise ValueError(
+            f"F = 0 is not smooth: its normal jumps by up to {np.degrees(np.nanmax(left)):.2g} degrees near {at} "
+            f"({int(bad.sum())} of {len(bad)} searches); an edge there has no creeping rays: round it off in F"
+        )
+
+
+def _normals(compiled: Compiled, points: FloatArray) -> FloatArray:
+    gradient = evaluated(compiled, points)[1]
+    with np.errstate(all="ignore"):
+        return np.asarray(gradient / np.linalg.norm(gradient, axis=1, keepdims=True))
+
+
+def _onto(compiled: Compiled, points: FloatArray, reach: float) -> FloatArray:
+    """Newton steps along grad F, none longer than ``reach``."""
+    for _ in range(6):
+        value, gradient, _ = evaluated(compiled, points)
+        slope = np.linalg.norm(gradient, axis=1)
+        with np.errstate(all="ignore"):
+            step = (np.clip(value / slope, -reach, reach) / slope)[:, None] * gradient
+        points = points - np.where(np.isfinite(step), step, 0.0)
+    return points
 
 
 def refuse_kinks(compiled: Compiled, points: FloatArray, spacing: float, size: float) -> None:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers._cad_files import read_cad
+from scatterers._cad_files import kind_of, read_cad
 from scatterers._fit_cache import key_of
-from scatterers._fitted_body import FittedBody, PointCloud
+from scatterers._fitted_body import FittedBody, PointCloud, checked_options
 from scatterers._jet_points import signed_distance
 from scatterers._jets import osculating_jets
 from scatterers._mesh_quality import MeshQuality, assess
@@ -74,16 +74,19 @@ class Cad(FittedBody):
         speed: Any = None,
         progress: Callable[[str], None] | None = None,
     ) -> None:
-        if isinstance(points, bool) or not isinstance(points, int) or not 500 <= points <= 200_000:
+        if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or not 500 <= points <= 200_000:
             raise ValueError(f"points = {points!r}; give a whole number from 500 to 200000")
-        say = progress or (lambda _: None)
+        points = int(points)
+        say = checked_options(units, allow_rough, cache, progress)
         try:
+            # before all of it is read
+            kind_of(Path(path))
             content = Path(path).suffix.lower().encode() + b"\0" + Path(path).read_bytes()
         except (TypeError, OSError) as error:
             raise ValueError(f"{path} cannot be read: {error}") from None
-        key = key_of("cad", content, units=units, points=points, allow_rough=bool(allow_rough))
-        self._open(key, cache, speed, lambda: self._points(Path(path), units, points, bool(allow_rough), say), say)
-        self.quality = MeshQuality.from_json(self._text["quality"])
+        key = key_of("cad", content, units=units, points=points, allow_rough=allow_rough)
+        self._open(key, cache, speed, lambda: self._points(Path(path), units, points, allow_rough, say), say)
+        self.quality = MeshQuality.from_json(self._text["quality"], self._badness)
         self.repairs = tuple(self._text["repairs"])
         self.edges = tuple(self._text["edges"])
 
@@ -104,7 +107,9 @@ class Cad(FittedBody):
         normals = np.where(np.isfinite(found.normals), found.normals, jets.normals)
         mean = np.where(jets.fitted & ~quality.bad, jets.mean, np.nan)
         distance = partial(signed_distance, found.mesh.vertices, jets)
-        return PointCloud(found.mesh.vertices, normals, edge, SPACING * edge, 0.0, rough, distance, mean)
+        return PointCloud(
+            found.mesh.vertices, normals, edge, SPACING * edge, 0.0, rough, distance, mean, quality.badness
+        )
 
     def _notes(self) -> dict[str, Any]:
         return self._made

@@ -15,7 +15,7 @@ from scatterers._body_search import FINE, SIZES, examine, found_box, samples_of,
 from scatterers._expression_space import ExpressionSpace
 from scatterers._level_body import LevelBody
 from scatterers._samples import Samples
-from scatterers._singularities import refuse_kinks, singular_points
+from scatterers._singularities import refuse_edges, refuse_kinks, singular_points
 from scatterers._star import star_map
 
 FloatArray = NDArray[np.float64]
@@ -49,7 +49,7 @@ class Implicit(LevelBody):
     ------
     ValueError
         If the expression contains anything else, or F = 0 is empty, open, unbounded, not finite, not connected, has a
-        cavity, a point where grad F = 0, or unbounded curvature.
+        cavity, a point where grad F = 0, an edge, or unbounded curvature.
     """
 
     def __init__(
@@ -84,6 +84,7 @@ class Implicit(LevelBody):
             )
         if len(found):
             self._round(found, samples, given)
+        refuse_edges(self.compiled, samples.crossings(), float(samples.spacing.max()))
         refuse_kinks(self.compiled, samples.crossings(), float(samples.spacing.max()), self._diagonal)
 
     def _shape(self, expression: str, samples: Samples, centre: FloatArray | None) -> None:

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers._fit_cache import key_of
-from scatterers._fitted_body import FittedBody, PointCloud
+from scatterers._fitted_body import FittedBody, PointCloud, checked_options
 from scatterers._jet_points import centroids, signed_distance
 from scatterers._jets import Jets, angle_weighted_normals, osculating_jets
-from scatterers._mesh_files import TriangleMesh, read_mesh
+from scatterers._mesh_files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers._mesh_quality import MeshQuality, assess
 
 FloatArray = NDArray[np.float64]
@@ -74,10 +74,10 @@ class Mesh(FittedBody):
         speed: Any = None,
         progress: Callable[[str], None] | None = None,
     ) -> None:
-        say = progress or (lambda _: None)
-        key = key_of("mesh", _content(source), units=units, allow_rough=bool(allow_rough))
-        self._open(key, cache, speed, lambda: self._points(source, units, bool(allow_rough), say), say)
-        self.quality = MeshQuality.from_json(self._text["quality"])
+        say = checked_options(units, allow_rough, cache, progress)
+        key = key_of("mesh", _content(source), units=units, allow_rough=allow_rough)
+        self._open(key, cache, speed, lambda: self._points(source, units, allow_rough, say), say)
+        self.quality = MeshQuality.from_json(self._text["quality"], self._badness)
         self.repairs = tuple(self._text["repairs"])
 
     def _points(self, source: Any, units: str | None, allow_rough: bool, say: Callable[[str], None]) -> PointCloud:
@@ -96,11 +96,13 @@ class Mesh(FittedBody):
         distance = partial(signed_distance, mesh.vertices, jets)
         if quality.noise >= NOISE:
             spacing = float(np.clip(TURN / max(quality.curvature, 1e-9), CLEAN, NOISY)) * edge
-            return PointCloud(points, normals, edge, spacing, quality.noise * edge, rough, distance, None)
+            return PointCloud(
+                points, normals, edge, spacing, quality.noise * edge, rough, distance, None, quality.badness
+            )
         more = centroids(mesh.vertices, mesh.triangles, jets)
         mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more[0]), np.nan)])
         points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])
-        return PointCloud(points, normals, edge, CLEAN * edge, 0.0, rough, distance, mean)
+        return PointCloud(points, normals, edge, CLEAN * edge, 0.0, rough, distance, mean, quality.badness)
 
     def _notes(self) -> dict[str, Any]:
         return self._made
@@ -130,14 +132,13 @@ def _content(source: Any) -> bytes:
     """What the fit depends on: the file's bytes, or the object's arrays."""
     if hasattr(source, "vertices") and hasattr(source, "faces"):
         try:
-            vertices = np.ascontiguousarray(source.vertices, dtype=float)
-            faces = np.ascontiguousarray(source.faces, dtype=np.int64)
+            arrays = [np.ascontiguousarray(values) for values in (source.vertices, source.faces)]
+            if any(array.dtype.hasobject for array in arrays):
+                return b""
         except (TypeError, ValueError):
             # what is wrong with it is said when it is read
             return b""
-        stated = str(getattr(source, "units", None))
-        return json.dumps([stated, vertices.shape, faces.shape]).encode() + vertices.tobytes() + faces.tobytes()
-    try:
-        return Path(source).suffix.lower().encode() + b"\0" + Path(source).read_bytes()
-    except (TypeError, ValueError, OSError):
-        return b""
+        stated = [str(getattr(source, "units", None)), *((array.shape, str(array.dtype)) for array in arrays)]
+        return json.dumps(stated).encode() + b"".join(array.tobytes() for array in arrays)
+    path, data = mesh_bytes(source)
+    return path.suffix.lower().encode() + b"\0" + data

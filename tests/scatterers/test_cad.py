@@ -137,7 +137,7 @@ def test_units_of_iges_files(tmp_path, flag, unit):
     text = f"1H,,1H;,4HPart,9Ha,b;c,5Hd,5Hmaker,1H1,32,38,6,308,15,4HPart,1.,{flag},2HMM,1,0.01;"
     lines = [f"{text[k : k + 72]:72}G{k // 72 + 1:7}" for k in range(0, len(text), 72)]
     (tmp_path / "a.igs").write_text("\n".join([f"{'':72}S      1", *lines]))
-    assert _cad_files._kind(tmp_path / "a.igs") == "IGES"
+    assert _cad_files.kind_of(tmp_path / "a.igs") == "IGES"
     assert _cad_files._stated(tmp_path / "a.igs", "IGES") == unit
 
 
@@ -176,7 +176,7 @@ def written(name, data):
 
 
 BAD = {
-    "missing.step": (lambda folder, files: None, "missing.step cannot be read: .*No such file"),
+    "missing.step": (lambda folder, files: None, "missing.step is no file"),
     "cut.step": (cut, "cut.step: gmsh cannot read or mesh it .*; repair the body or export it anew"),
     "empty.step": (written("empty.step", b""), "empty.step has 0 bytes"),
     "noise.step": (written("noise.step", bytes(range(256)) * 9), "noise.step does not begin as STEP files do"),
@@ -198,7 +198,7 @@ def test_bad_files_are_named(files, tmp_path, name):
 
 def test_a_path_is_asked_for(tmp_path):
     for source in (None, 7, tmp_path):
-        with pytest.raises(ValueError, match="cannot be read"):
+        with pytest.raises(ValueError, match=r"cannot be read|is none of"):
             sc.Cad(source, cache=False)
     for points in (100, 10**7, 2000.0, True, "many"):
         with pytest.raises(ValueError, match=r"points = .*; give a whole number from 500 to 200000"):

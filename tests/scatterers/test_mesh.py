@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -259,7 +260,7 @@ def test_reports_print_and_survive_json():
     assert FitReport.from_json(json.loads(json.dumps(body.fit.to_json()))) == body.fit
     text = str(body.fit)
     assert f"fit: {body.fit.points} points" in text and "kappa_n" in text and len(text.splitlines()) == 4
-    again = MeshQuality.from_json(json.loads(json.dumps(body.quality.to_json())))
+    again = MeshQuality.from_json(json.loads(json.dumps(body.quality.to_json())), body.quality.badness)
     assert again.summary(10.0) == body.quality.summary(10.0)
     assert "size                       2 x 2 x 2 m" in body.quality.summary()
     assert repr(body).startswith("Mesh(mesh-") and repr(body.coarser).startswith("SplineBody(mesh-")
@@ -324,6 +325,8 @@ def test_rough_ground_is_at_the_tip_only():
     assert body.rough(np.array([1.0, 0, 0])) and rough[x > 0.98].all()
     assert not rough[x < 0.5].any()
     assert rough.mean() < 0.2
+    # or an incidence on it would be compared with rays that go on
+    np.testing.assert_array_equal(body.coarser.rough(points), rough)
     line = cr.shadow_line(body, (1.0, 0.02, 0.01))
     fan = cr.launch(cr.DirectFlow(body), line, length=2.5, n_rays=32, n_steps=50, max_gap=np.inf)
     meets = np.array([body.rough(ray).any() for ray in fan.points])
@@ -363,3 +366,29 @@ def test_almond():
     ended = fan.status == cr.RayStatus.ROUGH
     assert ended.mean() > 0.5
     assert np.all(fan.points[ended][:, :, 0].max(axis=1) > 0.4)
+
+
+@pytest.mark.parametrize(
+    "options, match",
+    [
+        ({"units": ["m"]}, "units = .* is no text"),
+        ({"allow_rough": "yes"}, "allow_rough = 'yes' is neither True nor False"),
+        ({"cache": 5}, "cache = 5 is neither True, False nor a folder"),
+        ({"cache": None}, "cache = None is neither"),
+    ],
+)
+def test_options_are_checked(options, match):
+    with pytest.raises(ValueError, match=match):
+        sc.Mesh("nowhere.stl", **options)
+
+
+def test_progress_must_be_callable():
+    with pytest.raises(TypeError, match="progress = 3 cannot be called"):
+        sc.Mesh("nowhere.stl", progress=3)
+
+
+def test_badness_comes_back_from_the_cache(tmp_path):
+    points, triangles = geodesic_sphere(1000)
+    made = [sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), cache=tmp_path) for _ in range(2)]
+    assert made[0].quality.badness.shape == (len(points),)
+    np.testing.assert_array_equal(made[1].quality.badness, made[0].quality.badness)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import scatterers as sc
 from scatterers._mesh_crossings import crossings
 from scatterers._mesh_files import TriangleMesh, read_mesh
 
@@ -371,3 +372,19 @@ def test_crossings_of_neighbours():
     assert crossings(points, np.array([[0, 1, 2], [0, 3, 4]]))[0] == 1
     assert crossings(points, np.array([[0, 1, 2], [0, 1, 5]]))[0] == 1
     assert crossings(points, np.array([[0, 1, 2], [0, 1, 4]]))[0] == 0
+
+
+def test_objects_placed_many_times_are_counted_before_they_are_made(tmp_path, monkeypatch):
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in np.eye(3))
+    triangles = '<triangle v1="0" v2="1" v3="2"/>' * 100
+    items = '<item objectid="1"/>' * 50
+    model = (
+        '<model unit="meter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>'
+        f"</resources><build>{items}</build></model>"
+    )
+    with zipfile.ZipFile(tmp_path / "bomb.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    monkeypatch.setattr("scatterers._mesh_files.MOST_TRIANGLES", 4000)
+    with pytest.raises(ValueError, match="each where it is placed, have more than 4000 triangles"):
+        sc.examined_mesh(tmp_path / "bomb.3mf")
