@@ -101,7 +101,7 @@ class Cad(FittedBody):
         if found.edges and not allow_rough:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
         if quality.verdict != "smooth" and not allow_rough:
-            raise ValueError(f"{path.name} is {quality.verdict}: {quality.reasons}")
+            raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
         rough = np.concatenate([found.mesh.vertices[quality.bad], found.rough])
         edge = quality.edge_mean
         normals = np.where(np.isfinite(found.normals), found.normals, jets.normals)
