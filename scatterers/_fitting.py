@@ -148,6 +148,17 @@ def fit(
     return equations.result(kept if watch.guided else c, done, change / spacing)
 
 
+def spacing_of(points: FloatArray, nodes: float) -> float:
+    """Spacing at which the grid about points (n, 3) has so many nodes, L."""
+    side = np.ptp(points, axis=0)
+    low, high = 0.0, float(side.max())
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        fewer = np.prod(side / middle + 2 * PADDING + 5) < nodes
+        low, high = (low, middle) if fewer else (middle, high)
+    return high
+
+
 class _Equations:
     """Samples and operators of one fit, in cells; coefficients are flat with `OVERREAD` numbers behind."""
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from scatterers._fit_cache import key_of
 from scatterers._fitted_body import FittedBody, PointCloud, checked_options
+from scatterers._fitting import spacing_of
 from scatterers._jet_points import centroids, signed_distance
 from scatterers._jets import Jets, angle_weighted_normals, osculating_jets
 from scatterers._mesh_files import TriangleMesh, mesh_bytes, read_mesh
@@ -25,6 +26,9 @@ from scatterers._mesh_quality import MeshQuality, assess
 FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0
 """Spacings of the grid in units of the mean edge: for vertices and the points between them, and for noisy vertices,"""
+GRID, ENOUGH, SMALL = 1e6, 2.0, 0.2
+"""Nodes of the largest grid wanted; the spacing, in edges, at which vertices alone do, and over the radius of curvature
+at which nothing is lost."""
 TURN = 0.5
 """but these no more than so much over the curvature."""
 NOISE = 2e-4
@@ -99,6 +103,11 @@ class Mesh(FittedBody):
             return PointCloud(
                 points, normals, edge, spacing, quality.noise * edge, rough, distance, None, quality.badness
             )
+        # very fine meshes tell more than the fit can use
+        wide = spacing_of(points, GRID)
+        if wide > ENOUGH * edge and quality.curvature * wide < SMALL * edge:
+            mean = np.where(jets.fitted, jets.mean, np.nan)
+            return PointCloud(points, normals, edge, wide, 0.0, rough, distance, mean, quality.badness)
         more = centroids(mesh.vertices, mesh.triangles, jets)
         mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more[0]), np.nan)])
         points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])

@@ -392,3 +392,18 @@ def test_badness_comes_back_from_the_cache(tmp_path):
     made = [sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), cache=tmp_path) for _ in range(2)]
     assert made[0].quality.badness.shape == (len(points),)
     np.testing.assert_array_equal(made[1].quality.badness, made[0].quality.badness)
+
+
+def test_fine_meshes_are_fitted_on_the_grid_that_suffices(monkeypatch):
+    points, triangles = geodesic_sphere(4000)
+    monkeypatch.setattr("scatterers.mesh.GRID", 20_000)
+    body = sc.Mesh(Triangles(points, triangles), cache=False)
+    assert np.prod(body.fit.nodes) <= 20_000
+    # vertices alone, and a coarser grid than theirs
+    assert body.fit.points == len(points) and body.fit.spacing > 2 * body.quality.edge_mean
+    x = project(body, points[::7])
+    hessian, gradient = body.hessian(x), body.gradient(x)
+    mean = 0.5 * (np.trace(hessian, axis1=1, axis2=2) / np.linalg.norm(gradient, axis=1))
+    n = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+    mean -= 0.5 * np.einsum("ni,nij,nj->n", n, hessian, n) / np.linalg.norm(gradient, axis=1)
+    assert rms(mean - 1) < 2e-3
