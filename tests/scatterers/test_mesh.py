@@ -4,7 +4,6 @@ import json
 import subprocess
 import sys
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -366,44 +365,3 @@ def test_almond():
     ended = fan.status == cr.RayStatus.ROUGH
     assert ended.mean() > 0.5
     assert np.all(fan.points[ended][:, :, 0].max(axis=1) > 0.4)
-
-
-@pytest.mark.parametrize(
-    "options, match",
-    [
-        ({"units": ["m"]}, "units = .* is no text"),
-        ({"allow_rough": "yes"}, "allow_rough = 'yes' is neither True nor False"),
-        ({"cache": 5}, "cache = 5 is neither True, False nor a folder"),
-        ({"cache": None}, "cache = None is neither"),
-    ],
-)
-def test_options_are_checked(options, match):
-    with pytest.raises(ValueError, match=match):
-        sc.Mesh("nowhere.stl", **options)
-
-
-def test_progress_must_be_callable():
-    with pytest.raises(TypeError, match="progress = 3 cannot be called"):
-        sc.Mesh("nowhere.stl", progress=3)
-
-
-def test_badness_comes_back_from_the_cache(tmp_path):
-    points, triangles = geodesic_sphere(1000)
-    made = [sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), cache=tmp_path) for _ in range(2)]
-    assert made[0].quality.badness.shape == (len(points),)
-    np.testing.assert_array_equal(made[1].quality.badness, made[0].quality.badness)
-
-
-def test_fine_meshes_are_fitted_on_the_grid_that_suffices(monkeypatch):
-    points, triangles = geodesic_sphere(4000)
-    monkeypatch.setattr("scatterers.mesh.GRID", 20_000)
-    body = sc.Mesh(Triangles(points, triangles), cache=False)
-    assert np.prod(body.fit.nodes) <= 20_000
-    # vertices alone, and a coarser grid than theirs
-    assert body.fit.points == len(points) and body.fit.spacing > 2 * body.quality.edge_mean
-    x = project(body, points[::7])
-    hessian, gradient = body.hessian(x), body.gradient(x)
-    mean = 0.5 * (np.trace(hessian, axis1=1, axis2=2) / np.linalg.norm(gradient, axis=1))
-    n = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
-    mean -= 0.5 * np.einsum("ni,nij,nj->n", n, hessian, n) / np.linalg.norm(gradient, axis=1)
-    assert rms(mean - 1) < 2e-3
