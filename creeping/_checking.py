@@ -41,17 +41,19 @@ def check(
         raise InvalidInputError(f"--wavenumber tells the size of a file's body; {body!r} is no file")
     answer: dict[str, Any] = {}
     texts: list[str] = []
-    if suffix in MESHES:
-        _mesh(body, units, wavenumber, output, answer, texts)
-    ok = True
+    shape, refusal = None, None
     try:
         shape = parse_body(body, speed, units=units, allow_rough=allow_rough)
     except InvalidInputError as error:
-        if not texts:
+        if suffix not in MESHES:
             raise
-        # the mesh was readable: what is known of it is worth more than the refusal alone
-        ok, answer["refused"] = False, str(error)
-        texts.append(f"refused: {error}")
+        refusal = error
+    if refusal is not None or output is not None:
+        # what is known of a mesh that can be read is worth more than the refusal alone
+        _mesh(body, units, wavenumber, output, answer, texts)
+    if shape is None:
+        ok, answer["refused"] = False, str(refusal)
+        texts.append(f"refused: {refusal}")
     else:
         ok = _surface(shape, wavenumber, answer, texts)
     answer["ok"] = ok
@@ -68,7 +70,7 @@ def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts
     if getattr(shape, "fit", None) is not None:
         answer |= {"fit": shape.fit.to_json(), "quality": shape.quality.to_json(), "repairs": list(shape.repairs)}
         if not texts:
-            texts.append(shape.quality.summary(wavenumber))
+            texts += [*shape.repairs, shape.quality.summary(wavenumber)]
         texts.append(str(shape.fit))
     texts.append(str(report))
     return report.ok

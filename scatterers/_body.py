@@ -28,10 +28,14 @@ class Body:
     def _set_speed(self) -> None:
         object.__setattr__(self, "speed", as_speed(getattr(self, "speed", None)))
 
+    def _shape_texts(self) -> list[str]:
+        """Texts that change with the shape."""
+        return [f"{f.name}={float(getattr(self, f.name)).hex()}" for f in fields(self) if f.name != "speed"]  # type: ignore[arg-type]
+
     @property
     def fingerprint(self) -> str | None:
         """Text that changes with the shape or the speed; None if the speed cannot be named."""
-        values = [f"{f.name}={float(getattr(self, f.name)).hex()}" for f in fields(self) if f.name != "speed"]  # type: ignore[arg-type]
+        values = self._shape_texts()
         speed: Any = getattr(self, "speed", None)
         if speed is not None:
             named = getattr(speed, "fingerprint", None)

@@ -10,6 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers._samples import edge_crossings
+
 FloatArray = NDArray[np.float64]
 Field = Callable[[FloatArray], FloatArray]
 # cells of the first grid, along the side of a cube of the box's volume
@@ -62,19 +64,8 @@ def body_cloud(level: Field, gradient: Field, box: FloatArray, count: int) -> Fl
 
 
 def sign_changes(values: FloatArray, origin: FloatArray, spacing: FloatArray) -> FloatArray:
-    """Points (n, 3) where F changes sign on a grid of samples (n0, n1, n2), by linear interpolation.
-
-    Nodes where F is not a number take no part.
-    """
-    found = []
-    for axis in range(3):
-        last = values.shape[axis] - 1
-        f, g = np.take(values, range(last), axis), np.take(values, range(1, last + 1), axis)
-        crossed = ((f < 0) & (g >= 0)) | ((f >= 0) & (g < 0))
-        index = np.argwhere(crossed).astype(float)
-        index[:, axis] += f[crossed] / (f[crossed] - g[crossed])
-        found.append(index)
-    index = np.concatenate(found)
+    """Points (n, 3) where F changes sign on a grid of samples (n0, n1, n2), one in each voxel of half a cell."""
+    index = edge_crossings(values)
     voxel = np.floor(2 * index).astype(np.int64)
     shape = 2 * np.array(values.shape, dtype=np.int64)
     _, first = np.unique((voxel[:, 0] * shape[1] + voxel[:, 1]) * shape[2] + voxel[:, 2], return_index=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-SCHEMA = 5
+SCHEMA = 6
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
 ARRAYS = {"rough", "badness", "fine-coefficients", "fine-grid", "coarse-coefficients", "coarse-grid"}

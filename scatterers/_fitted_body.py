@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from scatterers import _fit_cache
 from scatterers._fit_report import FitReport
-from scatterers._fitting import SMOOTHING, Fitted, fit
-from scatterers._level_body import SYMMETRIC, LevelBody
+from scatterers._fitting import SMOOTHING, Fitted, fit, tangents
+from scatterers._level_body import LevelBody
+from scatterers._mesh_quality import MeshQuality
 from scatterers._samples import Samples
 from scatterers._star import star_map
-from scatterers._tensor_spline import TensorSpline, evaluated
+from scatterers._tensor_spline import SYMMETRIC, TensorSpline, evaluated
 
 if TYPE_CHECKING:
     from scatterers._monge_atlas import MongeAtlas
@@ -31,6 +32,8 @@ EXCESS = 1.01
 """by this factor."""
 NORMAL_WEIGHT = 0.1
 """Of the normals of noisy points: from jets they are noisier than the points."""
+SECOND = 0.4
+"""Share of noisy points that the second fit sees."""
 CHARTS = "charts-"
 ROUGH = 2.0
 """Edges about a rough point within which nothing is trusted."""
@@ -60,8 +63,10 @@ class PointCloud:
         Signed distance from the body, (k, 3) -> (k,); NaN where it is not known.
     mean_curvature : (n,), 1/L, or None
         At the points, NaN where it is not known; None for noisy points.
-    badness : (k,)
-        Of the source's points; see `scatterers._mesh_quality.MeshQuality`.
+    quality : MeshQuality
+        Of the source.
+    notes : dict
+        Plain values that are kept beside the fit: ``repairs``, and what else a kind of body has to tell.
     """
 
     points: FloatArray
@@ -72,7 +77,8 @@ class PointCloud:
     rough: FloatArray
     distance: Callable[[FloatArray], FloatArray]
     mean_curvature: FloatArray | None
-    badness: FloatArray
+    quality: MeshQuality
+    notes: dict[str, Any]
 
     @property
     def reach(self) -> float:
@@ -112,6 +118,7 @@ class FittedBody(SplineBody):
     Attributes
     ----------
     fit : FitReport
+    quality : MeshQuality
     coarser : SplineBody
         The same body fitted on a coarser grid: what differs on it is uncertain.
     repairs : tuple of str
@@ -127,8 +134,10 @@ class FittedBody(SplineBody):
         found = None if folder is None else _fit_cache.load(folder, key)
         arrays, text = found or self._fitted(make(), say)
         self.fit = FitReport.from_json(text["fit"])
+        self.quality = MeshQuality.from_json(text["quality"], arrays["badness"])
+        self.repairs = tuple(text["repairs"])
         self._text = text
-        self._rough, self._reach, self._badness = arrays["rough"], float(text["reach"]), arrays["badness"]
+        self._rough, self._reach = arrays["rough"], float(text["reach"])
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(_unpacked(arrays, "fine"), key, speed)
         self.coarser = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
@@ -154,15 +163,12 @@ class FittedBody(SplineBody):
                 "of 1; it is too thin or too curved for the distance of its points: refine the mesh there"
             )
         arrays = (
-            {"rough": cloud.rough, "badness": cloud.badness}
+            {"rough": cloud.rough, "badness": cloud.quality.badness}
             | _packed(fine.spline, "fine")
             | _packed(coarse.spline, "coarse")
         )
-        return arrays, {"fit": report.to_json(), "reach": cloud.reach} | self._notes()
-
-    def _notes(self) -> dict[str, Any]:
-        """What a subclass keeps beside the fit."""
-        return {}
+        text = {"fit": report.to_json(), "quality": cloud.quality.to_json(), "reach": cloud.reach}
+        return arrays, text | cloud.notes
 
 
 def checked_options(units: Any, allow_rough: Any, cache: Any, progress: Any) -> Say:
@@ -203,8 +209,8 @@ def fits(cloud: PointCloud, say: Say) -> tuple[Fitted, Fitted, float]:
         if smoother.misfit > EXCESS * cloud.noise:
             break
         fine, smoothing = smoother, more
-    # fits to the same noise err alike: the second one sees two fifths of it
-    fewer = np.random.default_rng(0).random(len(cloud.points)) < 0.4
+    # fits to the same noise err alike
+    fewer = np.random.default_rng(0).random(len(cloud.points)) < SECOND
     return fine, fitted(COARSER * cloud.spacing, smoothing, fewer if cloud.noise else every), smoothing
 
 
@@ -213,8 +219,7 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
     points, normals = cloud.points, cloud.normals
     if len(cloud.rough):
         points, normals = points[cloud.smooth], normals[cloud.smooth]
-    along = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along = tangents(normals)[0]
     found = [_curvatures(one.spline, points, along) for one in (fine, coarse)]
     (kappa, gauss, slope), (other_kappa, other_gauss, _) = found
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers._spline_constants import OVERREAD
-from scatterers._tensor_spline import TensorSpline, evaluated, weights
+from scatterers._tensor_spline import SYMMETRIC, TensorSpline, evaluated, weights
 
 FloatArray = NDArray[np.float64]
 OFFSET_WEIGHT = 0.01
@@ -304,6 +304,13 @@ class _Equations:
         return Fitted(spline, self.spacing, iterations, change, misfit, float(np.sqrt(np.mean(turn**2))))
 
 
+def tangents(normals: FloatArray) -> FloatArray:
+    """Two orthonormal tangents at unit normals: (n, 3) -> (2, n, 3)."""
+    e = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    e /= np.linalg.norm(e, axis=1, keepdims=True)
+    return np.stack([e, np.cross(normals, e)])
+
+
 class _Watch:
     """Curvatures at some of the points, by which the progress of a fit is judged."""
 
@@ -315,15 +322,12 @@ class _Watch:
         known = np.flatnonzero(np.isfinite(guide))
         known = known[:: max(1, len(known) // WATCHED)]
         self.at, n, self.guide = at[known], n[known], guide[known] * equations.spacing
-        e = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
-        e /= np.linalg.norm(e, axis=1, keepdims=True)
-        self.tangents = np.stack([e, np.cross(n, e)])
+        self.tangents = tangents(n)
 
     def curvatures(self, c: FloatArray) -> FloatArray:
         """Curvature along two orthogonal tangents, in 1/cells: (2, n)."""
         _, gradient, hessian = evaluated(self.equations.spline(c).compiled, self.at)
-        entries = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-        bent = np.einsum("kni,nij,knj->kn", self.tangents, hessian[:, entries], self.tangents)
+        bent = np.einsum("kni,nij,knj->kn", self.tangents, hessian[:, SYMMETRIC], self.tangents)
         return np.asarray(self.equations.spacing * bent / np.linalg.norm(gradient, axis=1))
 
     def off(self, curvatures: FloatArray) -> float:

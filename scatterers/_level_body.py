@@ -18,14 +18,12 @@ from scatterers._compile import Compiled
 from scatterers._radial import RadialMap, SpaceLevel
 from scatterers._samples import Samples
 from scatterers._spline_constants import CENTRE, HEADER
-from scatterers._tensor_spline import evaluated
+from scatterers._tensor_spline import SYMMETRIC, evaluated
 
 if TYPE_CHECKING:
     from scatterers._monge_atlas import MongeAtlas
 
 FloatArray = NDArray[np.float64]
-# where xx, yy, zz, yz, xz, xy stand in a matrix
-SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 CLOUDS = (25_000, 100_000)
 """Points of the body by which charts are chosen, the more if the fewer do not do."""
 MARGIN = 0.4
@@ -57,20 +55,10 @@ class LevelBody(Body):
         """Text that changes with the shape."""
         raise NotImplementedError
 
-    @property
-    def fingerprint(self) -> str | None:
-        """Text that changes with the shape or the speed; None if the speed cannot be named."""
-        parts = [self._identity()]
-        if self._map is None:
-            # what is stored on charts belongs to these charts
-            parts.append(f"charts={cast('MongeAtlas', self.atlas).digest}")
-        speed = getattr(self, "speed", None)
-        if speed is not None:
-            named = getattr(speed, "fingerprint", None)
-            if named is None:
-                return None
-            parts.append(f"speed={named}")
-        return f"{type(self).__name__}({', '.join(parts)})"
+    def _shape_texts(self) -> list[str]:
+        # what is stored on charts belongs to these charts
+        charts = [] if self._map is not None else [f"charts={cast('MongeAtlas', self.atlas).digest}"]
+        return [self._identity(), *charts]
 
     @property
     def bounds(self) -> FloatArray:
@@ -137,15 +125,12 @@ class LevelBody(Body):
 
         if self._charts:
             return MongeAtlas.restored(self.level, self.gradient, self._charts)
-        for count in CLOUDS[:-1]:
+        failure = ""
+        for count in CLOUDS:
             cloud = body_cloud(self.level, self.gradient, self._bounds, count)
             try:
                 return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)
-            except ValueError:
+            except ValueError as error:
                 # parts may be finer than the points
-                continue
-        cloud = body_cloud(self.level, self.gradient, self._bounds, CLOUDS[-1])
-        try:
-            return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)
-        except ValueError as error:
-            raise ValueError(f"the body is too thin, or too sharply curved, in places for charts: {error}") from None
+                failure = str(error)
+        raise ValueError(f"the body is too thin, or too sharply curved, in places for charts: {failure}")

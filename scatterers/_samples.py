@@ -57,12 +57,20 @@ class Samples:
 
     def crossings(self) -> FloatArray:
         """Points (n, 3) where edges of the grid cross the body, by linear interpolation."""
-        found = []
-        for axis in range(3):
-            last = self.values.shape[axis] - 1
-            f, g = np.take(self.values, range(last), axis), np.take(self.values, range(1, last + 1), axis)
-            crossed = (f < 0) != (g < 0)
-            index = np.argwhere(crossed).astype(float)
-            index[:, axis] += f[crossed] / (f[crossed] - g[crossed])
-            found.append(index)
-        return np.asarray(self.origin + np.concatenate(found) * self.spacing)
+        return np.asarray(self.origin + edge_crossings(self.values) * self.spacing)
+
+
+def edge_crossings(values: FloatArray) -> FloatArray:
+    """Places (n, 3) in cells where values on a grid (n0, n1, n2) change sign along its edges, by linear interpolation.
+
+    Nodes where they are not numbers take no part.
+    """
+    found = []
+    for axis in range(3):
+        last = values.shape[axis] - 1
+        f, g = np.take(values, range(last), axis), np.take(values, range(1, last + 1), axis)
+        crossed = ((f < 0) & (g >= 0)) | ((f >= 0) & (g < 0))
+        index = np.argwhere(crossed).astype(float)
+        index[:, axis] += f[crossed] / (f[crossed] - g[crossed])
+        found.append(index)
+    return np.concatenate(found)

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers._compile import Compiled
-from scatterers._level_body import SYMMETRIC
-from scatterers._tensor_spline import evaluated
+from scatterers._tensor_spline import SYMMETRIC, evaluated
 
 FloatArray = NDArray[np.float64]
 SINGULAR = 1e-6
@@ -58,7 +57,7 @@ def refuse_edges(compiled: Compiled, points: FloatArray, spacing: float) -> None
     """
     from scipy.spatial import cKDTree
 
-    points = _onto(compiled, points, spacing)
+    points = _onto(compiled, points, spacing, 6)
     points = points[np.all(np.isfinite(points), axis=1)]
     _, near = cKDTree(points).query(points, k=min(7, len(points)))
     a, b = (v.ravel() for v in np.broadcast_arrays(near[:, :1], near[:, 1:]))
@@ -66,7 +65,7 @@ def refuse_edges(compiled: Compiled, points: FloatArray, spacing: float) -> None
     most = np.argsort(-np.nan_to_num(turn))[:SUSPECTS]
     a, b = points[a[most]], points[b[most]]
     for _ in range(HALVINGS):
-        middle = _onto(compiled, 0.5 * (a + b), spacing)
+        middle = _onto(compiled, 0.5 * (a + b), spacing, 6)
         n = [_normals(compiled, one) for one in (a, middle, b)]
         first = np.linalg.norm(n[1] - n[0], axis=1) >= np.linalg.norm(n[2] - n[1], axis=1)
         a, b = np.where(first[:, None], a, middle), np.where(first[:, None], middle, b)
@@ -87,13 +86,13 @@ def _normals(compiled: Compiled, points: FloatArray) -> FloatArray:
         return np.asarray(gradient / np.linalg.norm(gradient, axis=1, keepdims=True))
 
 
-def _onto(compiled: Compiled, points: FloatArray, reach: float) -> FloatArray:
+def _onto(compiled: Compiled, points: FloatArray, reach: float, steps: int) -> FloatArray:
     """Newton steps along grad F, none longer than ``reach``."""
-    for _ in range(6):
+    for _ in range(steps):
         value, gradient, _ = evaluated(compiled, points)
-        slope = np.linalg.norm(gradient, axis=1)
+        slope = np.linalg.norm(gradient, axis=-1)
         with np.errstate(all="ignore"):
-            step = (np.clip(value / slope, -reach, reach) / slope)[:, None] * gradient
+            step = (np.clip(value / slope, -reach, reach) / slope)[..., None] * gradient
         points = points - np.where(np.isfinite(step), step, 0.0)
     return points
 
@@ -126,11 +125,7 @@ def refuse_kinks(compiled: Compiled, points: FloatArray, spacing: float, size: f
 def _bend(compiled: Compiled, points: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
     """|Hessian|/|grad F| (...), 0 where it is not known, at points brought onto the body by steps <= ``reach``."""
     with np.errstate(all="ignore"):
-        for _ in range(2 if np.isfinite(reach) else 0):
-            value, gradient, _ = evaluated(compiled, points)
-            slope = np.linalg.norm(gradient, axis=-1)
-            step = (np.clip(value / slope, -reach, reach) / slope)[..., None] * gradient
-            points = points - np.where(np.isfinite(step), step, 0.0)
+        points = _onto(compiled, points, reach, 2 if np.isfinite(reach) else 0)
         value, gradient, hessian = evaluated(compiled, points)
         slope = np.linalg.norm(gradient, axis=-1)
         bend = np.linalg.norm(hessian, axis=-1) / slope

@@ -20,6 +20,8 @@ from scatterers._compile import Compiled
 from scatterers._spline_constants import BEYOND, CENTRE, HEADER, OVERREAD, POWERS
 
 FloatArray = NDArray[np.float64]
+# where xx, yy, zz, yz, xz, xy stand in a matrix
+SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
 @cache

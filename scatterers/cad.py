@@ -16,7 +16,7 @@ from scatterers._fit_cache import key_of
 from scatterers._fitted_body import FittedBody, PointCloud, checked_options
 from scatterers._jet_points import signed_distance
 from scatterers._jets import osculating_jets
-from scatterers._mesh_quality import MeshQuality, assess
+from scatterers._mesh_quality import assess
 
 FloatArray = NDArray[np.float64]
 POINTS = 10_000
@@ -86,8 +86,6 @@ class Cad(FittedBody):
             raise ValueError(f"{path} cannot be read: {error}") from None
         key = key_of("cad", content, units=units, points=points, allow_rough=allow_rough)
         self._open(key, cache, speed, lambda: self._points(Path(path), units, points, allow_rough, say), say)
-        self.quality = MeshQuality.from_json(self._text["quality"], self._badness)
-        self.repairs = tuple(self._text["repairs"])
         self.edges = tuple(self._text["edges"])
 
     def _points(
@@ -97,19 +95,20 @@ class Cad(FittedBody):
         found = read_cad(path, units, points, say=say)
         jets = osculating_jets(found.mesh.vertices, found.mesh.triangles)
         quality = assess(found.mesh, jets)
-        self._made = {"quality": quality.to_json(), "repairs": list(found.mesh.repairs), "edges": list(found.edges)}
         if found.edges and not allow_rough:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
         if quality.verdict != "smooth" and not allow_rough:
             raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
         rough = np.concatenate([found.mesh.vertices[quality.bad], found.rough])
-        edge = quality.edge_mean
-        normals = np.where(np.isfinite(found.normals), found.normals, jets.normals)
-        mean = np.where(jets.fitted & ~quality.bad, jets.mean, np.nan)
-        distance = partial(signed_distance, found.mesh.vertices, jets)
         return PointCloud(
-            found.mesh.vertices, normals, edge, SPACING * edge, 0.0, rough, distance, mean, quality.badness
+            found.mesh.vertices,
+            np.where(np.isfinite(found.normals), found.normals, jets.normals),
+            edge=quality.edge_mean,
+            spacing=SPACING * quality.edge_mean,
+            noise=0.0,
+            rough=rough,
+            distance=partial(signed_distance, found.mesh.vertices, jets),
+            mean_curvature=np.where(jets.fitted & ~quality.bad, jets.mean, np.nan),
+            quality=quality,
+            notes={"repairs": list(found.mesh.repairs), "edges": list(found.edges)},
         )
-
-    def _notes(self) -> dict[str, Any]:
-        return self._made

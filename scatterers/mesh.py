@@ -26,11 +26,11 @@ from scatterers._mesh_quality import MeshQuality, assess
 FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0
 """Spacings of the grid in units of the mean edge: for vertices and the points between them, and for noisy vertices,"""
+TURN = 0.5
+"""but these no more than so much over the curvature."""
 GRID, ENOUGH, SMALL = 1e6, 2.0, 0.2
 """Nodes of the largest grid wanted; the spacing, in edges, at which vertices alone do, and over the radius of curvature
 at which nothing is lost."""
-TURN = 0.5
-"""but these no more than so much over the curvature."""
 NOISE = 2e-4
 """Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
 
@@ -81,12 +81,9 @@ class Mesh(FittedBody):
         say = checked_options(units, allow_rough, cache, progress)
         key = key_of("mesh", _content(source), units=units, allow_rough=allow_rough)
         self._open(key, cache, speed, lambda: self._points(source, units, allow_rough, say), say)
-        self.quality = MeshQuality.from_json(self._text["quality"], self._badness)
-        self.repairs = tuple(self._text["repairs"])
 
     def _points(self, source: Any, units: str | None, allow_rough: bool, say: Callable[[str], None]) -> PointCloud:
         mesh, jets, quality = _examined(source, units, say)
-        self._made = {"quality": quality.to_json(), "repairs": list(mesh.repairs)}
         if quality.verdict not in ("smooth", "noisy") and not allow_rough:
             raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
         if quality.bad.any() and quality.verdict != "noisy":
@@ -97,24 +94,30 @@ class Mesh(FittedBody):
         # noise is everywhere, and smoothed away
         rough = mesh.vertices[quality.bad & (quality.verdict != "noisy")]
         points, normals, edge = mesh.vertices, jets.normals, quality.edge_mean
-        distance = partial(signed_distance, mesh.vertices, jets)
-        if quality.noise >= NOISE:
+        mean = np.where(jets.fitted, jets.mean, np.nan)
+        noisy, wide = quality.noise >= NOISE, spacing_of(points, GRID)
+        if noisy:
             spacing = float(np.clip(TURN / max(quality.curvature, 1e-9), CLEAN, NOISY)) * edge
-            return PointCloud(
-                points, normals, edge, spacing, quality.noise * edge, rough, distance, None, quality.badness
-            )
-        # very fine meshes tell more than the fit can use
-        wide = spacing_of(points, GRID)
-        if wide > ENOUGH * edge and quality.curvature * wide < SMALL * edge:
-            mean = np.where(jets.fitted, jets.mean, np.nan)
-            return PointCloud(points, normals, edge, wide, 0.0, rough, distance, mean, quality.badness)
-        more = centroids(mesh.vertices, mesh.triangles, jets)
-        mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more[0]), np.nan)])
-        points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])
-        return PointCloud(points, normals, edge, CLEAN * edge, 0.0, rough, distance, mean, quality.badness)
-
-    def _notes(self) -> dict[str, Any]:
-        return self._made
+        elif wide > ENOUGH * edge and quality.curvature * wide < SMALL * edge:
+            # very fine meshes tell more than the fit can use
+            spacing = wide
+        else:
+            spacing = CLEAN * edge
+            more = centroids(mesh.vertices, mesh.triangles, jets)
+            points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])
+            mean = np.concatenate([mean, np.full(len(more[0]), np.nan)])
+        return PointCloud(
+            points,
+            normals,
+            edge=edge,
+            spacing=spacing,
+            noise=quality.noise * edge if noisy else 0.0,
+            rough=rough,
+            distance=partial(signed_distance, mesh.vertices, jets),
+            mean_curvature=None if noisy else mean,
+            quality=quality,
+            notes={"repairs": list(mesh.repairs)},
+        )
 
 
 def examined_mesh(source: Any, units: str | None = None) -> tuple[TriangleMesh, MeshQuality]:

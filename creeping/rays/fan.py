@@ -35,7 +35,9 @@ from creeping.surface import Surface, size
 MAX_RAYS = 200_000
 """Rays beyond which refinement stops."""
 ROUGH_SPACING = 0.005
-"""Spacing at which rays are looked at for rough ground, in sizes of the body."""
+"""Spacing at which rays are looked at for rough ground, in sizes of the body,"""
+ROUGH_BLOCK = 64
+"""so many rays at a time."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
 
@@ -311,12 +313,15 @@ def _rough_from(body: Surface, points: FloatArray, times: FloatArray) -> FloatAr
     # between the steps on chords: rough places may be small
     parts = int(np.ceil(np.max(np.diff(times), initial=0.0) / (ROUGH_SPACING * size(body)))) or 1
     fine = np.interp(np.arange((len(times) - 1) * parts + 1) / parts, np.arange(len(times)), times)
+    share = (np.arange(parts) / parts)[:, None]
     found = np.full(len(points), np.inf)
-    for ray, path in enumerate(points):
-        dense = np.stack([np.interp(fine, times, path[:, axis]) for axis in range(3)], axis=1)
-        met = np.flatnonzero(rough(dense))
-        if len(met):
-            found[ray] = fine[max(met[0] - 1, 0)]
+    for first in range(0, len(points), ROUGH_BLOCK):
+        path = points[first : first + ROUGH_BLOCK, :, None]
+        dense = path[:, :-1] + share * (path[:, 1:] - path[:, :-1])
+        dense = np.concatenate([dense.reshape(len(path), -1, 3), path[:, -1]], axis=1)
+        met = rough(dense)
+        before = np.maximum(np.argmax(met, axis=1) - 1, 0)
+        found[first : first + ROUGH_BLOCK] = np.where(met.any(axis=1), fine[before], np.inf)
     return found
 
 
