@@ -11,7 +11,7 @@ import numpy as np
 from creeping import plotting
 from creeping._errors import CreepingError, InvalidInputError
 from creeping._typing import FloatArray
-from creeping.field.coefficients import BoundaryLike, Impedance
+from creeping.field.coefficients import BoundaryLike, parse_boundary
 from creeping.field.far import FarField, checked, far_field
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.plotting.ffe import grid_directions
@@ -145,30 +145,14 @@ def job(
         k = checked(wavenumber, ORDER)
     except CreepingError as error:
         raise InvalidInputError(f"--{error}") from error
-    return Job(k, parse_boundary(boundary or "soft"), targets)
+    return Job(k, _boundary(boundary or "soft"), targets)
 
 
-def parse_boundary(text: str) -> BoundaryLike:
-    """Boundary of ``soft``, ``hard``, ``pec`` or ``impedance:ETA``.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is none of these, or ETA is not a complex number with Re ETA >= 0.
-    """
-    scalar: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard", "pec": "pec"}
-    if text in scalar:
-        return scalar[text]
-    name, _, number = text.partition(":")
-    if name != "impedance":
-        raise InvalidInputError(f"--boundary {text!r} is not soft, hard, pec or impedance:ETA, e.g. impedance:0.5+0.2j")
+def _boundary(text: str) -> BoundaryLike:
     try:
-        eta = complex(number.replace(" ", ""))
-    except ValueError:
-        raise InvalidInputError(
-            f"--boundary {text!r}: {number!r} is not a complex number such as 1 or 0.5+0.2j"
-        ) from None
-    return Impedance(eta)
+        return parse_boundary(text)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"--{error}") from error
 
 
 def parse_target(text: str, direction: FloatArray) -> Target:

@@ -97,6 +97,29 @@ def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
     raise InvalidInputError(f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or Impedance(eta)")
 
 
+def parse_boundary(text: str) -> BoundaryLike:
+    """Boundary of ``soft``, ``hard``, ``pec`` or ``impedance:ETA``.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none of these, or ETA is not a complex number with Re ETA >= 0.
+    """
+    scalar: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard", "pec": "pec"}
+    if text in scalar:
+        return scalar[text]
+    name, _, number = text.partition(":")
+    if name != "impedance":
+        raise InvalidInputError(f"boundary {text!r} is not soft, hard, pec or impedance:ETA, e.g. impedance:0.5+0.2j")
+    try:
+        eta = complex(number.replace(" ", ""))
+    except ValueError:
+        raise InvalidInputError(
+            f"boundary {text!r}: {number!r} is not a complex number such as 1 or 0.5+0.2j"
+        ) from None
+    return Impedance(eta)
+
+
 def fock_scale(wavenumber: float, curvature: FloatArray) -> FloatArray:
     """m = (k/(2 κₙ))^(1/3), inf where κₙ <= 0: (...) -> (...)."""
     with np.errstate(divide="ignore"):
