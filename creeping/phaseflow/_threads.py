@@ -30,14 +30,14 @@ def _pool(threads: int) -> Any:
     return ThreadPoolExecutor(threads, thread_name_prefix="creeping")
 
 
-def in_threads(work: Callable[[slice], None], count: int) -> None:
-    """Call ``work`` on slices that cover range(count), in as many threads as pay."""
-    threads = min(thread_count(), max(1, count // LEAST))
+def in_threads(work: Callable[[slice], None], count: int, *, least: int = LEAST, multiple: int = CHUNK) -> None:
+    """Call ``work`` on slices that cover range(count), at least ``least`` a thread, in as many threads as pay."""
+    threads = min(thread_count(), max(1, count // least))
     if threads == 1:
         work(slice(0, count))
         return
     # more chunks than threads: rays of one region may cost more than those of another
-    chunk = -(-count // (4 * threads * CHUNK)) * CHUNK
+    chunk = -(-count // (4 * threads * multiple)) * multiple
     parts = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
     # consume the results, or an exception of a chunk would be lost
     for _ in _pool(thread_count()).map(work, parts):

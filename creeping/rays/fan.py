@@ -276,7 +276,7 @@ def _assemble(
     status = np.array([LINE_STATUS[one] for one in position_statuses(line, arcs, arc, arclength)], dtype=np.int64)
     # a ray that never was a creeping ray keeps the reason
     status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
-    rough = _rough_from(body, points, times)
+    rough = rough_from(body, points, times)
     status[((status == RayStatus.OK) | (status == RayStatus.DETACHED)) & (rough < detachment)] = RayStatus.ROUGH
     detachment = np.minimum(detachment, rough)
     status[stalled] = RayStatus.STALLED
@@ -305,7 +305,7 @@ def _assemble(
     )
 
 
-def _rough_from(body: Surface, points: FloatArray, times: FloatArray) -> FloatArray:
+def rough_from(body: Surface, points: FloatArray, times: FloatArray) -> FloatArray:
     """Travel time (rays,) of the last place before rough ground, inf on rays that do not come there."""
     rough: Any = getattr(body, "rough", None)
     if rough is None or not points.size:

@@ -1,0 +1,133 @@
+"""The compiled route of a sweep: lines of many incidences, then the rays of all of them at once.
+
+Rays of an incidence start in blocks of their own, the last one filled up: a tracer that adapts its step to a block
+then gives the same, bit for bit, in whatever company an incidence is computed.
+"""
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray
+from creeping.phaseflow.geodesic import speed_of
+from creeping.phaseflow.tracing import pack
+from creeping.rays.fan import Flow, RayStatus, rough_from
+from creeping.rays.launch_points import line_tangents
+from creeping.rays.spreading import spread
+from creeping.surface import Surface
+from creeping.sweeping.request import NO_RAY, SINGULAR, SweepRequest
+from creeping.sweeping.shadow_lines import ShadowLines, shadow_lines
+
+BLOCK = 64
+"""Rays of a block of the engine."""
+BATCH = 16_384
+"""Rays carried at a time: what is known of them stays in the caches."""
+
+
+class CompiledSweeper:
+    """Results of incidences (n, 3) on a body with a compiled level; see `PlainSweeper`.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+    request : SweepRequest
+    """
+
+    def __init__(self, flow: Flow, request: SweepRequest) -> None:
+        self.flow, self.request = flow, request
+
+    @property
+    def body(self) -> Surface:
+        """Body of the flow."""
+        return self.flow.body
+
+    def __call__(self, incidences: FloatArray) -> dict[str, np.ndarray[Any, Any]]:
+        """Arrays of results, the first axis the incidence; see `SweepRequest.variables`."""
+        incidences = np.asarray(incidences, dtype=float)
+        out = self.request.empty(len(incidences))
+        batch = max(1, BATCH // (-(-self.request.n_rays // BLOCK) * BLOCK))
+        for first in range(0, len(incidences), batch):
+            part = slice(first, first + batch)
+            self._batch(incidences[part], {name: values[part] for name, values in out.items()})
+        return out
+
+    def _batch(self, incidences: FloatArray, out: dict[str, Any]) -> None:
+        lines = shadow_lines(self.body, incidences, self.request.n_rays)
+        fill_lines(lines, out)
+        fill_rays(self.flow, lines, self.request.travel_times, out)
+
+
+def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:
+    """Results of the lines."""
+    known = lines.status != SINGULAR
+    out["incidence_status"][:] = lines.status
+    out["curves"][known] = lines.curves[known]
+    out["line_length"][:], out["line_error"][:] = lines.length, lines.error
+    for name in ("attached", "occluded", "concave", "singular_distance"):
+        out[name][:] = getattr(lines, name)
+
+
+def carried(flow: Flow, lines: ShadowLines, times: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """States of all rays at the times, (n, rays, m, 12), and which of them there are, (n, rays)."""
+    there = lines.curve_index != NO_RAY
+    n, rays = there.shape
+    padded = -(-rays // BLOCK) * BLOCK
+    some = np.flatnonzero(there[:, 0])
+    points = np.empty((len(some), padded, 3))
+    points[:, :rays] = lines.launch_points[some]
+    # places without a ray go along as copies of the first
+    filled = np.zeros((len(some), padded), dtype=bool)
+    filled[:, :rays] = there[some]
+    points[~filled] = np.broadcast_to(points[:, :1], points.shape)[~filled]
+    directions = np.broadcast_to(lines.directions[some, None], points.shape)
+    states = flow.transport(pack(points, directions, lanes=12), times)
+    states = states.reshape(len(some), padded, len(times), 12)[:, :rays]
+    if len(some) == n:
+        return states, there
+    whole = np.full((n, rays, len(times), 12), np.nan)
+    whole[some] = states
+    return whole, there
+
+
+def fill_rays(flow: Flow, lines: ShadowLines, times: FloatArray, out: dict[str, Any]) -> None:
+    """Results of the rays."""
+    states, there = carried(flow, lines, times)
+    J, rate, stalled = _spreading(flow.body, lines, states)
+    detachment = states[..., -1, 11]
+    status = np.where(np.isfinite(detachment), int(RayStatus.DETACHED), int(RayStatus.OK))
+    if hasattr(flow.body, "rough"):
+        path = np.concatenate([lines.launch_points[:, :, None], states[..., :3]], axis=2)
+        rough = np.full(there.shape, np.inf)
+        rough[there] = rough_from(flow.body, path[there], np.concatenate([[0.0], times]))
+        status = np.where(rough < detachment, int(RayStatus.ROUGH), status)
+        detachment = np.minimum(detachment, rough)
+    status[stalled] = RayStatus.STALLED
+    out["ray_status"][:] = np.where(there, status, NO_RAY)
+    out["curve_index"][:], out["arclength"][:] = lines.curve_index, lines.arclength
+    out["launch_phase"][:], out["detachment"][:] = lines.launch_phase, np.where(there, detachment, np.nan)
+    for name, values in (
+        ("points", states[..., :3]),
+        ("directions", states[..., 3:6]),
+        ("spreading", J),
+        ("spreading_rate", rate),
+        ("attenuation", states[..., 10]),
+    ):
+        out[name][:] = values
+        if not there.all():
+            out[name][~there] = np.nan
+
+
+def _spreading(body: Surface, lines: ShadowLines, states: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """J and J' (n, rays, m), and rays that do not move (n, rays)."""
+    if speed_of(body) is None:
+        # J(0) = 1, J'(0) = 0: the first column of the Jacobi matrix
+        return states[..., 6], states[..., 7], np.zeros(states.shape[:2], dtype=bool)
+    n, rays, m = states.shape[:3]
+    points = np.nan_to_num(lines.launch_points).reshape(-1, 3)
+    directions = np.repeat(lines.directions, rays, axis=0)
+    tangents = np.concatenate(
+        [line_tangents(body, part, d) for part, d in zip(points.reshape(n, rays, 3), lines.directions, strict=True)]
+    )
+    # `spread` takes the speed at the launch point from the first step
+    start = pack(points, directions, lanes=12)[:, None]
+    path = np.concatenate([start, states.reshape(-1, m, 12)], axis=1)
+    J, rate, stalled = spread(body, np.concatenate([points, tangents], axis=1), directions, path)
+    return J[:, 1:].reshape(n, rays, m), rate[:, 1:].reshape(n, rays, m), stalled.reshape(n, rays)

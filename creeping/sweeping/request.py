@@ -1,0 +1,230 @@
+"""What a sweep computes for each incidence, and the layout of its results.
+
+Every quantity gives the shadow line of each incidence; "rays" adds its fan, "monostatic" the field in the direction
+the wave came from, "bistatic" that in given directions. Results are arrays whose first axis is the incidence.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, ArrayLike, FloatArray
+from creeping.field.coefficients import BoundaryLike, parse_boundary
+from creeping.field.far import checked
+
+Quantity = Literal["rays", "monostatic", "bistatic"]
+QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
+OK, NEAR_SINGULAR, DOUBTFUL, SINGULAR, FAILED = range(5)
+INCIDENCE_STATUSES = {
+    OK: "ok",
+    NEAR_SINGULAR: "near singular: the number of curves is not certain",
+    DOUBTFUL: "doubtful: the line did not settle on the finest mesh",
+    SINGULAR: "singular: the line crosses itself, nothing is given",
+    FAILED: "failed: an error, nothing is given",
+}
+NO_RAY = -1
+"""Status of a place for a ray that the incidence did not fill."""
+MOST_RAYS, MOST_STEPS = 65_536, 4096
+
+
+class Variable(NamedTuple):
+    """One array of results: its dimensions after the incidence, type, and what it is."""
+
+    dims: tuple[str, ...]
+    dtype: str
+    units: str
+    description: str
+
+    @property
+    def fill(self) -> Any:
+        """Value where nothing is given."""
+        kind = np.dtype(self.dtype).kind
+        return {"f": np.nan, "c": complex(np.nan, np.nan), "b": False}.get(kind, -1)
+
+
+LINE = {
+    "incidence_status": Variable((), "int8", "1", "; ".join(f"{k} {v}" for k, v in INCIDENCE_STATUSES.items())),
+    "curves": Variable((), "int16", "1", "closed curves of the shadow line"),
+    "line_length": Variable((), "float64", "L", "length of the shadow line"),
+    "line_error": Variable((), "float64", "1", "estimated relative error of the length"),
+    "attached": Variable((), "float64", "1", "share of the length that launches rays"),
+    "occluded": Variable((), "float64", "1", "share of the length that the wave does not reach"),
+    "concave": Variable((), "float64", "1", "share of the length on concave ground"),
+    "singular_distance": Variable((), "float64", "1", "least |n.d| at a critical point of n.d, n = +-d apart"),
+}
+RAYS = {
+    "ray_status": Variable(("ray",), "int8", "1", "codes of RayStatus; -1 where there is no ray"),
+    "curve_index": Variable(("ray",), "int16", "1", "curve of the shadow line, the longest first"),
+    "arclength": Variable(("ray",), "float64", "L", "of the launch point along its curve"),
+    "launch_phase": Variable(("ray",), "float64", "L", "d.x0; the eikonal is this plus the travel time"),
+    "detachment": Variable(("ray",), "float64", "L", "travel time at which the creeping ray ends, inf if it does not"),
+    "points": Variable(("ray", "step", "axis"), "float64", "L", "points of the rays"),
+    "directions": Variable(("ray", "step", "axis"), "float64", "1", "their tangents"),
+    "spreading": Variable(("ray", "step"), "float64", "1", "J"),
+    "spreading_rate": Variable(("ray", "step"), "float64", "1/L", "J'"),
+    "attenuation": Variable(("ray", "step"), "float64", "L^(1/3)", "integral of kappa_n^(2/3) along the ray"),
+}
+PARTS = {
+    "creeping": "far-field amplitude of the creeping rays",
+    "reflected": "far-field amplitude of the reflected rays",
+    "forward": "far-field amplitude of the forward lobe",
+}
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What is computed for each incidence.
+
+    Attributes
+    ----------
+    quantity : {"rays", "monostatic", "bistatic"}
+    length : float, L (travel time for a weighted body)
+        Of the rays.
+    n_rays : int
+        Rays of an incidence, shared among the attached arcs by length.
+    n_steps : int
+        Outputs of "rays", at equal steps of travel time; the last at ``length``.
+    wavenumbers : tuple of float, 1/L
+        Of the fields.
+    boundaries : tuple of str
+        "soft", "hard", "pec" or "impedance:ETA".
+    observation : tuple of (x, y, z)
+        Unit directions of "bistatic".
+    order : 2 or 1
+        Of the creeping waves.
+    """
+
+    quantity: Quantity
+    length: float
+    n_rays: int = 256
+    n_steps: int = 1
+    wavenumbers: tuple[float, ...] = ()
+    boundaries: tuple[str, ...] = ()
+    observation: tuple[tuple[float, float, float], ...] = ()
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        mistakes = list(self._mistakes())
+        if mistakes:
+            raise InvalidInputError("; ".join(mistakes), mistakes=mistakes)
+
+    def _mistakes(self) -> Any:
+        """All that is wrong, not the first only."""
+        if self.quantity not in QUANTITIES:
+            yield f"quantity = {self.quantity!r} is none of {', '.join(QUANTITIES)}"
+            return
+        if not (isinstance(self.length, (int, float)) and np.isfinite(self.length) and self.length > 0):
+            yield f"length = {self.length!r} is not a positive finite number"
+        for name, most in (("n_rays", MOST_RAYS), ("n_steps", MOST_STEPS)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= most:
+                yield f"{name} = {value!r} is not a whole number from 1 to {most}"
+        if self.quantity == "rays":
+            for name in ("wavenumbers", "boundaries", "observation"):
+                if getattr(self, name):
+                    yield f"{name} belong to a field; quantity 'rays' has none"
+            return
+        for name in ("wavenumbers", "boundaries"):
+            if not getattr(self, name):
+                yield f"quantity {self.quantity!r} needs {name}"
+        for text in (*self.boundaries, *self.wavenumbers):
+            try:
+                parse_boundary(text) if isinstance(text, str) else checked(text, self.order)
+            except InvalidInputError as error:
+                yield str(error)
+        if len(set(self.boundaries)) < len(self.boundaries):
+            yield f"boundaries {list(self.boundaries)} repeat themselves"
+        if (self.quantity == "bistatic") != bool(self.observation):
+            yield "observation directions go with quantity 'bistatic', and with no other"
+
+    @property
+    def scalar_boundaries(self) -> tuple[str, ...]:
+        """Boundaries of scalar problems, all but "pec"."""
+        return tuple(b for b in self.boundaries if b != "pec")
+
+    @property
+    def travel_times(self) -> FloatArray:
+        """Times of the outputs of "rays": (n_steps,)."""
+        return np.asarray(self.length * np.arange(1, self.n_steps + 1) / self.n_steps)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Lengths of the dimensions, the incidence apart."""
+        if self.quantity == "rays":
+            return {"ray": self.n_rays, "step": self.n_steps, "axis": 3}
+        sizes = {"boundary": len(self.scalar_boundaries), "wavenumber": len(self.wavenumbers), "observer": 1}
+        return sizes | {"observer": len(self.observation), "scattered": 2, "incident": 2}
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """The arrays of results by name."""
+        if self.quantity == "rays":
+            return LINE | RAYS
+        observer = ("observer",) if self.quantity == "bistatic" else ()
+        parts = PARTS if self.quantity == "bistatic" else {k: v for k, v in PARTS.items() if k != "forward"}
+        found = dict(LINE)
+        if self.scalar_boundaries:
+            dims = ("boundary", "wavenumber", *observer)
+            found |= {name: Variable(dims, "complex128", "L", text) for name, text in parts.items()}
+            found["unresolved"] = Variable(dims, "bool", "1", "whether an expansion fails there")
+        if "pec" in self.boundaries:
+            dims = ("wavenumber", *observer)
+            matrix = (*dims, "scattered", "incident")
+            words = ", theta and phi scattered by theta and phi incident"
+            found |= {f"{name}_pec": Variable(matrix, "complex128", "L", text + words) for name, text in parts.items()}
+            found["unresolved_pec"] = Variable(dims, "bool", "1", "whether an expansion fails there")
+        return found
+
+    def empty(self, count: int) -> dict[str, np.ndarray[Any, Any]]:
+        """Arrays of results for so many incidences, filled with what stands for nothing; FAILED."""
+        sizes = self.sizes
+        out = {
+            name: np.full((count, *(sizes[d] for d in v.dims)), v.fill, dtype=v.dtype)
+            for name, v in self.variables.items()
+        }
+        out["incidence_status"][:] = FAILED
+        return out
+
+
+def sweep_request(
+    quantity: str,
+    *,
+    length: float,
+    n_rays: int = 256,
+    n_steps: int = 1,
+    wavenumbers: ArrayLike = (),
+    boundary: BoundaryLike | list[BoundaryLike] | tuple[BoundaryLike, ...] = (),
+    observation: ArrayLike | None = None,
+    order: int = 2,
+) -> SweepRequest:
+    """Make a request of what users write: one boundary or a list, numbers or arrays.
+
+    Raises
+    ------
+    InvalidInputError
+        With all mistakes at once, as ``mistakes`` too.
+    """
+    several = boundary if isinstance(boundary, (list, tuple)) else (boundary,)
+    try:
+        numbers = tuple(float(k) for k in np.atleast_1d(np.asarray(wavenumbers, dtype=float)))
+        seen = np.zeros((0, 3)) if observation is None else np.asarray(observation, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"wavenumbers and observation must be arrays of numbers: {error}") from error
+    if seen.ndim < 1 or seen.shape[-1] != 3 or not np.all(np.isfinite(seen)):
+        raise InvalidInputError(f"observation has shape {seen.shape}; give finite directions (..., 3)")
+    seen = seen.reshape(-1, 3)
+    norm = np.linalg.norm(seen, axis=1, keepdims=True)
+    if np.any(norm == 0):
+        raise InvalidInputError(f"{int(np.sum(norm == 0))} of {len(seen)} observation directions are zero")
+    return SweepRequest(
+        quantity=quantity,  # type: ignore[arg-type]
+        length=length,
+        n_rays=n_rays,
+        n_steps=n_steps,
+        wavenumbers=numbers,
+        boundaries=tuple(b if isinstance(b, str) else f"impedance:{b.eta}".replace("(", "").replace(")", "") for b in several),
+        observation=tuple((float(x), float(y), float(z)) for x, y, z in seen / norm),
+        order=order,
+    )

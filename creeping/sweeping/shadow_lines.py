@@ -1,0 +1,90 @@
+"""Shadow lines of many incidences at sweep speed, with the points that launch their rays.
+
+The compiled route of `_line_kernel`; `creeping.rays.shadow` follows one line by other means and to rounding.
+"""
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.phaseflow._threads import in_threads
+from creeping.surface import Surface
+from creeping.sweeping.line_meshes import LineMeshes, line_meshes
+
+LEAST = 8
+"""Fewest incidences worth a thread."""
+_PREPARED: "WeakKeyDictionary[Surface, LineMeshes]" = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowLines:
+    """Shadow lines of n incidences, with places for so many rays each.
+
+    Attributes
+    ----------
+    directions : (n, 3)
+    status : (n,) of int8
+        Codes of `creeping.sweeping.request.INCIDENCE_STATUSES`.
+    curves, length, error, attached, occluded, concave, singular_distance : (n,)
+        Closed curves, their length, L, its estimated relative error, shares of the length, and least |n.d| at a
+        critical point with K = 0.
+    launch_points : (n, rays, 3), L
+        NaN where there is no ray, as below.
+    arclength, launch_phase : (n, rays), L
+        Along the curve, and d.x0.
+    curve_index : (n, rays)
+        The longest curve is 0; -1 where there is no ray.
+    """
+
+    directions: FloatArray
+    status: np.ndarray[Any, np.dtype[np.int8]]
+    curves: FloatArray
+    length: FloatArray
+    error: FloatArray
+    attached: FloatArray
+    occluded: FloatArray
+    concave: FloatArray
+    singular_distance: FloatArray
+    launch_points: FloatArray
+    arclength: FloatArray
+    launch_phase: FloatArray
+    curve_index: np.ndarray[Any, np.dtype[np.int16]]
+
+
+def prepared(body: Surface) -> LineMeshes:
+    """Meshes of a body, made once."""
+    if body not in _PREPARED:
+        _PREPARED[body] = line_meshes(body)
+    return _PREPARED[body]
+
+
+def shadow_lines(body: Any, directions: FloatArray, n_rays: int) -> ShadowLines:
+    """Shadow lines of the unit directions (n, 3) of a body with a compiled level.
+
+    Rays are shared among the attached arcs by length and equally spaced on each, as by `creeping.rays.launch`.
+    """
+    from creeping.sweeping._line_kernel import trace_lines
+
+    n = len(directions)
+    summary, status = np.empty((n, 7)), np.empty(n, np.int8)
+    launched, places = np.empty((n, n_rays, 5)), np.empty((n, n_rays), np.int16)
+    lines, level = prepared(body), body.compiled
+    box = np.ascontiguousarray(body.bounds, dtype=float)
+    directions = np.ascontiguousarray(directions, dtype=float)
+
+    def run(part: slice) -> None:
+        out = summary[part], status[part], launched[part], places[part]
+        trace_lines(level.function, level.parameters, box, lines.meshes, lines.critical, directions[part], *out)
+
+    in_threads(run, n, least=LEAST, multiple=1)
+    return ShadowLines(
+        directions,
+        status,
+        *summary.T,
+        launch_points=launched[..., :3],
+        arclength=launched[..., 3],
+        launch_phase=launched[..., 4],
+        curve_index=places,
+    )

@@ -1,0 +1,38 @@
+"""What computes the results of incidences: the compiled route where the body allows it, else the plain one."""
+
+from typing import Protocol
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.phaseflow.tracing import compiled_parts
+from creeping.rays.fan import Flow
+from creeping.surface import Surface
+from creeping.sweeping.compiled import CompiledSweeper
+from creeping.sweeping.plain import PlainSweeper
+from creeping.sweeping.request import SweepRequest
+
+
+class Sweeper(Protocol):
+    """Computes the results of incidences."""
+
+    request: SweepRequest
+
+    @property
+    def body(self) -> Surface:
+        """Body of the flow."""
+        ...
+
+    def __call__(self, incidences: FloatArray) -> dict[str, np.ndarray[Any, Any]]:
+        """Arrays of results of unit directions (n, 3), the first axis the incidence; see `SweepRequest.variables`.
+
+        Results of an incidence do not depend on the others in the call, bit for bit.
+        """
+        ...
+
+
+def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper:
+    """Make what computes a request with a flow."""
+    if request.quantity == "rays" and compiled_parts(flow.body) is not None:
+        return CompiledSweeper(flow, request)
+    return PlainSweeper(flow, request)
