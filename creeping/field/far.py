@@ -16,7 +16,7 @@ import numpy as np
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.coefficients import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.far_geometry import FarGeometry, far_geometry, merging, off_axis
+from creeping.field.far_geometry import FarGeometry, Geometry, far_geometry, merging, off_axis
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.launching import scales, shed_wave, smoothstep
 from creeping.field.polarisation import dyads, wave_frame
@@ -115,9 +115,14 @@ def far_field(
     InvalidInputError
         On bad directions, wavenumber, boundary or order, and for a weighted body.
     """
-    kinds = scalar_boundaries(boundary)
+    scalar_boundaries(boundary)
     k = checked(wavenumber, order)
-    geometry = far_geometry(fan, observation, k)
+    return field_of(far_geometry(fan, observation, k), k, boundary, order)
+
+
+def field_of(geometry: Geometry, k: float, boundary: BoundaryLike, order: int) -> FarField:
+    """Far field of a geometry; its observers may have an incidence each."""
+    kinds = scalar_boundaries(boundary)
     parts = _Parts(geometry, len(kinds), k, order)
     for number, kind in enumerate(kinds):
         parts.add(number, kind)
@@ -147,7 +152,7 @@ def checked(wavenumber: float, order: int) -> float:
     return k
 
 
-def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
+def isolated_rays(geometry: Geometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
     rays = geometry.shed.rays
     m1, m2 = scales(rays, wavenumber)
@@ -188,8 +193,9 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
 class _Parts:
     """Weighted parts of the far field, summed contribution by contribution."""
 
-    def __init__(self, geometry: FarGeometry, kinds: int, wavenumber: float, order: int) -> None:
+    def __init__(self, geometry: Geometry, kinds: int, wavenumber: float, order: int) -> None:
         self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
+        self.incident = np.broadcast_to(geometry.direction, geometry.directions.shape)
         self.vector = kinds == 2
         m = len(geometry.directions)
         self.creeping, self.reflected, self.forward = (
@@ -216,8 +222,7 @@ class _Parts:
     def add(self, number: int, kind: Boundary) -> None:
         """Add every part of one scalar problem."""
         g, k, order = self.geometry, self.wavenumber, self.order
-        w, d = self.in_forward, g.direction
-        shed = g.shed
+        w, shed = self.in_forward, g.shed
         share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
         wave = _weighted(share, isolated_rays(g, k, kind, order))
         # the first zero of J' is the launch point itself, where the forward lobe serves
@@ -229,9 +234,18 @@ class _Parts:
         wave = _weighted(((1 - w) * self.in_fan)[fan.observer], fan_half(fan, g.directions, k, kind, order))
         self._sum(self.creeping, number, fan.observer, wave, fan.rays.first_normal, g.normals_of(fan.rays.points))
         s = g.specular
-        wave = _weighted((1 - w)[s.observer], reflected_amplitude(s, g.directions, d, k, kind, order))
+        incident = self.incident[s.observer]
+        wave = _weighted((1 - w)[s.observer], reflected_amplitude(s, g.directions, incident, k, kind, order))
         self._doubt(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
         self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
+        if np.any(w > 0):
+            self._add_forward(number, kind)
+
+    def _add_forward(self, number: int, kind: Boundary) -> None:
+        """Add the forward lobe, that of one incidence."""
+        g, k, order, w = self.geometry, self.wavenumber, self.order, self.in_forward
+        assert isinstance(g, FarGeometry)
+        d = g.direction
         shadow, lit, lost = g.forward_nodes(k, w > 0)
         self.lost[lost] = True
         wave = shadow_half(shadow, g.directions, d, k, kind, order, self.beyond_axis[shadow.observer])
@@ -254,11 +268,10 @@ class _Parts:
         if not self.vector:
             np.add.at(into, observer, wave)
             return
-        d, r = self.geometry.direction, self.geometry.directions[observer]
-        incident = np.broadcast_to(d, r.shape)
+        d, r = self.incident[observer], self.geometry.directions[observer]
         spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=-1)])
         spare /= np.maximum(np.linalg.norm(spare, axis=-1, keepdims=True), 1e-300)
-        pair = dyads(wave_frame(n0, incident, spare), wave_frame(n, r, spare), d, r)
+        pair = dyads(wave_frame(n0, d, spare), wave_frame(n, r, spare), d, r)
         np.add.at(into, observer, wave[:, None, None] * pair[:, number])
 
 

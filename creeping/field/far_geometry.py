@@ -1,6 +1,7 @@
 """Geometry of the far field of one incidence in given directions; no wavenumber but in how finely it is sampled."""
 
 from functools import cached_property
+from typing import Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,6 +24,64 @@ NUDGE = 1e-6
 """Least angle between an observer and the forward direction in the forward integral, radians."""
 ALONG = 0.9
 """p.r above which a crossing is near a ray towards the observer."""
+
+
+class Geometry(Protocol):
+    """What the far field in m directions is assembled from; see `FarGeometry`.
+
+    The incidence is one, d (3,), or one for each observer, (m, 3); the forward lobe asks for a `FarGeometry`.
+    """
+
+    directions: FloatArray
+    direction: FloatArray
+
+    @property
+    def angle(self) -> FloatArray:
+        """Angle from d (m,)."""
+        ...
+
+    @property
+    def mean_root_radius(self) -> FloatArray | float:
+        """Mean of ρ^(1/3) over the launch points, one or (m,)."""
+        ...
+
+    @property
+    def shed(self) -> ShedRays:
+        """Rays with p = r."""
+        ...
+
+    @property
+    def shed_normals(self) -> FloatArray:
+        """Normals where they leave (n, 3)."""
+        ...
+
+    @property
+    def leaves(self) -> BoolArray:
+        """Whether a shed ray misses the body on its way out (n,)."""
+        ...
+
+    @property
+    def long(self) -> BoolArray:
+        """Whether a shed ray has crossed the observer's horizon before (n,)."""
+        ...
+
+    @property
+    def specular(self) -> SpecularPoints:
+        """Specular points of the lit side."""
+        ...
+
+    @property
+    def least_merging(self) -> FloatArray:
+        """Least χ over horizon crossings (m,)."""
+        ...
+
+    def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
+        """Nodes of the fan integral for the wanted observers."""
+        ...
+
+    def normals_of(self, points: FloatArray) -> FloatArray:
+        """N at points (n, 3)."""
+        ...
 
 
 def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:

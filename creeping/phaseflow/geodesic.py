@@ -67,10 +67,15 @@ def principal_curvature_bound(body: Surface, points: FloatArray) -> float:
     return float(np.max(np.abs(np.linalg.eigvalsh(shape))))
 
 
+def points_of_charts(body: Surface) -> FloatArray:
+    """Points all over a body (n, 3), L."""
+    uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.concatenate([chart.point(uv) for chart in body.atlas.charts])
+
+
 def natural_horizon(body: Surface) -> float:
     """Power of two next to the time a ray takes over the smallest radius of curvature."""
-    uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
-    points = np.concatenate([chart.point(uv) for chart in body.atlas.charts])
+    points = points_of_charts(body)
     fastest = float(np.max(speed_values(body, points)))
     return float(2.0 ** np.round(np.log2(1 / (principal_curvature_bound(body, points) * fastest))))
 

@@ -35,12 +35,14 @@ def newton_step(
 ) -> tuple[FloatArray, FloatArray]:
     """Newton step for {F = 0, grad F.d = 0} at right angles to an axis, and the tangent: (n, 3), (n, 3).
 
+    ``direction`` is d, (3,) or one for each point.
+
     Without an axis it is the tangent, and the step is that of least norm. Inverse rows of (grad F, Hd, axis) are cross
     products over the determinant axis.(grad F x Hd).
     """
     F, gradient = body.level(points), body.gradient(points)
-    Hd = body.hessian(points) @ direction
-    G = gradient @ direction
+    Hd = (body.hessian(points) @ direction[..., None])[..., 0]
+    G = np.sum(gradient * direction, axis=-1)
     W = np.cross(gradient, Hd)
     if axis is None:
         axis = W

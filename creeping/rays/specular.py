@@ -13,7 +13,7 @@ import numpy as np
 from creeping._typing import FloatArray, IntArray
 from creeping.rays.visibility import occluded
 from creeping.surface import Surface, normal, project, size
-from creeping.triangulation import triangulate
+from creeping.triangulation import Triangulation, triangulate
 
 CONVERGED = 1e-10
 """Residual of the normal at a specular point."""
@@ -50,24 +50,27 @@ class SpecularPoints:
     shape: FloatArray
 
 
-def specular_points(body: Surface, direction: FloatArray, observers: FloatArray) -> SpecularPoints:
-    """All lit specular points of the unit directions r (m, 3) for the unit incidence d.
+def specular_points(
+    body: Surface, direction: FloatArray, observers: FloatArray, mesh: Triangulation | None = None
+) -> SpecularPoints:
+    """All lit specular points of the unit directions r (m, 3) for the unit incidence d, (3,) or one for each r.
 
-    A direction r = d has none.
+    A direction r = d has none. ``mesh`` spares making one.
     """
     difference = observers - direction
     length = np.linalg.norm(difference, axis=1)
     rows = np.flatnonzero(length > 1e-9)
     wanted = difference[rows] / length[rows, None]
-    mesh = triangulate(body.level, body.gradient, body.bounds)
+    mesh = mesh or triangulate(body.level, body.gradient, body.bounds)
     which, seeds = _seeds(body, mesh.vertices, mesh.triangles, wanted)
     which, points = _newton(body, seeds, wanted, which)
     row = rows[which]
     n = normal(body, points)
-    free = ~(occluded(body, points, direction) | occluded(body, points, -observers[row]))
+    incident = np.broadcast_to(direction, observers.shape)
+    free = ~(occluded(body, points, incident[row]) | occluded(body, points, -observers[row]))
     row, points, n = row[free], points[free], n[free]
     r = observers[row]
-    q = r + direction
+    q = r + incident[row]
     # backscatter has no plane of incidence: any tangent will do
     spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
     q = np.where(np.linalg.norm(q, axis=1, keepdims=True) > 1e-9, q, spare)
@@ -162,12 +165,16 @@ def _seeds(body: Surface, vertices: FloatArray, triangles: IntArray, wanted: Flo
 def _newton(body: Surface, points: FloatArray, wanted: FloatArray, which: IntArray) -> tuple[IntArray, FloatArray]:
     """Move along the body until n = h; without duplicates and those that do not converge."""
     largest = 0.1 * size(body)
+    points, active = points.copy(), np.arange(len(points))
     for _ in range(30):
-        gap, step = _step(body, points, wanted[which])
-        if not len(points) or np.all(gap < CONVERGED):
+        gap, step = _step(body, points[active], wanted[which[active]])
+        moving = gap >= CONVERGED
+        active, step = active[moving], step[moving]
+        if not len(active):
             break
         long = np.linalg.norm(step, axis=1)
-        points = project(body, points + step * np.minimum(1.0, largest / np.maximum(long, 1e-300))[:, None])
+        step *= np.minimum(1.0, largest / np.maximum(long, 1e-300))[:, None]
+        points[active] = project(body, points[active] + step)
     good = np.sum((normal(body, points) - wanted[which]) ** 2, axis=1) < (100 * CONVERGED) ** 2
     which, points = which[good], points[good]
     keep: list[int] = []

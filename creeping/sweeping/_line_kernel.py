@@ -76,8 +76,8 @@ def trace_lines(level, level_par, box, meshes, critical, directions, summary, st
     summary : (n, 7), filled
         Curves, length, relative error, shares attached, occluded, concave, v.
     status : (n,), filled
-    launched : (n, rays, 5), filled
-        x0, arclength, d.x0; NaN where there is no ray.
+    launched : (n, rays, 8), filled
+        x0, arclength, d.x0, number of the arc, spacing on it, 1 if it is closed; NaN where there is no ray.
     places : (n, rays), filled
         Curve of each ray, NO_RAY where there is none.
     """
@@ -239,7 +239,8 @@ def _finish(
                 break
             place = arcs[k, 0] + long * (m + offset) / given[k]
             point_at(x, T, starts[c], size, spacing[c], place, points, r)
-            launched[r, 3] = (place % size) * spacing[c]
+            launched[r, 3], launched[r, 5] = (place % size) * spacing[c], k
+            launched[r, 6], launched[r, 7] = long * spacing[c] / given[k], long == size
             places[r] = c
             r += 1
     tangents, curvature = np.empty_like(points), np.empty(points.shape[1])

@@ -13,8 +13,10 @@ from creeping.rays.fan import Flow, RayStatus, rough_from
 from creeping.rays.launch_points import line_tangents
 from creeping.rays.spreading import spread
 from creeping.surface import Surface
+from creeping.sweeping.monostatic import fill_monostatic
 from creeping.sweeping.request import NO_RAY, SINGULAR, SweepRequest
 from creeping.sweeping.shadow_lines import ShadowLines, shadow_lines
+from creeping.sweeping.single_rays import SingleRayTracer
 
 BLOCK = 64
 """Rays of a block of the engine."""
@@ -33,6 +35,7 @@ class CompiledSweeper:
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
+        self._tracer = None if request.quantity == "rays" else SingleRayTracer(flow.body, request.length)
 
     @property
     def body(self) -> Surface:
@@ -52,7 +55,10 @@ class CompiledSweeper:
     def _batch(self, incidences: FloatArray, out: dict[str, Any]) -> None:
         lines = shadow_lines(self.body, incidences, self.request.n_rays)
         fill_lines(lines, out)
-        fill_rays(self.flow, lines, self.request.travel_times, out)
+        if self._tracer is None:
+            fill_rays(self.flow, lines, self.request.travel_times, out)
+        else:
+            fill_monostatic(self.flow, lines, self._tracer, self.request, out)
 
 
 def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:

@@ -28,10 +28,12 @@ class LineMeshes:
         As `_line_kernel.trace_lines` takes them.
     critical : (m, 2, 6)
         (n, n x a) at both ends of the segments of K = 0.
+    coarsest : Triangulation
     """
 
     meshes: tuple[tuple[Any, ...], ...]
     critical: FloatArray
+    coarsest: Triangulation
 
     @property
     def turns(self) -> FloatArray:
@@ -50,7 +52,7 @@ def line_meshes(body: Surface) -> LineMeshes:
     found = [_mesh_of(body, vertices) for vertices, _ in TIERS]
     packed = tuple(_packed(body, mesh, nodes) for mesh, (_, nodes) in zip(found, TIERS, strict=True))
     # the finer the mesh, the fewer small parabolic loops are missed
-    return LineMeshes(packed, singular_segments(body, found[-1]))
+    return LineMeshes(packed, singular_segments(body, found[-1]), found[0])
 
 
 def _mesh_of(body: Surface, vertices: int) -> Triangulation:

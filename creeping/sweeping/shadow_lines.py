@@ -3,12 +3,12 @@
 The compiled route of `_line_kernel`; `creeping.rays.shadow` follows one line by other means and to rounding.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.phaseflow._threads import in_threads
 from creeping.surface import Surface
 from creeping.sweeping.line_meshes import LineMeshes, line_meshes
@@ -36,6 +36,8 @@ class ShadowLines:
         Along the curve, and d.x0.
     curve_index : (n, rays)
         The longest curve is 0; -1 where there is no ray.
+    arc_index, spacing, closed : (n, rays)
+        Number of the attached arc, distance of neighbours on it, L, and 1 if it is a whole curve.
     """
 
     directions: FloatArray
@@ -51,6 +53,13 @@ class ShadowLines:
     arclength: FloatArray
     launch_phase: FloatArray
     curve_index: np.ndarray[Any, np.dtype[np.int16]]
+    arc_index: FloatArray
+    spacing: FloatArray
+    closed: FloatArray
+
+    def of(self, rows: IntArray) -> "ShadowLines":
+        """Those of some incidences."""
+        return ShadowLines(*(getattr(self, part.name)[rows] for part in fields(self)))
 
 
 def prepared(body: Surface) -> LineMeshes:
@@ -69,7 +78,7 @@ def shadow_lines(body: Any, directions: FloatArray, n_rays: int) -> ShadowLines:
 
     n = len(directions)
     summary, status = np.empty((n, 7)), np.empty(n, np.int8)
-    launched, places = np.empty((n, n_rays, 5)), np.empty((n, n_rays), np.int16)
+    launched, places = np.empty((n, n_rays, 8)), np.empty((n, n_rays), np.int16)
     lines, level = prepared(body), body.compiled
     box = np.ascontiguousarray(body.bounds, dtype=float)
     directions = np.ascontiguousarray(directions, dtype=float)
@@ -87,4 +96,7 @@ def shadow_lines(body: Any, directions: FloatArray, n_rays: int) -> ShadowLines:
         arclength=launched[..., 3],
         launch_phase=launched[..., 4],
         curve_index=places,
+        arc_index=launched[..., 5],
+        spacing=launched[..., 6],
+        closed=launched[..., 7],
     )

@@ -5,6 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.phaseflow.geodesic import speed_of
 from creeping.phaseflow.tracing import compiled_parts
 from creeping.rays.fan import Flow
 from creeping.surface import Surface
@@ -33,6 +34,8 @@ class Sweeper(Protocol):
 
 def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper:
     """Make what computes a request with a flow."""
-    if request.quantity == "rays" and compiled_parts(flow.body) is not None:
+    # a weighted body has no field: the plain route says so
+    plain = request.quantity == "bistatic" or (request.quantity == "monostatic" and speed_of(flow.body) is not None)
+    if not plain and compiled_parts(flow.body) is not None:
         return CompiledSweeper(flow, request)
     return PlainSweeper(flow, request)

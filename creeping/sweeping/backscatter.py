@@ -1,0 +1,186 @@
+"""Geometry of the field in the direction the wave came from, r = -d, for many incidences at once.
+
+What `creeping.field.far_geometry.FarGeometry` knows of one incidence and many observers, this knows of many incidences
+with one observer each, so that both are assembled by the same formulas. The fan, carried in long steps, tells where to
+look; rays that matter are traced again, exactly.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.field.far_geometry import ALONG
+from creeping.field.forward import TAPER
+from creeping.phaseflow.geodesic import natural_horizon
+from creeping.phaseflow.tracing import pack
+from creeping.rays.fan import Flow
+from creeping.rays.horizon import HorizonRays
+from creeping.rays.shedding import ShedRays
+from creeping.rays.specular import SpecularPoints, specular_points
+from creeping.rays.visibility import occluded
+from creeping.surface import normal, size
+from creeping.sweeping.shadow_lines import ShadowLines, prepared
+from creeping.sweeping.single_rays import SingleRayTracer
+
+EARLY = 0.28
+"""Time, in body sizes, before which a horizon crossing does not count for merging."""
+ALIKE = 1e-5
+"""Distance, in cells, below which two rays found are one."""
+BLOCK = 64
+"""Rays of a block of the engine."""
+
+
+class BackscatterGeometry:
+    """Rays shed back, specular points, and nodes of the fan integral; see `creeping.field.far_geometry.Geometry`.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+        Of a plain body with a compiled level.
+    lines : ShadowLines
+        Incidences (n), none of them singular.
+    tracer : SingleRayTracer
+        Its length is that of the rays.
+    highest : float, 1/L
+        Wavenumber that nodes of the fan integral are to serve.
+    """
+
+    def __init__(self, flow: Flow, lines: ShadowLines, tracer: SingleRayTracer, highest: float) -> None:
+        self.flow, self.body, self.lines, self.tracer = flow, flow.body, lines, tracer
+        self.direction, self.directions = lines.directions, -lines.directions
+        self.highest = highest
+        self._nodes: HorizonRays | None = None
+        self._seek()
+
+    @property
+    def angle(self) -> FloatArray:
+        """Angle from d (n,)."""
+        return np.full(len(self.directions), np.pi)
+
+    def _seek(self) -> None:
+        """Carry the fans, and find cells and crossings."""
+        from creeping.sweeping._seek_kernel import PARTS, quintic_weights, seek_all
+
+        lines, level = self.lines, self.body.compiled  # type: ignore[attr-defined]
+        n, rays = lines.arc_index.shape
+        times = coarse_times(self.flow, self.tracer.length)
+        points = np.where(np.isfinite(lines.launch_points), lines.launch_points, lines.launch_points[:, :1])
+        padded = -(-rays // BLOCK) * BLOCK
+        points = np.concatenate([points, np.broadcast_to(points[:, :1], (n, padded - rays, 3))], axis=1)
+        some = np.flatnonzero(np.isfinite(points[:, 0, 0]))
+        states = np.zeros((n, padded, len(times), 10))
+        if len(some):
+            directions = np.broadcast_to(self.direction[some, None], points[some].shape)
+            carried = self.flow.transport(pack(points[some], directions, jacobi=True), times)
+            states[some] = carried.reshape(len(some), padded, len(times), 10)
+        self._summary = np.empty((n, 2))
+        room = 64
+        while True:
+            found, crossed = np.empty((room * n, 4), np.int64), np.empty((8 * rays * n, 4))
+            a, b = seek_all(
+                level.function, level.parameters, times[1], quintic_weights(times[1]), states[:, :rays], lines.arc_index, lines.closed,
+                self.directions, EARLY * size(self.body), ALONG, room * n, found, crossed, self._summary,
+            )  # fmt: skip
+            if a >= 0:
+                break
+            room *= 8
+        self._found, self._crossed = found[:a], crossed[:b]
+        self._fine = times[:-1, None] + np.diff(times)[:, None] * (np.arange(PARTS) / PARTS)
+
+    @property
+    def mean_root_radius(self) -> FloatArray:
+        """Mean of ρ^(1/3) over the launch points (n,)."""
+        return self._summary[:, 1]
+
+    @property
+    def least_merging(self) -> FloatArray:
+        """Least χ over horizon crossings with p.r > 0.9 (n,); 0 without any."""
+        return self._summary[:, 0]
+
+    @cached_property
+    def shed(self) -> ShedRays:
+        """Rays with p = -d."""
+        row, ray, after, sample = self._found.T
+        lines = self.lines
+        near = 0.5 * (lines.launch_points[row, ray] + lines.launch_points[row, after])
+        fine = np.append(self._fine.ravel(), self.tracer.length)
+        long = fine[sample + 1] - fine[sample]
+        cell = np.stack([lines.spacing[row, ray], long], axis=1)
+        middle = fine[sample] + 0.5 * long
+        one, found, moved = self.tracer.towards(self.direction[row], self.directions[row], near, middle, cell)
+        row, ray, cell = row[found], ray[found], cell[found]
+        arc = lines.arc_index
+        same = arc[row] == arc[row, ray][:, None]
+        first, last = np.argmax(same, axis=1), same.shape[1] - 1 - np.argmax(same[:, ::-1], axis=1)
+        place = ray + 0.5 + moved
+        inside = (lines.closed[row, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))
+        kept = np.flatnonzero(inside)
+        kept = kept[_distinct(row[kept], one.starts[kept], one.rays.time[kept], cell[kept])]
+        return ShedRays(row[kept], np.zeros_like(kept), place[kept], one.rays[kept], np.full(len(kept), np.inf))
+
+    @cached_property
+    def shed_normals(self) -> FloatArray:
+        """Normals where they leave (m, 3)."""
+        return self.normals_of(self.shed.rays.points)
+
+    @cached_property
+    def leaves(self) -> BoolArray:
+        """Whether a shed ray misses the body on its way out (m,)."""
+        return ~occluded(self.body, self.shed.rays.points, -self.shed.rays.directions)
+
+    @property
+    def long(self) -> BoolArray:
+        """For the forward lobe only, which is not here."""
+        return np.zeros(len(self.shed.observer), dtype=bool)
+
+    @cached_property
+    def specular(self) -> SpecularPoints:
+        """Specular points, n = -d."""
+        return specular_points(self.body, self.direction, self.directions, prepared(self.body).coarsest)
+
+    def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
+        """Nodes of the fan integral for the wanted incidences, at most 1/k apart on the shadow line."""
+        # those of the highest wavenumber serve all
+        if self._nodes is None:
+            self._nodes = self._fan_nodes(max(wavenumber, self.highest), wanted)
+        return self._nodes
+
+    def _fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
+        row, ray = self._crossed[:, :2].astype(np.int64).T
+        mine = np.flatnonzero(wanted[row] & (self._crossed[:, 3] > TAPER[0] - 0.1))
+        row, ray, time = row[mine], ray[mine], self._crossed[mine, 2]
+        spacing = self.lines.spacing[row, ray]
+        parts = max(1, int(np.ceil(wavenumber * np.max(spacing, initial=0.0))))
+        starts, tangents = self.tracer.onto_line(self.lines.launch_points[row, ray], self.direction[row], 1)
+        offset = (np.arange(parts) + 0.5) / parts - 0.5
+        guess = starts[:, None] + (offset * spacing[:, None])[..., None] * tangents[:, None]
+        row, time, weight = (np.repeat(v, parts) for v in (row, time, spacing / parts))
+        rays = self.tracer.crossing(self.direction[row], self.directions[row], guess.reshape(-1, 3), time).rays
+        ahead = np.sum(rays.directions * self.directions[row], axis=1) > 0
+        return HorizonRays(row[ahead], rays[ahead], (weight * rays.width)[ahead])
+
+    def normals_of(self, points: FloatArray) -> FloatArray:
+        """N at points (m, 3)."""
+        return normal(self.body, points)
+
+
+def coarse_times(flow: Flow, length: float) -> FloatArray:
+    """Times of the fan, from 0: steps that the flow takes at once, about those that resolve the body."""
+    natural = natural_horizon(flow.body)
+    count = int(np.ceil(length / natural - 1e-9))
+    if flow.error is not None and flow.horizon < length:
+        leaps = max(1, round(natural / flow.horizon))
+        if abs(length / flow.horizon - round(length / flow.horizon)) < 1e-9:
+            whole = round(length / flow.horizon)
+            while whole % leaps:
+                leaps -= 1
+            count = whole // leaps
+    return np.asarray(np.linspace(0.0, length, count + 1))
+
+
+def _distinct(row: IntArray, starts: FloatArray, times: FloatArray, cell: FloatArray) -> IntArray:
+    """Numbers of the solutions that no earlier one of the same incidence equals."""
+    apart = np.linalg.norm(starts[:, None] - starts[None], axis=-1) / cell[:, :1]
+    alike = (row[:, None] == row) & (apart < ALIKE) & (np.abs(times[:, None] - times) < ALIKE * cell[:, 1:])
+    return np.flatnonzero(~np.any(np.tril(alike, -1), axis=1))

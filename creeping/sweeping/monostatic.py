@@ -1,0 +1,41 @@
+"""The monostatic field of many incidences: creeping and reflected, assembled by the formulas of one incidence."""
+
+import numpy as np
+
+from creeping._typing import Any
+from creeping.field.coefficients import parse_boundary
+from creeping.field.far import FORWARD, field_of
+from creeping.rays.fan import Flow
+from creeping.sweeping.backscatter import BackscatterGeometry
+from creeping.sweeping.plain import PlainSweeper
+from creeping.sweeping.request import LINE, SINGULAR, SweepRequest
+from creeping.sweeping.shadow_lines import ShadowLines
+from creeping.sweeping.single_rays import SingleRayTracer
+
+
+def fill_monostatic(
+    flow: Flow, lines: ShadowLines, tracer: SingleRayTracer, request: SweepRequest, out: dict[str, Any]
+) -> None:
+    """Results of the fields."""
+    rows = np.flatnonzero(lines.status != SINGULAR)
+    if not len(rows):
+        return
+    geometry = BackscatterGeometry(flow, lines.of(rows), tracer, max(request.wavenumbers))
+    # a body smaller than a wavelength: its forward lobe reaches all the way back
+    small = geometry.mean_root_radius * np.cbrt(min(request.wavenumbers) / 2) * np.pi < FORWARD[1]
+    if np.any(small):
+        found = PlainSweeper(flow, request)(lines.directions[rows[small]])
+        for name, values in found.items():
+            if name not in LINE:
+                out[name][rows[small]] = values
+        rows = rows[~small]
+        geometry = BackscatterGeometry(flow, lines.of(rows), tracer, max(request.wavenumbers))
+    scalar = 0
+    for name in request.boundaries:
+        for k, wavenumber in enumerate(request.wavenumbers):
+            field = field_of(geometry, wavenumber, parse_boundary(name), request.order)
+            place: tuple[Any, ...] = (rows, k) if name == "pec" else (rows, scalar, k)
+            suffix = "_pec" if name == "pec" else ""
+            for part in ("creeping", "reflected", "unresolved"):
+                out[part + suffix][place] = getattr(field, part)
+        scalar += name != "pec"
