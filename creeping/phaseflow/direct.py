@@ -55,7 +55,5 @@ class DirectFlow:
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same); see `PhaseMap.transport`."""
         if states.shape[1] > 10:
-            return with_attenuation(self.body, states, times, self.transport, rtol=self.rtol)
-        if self.step is not None:
-            return trace_states(self.body, states, times, rtol=0.0, step=self.step)
-        return trace_states(self.body, states, times, rtol=self.rtol)
+            return with_attenuation(self.body, states, times, rtol=self.rtol, step=self.step)
+        return trace_states(self.body, states, times, rtol=self.rtol if self.step is None else 0.0, step=self.step)

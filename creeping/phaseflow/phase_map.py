@@ -166,7 +166,7 @@ class PhaseMap:
         states = np.ascontiguousarray(states, dtype=float)
         times = np.asarray(times, dtype=float)
         if states.shape[1] > 10 and not self._attenuates_at(times):
-            return with_attenuation(self.body, states, times, self.transport, rtol=self._rtol)
+            return with_attenuation(self.body, states, times, rtol=self._rtol, transport=self.transport)
         # a time that misses a multiple of the horizon by rounding is that multiple
         whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12).astype(np.int64)
         rest = np.maximum(times - whole * self.horizon, 0.0)

@@ -7,7 +7,20 @@ from scipy.optimize import brentq
 
 import creeping as cr
 import scatterers as sc
-from creeping.phaseflow.attenuation import NODES, chebyshev_times, extend, first_zero, gauss_rule, halves, lagrange
+from creeping._errors import IntegrationError
+from creeping.phaseflow import attenuation
+from creeping.phaseflow._sliding import sliding
+from creeping.phaseflow.attenuation import (
+    NODES,
+    chebyshev_times,
+    extend,
+    extend_along,
+    fine_rules,
+    first_zero,
+    gauss_rule,
+    halves,
+    lagrange,
+)
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.geodesic import normal_curvature
 from creeping.phaseflow.tracing import pack, trace_states
@@ -117,3 +130,109 @@ def test_a_detached_ray_stays_so():
     total, end = np.array([1.0]), np.array([0.25])
     extend(np.ones((1, NODES)), 0.5, np.array([0.5]), total, end)
     assert (total[0], end[0]) == (1.0, 0.25)
+
+
+# unequal, repeated, with 0, and two that differ by rounding
+AWKWARD = np.array([0.0, 0.0, 0.3, 0.3, np.nextafter(0.3, 1), 0.31, 0.9, 0.9 + 1e-9, 2.0])
+
+
+class Uncompiled:
+    """A body without kernels."""
+
+    def __init__(self, body):
+        for name in ("level", "gradient", "hessian", "bounds", "atlas", "parameters"):
+            setattr(self, name, getattr(body, name))
+
+
+@pytest.mark.parametrize("body", [sc.Torus(), sc.TwistedEllipsoid(), sc.Torus(speed="1 + 0.3*x + 0.2*z")], ids=repr)
+def test_traced_kernel_equals_numpy_twin(body, rng):
+    states = pack(*random_bundle_points(body, 150, rng=rng), lanes=12)
+    states[:20, 11], states[:, 10] = 0.25, 7.0
+    got = cr.DirectFlow(body).transport(states, AWKWARD)
+    spacing = attenuation.fine_spacing(body, 1e-10)
+    fine = sliding(np.unique(AWKWARD[2:]), spacing, fine_rules()[0])
+    traced = trace_states(body, states[:, :10], fine.times)
+    out = np.empty_like(got)
+    out[:, 0, 10:] = states[:, 10:]
+    extend_along(body, traced, fine, np.searchsorted(fine.times, AWKWARD), out)
+    np.testing.assert_array_equal(got[..., :10], out[..., :10])
+    np.testing.assert_allclose(got[..., 10], out[..., 10], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(got[..., 11], out[..., 11], rtol=1e-9)
+    np.testing.assert_array_equal(got[:20, :, 10:], np.broadcast_to([7.0, 0.25], (20, len(AWKWARD), 2)))
+    assert 20 < np.isfinite(got[20:, -1, 11]).sum() < 130
+
+
+def test_body_without_kernels_attenuates_the_same(rng):
+    body = sc.Torus()
+    states = pack(*random_bundle_points(body, 40, rng=rng), lanes=12)
+    got = cr.DirectFlow(Uncompiled(body), rtol=1e-12).transport(states, AWKWARD)
+    np.testing.assert_allclose(got, cr.DirectFlow(body, rtol=1e-12).transport(states, AWKWARD), atol=1e-9)
+
+
+def test_output_times_change_nothing(rng):
+    body = sc.TwistedEllipsoid()
+    states = pack(*random_bundle_points(body, 200, rng=rng), lanes=12)
+    flow = cr.DirectFlow(body, rtol=1e-12)
+    one = flow.transport(states, np.array([2.0]))[:, 0]
+    dense = np.sort(np.concatenate([AWKWARD, np.linspace(0, 2, 3001)]))
+    for times in (AWKWARD, dense):
+        other = flow.transport(states, times)
+        np.testing.assert_allclose(other[:, -1, :10], one[:, :10], atol=1e-9)
+        np.testing.assert_allclose(other[:, -1, 10], one[:, 10], atol=1e-6)
+        np.testing.assert_allclose(other[:, -1, 11], one[:, 11], atol=1e-7)
+        assert np.all(np.diff(other[..., 10], axis=1) >= 0)
+        np.testing.assert_array_equal(other[:, 0], states)
+
+
+@pytest.mark.parametrize("time", [1e-320, 1e-150, 1e-14, 1e-9, 1e-5, 1e-3])
+def test_short_times(time, rng):
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    states = pack(*random_bundle_points(body, 20, rng=rng), lanes=12)
+    got = cr.DirectFlow(body).transport(states, np.array([0.5 * time, time]))
+    rate = normal_curvature(body, states[:, :3], states[:, 3:6])[:, None] ** (2 / 3)
+    np.testing.assert_allclose(got[..., 10], rate * [0.5 * time, time], rtol=1e-8 + 4 * time, atol=1e-100)
+    assert np.all(np.isinf(got[..., 11]))
+
+
+def test_slices_of_rays_change_nothing(rng, monkeypatch):
+    body = sc.Torus()
+    states = pack(*random_bundle_points(body, 150, rng=rng), lanes=12)
+    flow, times = cr.DirectFlow(body), np.array([0.4, 2.0])
+    whole = flow.transport(states, times)
+    monkeypatch.setattr(attenuation, "WORKSPACE", 1)
+    np.testing.assert_array_equal(flow.transport(states, times), whole)
+
+
+@pytest.mark.parametrize("body", [sc.Ellipsoid(1.2, 1.0, 0.7), sc.Sphere(speed="1 + 0.3*x")], ids=repr)
+def test_weighted_or_not_as_integrated_with_the_ray(body, rng):
+    # the tracer's own lane of A, good where kappa_n has no zeros
+    states = pack(*random_bundle_points(body, 100, rng=rng), lanes=12)
+    times = np.array([1.0, 6.0])
+    exact = trace_states(body, states[:, :11], times, rtol=1e-13)[..., 10]
+    for rtol, step, bound in ((1e-12, None, 1e-8), (1e-8, None, 2e-6), (1e-8, 0.07, 2e-6)):
+        got = cr.DirectFlow(body, rtol=rtol, step=step).transport(states, times)
+        np.testing.assert_allclose(got[..., 10], exact, atol=bound)
+
+
+def test_sliding_polynomial_has_degree_11(rng):
+    outputs, points = np.array([0.2, 0.21, 1.0, 1.0 + 1e-13, 2.0]), gauss_rule(6)[0]
+    fine = sliding(outputs, 0.25, points)
+    polynomial = np.polynomial.Polynomial(rng.standard_normal(12), domain=[0, 2])
+    knots = fine.times[fine.knots]
+    assert np.all(np.diff(knots) >= 0.25 / 4) and np.all(np.diff(knots) <= 1.5 * 0.25) and knots[-1] == 2.0
+    assert set(outputs) <= set(fine.times)
+    data = np.stack([polynomial.deriv(d)(knots) if d else polynomial(knots) for d in range(3)], axis=1)
+    at = fine.times[:-1, None] + np.diff(fine.times)[:, None] * points
+    for weights, wanted, bound in ((fine.position, polynomial, 1e-12), (fine.velocity, polynomial.deriv(), 1e-10)):
+        got = [weights[k] @ data[fine.first[k] : fine.first[k] + 4].ravel() for k in range(len(fine.first))]
+        np.testing.assert_allclose(got, wanted(at), atol=bound)
+
+
+def test_rays_that_fail_are_numbered_through(rng, monkeypatch):
+    body = sc.Torus()
+    states = pack(*random_bundle_points(body, 100, rng=rng), lanes=12)
+    states[70, 0] = np.nan
+    monkeypatch.setattr(attenuation, "WORKSPACE", 1)
+    with pytest.raises(IntegrationError, match="rays from 64") as caught:
+        cr.DirectFlow(body).transport(states, np.array([1.0]))
+    assert 70 in caught.value.failed and min(caught.value.failed) >= 64
