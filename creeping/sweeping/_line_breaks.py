@@ -178,13 +178,13 @@ def _between(plane, starts, spacing, owner, boxes, p, q, places, where, count):
                 continue
             if not _cross(plane, i, j, m, n):
                 continue
-            u, v = _solve(plane, i, j, spacing[c1], m, n, spacing[c2])
+            one, two = _solve(plane, f1, n1, k1 + a, spacing[c1], f2, n2, k2 + b, spacing[c2])
             # the piece behind loses the light
-            behind_first = _depth(plane, i, j, u) > _depth(plane, m, n, v)
+            behind_first = plane[2, i] > plane[2, m]
             if count == places.shape[0]:
                 return -1
             where[count] = c1 if behind_first else c2
-            places[count] = k1 + a + u if behind_first else k2 + b + v
+            places[count] = one % n1 if behind_first else two % n2
             count += 1
     return count
 
@@ -229,28 +229,27 @@ def _cubic(plane, row, i, j, h, u):
 
 
 @njit(**options)
-def _solve(plane, i, j, h, m, n, g):
-    """Fractions at which the cubics from i to j and from m to n cross; those of the chords where that fails."""
+def _solve(plane, first, number, k, h, first2, number2, m, g):
+    """Places at which the cubics cross near those of the chords after nodes k and m; of the chords where that fails."""
+    i, j, p, q = first + k % number, first + (k + 1) % number, first2 + m % number2, first2 + (m + 1) % number2
     a, b = plane[0, j] - plane[0, i], plane[1, j] - plane[1, i]
-    c, d = plane[0, n] - plane[0, m], plane[1, n] - plane[1, m]
-    e, f = plane[0, m] - plane[0, i], plane[1, m] - plane[1, i]
+    c, d = plane[0, q] - plane[0, p], plane[1, q] - plane[1, p]
+    e, f = plane[0, p] - plane[0, i], plane[1, p] - plane[1, i]
     determinant = a * d - b * c
-    u0, v0 = (e * d - f * c) / determinant, (e * b - f * a) / determinant
-    u, v = u0, v0
-    for _ in range(4):
-        x, a = _cubic(plane, 0, i, j, h, u)
-        y, b = _cubic(plane, 1, i, j, h, u)
-        z, c = _cubic(plane, 0, m, n, g, v)
-        w, d = _cubic(plane, 1, m, n, g, v)
+    one, two = k + (e * d - f * c) / determinant, m + (e * b - f * a) / determinant
+    start, begin = one, two
+    for _ in range(8):
+        # the crossing of the cubics may lie in a cell next to that of the chords
+        k, m = int(math.floor(one)), int(math.floor(two))
+        i, j, p, q = first + k % number, first + (k + 1) % number, first2 + m % number2, first2 + (m + 1) % number2
+        x, a = _cubic(plane, 0, i, j, h, one - k)
+        y, b = _cubic(plane, 1, i, j, h, one - k)
+        z, c = _cubic(plane, 0, p, q, g, two - m)
+        w, d = _cubic(plane, 1, p, q, g, two - m)
         determinant = a * d - b * c
         e, f = z - x, w - y
-        u += (e * d - f * c) / determinant
-        v += (e * b - f * a) / determinant
-    if not (abs(u - u0) < 0.5 and abs(v - v0) < 0.5):
-        u, v = u0, v0
-    return min(max(u, 0.0), 1.0), min(max(v, 0.0), 1.0)
-
-
-@njit(**options)
-def _depth(plane, i, j, u):
-    return (1.0 - u) * plane[2, i] + u * plane[2, j]
+        one += min(max((e * d - f * c) / determinant, -1.0), 1.0)
+        two += min(max((e * b - f * a) / determinant, -1.0), 1.0)
+    if not (abs(one - start) < 2.0 and abs(two - begin) < 2.0):
+        return start, begin
+    return one, two

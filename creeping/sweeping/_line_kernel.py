@@ -29,12 +29,14 @@ from creeping.sweeping._line_nodes import (
     spacings,
 )
 from creeping.sweeping._line_walk import incidence_at, mixed_triangles, walk
-from creeping.sweeping.request import DOUBTFUL, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
+from creeping.sweeping.request import FOLLOWED, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
 
 COMPONENTS = 16
 """Curves of a line at most."""
 COARSE_STEP = 0.22
 """Second step of the nodes on the mesh, in edges, from which a line is flagged: they may have changed branch."""
+REACH, MORE = 0.5, 4
+"""Longest step of a node, in edges, and steps more that a flagged line takes."""
 APART = 0.45
 """Least distance of kept nodes, in edges."""
 LOST, UNSETTLED, SETTLED = 1e-3, 1e-6, 2e-6
@@ -100,7 +102,7 @@ def trace_lines(level, level_par, box, meshes, critical, directions, summary, st
             far = v > mesh[5] * mesh[5]
             if sure and far:
                 break
-        status[row] = OK if sure and far else (NEAR_SINGULAR if sure else DOUBTFUL)
+        status[row] = OK if sure and far else (NEAR_SINGULAR if sure else FOLLOWED)
 
 
 @njit(**options)
@@ -138,9 +140,14 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
     for axis in range(3):
         for i in range(n):
             x[axis, i] = raw[axis, i]
-    if newton(level, level_par, d, x, 0.1 * extent, scratch, T, kappa) == FAILED:
+    # next to a small loop a longer step would end on another branch
+    reach = REACH * edge
+    if newton(level, level_par, d, x, reach, scratch, T, kappa) == FAILED:
         return False
-    sure = newton(level, level_par, d, x, 0.1 * extent, scratch, T, kappa) < COARSE_STEP * edge
+    step = newton(level, level_par, d, x, reach, scratch, T, kappa)
+    sure = step < COARSE_STEP * edge
+    for _ in range(MORE if not sure else 0):
+        step = newton(level, level_par, d, x, reach, scratch, T, kappa)
     kept_starts = np.empty(COMPONENTS + 1, np.int64)
     sure &= not prune(x, T, raw_starts, components, APART * edge, kept, kept_starts)
     lengths, counts = np.empty(COMPONENTS), np.empty(COMPONENTS, np.int64)
@@ -162,9 +169,9 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
         resample(x, T, kept, first, count, lengths[best], y, total, counts[best])
         total += counts[best]
     starts[components] = total
-    if newton(level, level_par, d, y, 0.1 * extent, scratch, U, kappa) == FAILED:
+    if newton(level, level_par, d, y, reach, scratch, U, kappa) == FAILED:
         return False
-    last = newton(level, level_par, d, y, 0.1 * extent, scratch, U, kappa)
+    last = newton(level, level_par, d, y, reach, scratch, U, kappa)
     if not last < LOST * extent:
         return False
     sure &= last < UNSETTLED * extent
@@ -180,7 +187,7 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
             length, doubt = length + own, doubt + error
             if again == 0:
                 equalise(y, U, starts[c], size, own, h, moved)
-        if again == 0 and not newton(level, level_par, d, y, 0.1 * extent, scratch, U, kappa) < LOST * extent:
+        if again == 0 and not newton(level, level_par, d, y, reach, scratch, U, kappa) < LOST * extent:
             return False
     sure &= doubt < SETTLED * length
     summary[0], summary[1], summary[2] = components, length, doubt / length

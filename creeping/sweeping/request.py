@@ -16,11 +16,11 @@ from creeping.field.far import checked
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
-OK, NEAR_SINGULAR, DOUBTFUL, SINGULAR, FAILED = range(5)
+OK, NEAR_SINGULAR, FOLLOWED, SINGULAR, FAILED = range(5)
 INCIDENCE_STATUSES = {
     OK: "ok",
     NEAR_SINGULAR: "near singular: the number of curves is not certain",
-    DOUBTFUL: "doubtful: the line did not settle on the finest mesh",
+    FOLLOWED: "followed one by one: the meshes did not resolve the line",
     SINGULAR: "singular: the line crosses itself, nothing is given",
     FAILED: "failed: an error, nothing is given",
 }

@@ -8,10 +8,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from creeping._errors import SingularIncidenceError
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.phaseflow._threads import in_threads
+from creeping.rays.launch_points import launch_positions, launching_arcs
+from creeping.rays.shadow import shadow_line
 from creeping.surface import Surface
 from creeping.sweeping.line_meshes import LineMeshes, line_meshes
+from creeping.sweeping.request import FOLLOWED, NO_RAY, SINGULAR
 
 LEAST = 8
 """Fewest incidences worth a thread."""
@@ -88,6 +92,8 @@ def shadow_lines(body: Any, directions: FloatArray, n_rays: int) -> ShadowLines:
         trace_lines(level.function, level.parameters, box, lines.meshes, lines.critical, directions[part], *out)
 
     in_threads(run, n, least=LEAST, multiple=1)
+    for row in np.flatnonzero(status == FOLLOWED):
+        status[row] = _follow(body, directions[row], summary[row], launched[row], places[row])
     return ShadowLines(
         directions,
         status,
@@ -100,3 +106,29 @@ def shadow_lines(body: Any, directions: FloatArray, n_rays: int) -> ShadowLines:
         spacing=launched[..., 6],
         closed=launched[..., 7],
     )
+
+
+def _follow(body: Surface, direction: FloatArray, summary: FloatArray, launched: FloatArray, places: Any) -> int:
+    """Fill the results of a line that the meshes do not resolve, by `shadow_line`; returns its status."""
+    launched[:], places[:] = np.nan, NO_RAY
+    try:
+        line = shadow_line(body, direction, n_points=16)
+    except SingularIncidenceError as error:
+        summary[:6] = np.nan
+        summary[6] = getattr(error, "distance", 0.0)
+        return SINGULAR
+    shares = line.fractions
+    # panels are exact to rounding
+    summary[:] = len(line.curves), line.length, 1e-12, *shares.values(), line.singular_distance
+    arcs = launching_arcs(line, every=False)
+    arc, s = launch_positions(line, arcs, len(places))
+    arc, s = arc[: len(places)], s[: len(places)]
+    counts = np.bincount(arc, minlength=len(arcs))
+    for row, (number, place) in enumerate(zip(arc, s, strict=True)):
+        one = arcs[number]
+        curve = line.curves[one.curve]
+        point = curve.at(place % curve.length)
+        launched[row, :3], launched[row, 3], launched[row, 4] = point, place % curve.length, point @ line.direction
+        launched[row, 5:] = number, (one.end - one.start) / counts[number], one.closed
+        places[row] = one.curve
+    return FOLLOWED
