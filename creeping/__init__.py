@@ -27,12 +27,14 @@ _HOMES = {
     "choose_flow": "creeping.phaseflow.choosing",
     "far_field": "creeping.field.far",
     "far_field_uncertainty": "creeping.field.uncertainty",
+    "fibonacci_directions": "creeping.sweeping.directions",
     "iso_phase_curves": "creeping.rays.isophase",
     "launch": "creeping.rays.fan",
     "load_phase_map": "creeping.phaseflow.caching",
     "near_field": "creeping.field.near",
     "shadow_line": "creeping.rays.shadow",
     "surface_field": "creeping.field.on_surface",
+    "sweep_directions": "creeping.sweeping.running",
     "trace": "creeping.phaseflow.tracing",
 }
 
@@ -56,12 +58,14 @@ __all__ = [
     "choose_flow",
     "far_field",
     "far_field_uncertainty",
+    "fibonacci_directions",
     "iso_phase_curves",
     "launch",
     "load_phase_map",
     "near_field",
     "shadow_line",
     "surface_field",
+    "sweep_directions",
     "trace",
 ]
 
@@ -83,6 +87,8 @@ if TYPE_CHECKING:
     from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
     from creeping.rays.shadow import ShadowLine, shadow_line
     from creeping.surface import check_surface
+    from creeping.sweeping.directions import fibonacci_directions
+    from creeping.sweeping.running import sweep_directions
 
 
 def __getattr__(name: str) -> Any:

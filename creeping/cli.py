@@ -1,7 +1,7 @@
 """The ``creeping`` command: the only place that joins creeping and scatterers.
 
-Exit codes: 0 done, 2 usage, 3 bad input, 130 interrupted. Libraries are imported inside the commands, so that
-``creeping --help`` answers at once.
+Exit codes: 0 done, 2 usage, 3 bad input, 4 partial sweep, 130 interrupted. Libraries are imported inside the commands,
+so that ``creeping --help`` answers at once.
 """
 
 import json
@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Group, Parameter
 
-from creeping import _checking, _upkeep
+from creeping import _checking, _sweep_command, _upkeep
 from creeping._body_argument import AllowRough, Body, SpeedOption, Units, parse_body
 from creeping._version import __version__
 
@@ -204,6 +204,7 @@ def figure(
 
 
 app.command(_checking.check)
+app.command(_sweep_command.sweep)
 cache_app.command(_upkeep.list_maps, name="ls")
 cache_app.command(_upkeep.verify_maps, name="verify")
 cache_app.command(_upkeep.clear_maps, name="clear")

@@ -91,12 +91,14 @@ def test_public_names_grow_on_purpose():
         "choose_flow",
         "far_field",
         "far_field_uncertainty",
+        "fibonacci_directions",
         "iso_phase_curves",
         "launch",
         "load_phase_map",
         "near_field",
         "shadow_line",
         "surface_field",
+        "sweep_directions",
         "trace",
     ]
     assert all(getattr(creeping, name) is not None for name in creeping.__all__)

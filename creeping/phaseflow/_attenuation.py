@@ -79,26 +79,19 @@ def extend(values, rules, time, now, a, sampled, count):
 def _detach(values, searching, points, weights, nodes, time, now, a, i):
     """The leap in which kappa_n reaches 0, or dips near an end."""
     steps = searching.shape[0] - 1
-    root = math.inf
+    root, c = math.inf, _divided(values, nodes)
     for k in range(steps + 1):
         total = 0.0
         for j in range(8):
             total += searching[k, j] * values[j]
         if total <= 0.0:
-            low, high = max(k - 1, 0) / steps, k / steps
-            for _ in range(50 if k > 0 else 0):
-                middle = 0.5 * (low + high)
-                if _polynomial(values, nodes, middle) > 0.0:
-                    low = middle
-                else:
-                    high = middle
-            root = high
+            root = _zero(c, nodes, (k - 1) / steps, k / steps) if k > 0 else 0.0
             break
     part = min(root, 1.0)
     total = 0.0
     for g in range(points.shape[0]):
         s = points[g]
-        value = _polynomial(values, nodes, part * (1.0 - s * s * s))
+        value = _polynomial(c, nodes, part * (1.0 - s * s * s))
         if value > 0.0:
             total += weights[g] * s * s * value ** (2 / 3)
     a[0, i] += 3.0 * part * time * total
@@ -107,16 +100,44 @@ def _detach(values, searching, points, weights, nodes, time, now, a, i):
 
 
 @njit(**options)
-def _polynomial(values, nodes, t):
-    """Polynomial through values at the nodes, by Neville's scheme."""
-    work = np.empty(8)
+def _zero(c, nodes, low, high):
+    """Zero of the polynomial between low, where it is positive, and high, where it is not, by the Illinois method."""
+    a, b, side = _polynomial(c, nodes, low), _polynomial(c, nodes, high), 0
+    for _ in range(60):
+        if not (high - low > 1e-15 and a > 0.0 and b < 0.0):
+            break
+        middle = (low * b - high * a) / (b - a)
+        value = _polynomial(c, nodes, middle)
+        if value > 0.0:
+            low, a = middle, value
+            b *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            high, b = middle, value
+            a *= 0.5 if side == -1 else 1.0
+            side = -1
+    return high
+
+
+@njit(**options)
+def _divided(values, nodes):
+    """Divided differences of values at the nodes: the coefficients of Newton's form."""
+    c = np.empty(8)
     for j in range(8):
-        work[j] = values[j]
+        c[j] = values[j]
     for width in range(1, 8):
-        for j in range(8 - width):
-            span = nodes[j] - nodes[j + width]
-            work[j] = ((t - nodes[j + width]) * work[j] + (nodes[j] - t) * work[j + 1]) / span
-    return work[0]
+        for j in range(7, width - 1, -1):
+            c[j] = (c[j] - c[j - 1]) / (nodes[j] - nodes[j - width])
+    return c
+
+
+@njit(**options)
+def _polynomial(c, nodes, t):
+    """Newton's form with the divided differences c at t."""
+    total = c[7]
+    for j in range(6, -1, -1):
+        total = total * (t - nodes[j]) + c[j]
+    return total
 
 
 @njit(**options)

@@ -35,6 +35,10 @@ CHUNK = 65_536
 UNMEASURED = MapError(float("nan"), float("nan"), 0)
 
 
+RESOLVED = 1e-7
+"""Error of the attenuation over a natural horizon by polynomials through Chebyshev times."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """What a direct build needs to know.
@@ -50,6 +54,8 @@ class Plan:
         d: nodes are traced to T0/2^d only.
     least_cells : int
         Along u and v, if the grid is refined or thinned.
+    reach : float
+        Longest horizon over which curvatures ride along, in natural ones; see `curvature_reach`.
     """
 
     horizon: float
@@ -58,6 +64,15 @@ class Plan:
     ride_along: bool = True
     doublings: int = 0
     least_cells: int = 1
+    reach: float = 1.0
+
+
+def curvature_reach(tolerance: float) -> float:
+    """Natural horizons over which the Chebyshev times resolve the curvature well enough for a tolerance.
+
+    Over one of them the attenuation errs by about RESOLVED, and by its eighth power over more.
+    """
+    return float(max(1.0, (tolerance / RESOLVED) ** (1 / 8)))
 
 
 def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol: float) -> PhaseMap:
@@ -67,8 +82,7 @@ def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol
     doublings = plan.doublings if isinstance(model, CompiledModel) else 0
     now = plan.horizon / 2**doublings
     say(f"tracing {len(nodes)} nodes to {now:g}")
-    # over longer leaps the Chebyshev times do not resolve the curvature
-    curved = isinstance(model, CompiledModel) and plan.horizon <= 1.01 * natural_horizon(body)
+    curved = isinstance(model, CompiledModel) and plan.horizon <= 1.01 * plan.reach * natural_horizon(body)
     values = _traced(body, model, nodes, now, plan.ride_along, curved, rtol)
     leap = _leap(values, plan.grid, now, model, single=plan.single and doublings == 0)
     for k in range(doublings):

@@ -18,7 +18,7 @@ import numpy as np
 
 from creeping._errors import ToleranceError
 from creeping._typing import FloatArray
-from creeping.phaseflow.building import Plan, Progress, build_direct, measured
+from creeping.phaseflow.building import Plan, Progress, build_direct, curvature_reach, measured
 from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.geodesic import natural_horizon
 from creeping.phaseflow.grids import MARGIN, Grid, least_cells
@@ -191,7 +191,9 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
             if nodes > MAX_NODES or nbytes > MAX_BYTES:
                 continue
             doublings = _doublings(horizon, natural, cost)
-            plan = Plan(horizon, grid, single, request.ride_along, doublings, least_cells(body))
+            plan = Plan(
+                horizon, grid, single, request.ride_along, doublings, least_cells(body), curvature_reach(tolerance)
+            )
             # the curvatures are wanted at several times of each leap
             traced = cost * horizon / 2**plan.doublings * (6.0 if request.ride_along else 1.0)
             build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if request.ride_along else 1.0)
@@ -229,8 +231,8 @@ def _horizons(request: "Request", natural: float, cost: float) -> list[float]:
     if not request.length:
         return [natural]
     # probing a horizon traces some 14 000 rays that far
-    # over longer leaps than the natural one the curvatures do not ride along
-    reach = natural if request.ride_along else 16 * natural
+    # over longer leaps the curvatures do not ride along
+    reach = natural * (curvature_reach(request.tolerance or 0.0) if request.ride_along else 16)
     longest = max(natural, min(reach, 4 * _budget(request, cost) / (cost * 3 * LINES * CELLS)))
     distance = request.length / request.outputs
     leaps = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)

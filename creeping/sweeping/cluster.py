@@ -1,0 +1,311 @@
+"""A sweep on a Dask cluster: a sliding window of tasks, each of which writes its own chunks.
+
+Workers get the recipe of the sweep once, by a plugin that restarted workers get too; a phase map they open from the
+store, mapped from its files. They return a record; the driver marks the task. A task whose worker dies again and again
+is put aside until all others are done, and then done in this process's hands: one incidence after the other, alone.
+"""
+
+import os
+import queue
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import dask
+import distributed
+import numpy as np
+
+from creeping._errors import CreepingError
+from creeping._typing import Any, FloatArray
+from creeping.surface import Surface
+from creeping.sweeping.planning import Arrays, Maker, SweepPlan, compute
+from creeping.sweeping.request import SweepRequest
+from creeping.sweeping.store import SweepStore
+
+AHEAD = 2
+"""Tasks in flight for each thread of the workers."""
+ANSWER = 20.0
+"""Seconds in which a scheduler must answer."""
+PATIENCE = 120.0
+"""Seconds without any worker after which the sweep is given up."""
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "CREEPING_THREADS")
+
+
+@dataclass
+class Recipe:
+    """What a worker needs to make the sweeper; pickled with the body in it, but not the tables of a map."""
+
+    digest: str
+    body: Surface
+    request: SweepRequest
+    make: Maker
+    folder: str
+    driver: tuple[str, int] = field(default_factory=lambda: _process())
+    own: threading.local = field(default_factory=threading.local, repr=False)
+
+    def tools(self) -> tuple[Any, SweepStore]:
+        """Sweeper and store of this thread, made when first asked for."""
+        if not hasattr(self.own, "tools"):
+            if not Path(self.folder).is_dir():
+                raise CreepingError(f"the worker on {_process()[0]} does not see {self.folder}; give a shared folder")
+            store = SweepStore.open(self.folder)
+            self.own.tools = (self.make(store.flow(self.body), self.request), store)
+        tools: tuple[Any, SweepStore] = self.own.tools
+        return tools
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "own"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, own=threading.local())
+
+
+_RECIPES: dict[str, Recipe] = {}
+"""Of the sweeps that this process, a worker, takes part in."""
+
+
+class RecipePlugin(distributed.WorkerPlugin):  # type: ignore[misc]
+    """Gives a worker the recipe of a sweep."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self.recipe = recipe
+
+    def setup(self, worker: Any) -> None:
+        """Keep the recipe, and keep to one thread: the cores are shared out among the workers."""
+        _RECIPES[self.recipe.digest] = self.recipe
+        if _process() == self.recipe.driver:
+            return
+        for name in THREADS:
+            os.environ.setdefault(name, "1")
+        if worker.nanny and threading.current_thread() is threading.main_thread():
+            # a terminal interrupts its whole group of processes; to stop is the driver's part
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def teardown(self, worker: Any) -> None:
+        """Forget the recipe."""
+        _RECIPES.pop(self.recipe.digest, None)
+
+
+def fill_on(
+    client: Any, plan: SweepPlan, store: SweepStore, missing: list[int], stop: Callable[[], bool]
+) -> Iterator[int]:
+    """Compute tasks on a cluster; yields each when it is committed.
+
+    Parameters
+    ----------
+    client : distributed.Client or str
+        Client, or the address of a scheduler.
+    plan : SweepPlan
+    store : SweepStore
+    missing : list of int
+        Tasks.
+    stop : callable
+        Asked now and then: whether to start no more tasks, and to wait for those that are being computed only.
+
+    Raises
+    ------
+    CreepingError
+        If the workers cannot write, or there are none for too long.
+    """
+    if isinstance(client, str):
+        with connected(client) as own:
+            yield from fill_on(own, plan, store, missing, stop)
+        return
+    recipe = Recipe(plan.digest, plan.body, plan.request, plan.make, str(store.folder))
+    name = f"creeping-{plan.digest[:16]}"
+    try:
+        client.register_plugin(RecipePlugin(recipe), name=name)
+    except (TypeError, AttributeError) as error:
+        raise CreepingError(f"{plan.body!r} cannot be sent to workers ({error}); sweep in one process") from error
+    window = _Window(client, plan, stop)
+    try:
+        dead = []
+        for task, outcome in window.results(missing):
+            if isinstance(outcome, distributed.KilledWorker):
+                dead.append(task)
+                continue
+            store.commit(task, failures=outcome > 0)
+            yield task
+        for task in dead:
+            if stop():
+                return
+            found = _singly(window, plan.rows(task), stop)
+            if found is None:
+                return
+            store.write_task(task, *found)
+            store.commit(task, failures=bool(found[1]))
+            yield task
+    finally:
+        window.close()
+        with suppress(Exception):
+            client.unregister_worker_plugin(name)
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """Client of the scheduler at an address."""
+    try:
+        client = distributed.Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise CreepingError(f"no Dask scheduler answers at {address!r} ({error}); start one first") from error
+    with client:
+        yield client
+
+
+@contextmanager
+def local_client(workers: int) -> Iterator[Any]:
+    """Client of as many worker processes of this machine, of one thread each."""
+    options = {
+        # a task goes to a worker when the worker is free: fewer are lost with it, or have to be waited for
+        "distributed.scheduler.worker-saturation": 1.0,
+        # one death may be an accident
+        "distributed.scheduler.allowed-failures": 1,
+    }
+    with (
+        dask.config.set(options),
+        distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            # any free port: 8787 may be taken by a cluster of the user
+            dashboard_address=":0",
+            env=dict.fromkeys(THREADS, "1"),
+            silence_logs=50,
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+class _Window:
+    """Tasks in flight: never more than a few for each thread of the workers."""
+
+    def __init__(self, client: Any, plan: SweepPlan, stop: Callable[[], bool]) -> None:
+        self.client, self.plan, self.stop = client, plan, stop
+        self.finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.flying: dict[str, tuple[int, Any]] = {}
+        self._threads, self._asked, self._alive = 0, 0.0, time.monotonic()
+
+    def results(self, tasks: list[int]) -> Iterator[tuple[int, Any]]:
+        """Task and number of its failed incidences, or the `KilledWorker`, in the order of completion."""
+        waiting = iter(tasks)
+        drained = False
+        while True:
+            stopping = self.stop()
+            while not stopping and len(self.flying) < self._width():
+                task = next(waiting, None)
+                if task is None:
+                    break
+                self.submit(task, _whole_task, task, self.plan.incidences[self.plan.rows(task)])
+            if stopping and not drained:
+                self._drop_what_waits()
+                drained = True
+            if not self.flying:
+                return
+            done = self.next()
+            if done is not None:
+                yield done
+
+    def submit(self, task: int, work: Callable[..., Any], *arguments: Any) -> None:
+        """Send work to the cluster."""
+        key = f"creeping-{task}-{os.urandom(6).hex()}"
+        future = self.client.submit(work, self.plan.digest, *arguments, key=key, pure=False)
+        self.flying[key] = (task, future)
+        future.add_done_callback(self.finished.put)
+
+    def next(self) -> tuple[int, Any] | None:
+        """Outcome of what is finished next; None if nothing was for a second."""
+        try:
+            future = self.finished.get(timeout=1.0)
+        except queue.Empty:
+            self._require_workers()
+            return None
+        if future.key not in self.flying:
+            return None
+        task, _ = self.flying.pop(future.key)
+        if future.status == "finished":
+            return task, future.result()
+        if future.status != "error":
+            raise CreepingError(
+                f"the cluster gave up task {task} ({future.status}); see to its scheduler; what is done is kept: resume"
+            )
+        error = future.exception()
+        if isinstance(error, distributed.KilledWorker):
+            return task, error
+        if isinstance(error, CreepingError):
+            raise error
+        raise CreepingError(
+            f"task {task} failed on its worker ({type(error).__name__}: {error}); what is done is kept: resume"
+        ) from error
+
+    def close(self) -> None:
+        """Cancel what is in flight."""
+        futures = [future for _, future in self.flying.values()]
+        self.flying.clear()
+        with suppress(Exception):
+            self.client.cancel(futures, force=True)
+
+    def _drop_what_waits(self) -> None:
+        """Cancel tasks that no worker has begun."""
+        futures = [future for _, future in self.flying.values()]
+        busy = {key for stacks in self.client.call_stack(futures).values() for key in stacks} if futures else set()
+        idle = [key for key in self.flying if key not in busy]
+        dropped = [self.flying.pop(key)[1] for key in idle]
+        self.client.cancel(dropped, force=True)
+
+    def _width(self) -> int:
+        if time.monotonic() - self._asked > 2.0:
+            self._threads, self._asked = sum(self.client.nthreads().values()), time.monotonic()
+        return AHEAD * max(1, self._threads)
+
+    def _require_workers(self) -> None:
+        if self.client.nthreads():
+            self._alive = time.monotonic()
+        elif time.monotonic() - self._alive > PATIENCE:
+            raise CreepingError(
+                f"the cluster has had no worker for {PATIENCE:.0f} s; start workers; what is done is kept: resume"
+            )
+
+
+def _singly(window: _Window, rows: slice, stop: Callable[[], bool]) -> tuple[Arrays, dict[int, str]] | None:
+    """Results of incidences, one after the other with nothing else on the cluster; None if stopped."""
+    request, incidences = window.plan.request, window.plan.incidences
+    arrays, errors = request.empty(rows.stop - rows.start), dict[int, str]()
+    for row in range(rows.start, rows.stop):
+        if stop():
+            return None
+        place = row - rows.start
+        window.submit(row, _one_incidence, incidences[row : row + 1])
+        outcome = None
+        while outcome is None:
+            outcome = window.next()
+        if isinstance(outcome[1], Exception):
+            errors[place] = "its worker died each time it was tried"
+            continue
+        found, failed = outcome[1]
+        for name, values in arrays.items():
+            values[place] = found[name][0]
+        if failed:
+            errors[place] = failed[0]
+    return arrays, errors
+
+
+def _whole_task(digest: str, task: int, incidences: FloatArray) -> int:
+    """Compute a task on a worker and write its chunks: the number of incidences that failed."""
+    sweeper, store = _RECIPES[digest].tools()
+    arrays, errors = compute(sweeper, np.asarray(incidences))
+    store.write_task(task, arrays, errors)
+    return len(errors)
+
+
+def _one_incidence(digest: str, incidence: FloatArray) -> tuple[Arrays, dict[int, str]]:
+    """Compute one incidence on a worker."""
+    return compute(_RECIPES[digest].tools()[0], np.asarray(incidence))
+
+
+def _process() -> tuple[str, int]:
+    return os.uname().nodename, os.getpid()

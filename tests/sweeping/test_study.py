@@ -1,0 +1,171 @@
+"""Study files: every kind of directions, all mistakes at once, and a digest of what changes results."""
+
+import re
+
+import numpy as np
+import pytest
+
+import scatterers as sc
+from creeping._errors import InvalidInputError
+from creeping.sweeping.directions import angles_of, azimuth_elevation_of
+from creeping.sweeping.study import EXAMPLE, KINDS, parse_study, read_study
+
+HEAD = '[study]\nbody = "sphere"\nquantity = "rays"\n'
+
+
+def directions(tmp_path, *lines):
+    return parse_study("\n".join([HEAD, "[incidences]", *lines]), folder=tmp_path).incidences
+
+
+def mistakes(text, tmp_path):
+    with pytest.raises(InvalidInputError) as caught:
+        parse_study(text, folder=tmp_path)
+    return caught.value.mistakes
+
+
+def test_the_example_says_what_it_means(tmp_path):
+    (tmp_path / "a.toml").write_text(EXAMPLE)
+    study = read_study(tmp_path / "a.toml")
+    request = study.request_for(sc.TwistedEllipsoid())
+    assert request.boundaries == ("soft", "hard") and request.wavenumbers == (20.0, 40.0) and request.n_rays == 256
+    low, high = sc.TwistedEllipsoid().bounds
+    assert request.length == pytest.approx(1.5 * np.linalg.norm(high - low))
+    assert (study.output, study.workers, study.text, study.folder) == ("sweep.zarr", None, EXAMPLE, tmp_path)
+
+
+def test_kinds_of_directions(tmp_path):
+    turns = ("phi_deg_min = 0", "phi_deg_max = 360", "phi_count = 4")
+    level = ("elevation_deg_min = 10", "elevation_deg_max = 10", "elevation_count = 1")
+    counts = {
+        "fibonacci": ("count = 7",),
+        "lebedev": ("order = 5",),
+        "grid": ("theta_count = 3", "phi_count = 4"),
+        "theta-phi": ("theta_deg_min = 0", "theta_deg_max = 90", "theta_count = 4", *turns),
+        "azimuth-elevation": ("azimuth_deg_min = -30", "azimuth_deg_max = 30", "azimuth_count = 3", *level),
+        "great-circle": ("first = [0, 0, 1]", "through = [2, 0, 1]", "count = 8"),
+        "list": ("directions = [[0, 0, 2], [1, 1, 0]]",),
+        "file": ('path = "d.csv"',),
+    }
+    assert set(counts) == set(KINDS)
+    (tmp_path / "d.csv").write_text("# x, y, z\n1, 2, 3\n0, 0, -1\n")
+    found = {kind: directions(tmp_path, f'kind = "{kind}"', *lines) for kind, lines in counts.items()}
+    assert [len(d) for d in found.values()] == [7, 14, 12, 16, 3, 8, 2, 2]
+    theta, phi = angles_of(found["theta-phi"][4:8])
+    # a whole circle does not repeat its start
+    assert np.degrees(theta) == pytest.approx(30) and np.degrees(phi) == pytest.approx([0, 90, 180, -90])
+    azimuth, elevation = azimuth_elevation_of(found["azimuth-elevation"])
+    assert np.degrees(azimuth) == pytest.approx([-30, 0, 30]) and np.degrees(elevation) == pytest.approx(10)
+    assert found["great-circle"][2] == pytest.approx([1, 0, 0])
+    assert found["file"][0] == pytest.approx(np.array([1, 2, 3]) / np.sqrt(14))
+    np.save(tmp_path / "d.npy", found["fibonacci"])
+    assert np.array_equal(directions(tmp_path, 'kind = "file"', 'path = "d.npy"'), found["fibonacci"])
+
+
+def test_all_mistakes_at_once_with_what_was_meant(tmp_path):
+    text = """
+quantty = "rays"
+[study]
+bodi = "sphere"
+quantity = "monostatik"
+boundary = 3
+wavenumbers_per_length = [1.0, -2.0]
+rays = 2.5
+length = inf
+[incidence]
+kind = "fibonacci"
+[incidences]
+kind = "fibonaci"
+[flow]
+tolerance = 1.0
+kind = "best"
+[run]
+wokers = 2
+workers = true
+"""
+    found = mistakes(text, tmp_path)
+    expected = [
+        "quantty: a key outside of the tables",
+        "incidence: unknown table; did you mean incidences?",
+        "[study] bodi: unknown key; did you mean body?",
+        '[study] quantity = "monostatik" is not "rays" or "monostatic" or "bistatic"',
+        "[study] boundary = 3 is not a text in quotes, or a list of them",
+        "[study] wavenumbers_per_length = [1.0, -2.0] is not a positive number, a list",
+        "[study] rays = 2.5 is not a whole number from 1 to 65536",
+        "[study] length = inf is not a positive finite number",
+        "[study] body is missing",
+        '[flow] kind = "best" is not "auto" or "map" or "direct"',
+        "[run] wokers: unknown key; did you mean workers?",
+        "[run] workers = True is not a whole number from 1 to 10000",
+        "[flow] tolerance = 1 is not between 1e-12 and 1e-1",
+        "[incidences] kind = 'fibonaci' is unknown; did you mean fibonacci?",
+    ]
+    for start in expected:
+        assert sum(mistake.startswith(start) for mistake in found) == 1, (start, found)
+    assert len(found) == len(expected)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("1000", "0"), r"\[incidences\] count = 0 is not a whole number >= 1"),
+        (("count = 1000", ""), r"\[incidences\] count is missing: a whole number >= 1"),
+        (
+            ("count = 1000", "count = 9\ntheta_count = 3"),
+            r"\[incidences\] theta_count: unknown key; did you mean count\?",
+        ),
+        (('"soft", "hard"', '"soft", "rubber"'), "boundary 'rubber'"),
+        (('"soft", "hard"', '"soft", "soft"'), "repeat themselves"),
+        (("[flow]", '[observation]\nkind = "fibonacci"\ncount = 3\n[flow]'), 'observation. goes with "bistatic"'),
+        (('"monostatic"  ', '"bistatic"  '), 'observation. is missing: quantity "bistatic" needs it'),
+        (("rays = 256", "length = 2.0"), "both given"),
+        (("rays = 256", 'speed = "1 + x"'), 'speed goes with quantity "rays"'),
+        (("[20.0, 40.0]", "{ first = 1.0, last = 2.0 }"), "wavenumbers_per_length = .* is not"),
+        (("wavenumbers_per_length = [20.0, 40.0]", ""), "needs wavenumbers_per_length"),
+        (("[study]", "[study"), "is not TOML"),
+    ],
+)
+def test_one_mistake_is_one_mistake(change, words, tmp_path):
+    text = EXAMPLE.replace(*change)
+    assert text != EXAMPLE
+    with pytest.raises(InvalidInputError, match=words) as caught:
+        parse_study(text, folder=tmp_path)
+    assert len(getattr(caught.value, "mistakes", [1])) == 1
+
+
+def test_files_of_directions_are_only_read(tmp_path):
+    np.save(tmp_path / "bad.npy", np.array([print, None], dtype=object), allow_pickle=True)
+    (tmp_path / "words.csv").write_text("x,y,z\n")
+    (tmp_path / "two.csv").write_text("1,2\n")
+    (tmp_path / "zero.csv").write_text("1,2,3\n0,0,0\n")
+    for name, words in (
+        ("bad.npy", "cannot read"),
+        ("words.csv", "cannot read"),
+        ("two.csv", r"\(1, 2\), not numbers \(n, 3\)"),
+        ("zero.csv", r"1 of 2 .* zero .rows 1"),
+        ("none.csv", "cannot read"),
+        ("d.txt", r"neither in .csv nor in .npy"),
+    ):
+        (found,) = mistakes(f'{HEAD}[incidences]\nkind = "file"\npath = "{name}"', tmp_path)
+        assert re.search(words, found), found
+
+
+def test_the_digest_changes_with_what_changes_results(tmp_path):
+    def digest(*change):
+        text = EXAMPLE.replace(*change) if change else EXAMPLE
+        assert not change or text != EXAMPLE
+        return parse_study(text, folder=tmp_path).digest
+
+    same = [("twisted ellipsoid", "another name"), ("sweep.zarr", "x.zarr"), ("[run]", "[run]\nworkers = 4\nchunk = 9")]
+    other = [("1000", "999"), ("1e-6", "1e-5"), ("40.0", "41.0"), ('"auto"', '"map"'), ("256", "128"), ("3.0", "2.0")]
+    assert {digest(*change) for change in same} == {digest()}
+    assert len({digest(*change) for change in other} | {digest()}) == len(other) + 1
+
+
+def test_a_study_that_is_not_there(tmp_path):
+    with pytest.raises(InvalidInputError, match="cannot read the study"):
+        read_study(tmp_path / "none.toml")
+
+
+def test_wavenumbers_over_a_range(tmp_path):
+    study = parse_study(EXAMPLE.replace("[20.0, 40.0]", "{ first = 5.0, last = 8.0, count = 4 }"), folder=tmp_path)
+    assert study.request.wavenumbers == (5.0, 6.0, 7.0, 8.0)
