@@ -11,7 +11,7 @@ from numba import njit
 from creeping.phaseflow import _angles, _rotations, _surface_exits
 from creeping.phaseflow._attenuation import SAMPLES, extend
 from creeping.phaseflow._integrator import BLOCK, aligned, options
-from creeping.phaseflow._stencils import cells_and_fractions, interpolate, weights
+from creeping.phaseflow._stencils import cells_and_fractions, interpolate, interpolate_where, weights
 
 ROTATION, ANGLES, FOLDED = 0, 1, 2
 WORK = 48
@@ -81,10 +81,11 @@ def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
 
 @njit(**options)
 def leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d):
-    """Move r (4, BLOCK) and the Jacobi matrices m (4, BLOCK) by one leap, their stencils being placed.
+    """Move r (4, BLOCK) and the Jacobi matrices, m (6, BLOCK), by one leap, their stencils being placed.
 
     ``leap`` is (table, centre, jacobi, matrix, curvature). d (4 BLOCK, 4) keeps what is interpolated: displacements,
-    matrices, and for riding = 2 the curvatures; ``odd`` says what was reflected.
+    matrices, and for riding = 2 the curvatures of rays that have not detached, row 5 of m; ``odd`` says what was
+    reflected. Returns the number of these rays.
     """
     table, centre, jacobi, matrix, curvature = leap
     rf, df, ef = r.reshape(-1), d[:BLOCK].reshape(-1), d[BLOCK : 2 * BLOCK].reshape(-1)
@@ -100,7 +101,8 @@ def leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d):
         interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
         _carry_jacobi(ef, matrix, m.reshape(-1))
     if riding > 1:
-        interpolate(curvature, degree, place, wu, wv, wa, count, d[2 * BLOCK :].reshape(-1))
+        return interpolate_where(curvature, degree, place, wu, wv, wa, m[5], count, d[2 * BLOCK :].reshape(-1))
+    return 0
 
 
 @njit(**options)
@@ -143,8 +145,8 @@ def flow(kind, exits, there, there_par, back, back_par, leap, time, rules, degre
         for output in range(counts.shape[0]):
             for _ in range(counts[output]):
                 place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
-                leap_block(kind, leap, riding, degree, uva, place, work[7], count, r, m, w, d)
-                if riding > 1:
+                creeping = leap_block(kind, leap, riding, degree, uva, place, work[7], count, r, m, w, d)
+                if creeping > 0:
                     extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
                 now += time
             leave(kind, exits, there, there_par, r, work, x, p)

@@ -12,9 +12,11 @@ from creeping.phaseflow._integrator import BLOCK, aligned, options
 @njit(**options)
 def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curvatures):
     """Displacement (n, 4), Jacobi matrix (n or 0, 4) and curvatures (n or 0, 16) of two leaps from the nodes (n, 4)."""
-    r, m, d = aligned(4, BLOCK), aligned(4, BLOCK), np.zeros((4 * BLOCK, 4))
+    r, m, d = aligned(4, BLOCK), aligned(6, BLOCK), np.zeros((4 * BLOCK, 4))
     work, uva, w = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK)
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    # no ray detaches from a node
+    m[5, :] = math.inf
     n = nodes.shape[0]
     riding = 0 if matrices.shape[0] == 0 else (1 if curvatures.shape[0] == 0 else 2)
     whole = np.empty((4, BLOCK))

@@ -67,8 +67,8 @@ def flow_ordered(
                     at = mine[min(i, count - 1)]
                     for k in range(more):
                         m[k, i] = carried[at, k]
-                leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d)
-                if riding > 1:
+                creeping = leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d)
+                if creeping > 0:
                     extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
                 place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
                 _put(flat, mine, r, uva, place, work[7], inverse, bucket, ends)

@@ -108,3 +108,24 @@ def interpolate(table, degree, first, wu, wv, wa, count, out):
     else:
         for i in range(count):
             _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+
+
+@njit(**options)
+def interpolate_where(table, degree, first, wu, wv, wa, end, count, out):
+    """Eight-lane sums of those of the first ``count`` rays whose time ``end`` is infinite; see `interpolate`.
+
+    Returns their number.
+    """
+    row = table.shape[3]
+    su, sv, some = 8 * row * table.shape[2], 8 * row, 0
+    if degree == 3:
+        for i in range(count):
+            if end[i] == math.inf:
+                _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+                some += 1
+    else:
+        for i in range(count):
+            if end[i] == math.inf:
+                _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+                some += 1
+    return some

@@ -90,14 +90,14 @@ def classify(level, level_par, box, d, x, tangents, starts, spacing, extreme, ar
             continue
         hidden = 0
         for m in range(3):
-            hidden |= blocked(level, level_par, box, d, probes, m, work) << m
+            hidden |= blocked(level, level_par, box, d, probes, m) << m
         state[k] = OCCLUDED if hidden & 1 else ATTACHED
         agree &= hidden == 0 or hidden == 7
     return agree
 
 
 @njit(**options)
-def blocked(level, level_par, box, d, points, m, work):
+def blocked(level, level_par, box, d, points, m):
     """Whether the backward ray from points[:, m] enters the body."""
     exit_ = 1e300
     for axis in range(3):
@@ -105,7 +105,7 @@ def blocked(level, level_par, box, d, points, m, work):
             exit_ = min(exit_, (points[axis, m] - box[0 if d[axis] > 0.0 else 1, axis]) / d[axis])
     step = max(exit_, 1e-3 * (box[1, 0] - box[0, 0])) / SAMPLES
     n = SAMPLES + 1
-    x, values = work[: 3 * n].reshape(3, n), work[3 * n : 13 * n].reshape(10, n)
+    x, values = np.empty((3, n)), np.empty((10, n))
     for i in range(n):
         for axis in range(3):
             x[axis, i] = points[axis, m] - (i + 1) * step * d[axis]

@@ -116,6 +116,22 @@ def project(x, tangents, n, d, plane):
 
 
 @njit(**options)
+def convex(plane, starts, components):
+    """Whether the line seen along d is one convex curve, which does not cross itself."""
+    if components != 1:
+        return False
+    n, turns = starts[1], 0
+    left = right = True
+    for k in range(n - 1):
+        turn = plane[3, k] * plane[4, k + 1] - plane[4, k] * plane[3, k + 1]
+        left &= turn > 0.0
+        right &= turn < 0.0
+        turns += (plane[3, k] > 0.0) != (plane[3, k + 1] > 0.0)
+    turns += (plane[3, n - 1] > 0.0) != (plane[3, 0] > 0.0)
+    return (left or right) and turns == 2
+
+
+@njit(**options)
 def crossings(plane, starts, components, spacing, boxes, owner, places, where):
     """Places (component ``where``, u) of the pieces behind at crossings of the line seen along d; their number.
 

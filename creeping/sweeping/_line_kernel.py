@@ -8,7 +8,7 @@ normals, that the mesh might miss a small loop.
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._integrator import options
+from creeping.phaseflow._integrator import BLOCK, aligned, options
 from creeping.sweeping._line_arcs import (
     ATTACHED,
     arcs_of,
@@ -18,7 +18,7 @@ from creeping.sweeping._line_arcs import (
     point_at,
     share_rays,
 )
-from creeping.sweeping._line_breaks import BOX, LIMIT, crossings, cusps, project
+from creeping.sweeping._line_breaks import BOX, LIMIT, convex, crossings, cusps, project
 from creeping.sweeping._line_nodes import (
     FAILED,
     equalise,
@@ -108,7 +108,7 @@ def trace_lines(level, level_par, box, meshes, critical, directions, summary, st
 @njit(**options)
 def _work(meshes):
     """Work space for each mesh."""
-    return [_work_of(meshes[0]), _work_of(meshes[1]), _work_of(meshes[2])]
+    return _work_of(meshes[0]), _work_of(meshes[1]), _work_of(meshes[2])
 
 
 @njit(**options)
@@ -120,15 +120,15 @@ def _work_of(mesh):
     marks = np.zeros(n, np.uint8), np.empty(m + 1, np.int64), np.full(m, -1, np.int64)
     raw = np.empty((3, cap)), np.empty(COMPONENTS + 1, np.int64), np.empty(cap, np.int64)
     flat = np.empty(3 * cap), np.empty(3 * cap), np.empty(3 * cap), np.empty(3 * cap)
-    nodal = np.empty(cap), np.empty(cap), np.empty(cap), np.empty((5, cap))
-    return np.empty(n), marks, raw, flat, nodal, np.empty(max(16 * cap, 4096)), np.empty((6, cap // BOX + 1))
+    nodal = np.empty(cap), np.empty(cap), np.empty((3, cap + 6)), np.empty((3, cap + 6)), np.empty((5, cap))
+    return np.empty(n), marks, raw, flat, nodal, aligned(18, BLOCK), np.empty((6, cap // BOX + 1))
 
 
 @njit(**options)
 def _trace(level, level_par, box, mesh, d, number, summary, launched, places, work):
     """One line on one mesh; returns whether every step was sure of it."""
     vertices, normals, triangles, neighbours, edge, _, wanted = mesh
-    s, (lit, found, stamp), (raw, raw_starts, kept), flat, (kappa, h, moved, plane), scratch, boxes = work
+    s, (lit, found, stamp), (raw, raw_starts, kept), flat, (kappa, h, beside, slopes, plane), scratch, boxes = work
     extent = max(box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[1, 2] - box[0, 2])
     incidence_at(normals, d, s)
     mixed = mixed_triangles(s, triangles, lit, found)
@@ -180,13 +180,13 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
         length, doubt = 0.0, 0.0
         for c in range(components):
             size = starts[c + 1] - starts[c]
-            own, error = spacings(y, U, starts[c], size, h)
+            own, error = spacings(y, U, starts[c], size, h, beside, slopes)
             if own == FAILED:
                 return False
             spacing[c] = own / size
             length, doubt = length + own, doubt + error
             if again == 0:
-                equalise(y, U, starts[c], size, own, h, moved)
+                equalise(y, slopes, starts[c], size, own, h)
         if again == 0 and not newton(level, level_par, d, y, reach, scratch, U, kappa) < LOST * extent:
             return False
     sure &= doubt < SETTLED * length
@@ -212,9 +212,10 @@ def _finish(
         sure &= not hidden
     extreme = project(x, T, x.shape[1], d, plane)
     owner_of_box = np.empty(x.shape[1] // BOX + 1, np.int64)
-    some = crossings(plane, starts, components, spacing, boxes, owner_of_box, at[count:], where[count:])
-    sure &= some >= 0
-    count += max(some, 0)
+    if not convex(plane, starts, components):
+        some = crossings(plane, starts, components, spacing, boxes, owner_of_box, at[count:], where[count:])
+        sure &= some >= 0
+        count += max(some, 0)
     number = np.empty(components, np.int64)
     for c in range(components):
         number[c] = starts[c + 1] - starts[c]

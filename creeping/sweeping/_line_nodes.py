@@ -12,57 +12,70 @@ of order 6, against that of order 4, A = [13 (T_0 + T_1) - (T_-1 + T_2)]/24: the
 
 import math
 
-import numpy as np
 from numba import njit
 
-from creeping.phaseflow._integrator import options
+from creeping.phaseflow._integrator import BLOCK, options
 
 FAILED = 1e300
-
-
-@njit(**options)
-def rows(work, number, n):
-    """Make an array (number, n) of the start of flat work space."""
-    return work[: number * n].reshape(number, n)
 
 
 @njit(**options)
 def newton(level, level_par, d, x, reach, work, tangents, curvature):
     """Move x (3, n) by one Newton step, each at most ``reach``; returns the largest, FAILED where there is none.
 
-    Fills T (3, n) and kappa_n(d) (n,) from where the points were.
+    Fills T (3, n) and kappa_n(d) (n,) from where the points were. work (18, BLOCK) is work space.
     """
     n = x.shape[1]
-    g = work[: 10 * n]
-    values = g.reshape(10, n)
-    level(x, values[0], values[1:4], values[4:], level_par)
+    points, values, out = work[:3], work[3:13], work[13:18]
+    worst = 0.0
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        for axis in range(3):
+            points[axis, :count] = x[axis, start : start + count]
+            # the last block is filled up with its last point
+            points[axis, count:] = x[axis, start + count - 1]
+        level(points, values[0], values[1:4], values[4:], level_par)
+        worst = max(worst, _steps(points.reshape(-1), values.reshape(-1), out.reshape(-1), d, reach))
+        for axis in range(3):
+            x[axis, start : start + count] = points[axis, :count]
+            tangents[axis, start : start + count] = out[axis, :count]
+        curvature[start : start + count] = out[3, :count]
+    return worst if worst < FAILED else FAILED
+
+
+@njit(**options)
+def _steps(x, g, out, d, reach):
+    """Newton steps of one block, rows flat; out holds T and kappa_n(d). Constant offsets let the loop vectorise."""
     dx, dy, dz = d[0], d[1], d[2]
-    xf, tf = x.reshape(-1), tangents.reshape(-1)
-    worst, bad = 0.0, 0
-    for i in range(n):
-        F, gx, gy, gz = g[i], g[n + i], g[2 * n + i], g[3 * n + i]
-        xx, yy, zz, yz, xz, xy = g[4 * n + i], g[5 * n + i], g[6 * n + i], g[7 * n + i], g[8 * n + i], g[9 * n + i]
+    worst = 0.0
+    for i in range(BLOCK):
+        F, gx, gy, gz = g[i], g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
+        xx, yy, zz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i]
+        yz, xz, xy = g[7 * BLOCK + i], g[8 * BLOCK + i], g[9 * BLOCK + i]
         hx, hy, hz = xx * dx + xy * dy + xz * dz, xy * dx + yy * dy + yz * dz, xz * dx + yz * dy + zz * dz
         G = gx * dx + gy * dy + gz * dz
         wx, wy, wz = gy * hz - gz * hy, gz * hx - gx * hz, gx * hy - gy * hx
-        square = wx * wx + wy * wy + wz * wz
-        inverse = 1.0 / square if square > 1e-280 else 0.0
+        # where W vanishes the step is too large for anything to hide it
+        inverse = 1.0 / (wx * wx + wy * wy + wz * wz + 1e-290)
         sx = -(F * (hy * wz - hz * wy) + G * (wy * gz - wz * gy)) * inverse
         sy = -(F * (hz * wx - hx * wz) + G * (wz * gx - wx * gz)) * inverse
         sz = -(F * (hx * wy - hy * wx) + G * (wx * gy - wy * gx)) * inverse
-        size = math.sqrt(sx * sx + sy * sy + sz * sz)
-        part = min(1.0, reach / max(size, 1e-300))
-        xf[i] += part * sx
-        xf[n + i] += part * sy
-        xf[2 * n + i] += part * sz
+        size = math.sqrt(sx * sx + sy * sy + sz * sz + 1e-290)
+        part = min(1.0, reach / size)
+        x[i] += part * sx
+        x[BLOCK + i] += part * sy
+        x[2 * BLOCK + i] += part * sz
         root = math.sqrt(inverse)
-        tf[i], tf[n + i], tf[2 * n + i] = wx * root, wy * root, wz * root
-        norm = math.sqrt(gx * gx + gy * gy + gz * gz)
-        curvature[i] = (dx * hx + dy * hy + dz * hz) / norm if norm > 0.0 else 0.0
-        worst = max(worst, size)
-        # also what is not a number
-        bad += not (square > 1e-280 and size < 1e100)
-    return FAILED if bad else worst
+        out[i], out[BLOCK + i], out[2 * BLOCK + i] = wx * root, wy * root, wz * root
+        bent = dx * hx + dy * hy + dz * hz
+        out[3 * BLOCK + i] = bent / math.sqrt(gx * gx + gy * gy + gz * gz + 1e-290)
+        out[4 * BLOCK + i] = size
+    total = 0.0
+    for i in range(4 * BLOCK, 5 * BLOCK):
+        worst = max(worst, out[i])
+        # the sum is not finite if one of them is not
+        total += out[i]
+    return worst if total < 1e100 else FAILED
 
 
 @njit(**options)
@@ -158,48 +171,51 @@ def resample(x, tangents, kept, first, count, length, out, place, number):
 
 
 @njit(**options)
-def spacings(x, tangents, first, number, h):
-    """Arclengths h[first:] between neighbours of one component; returns its length and the estimate of its error."""
-    length = doubt = 0.0
-    for k in range(number):
-        a, b = first + k, first + (k + 1) % number
-        a1, b1 = first + (k - 1) % number, first + (k + 2) % number
-        a2, b2 = first + (k - 2) % number, first + (k + 3) % number
-        square = sixth = fourth = 0.0
-        for axis in range(3):
-            c = x[axis, b] - x[axis, a]
-            near = tangents[axis, a] + tangents[axis, b]
-            next_ = tangents[axis, a1] + tangents[axis, b1]
-            far = tangents[axis, a2] + tangents[axis, b2]
-            six, four = (802.0 * near - 93.0 * next_ + 11.0 * far) / 1440.0, (13.0 * near - next_) / 24.0
-            square += c * c
-            sixth += six * six
-            fourth += four * four
-        if not (sixth > 1e-4 and fourth > 1e-4):
-            return FAILED, FAILED
-        chord = math.sqrt(square)
-        h[a] = chord / math.sqrt(sixth)
-        length += h[a]
-        doubt += abs(h[a] - chord / math.sqrt(fourth))
-    return length, doubt
+def _padded(rows, first, number, out):
+    """Copy one component of rows (3, n) into out (3, number + 6), three nodes from the other end on either side."""
+    for axis in range(3):
+        out[axis, 3 : number + 3] = rows[axis, first : first + number]
+        for k in range(3):
+            out[axis, k] = rows[axis, first + number - 3 + k]
+            out[axis, number + 3 + k] = rows[axis, first + k]
 
 
 @njit(**options)
-def equalise(x, tangents, first, number, length, h, moved):
-    """Shift the nodes of one component along it to equal arclengths; ``moved`` (number,) is work space."""
+def spacings(x, tangents, first, number, h, places, slopes):
+    """Arclengths h[first:] between neighbours of one component; returns its length and the estimate of its error.
+
+    places, slopes (3, number + 6 or more) are left with its nodes and tangents, three more on either side.
+    """
+    _padded(x, first, number, places)
+    _padded(tangents, first, number, slopes)
+    length = doubt = least = 0.0
+    for k in range(number):
+        square = sixth = fourth = 0.0
+        for axis in range(3):
+            x_, t = places[axis], slopes[axis]
+            c = x_[k + 4] - x_[k + 3]
+            near, next_, far = t[k + 3] + t[k + 4], t[k + 2] + t[k + 5], t[k + 1] + t[k + 6]
+            six = (802.0 / 1440.0) * near - (93.0 / 1440.0) * next_ + (11.0 / 1440.0) * far
+            four = (13.0 / 24.0) * near - (1.0 / 24.0) * next_
+            square += c * c
+            sixth += six * six
+            fourth += four * four
+        # of unit length but for the turn of T
+        h[first + k] = math.sqrt(square / (sixth + 1e-12))
+        length += h[first + k]
+        doubt += abs(h[first + k] - math.sqrt(square / (fourth + 1e-12)))
+        least += 1.0 / (sixth + 1e-12) + 1.0 / (fourth + 1e-12)
+    return (length, doubt) if least < 1e4 * number else (FAILED, FAILED)
+
+
+@njit(**options)
+def equalise(x, slopes, first, number, length, h):
+    """Shift the nodes of one component along it to equal arclengths; ``slopes`` as `spacings` has left them."""
     step = length / number
     s = 0.0
     for k in range(number):
-        moved[k] = k * step - s
+        move = k * step - s
         s += h[first + k]
-    for k in range(number):
-        move = moved[k]
-        i, before, after = first + k, first + (k - 1) % number, first + (k + 1) % number
         for axis in range(3):
-            bend = (tangents[axis, after] - tangents[axis, before]) / (2.0 * step)
-            x[axis, i] += move * (tangents[axis, i] + 0.5 * move * bend)
-
-
-def work_space(cap: int) -> np.ndarray:
-    """Flat array that serves up to ``cap`` points."""
-    return np.empty(16 * cap)
+            bend = (slopes[axis, k + 4] - slopes[axis, k + 2]) / (2.0 * step)
+            x[axis, first + k] += move * (slopes[axis, k + 3] + 0.5 * move * bend)
