@@ -4,13 +4,14 @@ import hashlib
 from pathlib import Path
 
 
-def discard_stale(folder: Path) -> None:
+def discard_stale(folder: Path, *others: Path) -> None:
     """Delete the compiled kernels cached for a package's folder unless they belong to its sources as they are.
 
-    A cache that cannot be written (numba keeps it elsewhere then) is left alone.
+    ``others`` are folders with sources that they call into. A cache that cannot be written (numba keeps it elsewhere
+    then) is left alone.
     """
     digest = hashlib.blake2b(digest_size=16)
-    for source in sorted(folder.glob("*.py")):
+    for source in [source for one in (folder, *others) for source in sorted(one.glob("*.py"))]:
         digest.update(source.name.encode() + b"\0" + source.read_bytes())
     stamp = folder / "__pycache__" / "kernels.digest"
     try:

@@ -17,6 +17,8 @@ from creeping.triangulation import Triangulation, triangulate
 
 CONVERGED = 1e-10
 """Residual of the normal at a specular point."""
+FLAT = 1e-4
+"""Determinant of S + n n^T, over the square of its norm, below which a point counts as flat."""
 ALIKE = 1e-6
 """Distance, in body sizes, below which two solutions are one."""
 
@@ -197,6 +199,10 @@ def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatA
     tangential = np.eye(3) - n[:, :, None] * n[:, None, :]
     shape = tangential @ body.hessian(points) @ tangential / g[:, None, None] + n[:, :, None] * n[:, None, :]
     right = gap - np.sum(gap * n, axis=1, keepdims=True) * n
+    scale = np.sum(shape * shape, axis=(1, 2))
+    flat = np.abs(np.linalg.det(shape)) < FLAT * scale
+    step = np.empty_like(right)
+    step[~flat] = np.linalg.solve(shape[~flat], right[~flat, :, None])[..., 0]
     # a flat point has no inverse: the least-squares step stays finite
-    step = np.einsum("nij,nj->ni", np.linalg.pinv(shape, rcond=1e-6), right)
+    step[flat] = np.einsum("nij,nj->ni", np.linalg.pinv(shape[flat], rcond=1e-6), right[flat])
     return np.linalg.norm(gap, axis=1), step

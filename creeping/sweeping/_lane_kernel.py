@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._integrator import options
 from creeping.rays.ray_points import GAUSS, GUARD, SHARPEST
+from creeping.sweeping._compiling import options
 
 WIDTH = 2 * GUARD
 

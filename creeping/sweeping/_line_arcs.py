@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._integrator import options
+from creeping.sweeping._compiling import options
 from creeping.sweeping._line_nodes import hermite, newton
 
 ATTACHED, OCCLUDED, CONCAVE = 0, 1, 2
@@ -57,7 +57,7 @@ def arcs_of(places, where, count, starts, components, arcs, owner):
 @njit(**options)
 def point_at(x, tangents, first, number, spacing, place, out, m):
     """Point at a place of a component, on the cubic between its nodes, into out[:, m]."""
-    k = int(math.floor(place))
+    k = np.int64(math.floor(place))
     hermite(x, tangents, first + k % number, first + (k + 1) % number, spacing, place - k, out, m)
 
 

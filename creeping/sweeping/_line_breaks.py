@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._integrator import options
+from creeping.sweeping._compiling import options
 
 BOX = 8
 """Segments of a box."""
@@ -256,7 +256,7 @@ def _solve(plane, first, number, k, h, first2, number2, m, g):
     start, begin = one, two
     for _ in range(8):
         # the crossing of the cubics may lie in a cell next to that of the chords
-        k, m = int(math.floor(one)), int(math.floor(two))
+        k, m = np.int64(math.floor(one)), np.int64(math.floor(two))
         i, j, p, q = first + k % number, first + (k + 1) % number, first2 + m % number2, first2 + (m + 1) % number2
         x, a = _cubic(plane, 0, i, j, h, one - k)
         y, b = _cubic(plane, 1, i, j, h, one - k)

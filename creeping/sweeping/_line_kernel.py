@@ -8,7 +8,7 @@ normals, that the mesh might miss a small loop.
 import numpy as np
 from numba import njit
 
-from creeping.phaseflow._integrator import BLOCK, aligned, options
+from creeping.sweeping._compiling import BLOCK, aligned, options
 from creeping.sweeping._line_arcs import (
     ATTACHED,
     arcs_of,
@@ -96,9 +96,7 @@ def trace_lines(level, level_par, box, meshes, critical, directions, summary, st
             continue
         for tier in range(len(meshes)):
             mesh = meshes[tier]
-            sure = _trace(
-                level, level_par, box, mesh, d, row, summary[row], launched[row], places[row], work[tier]
-            )
+            sure = _trace(level, level_par, box, mesh, d, row, summary[row], launched[row], places[row], work[tier])
             far = v > mesh[5] * mesh[5]
             if sure and far:
                 break
@@ -118,10 +116,15 @@ def _work_of(mesh):
     # every component has 64 nodes at least; mixed triangles of a line are far fewer than all of them
     cap = max(nodes + 72 * COMPONENTS, 8 * int(np.sqrt(m)) + 256, 1024)
     marks = np.zeros(n, np.uint8), np.empty(m + 1, np.int64), np.full(m, -1, np.int64)
-    raw = np.empty((3, cap)), np.empty(COMPONENTS + 1, np.int64), np.empty(cap, np.int64)
-    flat = np.empty(3 * cap), np.empty(3 * cap), np.empty(3 * cap), np.empty(3 * cap)
-    nodal = np.empty(cap), np.empty(cap), np.empty((3, cap + 6)), np.empty((3, cap + 6)), np.empty((5, cap))
-    return np.empty(n), marks, raw, flat, nodal, aligned(18, BLOCK), np.empty((6, cap // BOX + 1))
+    wide = 8 * (cap // 8 + 2)
+    raw_starts, kept = np.empty(COMPONENTS + 1, np.int64), np.empty(wide, np.int64)
+    # one piece of memory, or the last digits would depend on where the pieces lie: loops have versions for overlap
+    space = aligned(29, wide)
+    flat = space[3:15].reshape(-1)
+    lines = flat[: 3 * wide], flat[3 * wide : 6 * wide], flat[6 * wide : 9 * wide], flat[9 * wide :]
+    nodal = space[15], space[16], space[17:20], space[20:23], space[23:28]
+    scratch = space[28, : 18 * BLOCK].reshape(18, BLOCK)
+    return np.empty(n), marks, (space[:3], raw_starts, kept), lines, nodal, scratch, np.empty((6, wide // BOX))
 
 
 @njit(**options)
@@ -192,7 +195,22 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
     sure &= doubt < SETTLED * length
     summary[0], summary[1], summary[2] = components, length, doubt / length
     sure &= _finish(
-        level, level_par, box, d, y, U, kappa, starts, components, spacing, plane, boxes, scratch, summary, launched, places
+        level,
+        level_par,
+        box,
+        d,
+        y,
+        U,
+        kappa,
+        starts,
+        components,
+        spacing,
+        plane,
+        boxes,
+        scratch,
+        summary,
+        launched,
+        places,
     )
     return sure
 

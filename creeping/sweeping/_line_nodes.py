@@ -12,9 +12,10 @@ of order 6, against that of order 4, A = [13 (T_0 + T_1) - (T_-1 + T_2)]/24: the
 
 import math
 
+import numpy as np
 from numba import njit
 
-from creeping.phaseflow._integrator import BLOCK, options
+from creeping.sweeping._compiling import BLOCK, options
 
 FAILED = 1e300
 
@@ -123,9 +124,7 @@ def hermite(x, tangents, i, j, h, u, out, m):
     a, b = v * v * (1.0 + 2.0 * u), u * u * (3.0 - 2.0 * u)
     p, q = h * u * v * v, -h * u * u * v
     for axis in range(3):
-        out[axis, m] = (
-            a * x[axis, i] + b * x[axis, j] + p * tangents[axis, i] + q * tangents[axis, j]
-        )
+        out[axis, m] = a * x[axis, i] + b * x[axis, j] + p * tangents[axis, i] + q * tangents[axis, j]
 
 
 @njit(**options)
@@ -151,7 +150,7 @@ def share_nodes(x, tangents, kept, kept_starts, components, wanted, lengths, cou
             lengths[c] += _cubic_length(x, tangents, kept[first + m], kept[first + (m + 1) % count])
         whole += lengths[c]
     for c in range(components):
-        counts[c] = max(64, 8 * int(round(wanted * lengths[c] / whole / 8.0)))
+        counts[c] = max(64, 8 * np.int64(wanted * lengths[c] / whole / 8.0 + 0.5))
 
 
 @njit(**options)

@@ -6,7 +6,7 @@ leaving by it keeps the lit side on the left, and ends where it began, so compon
 
 from numba import njit
 
-from creeping.phaseflow._integrator import options
+from creeping.sweeping._compiling import options
 
 TOO_MANY = -1
 

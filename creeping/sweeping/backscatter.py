@@ -13,13 +13,13 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.far_geometry import ALONG
 from creeping.field.forward import TAPER
 from creeping.phaseflow.geodesic import natural_horizon
-from creeping.phaseflow.tracing import pack
 from creeping.rays.fan import Flow
 from creeping.rays.horizon import HorizonRays
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.visibility import occluded
 from creeping.surface import normal, size
+from creeping.sweeping.carrying import carried
 from creeping.sweeping.shadow_lines import ShadowLines, prepared
 from creeping.sweeping.single_rays import SingleRayTracer
 
@@ -27,8 +27,8 @@ EARLY = 0.28
 """Time, in body sizes, before which a horizon crossing does not count for merging."""
 ALIKE = 1e-5
 """Distance, in cells, below which two rays found are one."""
-BLOCK = 64
-"""Rays of a block of the engine."""
+LONGEST_TIE = 12
+"""Solutions of one incidence that may end at equal times: mirror images of each other, and what was found twice."""
 
 
 class BackscatterGeometry:
@@ -65,27 +65,21 @@ class BackscatterGeometry:
         lines, level = self.lines, self.body.compiled  # type: ignore[attr-defined]
         n, rays = lines.arc_index.shape
         times = coarse_times(self.flow, self.tracer.length)
-        points = np.where(np.isfinite(lines.launch_points), lines.launch_points, lines.launch_points[:, :1])
-        padded = -(-rays // BLOCK) * BLOCK
-        points = np.concatenate([points, np.broadcast_to(points[:, :1], (n, padded - rays, 3))], axis=1)
-        some = np.flatnonzero(np.isfinite(points[:, 0, 0]))
-        states = np.zeros((n, padded, len(times), 10))
-        if len(some):
-            directions = np.broadcast_to(self.direction[some, None], points[some].shape)
-            carried = self.flow.transport(pack(points[some], directions, jacobi=True), times)
-            states[some] = carried.reshape(len(some), padded, len(times), 10)
+        states = carried(self.flow, lines, times, lanes=10)
         self._summary = np.empty((n, 2))
         room = 64
         while True:
             found, crossed = np.empty((room * n, 4), np.int64), np.empty((8 * rays * n, 4))
+            places = np.empty((room * n, 2))
             a, b = seek_all(
-                level.function, level.parameters, times[1], quintic_weights(times[1]), states[:, :rays], lines.arc_index, lines.closed,
-                self.directions, EARLY * size(self.body), ALONG, room * n, found, crossed, self._summary,
+                level.function, level.parameters, times[1], quintic_weights(times[1]), states,
+                lines.arc_index, lines.closed, self.directions, EARLY * size(self.body), ALONG,
+                room * n, found, places, crossed, self._summary,
             )  # fmt: skip
             if a >= 0:
                 break
             room *= 8
-        self._found, self._crossed = found[:a], crossed[:b]
+        self._found, self._places, self._crossed = found[:a], places[:a], crossed[:b]
         self._fine = times[:-1, None] + np.diff(times)[:, None] * (np.arange(PARTS) / PARTS)
 
     @property
@@ -103,17 +97,18 @@ class BackscatterGeometry:
         """Rays with p = -d."""
         row, ray, after, sample = self._found.T
         lines = self.lines
-        near = 0.5 * (lines.launch_points[row, ray] + lines.launch_points[row, after])
+        across, along = self._places[:, :1], self._places[:, 1]
+        near = (1 - across) * lines.launch_points[row, ray] + across * lines.launch_points[row, after]
         fine = np.append(self._fine.ravel(), self.tracer.length)
         long = fine[sample + 1] - fine[sample]
         cell = np.stack([lines.spacing[row, ray], long], axis=1)
-        middle = fine[sample] + 0.5 * long
-        one, found, moved = self.tracer.towards(self.direction[row], self.directions[row], near, middle, cell)
-        row, ray, cell = row[found], ray[found], cell[found]
+        begin = fine[sample] + along * long
+        one, found, moved = self.tracer.towards(self.direction[row], self.directions[row], near, begin, cell)
+        row, ray, cell, across = row[found], ray[found], cell[found], across[found, 0]
         arc = lines.arc_index
         same = arc[row] == arc[row, ray][:, None]
         first, last = np.argmax(same, axis=1), same.shape[1] - 1 - np.argmax(same[:, ::-1], axis=1)
-        place = ray + 0.5 + moved
+        place = ray + across + moved
         inside = (lines.closed[row, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))
         kept = np.flatnonzero(inside)
         kept = kept[_distinct(row[kept], one.starts[kept], one.rays.time[kept], cell[kept])]
@@ -180,7 +175,13 @@ def coarse_times(flow: Flow, length: float) -> FloatArray:
 
 
 def _distinct(row: IntArray, starts: FloatArray, times: FloatArray, cell: FloatArray) -> IntArray:
-    """Numbers of the solutions that no earlier one of the same incidence equals."""
-    apart = np.linalg.norm(starts[:, None] - starts[None], axis=-1) / cell[:, :1]
-    alike = (row[:, None] == row) & (apart < ALIKE) & (np.abs(times[:, None] - times) < ALIKE * cell[:, 1:])
-    return np.flatnonzero(~np.any(np.tril(alike, -1), axis=1))
+    """Numbers of the solutions that no other one of the same incidence equals, but for the first of those that do."""
+    order = np.lexsort((times, row))
+    kept = np.ones(len(row), dtype=bool)
+    # times of equal solutions follow each other
+    for shift in range(1, min(len(row), LONGEST_TIE)):
+        one, two = order[shift:], order[:-shift]
+        alike = (row[one] == row[two]) & (np.abs(times[one] - times[two]) < ALIKE * cell[one, 1])
+        alike &= np.linalg.norm(starts[one] - starts[two], axis=1) < ALIKE * cell[one, 0]
+        kept[one[alike]] = False
+    return np.flatnonzero(kept)

@@ -1,8 +1,4 @@
-"""The compiled route of a sweep: lines of many incidences, then the rays of all of them at once.
-
-Rays of an incidence start in blocks of their own, the last one filled up: a tracer that adapts its step to a block
-then gives the same, bit for bit, in whatever company an incidence is computed.
-"""
+"""The compiled route of a sweep: lines of many incidences, then the rays of all of them at once."""
 
 import numpy as np
 
@@ -13,15 +9,15 @@ from creeping.rays.fan import Flow, RayStatus, rough_from
 from creeping.rays.launch_points import line_tangents
 from creeping.rays.spreading import spread
 from creeping.surface import Surface
+from creeping.sweeping.carrying import BLOCK, carried
 from creeping.sweeping.monostatic import fill_monostatic
 from creeping.sweeping.request import NO_RAY, SINGULAR, SweepRequest
 from creeping.sweeping.shadow_lines import ShadowLines, shadow_lines
 from creeping.sweeping.single_rays import SingleRayTracer
 
-BLOCK = 64
-"""Rays of a block of the engine."""
-BATCH = 16_384
-"""Rays carried at a time: what is known of them stays in the caches."""
+BATCH, FIELD_BATCH = 16_384, 65_536
+"""Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
+numbers, and want more."""
 
 
 class CompiledSweeper:
@@ -46,7 +42,8 @@ class CompiledSweeper:
         """Arrays of results, the first axis the incidence; see `SweepRequest.variables`."""
         incidences = np.asarray(incidences, dtype=float)
         out = self.request.empty(len(incidences))
-        batch = max(1, BATCH // (-(-self.request.n_rays // BLOCK) * BLOCK))
+        together = BATCH if self._tracer is None else FIELD_BATCH
+        batch = max(1, together // (-(-self.request.n_rays // BLOCK) * BLOCK))
         for first in range(0, len(incidences), batch):
             part = slice(first, first + batch)
             self._batch(incidences[part], {name: values[part] for name, values in out.items()})
@@ -71,31 +68,9 @@ def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:
         out[name][:] = getattr(lines, name)
 
 
-def carried(flow: Flow, lines: ShadowLines, times: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """States of all rays at the times, (n, rays, m, 12), and which of them there are, (n, rays)."""
-    there = lines.curve_index != NO_RAY
-    n, rays = there.shape
-    padded = -(-rays // BLOCK) * BLOCK
-    some = np.flatnonzero(there[:, 0])
-    points = np.empty((len(some), padded, 3))
-    points[:, :rays] = lines.launch_points[some]
-    # places without a ray go along as copies of the first
-    filled = np.zeros((len(some), padded), dtype=bool)
-    filled[:, :rays] = there[some]
-    points[~filled] = np.broadcast_to(points[:, :1], points.shape)[~filled]
-    directions = np.broadcast_to(lines.directions[some, None], points.shape)
-    states = flow.transport(pack(points, directions, lanes=12), times)
-    states = states.reshape(len(some), padded, len(times), 12)[:, :rays]
-    if len(some) == n:
-        return states, there
-    whole = np.full((n, rays, len(times), 12), np.nan)
-    whole[some] = states
-    return whole, there
-
-
 def fill_rays(flow: Flow, lines: ShadowLines, times: FloatArray, out: dict[str, Any]) -> None:
     """Results of the rays."""
-    states, there = carried(flow, lines, times)
+    states, there = carried(flow, lines, times, lanes=12), lines.curve_index != NO_RAY
     J, rate, stalled = _spreading(flow.body, lines, states)
     detachment = states[..., -1, 11]
     status = np.where(np.isfinite(detachment), int(RayStatus.DETACHED), int(RayStatus.OK))

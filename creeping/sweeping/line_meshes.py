@@ -2,7 +2,8 @@
 
 The gradient of n.d along the body is S d with S the shape operator. On n.d = 0 it vanishes only where K = 0 and d is
 the null direction a of S there: those directions are singular, and form curves on the sphere. They bound the regions
-in which the number of curves of the line is constant; to first order v = |n.d| at a critical point is the angle to them.
+in which the number of curves of the line is constant; to first order v = |n.d| at a critical point is the angle to
+them.
 """
 
 from dataclasses import dataclass
@@ -63,20 +64,19 @@ def _mesh_of(body: Surface, vertices: int) -> Triangulation:
         ratio = np.sqrt(vertices / len(mesh.vertices))
         if 0.93 < ratio < 1.07:
             break
-        cells = int(round(cells * ratio))
+        cells = round(cells * float(ratio))
     return mesh
 
 
 def _packed(body: Surface, mesh: Triangulation, nodes: int) -> tuple[Any, ...]:
     n = normal(body, mesh.vertices)
-    triangles = mesh.triangles.astype(np.int32)
     ends = n[mesh.triangles]
     turn = np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=-1)
     return (
         np.ascontiguousarray(mesh.vertices.T),
         np.ascontiguousarray(n.T).ravel(),
-        triangles,
-        neighbours_of(triangles),
+        mesh.triangles.astype(np.int32),
+        neighbours_of(mesh.triangles),
         mesh.edge_length,
         float(np.sqrt(np.mean(turn**2))),
         nodes,
@@ -91,7 +91,7 @@ def neighbours_of(triangles: IntArray) -> np.ndarray[Any, np.dtype[np.int32]]:
     reverse = edges[:, 1] * (edges.max() + 1) + edges[:, 0]
     order = np.argsort(code)
     across = order[np.searchsorted(code[order], reverse)] // 3
-    return across.reshape(m, 3).astype(np.int32)
+    return np.asarray(across.reshape(m, 3), dtype=np.int32)
 
 
 def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
@@ -129,4 +129,4 @@ def _null_direction(body: Surface, points: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(basis @ H @ np.swapaxes(basis, 1, 2) / norm[:, None, None])
     least = np.argmin(np.abs(values), axis=1)
     chosen = np.take_along_axis(vectors, least[:, None, None], axis=2)[..., 0]
-    return np.einsum("mk,mki->mi", chosen, basis)
+    return np.asarray(np.einsum("mk,mki->mi", chosen, basis))

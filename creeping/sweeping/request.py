@@ -129,9 +129,10 @@ class SweepRequest:
         for name in ("wavenumbers", "boundaries"):
             if not getattr(self, name):
                 yield f"quantity {self.quantity!r} needs {name}"
-        for text in (*self.boundaries, *self.wavenumbers):
+        checks = [(parse_boundary, (name,)) for name in self.boundaries]
+        for check, asked in [*checks, *((checked, (k, self.order)) for k in self.wavenumbers)]:
             try:
-                parse_boundary(text) if isinstance(text, str) else checked(text, self.order)
+                check(*asked)  # type: ignore[operator]
             except InvalidInputError as error:
                 yield str(error)
         if len(set(self.boundaries)) < len(self.boundaries):
@@ -224,7 +225,9 @@ def sweep_request(
         n_rays=n_rays,
         n_steps=n_steps,
         wavenumbers=numbers,
-        boundaries=tuple(b if isinstance(b, str) else f"impedance:{b.eta}".replace("(", "").replace(")", "") for b in several),
+        boundaries=tuple(
+            b if isinstance(b, str) else f"impedance:{b.eta}".replace("(", "").replace(")", "") for b in several
+        ),
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen / norm),
         order=order,
     )

@@ -94,18 +94,13 @@ def shadow_lines(body: Any, directions: FloatArray, n_rays: int) -> ShadowLines:
     in_threads(run, n, least=LEAST, multiple=1)
     for row in np.flatnonzero(status == FOLLOWED):
         status[row] = _follow(body, directions[row], summary[row], launched[row], places[row])
+    curves, length, error, attached, occluded, concave, distance = summary.T
+    points, *rest = launched[..., :3], *(launched[..., k] for k in range(3, 8))
+    arclength, phase, arc, spacing, closed = rest
     return ShadowLines(
-        directions,
-        status,
-        *summary.T,
-        launch_points=launched[..., :3],
-        arclength=launched[..., 3],
-        launch_phase=launched[..., 4],
-        curve_index=places,
-        arc_index=launched[..., 5],
-        spacing=launched[..., 6],
-        closed=launched[..., 7],
-    )
+        directions, status, curves, length, error, attached, occluded, concave, distance,
+        points, arclength, phase, places, arc, spacing, closed,
+    )  # fmt: skip
 
 
 def _follow(body: Surface, direction: FloatArray, summary: FloatArray, launched: FloatArray, places: Any) -> int:
@@ -122,13 +117,13 @@ def _follow(body: Surface, direction: FloatArray, summary: FloatArray, launched:
     summary[:] = len(line.curves), line.length, 1e-12, *shares.values(), line.singular_distance
     arcs = launching_arcs(line, every=False)
     arc, s = launch_positions(line, arcs, len(places))
-    arc, s = arc[: len(places)], s[: len(places)]
+    n = min(len(arc), len(places))
     counts = np.bincount(arc, minlength=len(arcs))
-    for row, (number, place) in enumerate(zip(arc, s, strict=True)):
-        one = arcs[number]
+    for number, one in enumerate(arcs):
+        rows = np.flatnonzero(arc[:n] == number)
         curve = line.curves[one.curve]
-        point = curve.at(place % curve.length)
-        launched[row, :3], launched[row, 3], launched[row, 4] = point, place % curve.length, point @ line.direction
-        launched[row, 5:] = number, (one.end - one.start) / counts[number], one.closed
-        places[row] = one.curve
+        launched[rows, :3] = curve.at(s[rows])
+        launched[rows, 3], launched[rows, 4] = s[rows] % curve.length, launched[rows, :3] @ line.direction
+        launched[rows, 5:] = number, (one.end - one.start) / counts[number], one.closed
+        places[rows] = one.curve
     return FOLLOWED

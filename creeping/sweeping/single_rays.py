@@ -18,13 +18,13 @@ from creeping.rays.panels import newton_step
 from creeping.rays.ray_points import GAUSS, GUARD, LANES, START_LANES, TURN, RayPoints
 from creeping.surface import size
 
-CLOSE = 1e-9
-"""Residual at which the search for a ray ends, radians."""
+CLOSE = 1e-6
+"""Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
 ROUNDS = 10
 LONG = 2
 """Steps of a search, in steps of what it finds: points err less than derivatives of curvature do."""
-RTOL = 1e-10
-"""Tolerance of a step of the tracer."""
+RTOL, SEARCH_RTOL = 1e-10, 1e-8
+"""Tolerance of a step of the tracer, and while a ray is sought."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,7 @@ class SingleRayTracer:
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
         self._rule = polynomial_matrix(), 0.5 * (nodes + 1), 0.5 * weights
 
-    def onto_line(
-        self, points: FloatArray, directions: FloatArray, steps: int = 4
-    ) -> tuple[FloatArray, FloatArray]:
+    def onto_line(self, points: FloatArray, directions: FloatArray, steps: int = 4) -> tuple[FloatArray, FloatArray]:
         """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""
         reach = 0.1 * size(self.body)
         tangents = np.zeros_like(points)
@@ -73,12 +71,20 @@ class SingleRayTracer:
             points = points + step * np.minimum(1.0, reach / np.maximum(long, 1e-300))
         return points, tangents
 
-    def states(self, directions: FloatArray, starts: FloatArray, latest: float, step: float) -> FloatArray:
-        """x, p, J, J' at equal steps, GUARD of them before the launch point and beyond a time: (n, K, 8)."""
+    def _states(
+        self, directions: FloatArray, starts: FloatArray, latest: float, step: float, rtol: float, before: bool
+    ) -> FloatArray:
+        """x, p, J, J' at equal steps, GUARD of them before the launch point and beyond a time: (n, K, 8).
+
+        Those ``before`` are copies of the launch point unless they are wanted.
+        """
         last = int(np.ceil(latest / step)) + GUARD + 1
-        forward = step * np.arange(last + 1)
-        ahead = trace_states(self.body, pack(starts, directions, jacobi=True), forward, rtol=RTOL)
-        back = trace_states(self.body, pack(starts, -directions, jacobi=True), forward[: GUARD + 1], rtol=RTOL)
+        forward: FloatArray = step * np.arange(last + 1, dtype=np.float64)
+        ahead = trace_states(self.body, pack(starts, directions, jacobi=True), forward, rtol=rtol)
+        if not before:
+            # never read, but polynomials of the first steps pass there
+            return np.concatenate([np.repeat(ahead[:, :1, :8], GUARD, axis=1), ahead[..., :8]], axis=1)
+        back = trace_states(self.body, pack(starts, -directions, jacobi=True), forward[: GUARD + 1], rtol=rtol)
         states = np.empty((len(starts), last + 1 + GUARD, 8))
         states[:, GUARD:] = ahead[..., :8]
         behind = back[:, GUARD:0:-1]
@@ -106,8 +112,9 @@ class SingleRayTracer:
         lanes, first, alive = np.zeros((n, LANES)), np.zeros((n, START_LANES)), np.zeros(n, dtype=bool)
         times = np.array(times)
         if n:
-            step = self.step if whole else LONG * self.step
-            states = self.states(directions, starts, float(np.max(times)) + 2 * step, step)
+            step, rtol = (self.step, RTOL) if whole else (LONG * self.step, SEARCH_RTOL)
+            before = whole or float(np.min(times)) < GUARD * step
+            states = self._states(directions, starts, float(np.max(times)) + 2 * step, step, rtol, before)
             level, scale = self.body.compiled, size(self.body)
             evaluator = level.function, level.parameters
             if observers is not None:
@@ -156,7 +163,7 @@ class SingleRayTracer:
             times[active] = np.clip(times[active] + later, 0.0, self.length)
             guess = starts[active] + along_line[:, None] * tangents[active]
             starts[active], tangents[active] = self.onto_line(guess, directions[active], 2)
-        good = (residual < 100 * CLOSE) & (np.abs(moved) <= 3) & (np.abs(times - begin) <= 3 * cell[:, 1])
+        good = (residual < 10 * CLOSE) & (np.abs(moved) <= 3) & (np.abs(times - begin) <= 3 * cell[:, 1])
         found = np.flatnonzero(good)
         return self.at(directions[found], starts[found], tangents[found], times[found]), found, moved[found]
 

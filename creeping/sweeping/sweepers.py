@@ -27,7 +27,8 @@ class Sweeper(Protocol):
     def __call__(self, incidences: FloatArray) -> dict[str, np.ndarray[Any, Any]]:
         """Arrays of results of unit directions (n, 3), the first axis the incidence; see `SweepRequest.variables`.
 
-        Results of an incidence do not depend on the others in the call, bit for bit.
+        The same call gives the same bits. Lines and rays of an incidence do not depend on the others in the call, its
+        fields only by rounding.
         """
         ...
 

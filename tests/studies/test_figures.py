@@ -37,7 +37,7 @@ def drawn(tmp_path_factory):
 
 
 PAPER = [name for name in studies.FIGURES if name.startswith("fig")]
-FIELD = [name for name in studies.FIGURES if name.startswith("field")]
+FIELD = [name for name in studies.FIGURES if name.startswith(("field", "sweep"))]
 
 
 @pytest.mark.parametrize("name", FIELD)
@@ -59,6 +59,43 @@ def test_field_cut_lies_on_the_exact_curve(drawn):
 def test_field_on_the_body_is_measured(drawn):
     card, _, _ = drawn("field-body")
     assert np.median(card["error"]["field"]["median_relative_by_arclength"]) < 10.5
+
+
+def test_creeping_wave_beats_in_step_on_the_conducting_sphere(drawn):
+    card, _, _ = drawn("sweep-sphere-rcs")
+    found = card["error"]["field"]
+    assert card["parameters"]["ka"] == [5.0, 40.0]
+    assert found["peaks"] == found["exact_peaks"] == 29
+    # the wave goes half round and its rays 2a through the air: Δ(ka) (2 + π) = 2π, and a little less for its lag
+    assert 1.18 < found["period_of_ka"] < 2 * np.pi / (2 + np.pi)
+    assert found["largest_shift_degrees"] < 4
+    assert found["median_shift_degrees"] < 1
+    assert found["largest_error_of_swing"] < 0.03
+    assert found["cross_section_largest_beyond_10"] < 0.04
+    assert max(found["field_largest_beyond_10"], found["across_largest_beyond_10"]) < 0.025
+
+
+def test_cross_sections_of_a_sweep_are_those_of_one_incidence(drawn):
+    card, _, _ = drawn("sweep-cross-section")
+    twisted, ellipsoid = card["error"]["field"].values()
+    for one in (twisted, ellipsoid):
+        assert max(one["against_one_by_one_dB"].values()) < 0.1
+        for boundary in ("soft", "hard", "pec"):
+            assert one["mirrored"][boundary]["largest_dB"] < 0.1
+            assert one["highest_dB"][boundary] > one["mean_dB"][boundary]
+        # a soft wave is far weaker
+        assert one["mean_dB"]["soft"] < one["mean_dB"]["hard"] - 30
+    assert max(ellipsoid["unresolved"].values()) < 0.1 and max(ellipsoid["without_return"].values()) == 0
+    # rays that leave concave ground have no field
+    assert 0 < twisted["without_return"]["hard"] < 0.1
+
+
+def test_bistatic_maps_are_reciprocal(drawn):
+    card, _, _ = drawn("sweep-bistatic")
+    ellipsoid, twisted = card["error"]["field"].values()
+    assert ellipsoid["pairs"] == 6 and ellipsoid["unresolved"] == 0
+    assert ellipsoid["largest_over_largest"] < 0.01
+    assert twisted["pairs"] >= 3 and twisted["median_relative"] < 0.03
 
 
 @pytest.mark.parametrize("name", PAPER)

@@ -87,8 +87,8 @@ def test_neighbouring_rays_are_a_spacing_apart(rng):
     lines = shadow_lines(BODIES["twisted"], directions(10, rng), 256)
     gap = np.linalg.norm(np.diff(lines.launch_points, axis=1), axis=2)
     same = np.diff(lines.arc_index, axis=1) == 0
-    # chords are shorter than arcs, by their square
-    assert np.all(np.abs(gap / lines.spacing[:, 1:] - 1)[same] < 5e-3)
+    # chords are shorter than arcs, by 20 degrees of turning at most here
+    assert np.all(np.abs(gap / lines.spacing[:, 1:] - 1)[same] < 1e-2)
 
 
 def test_singular_incidences_are_refused_and_those_near_reported():
