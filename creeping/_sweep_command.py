@@ -134,25 +134,11 @@ def _flow(read: Any, body: Any, request: Any, cache: bool, say: Any) -> Any:
     if read.flow == "direct":
         # errors of the steps add up and grow along the rays
         return cr.DirectFlow(body, rtol=min(max(1e-4 * read.tolerance, 1e-13), 1e-8))
-    steps = request.n_steps if request.quantity == "rays" else _steps(body, read.incidences, request.length)
-    asked = {"length": request.length, "outputs": steps, "tolerance": read.tolerance, "cache": cache, "progress": say}
-    if read.flow == "map":
-        return cr.build_phase_map(body, **asked)
-    return cr.choose_flow(body, rays=len(read.incidences) * request.n_rays, **asked)
+    from creeping.sweeping.sweepers import outputs_of
 
-
-def _steps(body: Any, incidences: Any, length: float) -> int:
-    """Steps of the rays that a field needs."""
-    from creeping._errors import SingularIncidenceError
-    from creeping.rays.fan import enough_steps
-    from creeping.rays.shadow import shadow_line
-
-    for direction in incidences[:16]:
-        try:
-            return enough_steps(body, shadow_line(body, direction), length)
-        except SingularIncidenceError:
-            continue
-    return 64
+    asked = {"length": request.length, "outputs": outputs_of(body, request), "tolerance": read.tolerance}
+    asked |= {"rays": len(read.incidences) * request.n_rays, "cache": cache, "progress": say}
+    return cr.build_phase_map(body, **asked) if read.flow == "map" else cr.choose_flow(body, **asked)
 
 
 def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, meter: "_Meter") -> tuple[bool, int]:

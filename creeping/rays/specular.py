@@ -179,14 +179,23 @@ def _newton(body: Surface, points: FloatArray, wanted: FloatArray, which: IntArr
         points[active] = project(body, points[active] + step)
     good = np.sum((normal(body, points) - wanted[which]) ** 2, axis=1) < (100 * CONVERGED) ** 2
     which, points = which[good], points[good]
-    keep: list[int] = []
-    mine: dict[int, list[int]] = {}
-    for k in range(len(which)):
-        others = mine.setdefault(int(which[k]), [])
-        if all(np.linalg.norm(points[k] - points[j]) > ALIKE * size(body) for j in others):
-            others.append(k)
-            keep.append(k)
+    keep = first_of_equals(which, points, ALIKE * size(body))
     return which[keep], points[keep]
+
+
+def first_of_equals(which: IntArray, points: FloatArray, gap: float) -> IntArray:
+    """Numbers of the points that are farther than ``gap`` from every earlier one of the same ``which``: (n,), (n, 3)."""
+    if not len(which):
+        return np.zeros(0, dtype=np.int64)
+    order = np.argsort(which, kind="stable")
+    place = np.arange(len(which)) - np.searchsorted(which[order], which[order])
+    kept = np.ones(len(which), dtype=bool)
+    for shift in range(1, int(place.max()) + 1):
+        late = order[place >= shift]
+        early = order[np.flatnonzero(place >= shift) - shift]
+        near = np.linalg.norm(points[late] - points[early], axis=1) <= gap
+        kept[late[near & kept[early]]] = False
+    return np.flatnonzero(kept)
 
 
 def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -21,6 +21,8 @@ from creeping.surface import size
 CLOSE = 1e-6
 """Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
 ROUNDS = 10
+TOGETHER = 192
+"""Rays traced in one call."""
 LONG = 2
 """Steps of a search, in steps of what it finds: points err less than derivatives of curvature do."""
 RTOL, SEARCH_RTOL = 1e-10, 1e-8
@@ -111,17 +113,25 @@ class SingleRayTracer:
         n = len(starts)
         lanes, first, alive = np.zeros((n, LANES)), np.zeros((n, START_LANES)), np.zeros(n, dtype=bool)
         times = np.array(times)
-        if n:
-            step, rtol = (self.step, RTOL) if whole else (LONG * self.step, SEARCH_RTOL)
-            before = whole or float(np.min(times)) < GUARD * step
-            states = self._states(directions, starts, float(np.max(times)) + 2 * step, step, rtol, before)
-            level, scale = self.body.compiled, size(self.body)
-            evaluator = level.function, level.parameters
+        step, rtol = (self.step, RTOL) if whole else (LONG * self.step, SEARCH_RTOL)
+        level, scale = self.body.compiled, size(self.body)
+        evaluator = level.function, level.parameters
+        # those of like length together: all rays of a call are traced to the latest time
+        order = np.argsort(times, kind="stable")
+        for k in range(0, n, TOGETHER):
+            rows = order[k : k + TOGETHER]
+            ends = times[rows]
+            before = whole or float(np.min(ends)) < GUARD * step
+            latest = float(np.max(ends)) + 2 * step
+            states = self._states(directions[rows], starts[rows], latest, step, rtol, before)
             if observers is not None:
-                cross(*evaluator, self._rule[0], states, step, observers, times)
-            lanes_at(*evaluator, *self._rule, scale, states, step, times, whole, lanes, first, alive)
-            first[:, 0] = np.sum(starts * directions, axis=1)
-            first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
+                cross(*evaluator, self._rule[0], states, step, observers[rows], ends)
+            found = np.zeros((len(rows), LANES)), np.zeros((len(rows), START_LANES)), np.zeros(len(rows), dtype=bool)
+            lanes_at(*evaluator, *self._rule, scale, states, step, ends, whole, *found)
+            times[rows] = ends
+            lanes[rows], first[rows], alive[rows] = found
+        first[:, 0] = np.sum(starts * directions, axis=1)
+        first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
         return SingleRays(directions, starts, tangents, RayPoints(lanes, first, times, alive, size(self.body)))
 
     def towards(

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.phaseflow.geodesic import speed_of
+from creeping.phaseflow.geodesic import natural_horizon, speed_of
 from creeping.phaseflow.tracing import compiled_parts
 from creeping.rays.fan import Flow
 from creeping.surface import Surface
@@ -35,8 +35,20 @@ class Sweeper(Protocol):
 
 def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper:
     """Make what computes a request with a flow."""
+    return CompiledSweeper(flow, request) if _is_compiled(flow.body, request) else PlainSweeper(flow, request)
+
+
+def outputs_of(body: Surface, request: SweepRequest) -> int:
+    """Equal steps of the rays at which a request needs them: what a flow for it is to be tuned for."""
+    if request.quantity == "rays":
+        return request.n_steps
+    if _is_compiled(body, request):
+        return int(np.ceil(request.length / natural_horizon(body) - 1e-9))
+    # as many as a fan has at least
+    return 64
+
+
+def _is_compiled(body: Surface, request: SweepRequest) -> bool:
     # a weighted body has no field: the plain route says so
-    plain = request.quantity == "bistatic" or (request.quantity == "monostatic" and speed_of(flow.body) is not None)
-    if not plain and compiled_parts(flow.body) is not None:
-        return CompiledSweeper(flow, request)
-    return PlainSweeper(flow, request)
+    plain = request.quantity == "bistatic" or (request.quantity == "monostatic" and speed_of(body) is not None)
+    return not plain and compiled_parts(body) is not None
