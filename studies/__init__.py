@@ -23,6 +23,9 @@ FIGURES = {
     "field-body": "figure_field_body",
     "field-decay": "figure_field_decay",
     "mesh-quality": "figure_mesh_quality",
+    "sweep-cross-section": "figure_cross_section",
+    "sweep-sphere-rcs": "figure_sphere_rcs",
+    "sweep-bistatic": "figure_bistatic_map",
 }
 """Name on the command line: module of this package."""
 

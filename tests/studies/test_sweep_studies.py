@@ -25,7 +25,7 @@ def test_lines_agree_with_both_references():
 
 def test_a_line_that_differs_is_counted():
     directions = fibonacci_directions(6)
-    lines = sweep_lines.on_meshes(sweep_lines.BODIES["torus"], directions, (0, 0, 0))
+    lines = sweep_lines.on_meshes(sweep_lines.BODIES["ellipsoid"], directions, (0, 0, 0))
     assert not np.any(lines.status == FOLLOWED)
     other = lines._replace(curves=lines.curves + 1, length=lines.length * 1.01)
     found = sweep_lines.differences(lines, other)
@@ -43,8 +43,11 @@ def test_fans_carry_their_errors():
 
 
 def test_fields_are_compared_with_one_by_one():
-    (composed, direct) = sweep_speed.fields(("ellipsoid",), count=4, checked=2)
-    for row in (composed, direct):
+    rows = sweep_speed.fields(("ellipsoid",), count=32, checked=2)
+    assert [row["flow"] for row in rows] == ["order 8", "map"]
+    for row in rows:
+        # found 2026-11-21: a shed ray that two cells find is counted once
+        assert row["off"] == 0
         assert row["checked"] == 2 and row["unresolved"] == 0 == row["status > 0"]
         assert row["creeping, median"] < 1e-3 and row["reflected, median"] < 1e-6
 
