@@ -15,6 +15,7 @@ from cyclopts import Group, Parameter
 from creeping._body_argument import CAD, MESHES, parse_body
 
 PARTIAL, ALL_FAILED = 4, 3
+"""Exit codes: of a sweep that --resume would go on with, for what is missing or failed; of one without results."""
 PILOT = 2
 """Tasks by which a sweep is timed; the first may have to compile."""
 LARGE = 1800.0
@@ -38,7 +39,8 @@ def sweep(
         Parameter(negative="", help="Go on with what is there: tasks that are missing, or have failed incidences."),
     ] = False,
     verify: Annotated[
-        bool, Parameter(negative="", help="With --resume: check what is there, renew the damaged.")
+        bool,
+        Parameter(negative="", help="With --resume: check what is there; compute damaged tasks again."),
     ] = False,
     scheduler: Annotated[str | None, Parameter(group=_workers, help="Address of a Dask scheduler.")] = None,
     workers: Annotated[
@@ -51,7 +53,10 @@ def sweep(
         bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")
     ] = False,
 ) -> int:
-    """Run the sweep of a study file; interrupted, it can be resumed. Exit code 4 if it is not complete."""
+    """Run the sweep of a study file; interrupted, it can be resumed.
+
+    Exit code 4 if --resume would go on: some incidences are missing or failed. 3 if all of them failed.
+    """
     from creeping._errors import InvalidInputError
     from creeping.sweeping.study import EXAMPLE, read_study
 
@@ -73,31 +78,34 @@ def sweep(
         workers = read.workers
     with _Meter(quiet=json_) as meter:
         plan, store = _prepared(read, folder, resume, cache, meter.say)
-        if verify:
-            meter.say("verifying")
-            for task, reason in store.verify(repair=True):
-                meter.say(f"task {task} is computed anew: {reason}")
         again = ["creeping", "sweep", str(study), "--resume", "-o", str(folder)]
         again += ["--scheduler", scheduler] if scheduler else []
         again += ["--workers", str(workers)] if workers else []
-        missing = sum(plan.rows(task).stop - plan.rows(task).start for task in store.missing())
-        meter.begin(len(plan.incidences) - missing, len(plan.incidences))
-        running = time.perf_counter()
-        try:
-            complete, done = _run(plan, store, scheduler, workers, meter)
-        except BaseException:
-            meter.say(f"what is done is kept; to go on: {shlex.join(again)}")
-            raise
+        # one lock for all: nobody slips in between
+        with store.locked():
+            if verify:
+                meter.say("verifying")
+                for task, reason in store.verify(repair=True):
+                    meter.say(f"task {task} is computed anew: {reason}")
+            missing = sum(plan.rows(task).stop - plan.rows(task).start for task in store.missing())
+            meter.begin(len(plan.incidences) - missing, len(plan.incidences))
+            running = time.perf_counter()
+            try:
+                complete, done = _run(plan, store, scheduler, workers, meter)
+            except BaseException:
+                meter.tell(f"what is done is kept; to go on: {shlex.join(again)}")
+                raise
         now = time.perf_counter()
     summary = _summary(plan, store, complete)
     summary |= {"incidences_now": done, "incidences_per_second": round(done / (now - running), 2)}
     summary["seconds"] = round(now - started, 2)
-    if not complete:
+    failed = summary["status"]["failed"]
+    if failed or not complete:
         summary["resume"] = shlex.join(again)
     print(json.dumps(summary, indent=1) if json_ else _readable(summary))
-    if not complete:
-        return PARTIAL
-    return ALL_FAILED if summary["status"]["failed"] == len(plan.incidences) else 0
+    if failed == len(plan.incidences):
+        return ALL_FAILED
+    return PARTIAL if failed or not complete else 0
 
 
 def _prepared(read: Any, folder: Path, resume: bool, cache: bool, say: Any) -> tuple[Any, Any]:
@@ -114,14 +122,18 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, say: Any) -> t
     say("body")
     body = parse_body(text, read.speed, units=read.units, allow_rough=read.allow_rough, cache=cache, say=say)
     request = read.request_for(body)
-    going_on = resume and folder.exists()
     say("flow")
-    flow = SweepStore.open(folder).flow(body) if going_on else _flow(read, body, request, cache, say)
+    if resume and folder.exists():
+        store = SweepStore.open(folder)
+        # the size of its tasks is the store's, whatever the study says now
+        flow, chunk = store.flow(body), store.chunk
+    else:
+        flow, chunk = _flow(read, body, request, cache, say), task_size(request, len(read.incidences), read.chunk)
     plan = SweepPlan(
         flow,
         request,
         read.incidences,
-        min(read.chunk or task_size(request, len(read.incidences)), len(read.incidences)),
+        chunk,
         asked={"flow": read.flow, "tolerance": read.tolerance},
         text=read.text,
     )
@@ -211,19 +223,22 @@ def _summary(plan: Any, store: Any, complete: bool) -> dict[str, Any]:
 
 def _readable(summary: dict[str, Any]) -> str:
     counts = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in summary["status"].items() if n)
+    now = (
+        f"{summary['incidences_now']} of them now, in {summary['seconds']:.1f} s "
+        f"({summary['incidences_per_second']:g} a second)"
+    )
+    nothing = summary["complete"] and not summary["incidences_now"]
     rows = [
         f"{summary['incidences']} incidences, {summary['quantity']}: {counts}",
-        f"{summary['incidences_now']} of them now, in {summary['seconds']:.1f} s "
-        f"({summary['incidences_per_second']:g} a second)",
+        "nothing was missing" if nothing else now,
     ]
     rows += [f"incidence {item['incidence']} failed: {item['error']}" for item in summary["failures"][:5]]
     if summary["status"]["failed"] > 5:
-        rows.append(
-            f"... {summary['status']['failed']} incidences failed; their status is 4, --resume tries them again"
-        )
+        rows.append(f"... {summary['status']['failed']} incidences failed; their incidence_status is 4")
     rows.append(f"results in {summary['output']}: xarray.open_zarr({summary['output']!r}, consolidated=False)")
     if "resume" in summary:
-        rows.append(f"not complete; to go on: {summary['resume']}")
+        why = "to try again those that failed" if summary["complete"] else "not complete; to go on"
+        rows.append(f"{why}: {summary['resume']}")
     return "\n".join(rows)
 
 
@@ -255,9 +270,14 @@ class _Meter:
 
     def say(self, text: str) -> None:
         """Say what is being done now."""
+        if not self.quiet:
+            self.tell(text)
+
+    def tell(self, text: str) -> None:
+        """Say what must be known, quiet or not."""
         if self._bar is not None:
             self._bars.console.print(f"creeping: {text}", highlight=False, markup=False, soft_wrap=True)
-        elif not self.quiet:
+        else:
             print(f"creeping: {text}", file=sys.stderr, flush=True)
 
     @property

@@ -20,7 +20,7 @@ from creeping.field.far_geometry import FarGeometry, Geometry, far_geometry, mer
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.launching import scales, shed_wave, smoothstep
 from creeping.field.polarisation import dyads, wave_frame
-from creeping.field.reflected import UNRESOLVED, next_order, reflected_amplitude
+from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude
 from creeping.rays.fan import RayFan
 from creeping.rays.ray_points import RayPoints
 
@@ -33,6 +33,8 @@ CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)
 """Polarisations of a conductor and the other of each, with the sign of their coupling."""
 MATTERS = 0.05
 """Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
+HIDDEN = 0.01
+"""Share of the shadow line from which hidden parts leave the forward lobe unresolved."""
 MERGED = (0.38, 0.52)
 """χ between which the fan integral replaces isolated rays."""
 
@@ -52,7 +54,7 @@ class FarField:
     unresolved : (m,) of bool
         Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
         fan integral does not cover, a caustic of the reflected field (a specular point on nearly flat ground), or a
-        forward lobe with no mid-horizon (concave ground).
+        forward lobe with no mid-horizon (concave ground) or with a rim that the body hides in part.
     wavenumber : float, 1/L
     boundary : str
     order : int
@@ -163,18 +165,27 @@ def isolated_rays(geometry: Geometry, wavenumber: float, boundary: Boundary, ord
         if order == 2 and boundary in CROSSED:
             sign, other = CROSSED[boundary]
             wave = wave + sign * gradient_coupling(rays, wavenumber) * shed_wave(rays, wavenumber, other, order)
-        amplitude = np.sqrt(2 * m1 * m2 / wavenumber / held_rate(rays, m2))
+        amplitude = np.sqrt(2 * m1 * m2 / wavenumber / held_rate(rays, m2, passed_fold(geometry)))
         wave = np.where(amplitude > 0, -amplitude * wave * np.exp(1j * phase), 0.0)
     return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
 
 
-def held_rate(rays: RayPoints, m: FloatArray) -> FloatArray:
-    """|J'| (n,), held above |J|κₙ/(2m) where φ is outside [0, π/2]: at a fold that is not the launch point's own.
+def passed_fold(geometry: Geometry) -> BoolArray:
+    """Whether a shed ray is past the fold J' = 0 of its launch point (n,): φ outside [0, π/2], or turned back.
+
+    Over ground with K < 0, φ may come back to 0.
+    """
+    rays = geometry.shed.rays
+    turned = geometry.angle[geometry.shed.observer] > np.pi / 2
+    return np.asarray((rays.prufer > np.pi / 2) | (rays.prufer < 0) | turned)
+
+
+def held_rate(rays: RayPoints, m: FloatArray, passed: BoolArray) -> FloatArray:
+    """|J'| (n,), held above |J|κₙ/(2m) at folds that are not the launch point's own, which the ray has passed.
 
     There a fold's wave stops growing.
     """
     rate = np.abs(rays.spreading_rate)
-    passed = (rays.prufer > np.pi / 2) | (rays.prufer < 0)
     least = np.where(passed, 0.5 * np.abs(rays.spreading) * np.maximum(rays.curvature[1], 0.0) / m, 0.0)
     return np.asarray(np.sqrt(np.sqrt(rate**4 + least**4)))
 
@@ -226,7 +237,7 @@ class _Parts:
         share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
         wave = _weighted(share, isolated_rays(g, k, kind, order))
         # the first zero of J' is the launch point itself, where the forward lobe serves
-        merged = (merging(shed.rays) > MERGED[1]) & ((shed.rays.prufer > np.pi / 2) | (shed.rays.prufer < 0))
+        merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
         self._doubt(shed.observer, wave, merged)
         n0, n = shed.rays.first_normal, g.shed_normals
         self._sum(self.creeping, number, shed.observer, wave, n0, n)
@@ -235,7 +246,12 @@ class _Parts:
         self._sum(self.creeping, number, fan.observer, wave, fan.rays.first_normal, g.normals_of(fan.rays.points))
         s = g.specular
         incident = self.incident[s.observer]
-        wave = _weighted((1 - w)[s.observer], reflected_amplitude(s, g.directions, incident, k, kind, order))
+        wave = reflected_amplitude(s, g.directions, incident, k, kind, order)
+        if self.vector:
+            # at normal incidence no polarisation is along the plane of incidence: both take the mean of their orders
+            other = reflected_amplitude(s, g.directions, incident, k, CROSSED[kind][1], order)
+            wave = wave - 0.5 * (1 - smoothstep(s.sine, *NORMAL)) * (wave + other)
+        wave = _weighted((1 - w)[s.observer], wave)
         self._doubt(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
         self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
         if np.any(w > 0):
@@ -248,6 +264,8 @@ class _Parts:
         d = g.direction
         shadow, lit, lost = g.forward_nodes(k, w > 0)
         self.lost[lost] = True
+        if g.line.fractions["occluded"] > HIDDEN:
+            self.lost[w > 0] = True
         wave = shadow_half(shadow, g.directions, d, k, kind, order, self.beyond_axis[shadow.observer])
         wave = _weighted(w[shadow.observer], wave)
         self._sum(

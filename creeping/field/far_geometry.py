@@ -16,7 +16,7 @@ from creeping.rays.shedding import ShedRays, shed_far
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
 from creeping.rays.visibility import occluded
-from creeping.surface import normal, size
+from creeping.surface import normal, project, size
 
 _KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionary()
 _STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()
@@ -165,7 +165,8 @@ class FarGeometry:
     @cached_property
     def leaves(self) -> BoolArray:
         """Whether a shed ray misses the body on its way out (n,)."""
-        return ~occluded(self.body, self.shed.rays.points, -self.shed.rays.directions)
+        # interpolated points may lie below the surface by their error
+        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
 
     @cached_property
     def long(self) -> BoolArray:

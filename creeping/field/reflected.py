@@ -18,9 +18,11 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.coefficients import Boundary, fock_scale
 from creeping.field.fock import FARTHEST, pekeris, pekeris_slope
-from creeping.field.launching import limited
+from creeping.field.launching import limited, smoothstep
 from creeping.rays.specular import SpecularPoints
 
+NORMAL = (0.0, 0.2)
+"""Sines of the angle of incidence between which its plane, and a conductor's polarisations, come to be told apart."""
 UNRESOLVED = 0.25
 """Size of the next term of the reflected field's series from which a specular point is too flat for it."""
 
@@ -56,10 +58,20 @@ def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
     return np.full(cosine.shape, -1.0 if boundary.kind.endswith("soft") else 1.0, dtype=complex)
 
 
+def curvatures(specular: SpecularPoints) -> tuple[FloatArray, FloatArray]:
+    """Normal curvatures along the plane of incidence and across it (n,).
+
+    At normal incidence there is no such plane: both are the mean curvature.
+    """
+    oblique = smoothstep(specular.sine, *NORMAL)
+    mean = 0.5 * (specular.along + specular.across)
+    return mean + oblique * (specular.along - mean), mean + oblique * (specular.across - mean)
+
+
 def next_order(specular: SpecularPoints, wavenumber: float) -> FloatArray:
     """Size (n,) of (κ_b/2 - Λ)/(k cos θᵢ), real: i times it is the next term of the reflected field's series."""
     with np.errstate(divide="ignore", over="ignore"):
-        return np.asarray((specular.across / 2 - specular.shape) / (wavenumber * specular.cosine))
+        return np.asarray((curvatures(specular)[1] / 2 - specular.shape) / (wavenumber * specular.cosine))
 
 
 def reflected_amplitude(
@@ -71,7 +83,7 @@ def reflected_amplitude(
     order: int,
 ) -> ComplexArray:
     """Contribution of each specular point to the far field (n,), L."""
-    R = reflection(specular.cosine, specular.along, specular.across, wavenumber, boundary, order)
+    R = reflection(specular.cosine, *curvatures(specular), wavenumber, boundary, order)
     path = np.sum((direction - observers[specular.observer]) * specular.points, axis=1)
     with np.errstate(divide="ignore"):
         spread = 0.5 / np.sqrt(np.abs(np.prod(specular.principal, axis=1)))

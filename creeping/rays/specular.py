@@ -19,6 +19,8 @@ CONVERGED = 1e-10
 """Residual of the normal at a specular point."""
 FLAT = 1e-4
 """Determinant of S + n n^T, over the square of its norm, below which a point counts as flat."""
+FLATTEST = 1e-8
+"""Least principal curvature, in inverse body sizes."""
 ALIKE = 1e-6
 """Distance, in body sizes, below which two solutions are one."""
 
@@ -50,6 +52,11 @@ class SpecularPoints:
     across: FloatArray
     principal: FloatArray
     shape: FloatArray
+
+    @property
+    def sine(self) -> FloatArray:
+        """Sine of the angle of incidence (n,)."""
+        return np.sqrt(np.maximum(1 - self.cosine**2, 0.0))
 
 
 def specular_points(
@@ -84,6 +91,8 @@ def specular_points(
     along, across, mixed = (np.einsum("ni,nij,nj->n", v, H, w) for v, w in ((q, q), (b, b), (q, b)))
     matrix = np.stack([np.stack([along, mixed], axis=-1), np.stack([mixed, across], axis=-1)], axis=-2)
     principal, axes = np.linalg.eigh(matrix)
+    # on flat ground the field is not finite: large, and for its next term unresolved
+    principal = np.copysign(np.maximum(np.abs(principal), FLATTEST / size(body)), principal)
     frame = np.einsum("nak,nai->nki", axes, np.stack([q, b], axis=1))
     return SpecularPoints(
         observer=row,
@@ -184,17 +193,19 @@ def _newton(body: Surface, points: FloatArray, wanted: FloatArray, which: IntArr
 
 
 def first_of_equals(which: IntArray, points: FloatArray, gap: float) -> IntArray:
-    """Numbers of the points that are farther than ``gap`` from every earlier one of the same ``which``: (n,), (n, 3)."""
+    """Numbers (m,) of the points (n, 3) farther than ``gap`` from every earlier one kept of their ``which`` (n,)."""
     if not len(which):
         return np.zeros(0, dtype=np.int64)
     order = np.argsort(which, kind="stable")
     place = np.arange(len(which)) - np.searchsorted(which[order], which[order])
     kept = np.ones(len(which), dtype=bool)
-    for shift in range(1, int(place.max()) + 1):
-        late = order[place >= shift]
-        early = order[np.flatnonzero(place >= shift) - shift]
-        near = np.linalg.norm(points[late] - points[early], axis=1) <= gap
-        kept[late[near & kept[early]]] = False
+    # in the order of their places, so that what is kept of earlier ones is known
+    for rank in range(1, int(place.max()) + 1):
+        late = order[place == rank]
+        for before in range(rank):
+            early = order[np.flatnonzero(place == rank) - rank + before]
+            near = np.linalg.norm(points[late] - points[early], axis=1) <= gap
+            kept[late[near & kept[early]]] = False
     return np.flatnonzero(kept)
 
 

@@ -254,6 +254,7 @@ def seek_all(
     early,
     along,
     most,
+    crossings,
     found,
     places,
     crossed,
@@ -268,7 +269,7 @@ def seek_all(
     m = (states.shape[2] - 1) * PARTS + 1
     heights = np.empty((rays, 3, m))
     cells, inside = np.empty((most, 3), np.int64), np.empty((most, 2))
-    ray_of, at = np.empty(8 * rays, np.int64), np.empty((8 * rays, 2))
+    ray_of, at = np.empty(crossings, np.int64), np.empty((crossings, 2))
     total = passed = 0
     for row in range(n):
         a, b, summary[row, 0], summary[row, 1] = seek(

@@ -15,18 +15,19 @@ from creeping.field.forward import TAPER
 from creeping.phaseflow.geodesic import natural_horizon
 from creeping.rays.fan import Flow
 from creeping.rays.horizon import HorizonRays
+from creeping.rays.ray_points import TURN
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.visibility import occluded
-from creeping.surface import normal, size
+from creeping.surface import normal, project, size
 from creeping.sweeping.carrying import carried
 from creeping.sweeping.shadow_lines import ShadowLines, prepared
 from creeping.sweeping.single_rays import SingleRayTracer
 
 EARLY = 0.28
 """Time, in body sizes, before which a horizon crossing does not count for merging."""
-ALIKE = 1e-5
-"""Distance, in cells, below which two rays found are one."""
+ALIKE = 1e-2
+"""Distance, in cells, below which two rays found are one: searches end within 1e-4 or so of each other."""
 APART = 2.0
 """Spacing of the nodes of a fan integral, in 1/k: a periodic integrand sampled so errs by less than 1e-6 of itself."""
 LONGEST_TIE = 12
@@ -69,18 +70,19 @@ class BackscatterGeometry:
         times = coarse_times(self.flow, self.tracer.length)
         states = carried(self.flow, lines, times, lanes=10)
         self._summary = np.empty((n, 2))
-        room = 64
+        # a ray crosses about once in every half turn; at worst each sample is a cell and a crossing
+        cells, crossings, most = 64, 2 + int(self.tracer.steps * TURN / np.pi), len(times) * PARTS
         while True:
-            found, crossed = np.empty((room * n, 4), np.int64), np.empty((8 * rays * n, 4))
-            places = np.empty((room * n, 2))
+            found, places = np.empty((cells * n, 4), np.int64), np.empty((cells * n, 2))
+            crossed = np.empty((crossings * rays * n, 4))
             a, b = seek_all(
                 level.function, level.parameters, times[1], quintic_weights(times[1]), states,
                 lines.arc_index, lines.closed, self.directions, EARLY * size(self.body), ALONG,
-                room * n, found, places, crossed, self._summary,
+                cells * n, crossings * rays, found, places, crossed, self._summary,
             )  # fmt: skip
             if a >= 0:
                 break
-            room *= 8
+            cells, crossings = min(8 * cells, most * rays), min(2 * crossings, most)
         self._found, self._places, self._crossed = found[:a], places[:a], crossed[:b]
         self._fine = times[:-1, None] + np.diff(times)[:, None] * (np.arange(PARTS) / PARTS)
 
@@ -124,7 +126,8 @@ class BackscatterGeometry:
     @cached_property
     def leaves(self) -> BoolArray:
         """Whether a shed ray misses the body on its way out (m,)."""
-        return ~occluded(self.body, self.shed.rays.points, -self.shed.rays.directions)
+        # interpolated points may lie below the surface by their error
+        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
 
     @property
     def long(self) -> BoolArray:
@@ -165,7 +168,7 @@ class BackscatterGeometry:
 def coarse_times(flow: Flow, length: float) -> FloatArray:
     """Times of the fan, from 0: steps that the flow takes at once, about those that resolve the body."""
     natural = natural_horizon(flow.body)
-    count = int(np.ceil(length / natural - 1e-9))
+    count = max(1, int(np.ceil(length / natural - 1e-9)))
     if flow.error is not None and flow.horizon < length:
         leaps = max(1, round(natural / flow.horizon))
         if abs(length / flow.horizon - round(length / flow.horizon)) < 1e-9:

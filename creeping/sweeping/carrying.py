@@ -12,12 +12,11 @@ from creeping.rays.fan import Flow
 from creeping.sweeping.request import NO_RAY
 from creeping.sweeping.shadow_lines import ShadowLines
 
-BLOCK = 64
-"""Rays of a block of the engine."""
-
 
 def carried(flow: Flow, lines: ShadowLines, times: FloatArray, *, lanes: int) -> FloatArray:
     """States (n, rays, m, lanes) of all rays at the times (m,); what stands for no ray is not to be read."""
+    from creeping.phaseflow._integrator import BLOCK
+
     there = lines.curve_index != NO_RAY
     n, rays = there.shape
     padded = -(-rays // BLOCK) * BLOCK

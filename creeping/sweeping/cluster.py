@@ -7,24 +7,19 @@ is put aside until all others are done, and then done in this process's hands: o
 
 import os
 import queue
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from pathlib import Path
 
 import dask
 import distributed
-import numpy as np
 
 from creeping._errors import CreepingError
-from creeping._typing import Any, FloatArray
-from creeping.surface import Surface
-from creeping.sweeping.planning import Arrays, Maker, SweepPlan, compute
-from creeping.sweeping.request import SweepRequest
+from creeping._typing import Any
+from creeping.sweeping.planning import Arrays, Beginning, SweepPlan
 from creeping.sweeping.store import SweepStore
+from creeping.sweeping.store_layout import UNDONE
+from creeping.sweeping.workers import THREADS, Recipe, RecipePlugin, one_incidence, whole_task
 
 AHEAD = 2
 """Tasks in flight for each thread of the workers."""
@@ -32,62 +27,6 @@ ANSWER = 20.0
 """Seconds in which a scheduler must answer."""
 PATIENCE = 120.0
 """Seconds without any worker after which the sweep is given up."""
-THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "CREEPING_THREADS")
-
-
-@dataclass
-class Recipe:
-    """What a worker needs to make the sweeper; pickled with the body in it, but not the tables of a map."""
-
-    digest: str
-    body: Surface
-    request: SweepRequest
-    make: Maker
-    folder: str
-    driver: tuple[str, int] = field(default_factory=lambda: _process())
-    own: threading.local = field(default_factory=threading.local, repr=False)
-
-    def tools(self) -> tuple[Any, SweepStore]:
-        """Sweeper and store of this thread, made when first asked for."""
-        if not hasattr(self.own, "tools"):
-            if not Path(self.folder).is_dir():
-                raise CreepingError(f"the worker on {_process()[0]} does not see {self.folder}; give a shared folder")
-            store = SweepStore.open(self.folder)
-            self.own.tools = (self.make(store.flow(self.body), self.request), store)
-        tools: tuple[Any, SweepStore] = self.own.tools
-        return tools
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "own"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, own=threading.local())
-
-
-_RECIPES: dict[str, Recipe] = {}
-"""Of the sweeps that this process, a worker, takes part in."""
-
-
-class RecipePlugin(distributed.WorkerPlugin):  # type: ignore[misc]
-    """Gives a worker the recipe of a sweep."""
-
-    def __init__(self, recipe: Recipe) -> None:
-        self.recipe = recipe
-
-    def setup(self, worker: Any) -> None:
-        """Keep the recipe, and keep to one thread: the cores are shared out among the workers."""
-        _RECIPES[self.recipe.digest] = self.recipe
-        if _process() == self.recipe.driver:
-            return
-        for name in THREADS:
-            os.environ.setdefault(name, "1")
-        if worker.nanny and threading.current_thread() is threading.main_thread():
-            # a terminal interrupts its whole group of processes; to stop is the driver's part
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def teardown(self, worker: Any) -> None:
-        """Forget the recipe."""
-        _RECIPES.pop(self.recipe.digest, None)
 
 
 def fill_on(
@@ -109,7 +48,8 @@ def fill_on(
     Raises
     ------
     CreepingError
-        If the workers cannot write, or there are none for too long.
+        If the workers cannot write, or there are none for too long, or the first incidences all fail with one and the
+        same error.
     """
     if isinstance(client, str):
         with connected(client) as own:
@@ -124,12 +64,17 @@ def fill_on(
     window = _Window(client, plan, stop)
     try:
         dead = []
+        status, beginning = store.status(), Beginning()
         for task, outcome in window.results(missing):
             if isinstance(outcome, distributed.KilledWorker):
                 dead.append(task)
                 continue
-            store.commit(task, failures=outcome > 0)
+            failed, common = outcome
+            store.commit(task, failures=failed > 0)
             yield task
+            # those that failed before may fail again
+            if status[task] == UNDONE:
+                beginning.add(store.rows(task).stop - store.rows(task).start, common)
         for task in dead:
             if stop():
                 return
@@ -191,7 +136,7 @@ class _Window:
         self._threads, self._asked, self._alive = 0, 0.0, time.monotonic()
 
     def results(self, tasks: list[int]) -> Iterator[tuple[int, Any]]:
-        """Task and number of its failed incidences, or the `KilledWorker`, in the order of completion."""
+        """Task and what `whole_task` says of it, or the `KilledWorker`, in the order of completion."""
         waiting = iter(tasks)
         drained = False
         while True:
@@ -200,7 +145,7 @@ class _Window:
                 task = next(waiting, None)
                 if task is None:
                     break
-                self.submit(task, _whole_task, task, self.plan.incidences[self.plan.rows(task)])
+                self.submit(task, whole_task, task, self.plan.incidences[self.plan.rows(task)])
             if stopping and not drained:
                 self._drop_what_waits()
                 drained = True
@@ -279,7 +224,7 @@ def _singly(window: _Window, rows: slice, stop: Callable[[], bool]) -> tuple[Arr
         if stop():
             return None
         place = row - rows.start
-        window.submit(row, _one_incidence, incidences[row : row + 1])
+        window.submit(row, one_incidence, incidences[row : row + 1])
         outcome = None
         while outcome is None:
             outcome = window.next()
@@ -292,20 +237,3 @@ def _singly(window: _Window, rows: slice, stop: Callable[[], bool]) -> tuple[Arr
         if failed:
             errors[place] = failed[0]
     return arrays, errors
-
-
-def _whole_task(digest: str, task: int, incidences: FloatArray) -> int:
-    """Compute a task on a worker and write its chunks: the number of incidences that failed."""
-    sweeper, store = _RECIPES[digest].tools()
-    arrays, errors = compute(sweeper, np.asarray(incidences))
-    store.write_task(task, arrays, errors)
-    return len(errors)
-
-
-def _one_incidence(digest: str, incidence: FloatArray) -> tuple[Arrays, dict[int, str]]:
-    """Compute one incidence on a worker."""
-    return compute(_RECIPES[digest].tools()[0], np.asarray(incidence))
-
-
-def _process() -> tuple[str, int]:
-    return os.uname().nodename, os.getpid()

@@ -9,7 +9,7 @@ from creeping.rays.fan import Flow, RayStatus, rough_from
 from creeping.rays.launch_points import line_tangents
 from creeping.rays.spreading import spread
 from creeping.surface import Surface
-from creeping.sweeping.carrying import BLOCK, carried
+from creeping.sweeping.carrying import carried
 from creeping.sweeping.monostatic import fill_monostatic
 from creeping.sweeping.request import NO_RAY, SINGULAR, SweepRequest
 from creeping.sweeping.shadow_lines import ShadowLines, shadow_lines
@@ -43,7 +43,7 @@ class CompiledSweeper:
         incidences = np.asarray(incidences, dtype=float)
         out = self.request.empty(len(incidences))
         together = BATCH if self._tracer is None else FIELD_BATCH
-        batch = max(1, together // (-(-self.request.n_rays // BLOCK) * BLOCK))
+        batch = max(1, together // self.request.n_rays)
         for first in range(0, len(incidences), batch):
             part = slice(first, first + batch)
             self._batch(incidences[part], {name: values[part] for name, values in out.items()})

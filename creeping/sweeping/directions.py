@@ -9,8 +9,8 @@ import numpy as np
 from creeping._errors import InvalidInputError
 from creeping._typing import ArrayLike, FloatArray
 
-MOST = 100_000_000
-"""Directions of one set."""
+MOST = 10_000_000
+"""Directions of one set: 240 MB."""
 LEBEDEV_ORDERS = (
     *range(3, 33, 2),
     *range(35, 132, 6),
@@ -66,7 +66,7 @@ def fibonacci_directions(n: int) -> FloatArray:
     >>> fibonacci_directions(1000).shape
     (1000, 3)
     """
-    count = _count("n", n, 1)
+    count = direction_count("n", n)
     k = np.arange(count)
     z = 1 - (2 * k + 1) / count
     # whole turns are left out before the product grows, so that late points keep their digits
@@ -108,11 +108,16 @@ def theta_phi_grid(n_theta: int, n_phi: int) -> tuple[FloatArray, FloatArray]:
     weights : (n_theta n_phi,)
         Of sum 4 pi; Fejer's first rule, exact for polynomials below the degree min(n_theta, n_phi).
     """
-    rows, columns = _count("n_theta", n_theta, 1), _count("n_phi", n_phi, 1)
-    _count("n_theta n_phi", rows * columns, 1)
+    from scipy.fft import dct
+
+    rows, columns = direction_count("n_theta", n_theta), direction_count("n_phi", n_phi)
+    direction_count("n_theta n_phi", rows * columns)
     theta = (np.arange(rows) + 0.5) * np.pi / rows
-    j = np.arange(1, rows // 2 + 1)
-    fejer = 2 / rows * (1 - 2 * np.sum(np.cos(2 * j * theta[:, None]) / (4 * j**2 - 1), axis=1))
+    # 2 sum over j of cos(2 j theta)/(4 j^2 - 1) is a cosine transform; cos(rows theta) is 0
+    j = np.arange(1, (rows + 1) // 2)
+    terms = np.zeros(rows)
+    terms[2 * j] = 1 / (4.0 * j**2 - 1)
+    fejer = 2 / rows * (1 - dct(terms, type=3))
     phi = 2 * np.pi * np.arange(columns) / columns
     directions = directions_from_angles(theta[:, None], phi).reshape(-1, 3)
     return directions, np.repeat(fejer * 2 * np.pi / columns, columns)
@@ -145,7 +150,7 @@ def great_circle(
            [ 0.,  0., -1.],
            [-1.,  0.,  0.]])
     """
-    count = _count("n", n, 1)
+    count = direction_count("n", n)
     a, b = unit_directions(first), unit_directions(through)
     if a.shape != (3,) or b.shape != (3,):
         raise InvalidInputError(f"first and through have shapes {a.shape} and {b.shape}; give three numbers each")
@@ -213,7 +218,8 @@ def _angles(**named: ArrayLike) -> list[FloatArray]:
         raise InvalidInputError(f"shapes do not go together: {shapes}") from error
 
 
-def _count(name: str, value: int, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= MOST:
-        raise InvalidInputError(f"{name} = {value!r} is not a whole number from {least} to {MOST}")
+def direction_count(name: str, value: int) -> int:
+    """Return a number of directions, if it is one from 1 to `MOST`."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST:
+        raise InvalidInputError(f"{name} = {value!r} is not a whole number from 1 to {MOST}")
     return int(value)

@@ -28,6 +28,8 @@ def fill_monostatic(
         for name, values in found.items():
             if name not in LINE:
                 out[name][rows[small]] = values
+        lost = found["incidence_status"] == SINGULAR
+        out["incidence_status"][rows[small][lost]] = SINGULAR
         rows = rows[~small]
         geometry = BackscatterGeometry(flow, lines.of(rows), tracer, max(request.wavenumbers))
     scalar = 0

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
+from creeping._errors import CreepingError, InvalidInputError
 from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.phaseflow.caching import load_phase_map
@@ -28,6 +28,10 @@ from creeping.sweeping.sweepers import Sweeper, sweeper_of
 MOST_IN_TASK = 1024
 TASK_BYTES = 64_000_000
 """Results of one task, in memory."""
+INCIDENCE_BYTES = 1_000_000_000
+"""Results of one incidence, which is computed whole and is a chunk of its own at least."""
+MISTAKES = (MemoryError, TypeError, AttributeError, NameError, ImportError)
+"""Errors that tell of the program or the machine, not of an incidence."""
 Maker = Callable[[Flow, SweepRequest], Sweeper]
 Arrays = dict[str, np.ndarray[Any, Any]]
 
@@ -59,6 +63,11 @@ class SweepPlan:
     make: Maker = sweeper_of
     asked: dict[str, Any] = field(default_factory=dict)
     text: str = ""
+
+    def __post_init__(self) -> None:
+        reason = too_large(self.request)
+        if reason:
+            raise InvalidInputError(reason, bytes=bytes_of(self.request))
 
     @property
     def body(self) -> Surface:
@@ -102,8 +111,10 @@ class SweepPlan:
         return content_digest(self.key)
 
 
-def task_size(request: SweepRequest, count: int) -> int:
-    """Incidences of a task unless given: enough tasks to share and to save often, and not too large in memory."""
+def task_size(request: SweepRequest, count: int, asked: int | None = None) -> int:
+    """Incidences of a task unless asked for: enough tasks to share and to save often, and not too large in memory."""
+    if asked:
+        return min(int(asked), count)
     each = bytes_of(request)
     return int(np.clip(min(-(-count // 32), TASK_BYTES // each), 1, MOST_IN_TASK))
 
@@ -118,14 +129,27 @@ def bytes_of(request: SweepRequest) -> int:
     return sum(counts)
 
 
+def too_large(request: SweepRequest) -> str:
+    """Why the results of one incidence are too many; nothing if they are not."""
+    size = bytes_of(request)
+    if size <= INCIDENCE_BYTES:
+        return ""
+    fewer = "rays or steps" if request.quantity == "rays" else "wavenumbers, boundaries or directions of observation"
+    return (
+        f"one incidence gives {size / 1e9:.1f} GB of results, more than {INCIDENCE_BYTES / 1e9:g} GB; ask for fewer "
+        f"{fewer}"
+    )
+
+
 def compute(sweeper: Sweeper, incidences: FloatArray) -> tuple[Arrays, dict[int, str]]:
     """Results of incidences (n, 3), and the errors of those that failed, by row.
 
-    If the sweeper raises, each incidence is tried alone, so that one does not cost the others their results.
+    If the sweeper raises, each incidence is tried alone, so that one does not cost the others their results. `MISTAKES`
+    are raised.
     """
     try:
         arrays, errors = sweeper(incidences), dict[int, str]()
-    except MemoryError:
+    except MISTAKES:
         raise
     except Exception as error:
         if len(incidences) > 1:
@@ -136,6 +160,36 @@ def compute(sweeper: Sweeper, incidences: FloatArray) -> tuple[Arrays, dict[int,
     for row in np.flatnonzero(arrays["incidence_status"] == FAILED):
         errors[int(row)] = "no reason is known"
     return arrays, errors
+
+
+def common_error(errors: dict[int, str], count: int) -> str:
+    """Error that all of ``count`` incidences failed with; nothing if there is no such error."""
+    texts = set(errors.values())
+    return texts.pop() if len(errors) == count and len(texts) == 1 else ""
+
+
+class Beginning:
+    """What the first task of a run came to: if all in it fail alike, so would the rest; one incidence is too few."""
+
+    def __init__(self) -> None:
+        self._count, self._text, self._settled = 0, "", False
+
+    def add(self, count: int, error: str) -> None:
+        """Add a task: how many incidences it has, and their `common_error`.
+
+        Raises
+        ------
+        CreepingError
+            If nothing would come of the rest.
+        """
+        if not error or self._text not in ("", error):
+            self._settled = True
+        self._count, self._text = self._count + count, error
+        if not self._settled and self._count > 1:
+            raise CreepingError(
+                f"the first {self._count} incidences failed, all with {error}; nothing would come of the rest",
+                incidences=self._count,
+            )
 
 
 def describe_flow(flow: Flow) -> dict[str, Any]:
@@ -173,8 +227,10 @@ def open_flow(content: dict[str, Any], folder: Path, body: Surface) -> PhaseMap 
     """Make the flow of a description; a map from its folder, its tables mapped from the files."""
     if content["kind"] == "map":
         return load_phase_map(folder / "map", body)
-    error = content["error"] and MapError(*content["error"])
-    return DirectFlow(body, content["rtol"], content["horizon"], content["step"], error)
+    if content["kind"] == "direct":
+        error = content["error"] and MapError(*content["error"])
+        return DirectFlow(body, content["rtol"], content["horizon"], content["step"], error)
+    raise CreepingError(f"{folder} holds a flow of kind {content['kind']!r}, which is neither 'map' nor 'direct'")
 
 
 def differing(first: dict[str, Any], second: dict[str, Any], prefix: str = "") -> list[str]:
@@ -185,7 +241,7 @@ def differing(first: dict[str, Any], second: dict[str, Any], prefix: str = "") -
         if isinstance(a, dict) and isinstance(b, dict):
             found += differing(a, b, f"{prefix}{name}.")
         elif a != b:
-            found.append(f"{prefix}{name} (stored {_short(a)}, now {_short(b)})")
+            found.append(f"{prefix}{name} (stored {short(a)}, now {short(b)})")
     return found
 
 
@@ -196,6 +252,11 @@ def array_digest(array: FloatArray) -> str:
     return digest.hexdigest()
 
 
-def _short(value: Any) -> str:
-    text = str(value)
+def short(value: Any) -> str:
+    """Value as text for a message, at most 60 characters of it."""
+    try:
+        text = str(value)
+    except ValueError:
+        # of a number with thousands of digits
+        text = "a number too long to be shown"
     return text if len(text) <= 60 else text[:57] + "..."

@@ -41,7 +41,8 @@ class Variable(NamedTuple):
     def fill(self) -> Any:
         """Value where nothing is given."""
         kind = np.dtype(self.dtype).kind
-        return {"f": np.nan, "c": complex(np.nan, np.nan), "b": False}.get(kind, -1)
+        # nothing is resolved where nothing is given
+        return {"f": np.nan, "c": complex(np.nan, np.nan), "b": True}.get(kind, -1)
 
 
 LINE = {
@@ -115,11 +116,12 @@ class SweepRequest:
         if self.quantity not in QUANTITIES:
             yield f"quantity = {self.quantity!r} is none of {', '.join(QUANTITIES)}"
             return
-        if not (isinstance(self.length, (int, float)) and np.isfinite(self.length) and self.length > 0):
+        number = isinstance(self.length, (int, float)) and not isinstance(self.length, bool)
+        if not (number and np.isfinite(self.length) and self.length > 0):
             yield f"length = {self.length!r} is not a positive finite number"
         for name, most in (("n_rays", MOST_RAYS), ("n_steps", MOST_STEPS)):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= most:
+            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
                 yield f"{name} = {value!r} is not a whole number from 1 to {most}"
         if self.quantity == "rays":
             for name in ("wavenumbers", "boundaries", "observation"):
@@ -221,13 +223,18 @@ def sweep_request(
         raise InvalidInputError(f"{int(np.sum(norm == 0))} of {len(seen)} observation directions are zero")
     return SweepRequest(
         quantity=quantity,  # type: ignore[arg-type]
-        length=length,
-        n_rays=n_rays,
-        n_steps=n_steps,
+        length=_plain(length),
+        n_rays=_plain(n_rays),
+        n_steps=_plain(n_steps),
         wavenumbers=numbers,
         boundaries=tuple(
             b if isinstance(b, str) else f"impedance:{b.eta}".replace("(", "").replace(")", "") for b in several
         ),
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen / norm),
-        order=order,
+        order=_plain(order),
     )
+
+
+def _plain(value: Any) -> Any:
+    """Number of Python for one of numpy: what is stored is that."""
+    return value.item() if isinstance(value, np.generic) else value

@@ -15,9 +15,10 @@ from creeping.rays.fan import Flow
 from creeping.surface import size
 from creeping.sweeping.dataset import as_dataset, require
 from creeping.sweeping.directions import unit_directions
-from creeping.sweeping.planning import Arrays, SweepPlan, bytes_of, compute, task_size
+from creeping.sweeping.planning import Arrays, Beginning, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, sweep_request
 from creeping.sweeping.store import SweepStore
+from creeping.sweeping.store_layout import UNDONE
 
 if TYPE_CHECKING:
     import xarray
@@ -78,7 +79,7 @@ def sweep_directions(
     client : distributed.Client or str, optional
         Dask cluster, or the address of its scheduler, that shares the tasks; it needs a store that all workers see.
     chunk : int, optional
-        Incidences of one task.
+        Incidences of one task; a store that exists keeps its own.
     progress : callable, optional
         Called as ``progress(done, total, seconds)`` after each task.
 
@@ -90,8 +91,8 @@ def sweep_directions(
     Raises
     ------
     CreepingError
-        On bad input, all mistakes of the request at once; if the store belongs to another study, is in use, or cannot
-        be written. What was written is kept.
+        On bad input, all mistakes of the request at once; if the first incidences all fail with one and the same
+        error; if the store belongs to another study, is in use, or cannot be written. What was written is kept.
 
     Examples
     --------
@@ -121,7 +122,8 @@ def sweep_directions(
         raise InvalidInputError(f"incidences have shape {directions.shape}; give rows of three numbers, shape (n, 3)")
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, (int, np.integer)) or chunk < 1):
         raise InvalidInputError(f"chunk = {chunk!r} is not a whole number >= 1")
-    chunk = min(int(chunk), len(directions)) if chunk else task_size(request, len(directions))
+    going_on = store is not None and resume and Path(store).exists()
+    chunk = SweepStore.open(str(store)).chunk if going_on else task_size(request, len(directions), chunk)
     plan = SweepPlan(flow, request, directions, chunk)
     if store is None:
         return in_memory(plan, progress)
@@ -141,12 +143,14 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> "xarray.Data
     sweeper = plan.make(plan.flow, plan.request)
     arrays: Arrays = plan.request.empty(count)
     errors: list[tuple[int, str]] = []
+    beginning = Beginning()
     for task in range(plan.tasks):
         rows = plan.rows(task)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():
             values[rows] = found[name]
         errors += [(rows.start + row, text) for row, text in failed.items()]
+        beginning.add(rows.stop - rows.start, common_error(failed, rows.stop - rows.start))
         if progress:
             progress(rows.stop, count, time.perf_counter() - started)
     return as_dataset(plan, arrays, errors, time.perf_counter() - started)
@@ -193,6 +197,11 @@ def fill(
     -------
     bool
         Whether nothing is missing now.
+
+    Raises
+    ------
+    CreepingError
+        If the store is in use or cannot be written, or the first incidences all fail with one and the same error.
     """
     started = time.perf_counter()
     with store.locked():
@@ -230,6 +239,7 @@ def fill(
 def _here(plan: SweepPlan, store: SweepStore, tasks: list[int], stop: Callable[[], bool]) -> Any:
     """Compute tasks one after the other; yields each when it is committed."""
     sweeper = plan.make(plan.flow, plan.request) if tasks else None
+    status, beginning = store.status(), Beginning()
     for task in tasks:
         if stop() or sweeper is None:
             return
@@ -237,6 +247,10 @@ def _here(plan: SweepPlan, store: SweepStore, tasks: list[int], stop: Callable[[
         store.write_task(task, arrays, errors)
         store.commit(task, failures=bool(errors))
         yield task
+        # those that failed before may fail again
+        if status[task] == UNDONE:
+            count = store.rows(task).stop - store.rows(task).start
+            beginning.add(count, common_error(errors, count))
 
 
 def _refuse(flow: Flow, quantity: str, store: Any, resume: bool, client: Any) -> None:

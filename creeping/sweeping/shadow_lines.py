@@ -4,7 +4,7 @@ The compiled route of `_line_kernel`; `creeping.rays.shadow` follows one line by
 """
 
 from dataclasses import dataclass, fields
-from weakref import WeakKeyDictionary
+from weakref import finalize
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from creeping.sweeping.request import FOLLOWED, NO_RAY, SINGULAR
 
 LEAST = 8
 """Fewest incidences worth a thread."""
-_PREPARED: "WeakKeyDictionary[Surface, LineMeshes]" = WeakKeyDictionary()
+_PREPARED: dict[int, LineMeshes] = {}
+"""By identity: bodies may be equal to others, or not be hashable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +69,11 @@ class ShadowLines:
 
 def prepared(body: Surface) -> LineMeshes:
     """Meshes of a body, made once."""
-    if body not in _PREPARED:
-        _PREPARED[body] = line_meshes(body)
-    return _PREPARED[body]
+    key = id(body)
+    if key not in _PREPARED:
+        _PREPARED[key] = line_meshes(body)
+        finalize(body, _PREPARED.pop, key, None)
+    return _PREPARED[key]
 
 
 def shadow_lines(body: Any, directions: FloatArray, n_rays: int) -> ShadowLines:

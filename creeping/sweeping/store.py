@@ -3,14 +3,15 @@
 One array a variable, with dimension names, one chunk a task along the incidences, compressed and with a CRC. Chunks are
 written aside and renamed, and ``task_status`` of a task (0 missing, 1 done, 2 done but for failed incidences) after all
 its chunks: what is marked is whole, whenever a writer dies. After a power failure `SweepStore.verify` finds what the
-disk lost. The group ``study`` holds what the results depend on, signed, and the flow.
+disk lost. The group ``study`` holds what the results depend on, with a digest, and the flow. CRCs and digest have no
+key: they tell of accidents, not of forgery.
 """
 
 import os
 import shutil
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,27 +22,23 @@ from creeping._typing import Any, IntArray
 from creeping.phaseflow.storing import content_digest
 from creeping.rays.fan import Flow
 from creeping.surface import Surface
-from creeping.sweeping.dataset import (
-    MISSING,
-    SHOWN,
-    coordinates,
-    count_attributes,
-    require,
-    sweep_attributes,
-    variable_attributes,
-)
+from creeping.sweeping.dataset import MISSING, SHOWN, count_attributes, require
 from creeping.sweeping.planning import Arrays, SweepPlan, differing, open_flow, save_flow
 from creeping.sweeping.request import FAILED
+from creeping.sweeping.store_layout import (
+    DONE,
+    ERROR_BYTES,
+    ERRORS,
+    SCHEMA,
+    STATUS,
+    STUDY,
+    UNDONE,
+    WITH_FAILURES,
+    write_empty,
+)
 
 if TYPE_CHECKING:
     import xarray
-
-SCHEMA = 1
-STUDY, STATUS, ERRORS = "study", "task_status", "incidence_error"
-UNDONE, DONE, WITH_FAILURES = 0, 1, 2
-ERROR_BYTES = 256
-"""Bytes kept of the message of a failed incidence, UTF-8, zeros after it."""
-COORDINATE_CHUNK = 65_536
 
 
 class SweepStore:
@@ -60,6 +57,7 @@ class SweepStore:
         self.tasks = -(-self.count // self.chunk)
         self.variables: list[str] = list(content["variables"])
         self._opened: dict[str, Any] = {}
+        self._lock: Any = None
 
     @classmethod
     def create(cls, folder: str | Path, plan: SweepPlan) -> "SweepStore":
@@ -79,7 +77,7 @@ class SweepStore:
             if folder.exists():
                 raise InvalidInputError(f"{folder} exists; resume it, or choose another store")
             aside.mkdir(parents=True)
-            _write_empty(aside, plan)
+            write_empty(aside, plan)
             save_flow(plan.flow, aside / STUDY)
             aside.rename(folder)
         except BaseException as error:
@@ -113,8 +111,17 @@ class SweepStore:
         return cls(folder, content)
 
     def flow(self, body: Surface) -> Flow:
-        """Flow that the sweep was begun with."""
-        return open_flow(self.key["flow"], self.folder / STUDY, body)
+        """Flow that the sweep was begun with.
+
+        Raises
+        ------
+        CreepingError
+            If it is of another body, damaged, or of no known kind.
+        """
+        try:
+            return open_flow(self.key["flow"], self.folder / STUDY, body)
+        except KeyError as error:
+            raise CreepingError(f"{self.folder} lacks {error} of its flow; compute the sweep anew") from error
 
     def require_same(self, plan: SweepPlan) -> None:
         """Refuse to go on with another study than the one that the store was begun with."""
@@ -127,14 +134,29 @@ class SweepStore:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the store as its only driver; workers of the driver need no lock, their chunks are theirs alone."""
+        """Hold the store as its only driver; who holds it may ask again.
+
+        Workers of the driver need no lock, their chunks are theirs alone.
+
+        Raises
+        ------
+        CreepingError
+            If another process holds it, or nothing can be written there.
+        """
         from filelock import FileLock, Timeout
 
+        if self._lock is None:
+            self._lock = FileLock(self.folder / STUDY / ".lock", timeout=0)
         try:
-            with FileLock(self.folder / STUDY / ".lock", timeout=0):
-                yield
+            self._lock.acquire()
         except Timeout as error:
             raise CreepingError(f"another process is filling {self.folder}; wait for it or choose another") from error
+        except OSError as error:
+            raise CreepingError(f"cannot write to {self.folder}: {error}; choose another place") from error
+        try:
+            yield
+        finally:
+            self._lock.release()
 
     def rows(self, task: int) -> slice:
         """Incidences of a task."""
@@ -197,17 +219,14 @@ class SweepStore:
         -------
         list of (task, reason)
             Of damaged tasks.
+
+        Raises
+        ------
+        CreepingError
+            If they are to be repaired while another process fills the store.
         """
-        damaged = []
-        for task in np.flatnonzero(self.status() != UNDONE):
-            reason = self._damage(int(task))
-            if reason:
-                damaged.append((int(task), reason))
-                if repair:
-                    for name in self.variables:
-                        self._chunk(name, int(task)).unlink(missing_ok=True)
-                    self._put(STATUS, slice(task, task + 1), UNDONE)
-        return damaged
+        with self.locked() if repair else nullcontext():
+            return self._verified(repair)
 
     def incidence_status(self) -> IntArray:
         """Status of the incidences (n,); -1 of those that are missing."""
@@ -237,6 +256,18 @@ class SweepStore:
         opened: xarray.Dataset = require("xarray").open_zarr(self.folder, consolidated=False)
         # in the order of the request; a selection lacks coordinates with dimensions of their own
         return opened[self.variables].assign_coords(opened.coords)
+
+    def _verified(self, repair: bool) -> list[tuple[int, str]]:
+        damaged = []
+        for task in np.flatnonzero(self.status() != UNDONE):
+            reason = self._damage(int(task))
+            if reason:
+                damaged.append((int(task), reason))
+                if repair:
+                    for name in self.variables:
+                        self._chunk(name, int(task)).unlink(missing_ok=True)
+                    self._put(STATUS, slice(task, task + 1), UNDONE)
+        return damaged
 
     def _damage(self, task: int) -> str:
         for name in self.variables:
@@ -289,55 +320,3 @@ class SweepStore:
                 "--verify, or after SweepStore.verify(repair=True)",
                 task=task,
             ) from error
-
-
-def _write_empty(folder: Path, plan: SweepPlan) -> None:
-    """Write groups, coordinates, and arrays without chunks."""
-    zarr = require("zarr")
-    group = zarr.open_group(folder, mode="w", zarr_format=3)
-    request, count = plan.request, len(plan.incidences)
-    beside = coordinates(request, plan.incidences)
-    for name, (dims, values, words) in beside.items():
-        text = values.dtype.kind == "U"
-        where = _create(
-            group, name, values.shape, str if text else values.dtype, dims, words, first=COORDINATE_CHUNK, fill=None
-        )
-        where[:] = values.astype(object) if text else values
-    for name, variable in request.variables.items():
-        shape = (count, *(request.sizes[d] for d in variable.dims))
-        words, dims = variable_attributes(request, name), ("incidence", *variable.dims)
-        _create(group, name, shape, variable.dtype, dims, words, first=plan.chunk, fill=variable.fill)
-    words = {"description": "0 missing, 1 done, 2 done but for failed incidences; written last"}
-    _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=UNDONE)
-    words = {"description": "why an incidence failed, UTF-8, zeros after it"}
-    _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
-    # as xarray writes it: which arrays are coordinates
-    group.attrs.update(sweep_attributes(plan) | {"coordinates": " ".join(beside)})
-    content = {"schema": SCHEMA, "key": plan.key, "variables": list(request.variables)}
-    group.create_group(STUDY).attrs.update({"content": content, "blake2b": content_digest(content)})
-
-
-def _create(
-    group: Any,
-    name: str,
-    shape: tuple[int, ...],
-    dtype: Any,
-    dims: Any,
-    words: dict[str, Any],
-    *,
-    first: int,
-    fill: Any,
-) -> Any:
-    """Array with chunks that are whole but along the first axis."""
-    from zarr.codecs import Crc32cCodec, ZstdCodec
-
-    return group.create_array(
-        name,
-        shape=shape,
-        dtype=dtype,
-        chunks=(min(first, shape[0]), *shape[1:]),
-        dimension_names=dims,
-        attributes=words,
-        compressors=[ZstdCodec(level=1), Crc32cCodec()],
-        **({} if fill is None else {"fill_value": fill}),
-    )

@@ -7,23 +7,13 @@ import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
-from creeping._errors import CreepingError, InvalidInputError
+from creeping._errors import InvalidInputError
 from creeping._typing import Any, FloatArray
 from creeping.phaseflow.storing import content_digest
 from creeping.surface import Surface, size
-from creeping.sweeping.directions import (
-    directions_from_angles,
-    directions_from_azimuth_elevation,
-    fibonacci_directions,
-    great_circle,
-    lebedev_directions,
-    theta_phi_grid,
-    unit_directions,
-)
-from creeping.sweeping.planning import array_digest
+from creeping.sweeping.planning import array_digest, too_large
 from creeping.sweeping.request import MOST_RAYS, MOST_STEPS, QUANTITIES, SweepRequest, sweep_request
+from creeping.sweeping.study_directions import read_directions
 from creeping.sweeping.study_keys import Key, nearest, read_table
 
 EXAMPLE = """\
@@ -48,55 +38,26 @@ tolerance = 1e-6
 output = "sweep.zarr"
 """
 STUDY = {
-    "name": Key("text", ""),
+    "name": Key("text", "", blank=True),
     "body": Key("text", "", required=True),
     "units": Key("text"),
     "speed": Key("text"),
     "allow_rough": Key("flag", False),
     "quantity": Key("text", "monostatic", choices=QUANTITIES),
     "boundary": Key("texts"),
-    "wavenumbers_per_length": Key("numbers", ()),
+    "wavenumbers_per_length": Key("wavenumbers", ()),
     "rays": Key("count", 256, most=MOST_RAYS),
-    "steps": Key("count", 1, most=MOST_STEPS),
-    "order": Key("count", 2, most=2),
+    "steps": Key("count", most=MOST_STEPS),
+    "order": Key("count", most=2),
     "length": Key("positive"),
     "length_in_body_sizes": Key("positive"),
 }
+_AS_LIST = 'write [{}] and below it kind = "list" and directions = [[x, y, z], ...], or another kind'
 FLOW = {"kind": Key("text", "auto", choices=("auto", "map", "direct")), "tolerance": Key("positive", 1e-6)}
 RUN = {
     "chunk": Key("count", most=1_000_000),
     "workers": Key("count", most=10_000),
     "output": Key("text"),
-}
-_COUNT = {"count": Key("count", 1, required=True)}
-
-
-def _ranges(first: str, second: str) -> dict[str, Key]:
-    found: dict[str, Key] = {}
-    for name in (first, second):
-        found |= {
-            f"{name}_deg_min": Key("number", 0.0, required=True),
-            f"{name}_deg_max": Key("number", 0.0, required=True),
-            f"{name}_count": Key("count", 1, required=True),
-        }
-    return found
-
-
-KINDS: dict[str, dict[str, Key]] = {
-    "fibonacci": _COUNT,
-    "lebedev": {"order": Key("count", 3, required=True)},
-    "grid": {"theta_count": Key("count", 1, required=True), "phi_count": Key("count", 1, required=True)},
-    "theta-phi": _ranges("theta", "phi"),
-    "azimuth-elevation": _ranges("azimuth", "elevation"),
-    "great-circle": {
-        "first": Key("vector", required=True),
-        "through": Key("vector", required=True),
-        **_COUNT,
-        "angle_deg_min": Key("number", 0.0),
-        "angle_deg_max": Key("number", 360.0),
-    },
-    "list": {"directions": Key("vectors", required=True)},
-    "file": {"path": Key("text", "", required=True)},
 }
 
 
@@ -174,6 +135,11 @@ def read_study(path: str | Path) -> Study:
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise InvalidInputError(
+            f"cannot read the study {path}: there is no such file; name another, or write one to start from with "
+            f"'creeping sweep --example > study.toml'"
+        ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidInputError(f"cannot read the study {path}: {error}") from error
     return parse_study(text, folder=path.parent, name=str(path))
@@ -190,24 +156,39 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
     """
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
+        # also of numbers with thousands of digits, and of brackets in brackets in brackets
         raise InvalidInputError(f"{name} is not TOML: {error}") from error
+    if not tables:
+        raise InvalidInputError(f"{name} is empty; start from what 'creeping sweep --example' prints")
     mistakes: list[str] = []
     known = ("study", "incidences", "observation", "flow", "run")
+    observed: bool | None = "observation" in tables
+    main = tables.get("study", {"body": "?"})
+    if isinstance(main, dict) and "observation" in main and not observed:
+        main = {key: value for key, value in main.items() if key != "observation"}
+        mistakes.append(f"[study] observation is a table of its own: {_AS_LIST.format('observation')}")
+        observed = None
     for key, value in tables.items():
         if key not in known:
             what = "unknown table" if isinstance(value, dict) else "a key outside of the tables"
             mistakes.append(f"{key}: {what}{nearest(key, known)}")
     mistakes += [f"the table [{key}] is missing" for key in ("study", "incidences") if key not in tables]
-    main = read_table("study", tables.get("study", {"body": ""}), STUDY, mistakes)
+    main = read_table("study", main, STUDY, mistakes)
     flow = read_table("flow", tables.get("flow", {}), FLOW, mistakes)
     run = read_table("run", tables.get("run", {}), RUN, mistakes)
     if not 1e-12 <= flow["tolerance"] <= 1e-1:
         mistakes.append(f"[flow] tolerance = {flow['tolerance']:g} is not between 1e-12 and 1e-1")
-    sets = {key: _directions(key, tables[key], folder, mistakes) for key in known[1:3] if key in tables}
+    sets: dict[str, FloatArray | None] = {}
+    for key in known[1:3]:
+        if isinstance(tables.get(key), dict):
+            sets[key] = read_directions(key, tables[key], folder, mistakes)
+        elif key in tables:
+            mistakes.append(f"{key} is not a table: {_AS_LIST.format(key)}")
+            observed = None if key == "observation" else observed
     if main["length"] is not None and main["length_in_body_sizes"] is not None:
         mistakes.append("[study] length and length_in_body_sizes are both given; give one")
-    request = _request(main, "observation" in tables, sets.get("observation"), mistakes)
+    request = _request(main, observed, sets.get("observation"), mistakes)
     if mistakes or request is None:
         count = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
         raise InvalidInputError(f"{name} has {count}:\n  " + "\n  ".join(mistakes), mistakes=mistakes)
@@ -227,12 +208,21 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
     )
 
 
-def _request(main: dict[str, Any], observed: bool, seen: FloatArray | None, mistakes: list[str]) -> SweepRequest | None:
-    """Request of the table [study]; its mistakes are added to the list."""
+def _request(
+    main: dict[str, Any], observed: bool | None, seen: FloatArray | None, mistakes: list[str]
+) -> SweepRequest | None:
+    """Request of the table [study]; its mistakes are added to the list.
+
+    ``observed`` says whether there is a table [observation], None if one is meant and a mistake is told already.
+    """
     quantity = main["quantity"]
+    if quantity != "rays" and main["steps"] is not None:
+        mistakes.append(f'[study] steps goes with quantity "rays"; "{quantity}" chooses its own')
+    if quantity == "rays" and main["order"] is not None:
+        mistakes.append('[study] order goes with a field; quantity "rays" has none')
     if quantity != "rays" and main["speed"] is not None:
         mistakes.append(f'[study] speed goes with quantity "rays"; a field ("{quantity}") is for constant speed')
-    if (quantity == "bistatic") != observed:
+    if observed is not None and (quantity == "bistatic") != observed:
         there = (
             'is missing: quantity "bistatic" needs it' if not observed else f'goes with "bistatic", not "{quantity}"'
         )
@@ -241,16 +231,16 @@ def _request(main: dict[str, Any], observed: bool, seen: FloatArray | None, mist
     if boundary is None:
         boundary = () if quantity == "rays" else ("soft",)
     try:
-        return sweep_request(
+        request = sweep_request(
             quantity,
             length=main["length"] or main["length_in_body_sizes"] or 3.0,
             n_rays=main["rays"],
-            n_steps=main["steps"],
+            n_steps=main["steps"] or 1,
             wavenumbers=main["wavenumbers_per_length"],
             boundary=list(boundary),
             # a mistake of its own is told already
             observation=seen if seen is not None or quantity != "bistatic" else (0, 0, 1),
-            order=main["order"],
+            order=main["order"] or 2,
         )
     except InvalidInputError as error:
         told = getattr(error, "mistakes", [str(error)])
@@ -260,71 +250,7 @@ def _request(main: dict[str, Any], observed: bool, seen: FloatArray | None, mist
         told = [reason for reason in told if not (reason.startswith("observation") or (unsure and needs in reason))]
         mistakes += [f"[study] {reason.replace(needs, needs + '_per_length')}" for reason in told]
         return None
-
-
-def _directions(name: str, table: Any, folder: Path, mistakes: list[str]) -> FloatArray | None:
-    """Unit directions of a table; its mistakes are added to the list."""
-    kind = table.get("kind") if isinstance(table, dict) else None
-    if not isinstance(kind, str) or kind not in KINDS:
-        told = "is missing" if kind is None else f"= {kind!r} is unknown"
-        mistakes.append(f"[{name}] kind {told}{nearest(str(kind or ''), KINDS)}")
-        return None
-    before = len(mistakes)
-    values = read_table(name, {k: v for k, v in table.items() if k != "kind"}, KINDS[kind], mistakes)
-    if len(mistakes) > before:
-        return None
-    try:
-        return unit_directions(_made(kind, values, folder), f"[{name}] directions").reshape(-1, 3)
-    except CreepingError as error:
-        mistakes.append(f"[{name}] {error}".replace(f"[{name}] [{name}]", f"[{name}]"))
-        return None
-
-
-def _made(kind: str, values: dict[str, Any], folder: Path) -> FloatArray:
-    if kind == "fibonacci":
-        return fibonacci_directions(values["count"])
-    if kind == "lebedev":
-        return lebedev_directions(values["order"])[0]
-    if kind == "grid":
-        return theta_phi_grid(values["theta_count"], values["phi_count"])[0]
-    if kind == "theta-phi":
-        return directions_from_angles(*_mesh(values, "theta", "phi"))
-    if kind == "azimuth-elevation":
-        return directions_from_azimuth_elevation(*_mesh(values, "azimuth", "elevation"))
-    if kind == "great-circle":
-        start, stop = np.radians(values["angle_deg_min"]), np.radians(values["angle_deg_max"])
-        # a whole circle ends where it began
-        ends = abs(stop - start) < 2 * np.pi - 1e-9
-        return great_circle(values["first"], values["through"], values["count"], start=start, stop=stop, endpoint=ends)
-    if kind == "list":
-        return np.asarray(values["directions"], dtype=float)
-    return _from_file(folder / values["path"])
-
-
-def _mesh(values: dict[str, Any], first: str, second: str) -> tuple[FloatArray, FloatArray]:
-    """Angles of both axes in radians (n, m), the second running fastest."""
-    axes = []
-    for name in (first, second):
-        low, high, count = (values[f"{name}_{part}"] for part in ("deg_min", "deg_max", "count"))
-        whole = count > 1 and abs(abs(high - low) - 360) < 1e-9
-        axes.append(np.radians(np.linspace(low, high, count, endpoint=not whole)))
-    grids = np.meshgrid(*axes, indexing="ij")
-    return grids[0], grids[1]
-
-
-def _from_file(path: Path) -> FloatArray:
-    """Directions of a .npy file or of a table with three columns, separated by commas; nothing in it is executed."""
-    try:
-        if path.suffix.lower() == ".npy":
-            found = np.load(path, allow_pickle=False)
-        elif path.suffix.lower() == ".csv":
-            found = np.loadtxt(path, delimiter=",", ndmin=2)
-        else:
-            raise InvalidInputError(f"path = {str(path)!r} ends neither in .csv nor in .npy")
-    except (OSError, ValueError) as error:
-        if isinstance(error, CreepingError):
-            raise
-        raise InvalidInputError(f"cannot read directions from {path}: {error}") from error
-    if found.ndim != 2 or found.shape[1] != 3 or found.dtype.kind not in "fiu":
-        raise InvalidInputError(f"{path} holds {found.dtype} {found.shape}, not numbers (n, 3)")
-    return np.asarray(found, dtype=float)
+    reason = too_large(request)
+    if reason:
+        mistakes.append(f"[study] {reason}")
+    return request

@@ -28,7 +28,7 @@ class Sweeper(Protocol):
         """Arrays of results of unit directions (n, 3), the first axis the incidence; see `SweepRequest.variables`.
 
         The same call gives the same bits. Lines and rays of an incidence do not depend on the others in the call, its
-        fields only by rounding.
+        fields by 1e-7 of themselves.
         """
         ...
 

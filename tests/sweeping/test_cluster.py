@@ -2,6 +2,7 @@
 
 import os
 import signal
+from dataclasses import replace
 
 import fake_sweeps as fake
 import numpy as np
@@ -98,6 +99,14 @@ def test_a_worker_that_cannot_write_ends_the_sweep_with_the_reason(two, tmp_path
         fill(plan, store, client=two)
     (store.folder / "curves" / "c").unlink()
     assert fill(plan, store, client=two)
+
+
+def test_a_sweep_whose_first_task_fails_as_one_ends(two, tmp_path):
+    plan = replace(fake.plan(40, 4), incidences=np.tile(fibonacci_directions(40)[21], (40, 1)))
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    with pytest.raises(CreepingError, match="the first 4 incidences failed, all with ArithmeticError: a poisonous"):
+        fill(plan, store, client=two)
+    assert store.dataset().attrs["incidences_failed"] == 4
 
 
 def test_a_client_is_an_option_of_the_public_function(two, tmp_path):

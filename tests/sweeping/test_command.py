@@ -6,6 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 import xarray
+from filelock import FileLock
 
 from creeping import _sweep_command, cli
 from creeping.sweeping import cluster, running
@@ -60,7 +61,11 @@ def test_a_second_run_needs_resume_and_a_changed_study_another_place(sweep, tmp_
     assert sweep("--json")[0] == 0
     code, _, err = sweep()
     assert code == 3 and "exists; give --resume" in err
-    code, out, _ = sweep("--resume", "--json", "--verify")
+    code, out, _ = sweep("--resume")
+    assert code == 0 and "nothing was missing" in out and "a second" not in out
+    # the size of the tasks stays what it was
+    code, out, _ = sweep("--resume", "--json", "--verify", study=STUDY.replace("chunk = 2", "chunk = 3"))
+    assert json.loads(out)["chunk"] == 2
     summary = json.loads(out)
     assert code == 0 and summary["complete"] and summary["incidences_now"] == 0 and summary["status"]["ok"] == 6
     code, _, err = sweep("--resume", study=STUDY.replace("rays = 8", "rays = 9"))
@@ -118,10 +123,54 @@ def test_incidences_that_fail_are_data_unless_all_do(sweep, tmp_path, monkeypatc
     monkeypatch.setattr(running, "compute", poisoned)
     limit = 0.5
     code, out, _ = sweep()
-    assert code == 0 and "5 ok, 1 failed" in out and "failed: ArithmeticError: too steep" in out
+    assert code == 4 and "5 ok, 1 failed" in out and "failed: ArithmeticError: too steep" in out
+    assert "to try again those that failed: creeping sweep" in out
     limit = -2.0
-    code, out, _ = sweep("-o", tmp_path / "all.zarr", "--json")
-    assert code == 3 and json.loads(out)["status"]["failed"] == 6
+    code, out, err = sweep("-o", tmp_path / "all.zarr", "--json")
+    assert code == 3 and out == "" and "the first 2 incidences failed, all with ArithmeticError: too steep" in err
+    assert "what is done is kept; to go on: creeping sweep" in err
+    (study := tmp_path / "one").mkdir()
+    lone = STUDY.replace('"lebedev"', '"list"').replace("order = 3", "directions = [[0, 0, 1]]")
+    code, out, _ = sweep("-o", study / "one.zarr", "--json", study=lone)
+    assert code == 3 and json.loads(out)["status"]["failed"] == 1
+    limit = 2.0
+    code, out, _ = sweep("--resume")
+    assert code == 0 and "2 of them now" in out
+
+
+def test_a_store_is_held_from_check_to_end(sweep, tmp_path, monkeypatch):
+    sweep()
+    folder = tmp_path / "out/rays.zarr"
+    with FileLock(folder / "study/.lock"):
+        code, _, err = sweep("--resume", "--verify")
+    assert code == 3 and "another process is filling" in err and "to go on" not in err
+    monkeypatch.setattr(_sweep_command, "PILOT", 1)
+    held = []
+
+    def fill(plan, store, **options):
+        held.append(store._lock.is_locked)
+        return real(plan, store, **options)
+
+    real = running.fill
+    monkeypatch.setattr(running, "fill", fill)
+    assert sweep("-o", tmp_path / "b.zarr")[0] == 0 and held == [True, True]
+
+
+def test_an_interrupt_at_once_tells_how_to_go_on_with_json_too(sweep, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(running, "fill", interrupted)
+    code, out, err = sweep("--json")
+    assert code == 130 and out == "" and "what is done is kept; to go on: creeping sweep" in err
+
+
+def test_without_a_study_the_command_tells_where_to_start(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["sweep"])
+    err = capsys.readouterr().err
+    assert caught.value.code == 3 and "study.toml" in err and "creeping sweep --example > study.toml" in err
 
 
 def test_mistakes_of_a_study_and_of_options(sweep, tmp_path, capsys):

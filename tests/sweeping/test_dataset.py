@@ -119,6 +119,8 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
         ({"resume": True}, "resume goes with store="),
         ({"client": "tcp://nowhere:1"}, "client goes with store=.*seen by all workers"),
         ({"incidences": np.ones((3_000_000, 3)), "n_rays": 60_000}, "GB of results; give store="),
+        ({"n_rays": 65_536, "n_steps": 4096}, "one incidence gives 19.3 GB of results.*fewer rays or steps"),
+        ({"n_rays": 65_536, "n_steps": 4096, "store": "never.zarr"}, "one incidence gives 19.3 GB of results"),
     ],
 )
 def test_bad_input_is_refused_before_anything_is_computed(options, words):

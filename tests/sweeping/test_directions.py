@@ -43,6 +43,19 @@ def test_weights_integrate_polynomials(rule):
     assert np.array([weights @ f for f in harmonics(d)]) == pytest.approx(INTEGRALS, abs=1e-13)
 
 
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_the_smallest_grids_integrate_what_they_can(n):
+    _, weights = dirs.theta_phi_grid(n, 1)
+    # Fejer's first rule of 1, 2 and 3 points
+    known = {1: [2], 2: [1, 1], 3: [4 / 9, 10 / 9, 4 / 9]}[n]
+    assert weights == pytest.approx(2 * np.pi * np.array(known), rel=1e-14)
+
+
+def test_a_large_grid_needs_no_memory_but_its_own():
+    d, weights = dirs.theta_phi_grid(200_000, 1)
+    assert len(d) == 200_000 and weights.sum() == pytest.approx(4 * np.pi, rel=1e-12)
+
+
 def test_all_lebedev_orders_exist():
     sizes = [len(dirs.lebedev_directions(order)[0]) for order in dirs.LEBEDEV_ORDERS]
     assert sizes[:4] == [6, 14, 26, 38] and sizes[-1] == 5810

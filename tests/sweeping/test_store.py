@@ -1,6 +1,7 @@
 """Stores of sweeps: what is marked is whole, what is damaged is found, and what belongs elsewhere is refused."""
 
 import errno
+from dataclasses import replace
 
 import fake_sweeps as fake
 import numpy as np
@@ -81,6 +82,8 @@ def test_resuming_does_what_is_missing_and_nothing_else(tmp_path, monkeypatch):
     assert not fill(plan, store, most=2) and store.missing() == [2, 3, 4]
     partial = store.dataset()
     assert partial.attrs["incidences_missing"] == 10 and np.isnan(partial.creeping[8:]).all()
+    # where nothing is given nothing is resolved
+    assert partial.unresolved[8:].all() and not partial.unresolved[:8].any()
     diary = tmp_path / "diary"
     diary.mkdir()
     monkeypatch.setenv("FAKE_DIARY", str(diary))
@@ -110,6 +113,63 @@ def test_two_drivers_do_not_fill_one_store(tmp_path):
     plan, store = filled(tmp_path / "s.zarr")
     with FileLock(store.folder / "study" / ".lock"), pytest.raises(CreepingError, match="another process is filling"):
         fill(plan, store)
+    with FileLock(store.folder / "study" / ".lock"):
+        assert store.verify() == []
+        with pytest.raises(CreepingError, match="another process is filling"):
+            store.verify(repair=True)
+    # who holds it may ask again, and holds it until the end
+    with store.locked():
+        fill(plan, store)
+        with pytest.raises(CreepingError, match="another process is filling"):
+            fill(plan, SweepStore.open(store.folder))
+    assert fill(plan, SweepStore.open(store.folder))
+
+
+def test_a_flow_of_no_known_kind_is_told(tmp_path):
+    _, store = filled(tmp_path / "s.zarr")
+    store.key["flow"]["kind"] = "spline"
+    with pytest.raises(CreepingError, match="flow of kind 'spline', which is neither"):
+        store.flow(sc.Sphere())
+    del store.key["flow"]["kind"]
+    with pytest.raises(CreepingError, match="lacks 'kind' of its flow"):
+        store.flow(sc.Sphere())
+
+
+class Broken(fake.FakeSweeper):
+    """Raises what a mistake of the program raises."""
+
+    def __call__(self, incidences):
+        return incidences.no_such_thing
+
+
+@pytest.mark.parametrize("where", ["memory", "store"])
+def test_mistakes_of_the_program_are_no_data(tmp_path, where):
+    plan = replace(fake.plan(18, 4), make=Broken)
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        in_memory(plan) if where == "memory" else fill(plan, SweepStore.create(tmp_path / "s.zarr", plan))
+
+
+@pytest.mark.parametrize("chunk", [1, 4])
+def test_a_sweep_whose_first_task_fails_as_one_ends(tmp_path, monkeypatch, chunk):
+    bad = cr.fibonacci_directions(18)[:4, 2]
+    monkeypatch.setenv("FAKE_RAISES", " ".join(map(str, bad)))
+    plan = fake.plan(18, chunk)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    words = f"the first {max(chunk, 2)} incidences failed, all with ArithmeticError: a poison.* nothing would come"
+    with pytest.raises(CreepingError, match=words):
+        fill(plan, store)
+    with pytest.raises(CreepingError, match=words):
+        in_memory(plan)
+    assert store.dataset().attrs["incidences_failed"] == max(chunk, 2)
+    if chunk == 4:
+        # what has failed before does not keep the rest from being tried
+        assert fill(plan, store) and store.missing() == [0]
+        assert fill(plan, store) and store.missing() == [0]
+
+
+def test_one_incidence_is_too_few_to_end_a_sweep(monkeypatch):
+    monkeypatch.setenv("FAKE_RAISES", str(cr.fibonacci_directions(18)[0, 2]))
+    assert in_memory(fake.plan(18, 1)).attrs["incidences_failed"] == 1
 
 
 def test_a_full_disk_is_one_clear_error_and_loses_nothing(tmp_path, monkeypatch):

@@ -1,0 +1,151 @@
+"""Are shadow lines at sweep speed right in every direction? 1000 incidences on five bodies, two references.
+
+Lines of the three meshes, the finer ones where needed, against (a) the finest mesh for all and (b) the independent
+`creeping.shadow_line`, panels of exact points, on every tenth direction. Times are processor times on one thread, the
+least of three, with 256 launch points. Run ``python -m studies.sweep_lines [--quick]`` (three minutes).
+"""
+
+import argparse
+import os
+import time
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+import creeping as cr
+import scatterers as sc
+from creeping._errors import SingularIncidenceError
+from creeping._typing import Any, FloatArray
+from creeping.sweeping.directions import fibonacci_directions
+from creeping.sweeping.request import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
+from creeping.sweeping.shadow_lines import prepared, shadow_lines
+from studies._flow_cases import Row, show, threads
+from studies._peers import measured
+
+BODIES: dict[str, Any] = {
+    "ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8),
+    "torus": sc.Torus(),
+    "twisted": sc.TwistedEllipsoid(),
+    "peanut": sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
+    "bumpy": sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
+}
+SHARES = ("attached", "occluded", "concave")
+RAYS = 256
+REPEATS = 3
+
+
+class Lines(NamedTuple):
+    """Lines of n incidences: status, curves, length and shares (n,) and (n, 3), and v."""
+
+    status: Any
+    curves: FloatArray
+    length: FloatArray
+    shares: FloatArray
+    singular_distance: FloatArray
+
+
+def on_meshes(body: Any, directions: FloatArray, tiers: tuple[int, int, int]) -> Lines:
+    """Lines on chosen meshes, one for each attempt; none is followed by other means."""
+    from creeping.sweeping._line_kernel import trace_lines
+
+    n, lines = len(directions), prepared(body)
+    summary, status = np.empty((n, 7)), np.empty(n, np.int8)
+    launched, places = np.empty((n, RAYS, 8)), np.empty((n, RAYS), np.int16)
+    box, level = np.ascontiguousarray(body.bounds, dtype=float), body.compiled
+    meshes = tuple(lines.meshes[tier] for tier in tiers)
+    trace_lines(
+        level.function, level.parameters, box, meshes, lines.critical, directions, summary, status, launched, places
+    )
+    return Lines(status, summary[:, 0], summary[:, 1], summary[:, 3:6], summary[:, 6])
+
+
+def swept(body: Any, directions: FloatArray) -> Lines:
+    """Lines as a sweep gets them."""
+    found = shadow_lines(body, directions, RAYS)
+    shares = np.stack([found.attached, found.occluded, found.concave], axis=1)
+    return Lines(found.status, found.curves, found.length, shares, found.singular_distance)
+
+
+def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
+    """Lines by `shadow_line`, and seconds of each."""
+    n = len(directions)
+    nothing = np.full((n, 6), np.nan)
+    lines = Lines(np.zeros(n, np.int8), nothing[:, 0], nothing[:, 1], nothing[:, 2:5], nothing[:, 5])
+    started = time.process_time()
+    for row, d in enumerate(directions):
+        try:
+            line = cr.shadow_line(body, d)
+        except SingularIncidenceError:
+            lines.status[row] = SINGULAR
+            continue
+        lines.curves[row], lines.length[row] = len(line.curves), line.length
+        lines.shares[row] = [line.fractions[name] for name in SHARES]
+    return lines, (time.process_time() - started) / n
+
+
+def differences(found: Lines, exact: Lines) -> Row:
+    """Lines that differ in the number of curves, and worst errors: of status OK, and of all (in brackets)."""
+    both = np.isfinite(found.length) & np.isfinite(exact.length) & (exact.status < SINGULAR)
+    certain = both & (found.status == OK)
+    length = np.abs(found.length / np.where(both, exact.length, 1.0) - 1)
+    share = np.abs(found.shares - exact.shares)
+    row: Row = {}
+    for suffix, rows in (("", certain), (", all", both)):
+        row[f"counts differ{suffix}"] = int(np.sum(found.curves[rows] != exact.curves[rows]))
+        row[f"length{suffix}"] = float(np.max(length[rows], initial=0.0))
+        for k, name in enumerate(SHARES):
+            row[f"{name}{suffix}"] = float(np.max(share[rows, k], initial=0.0))
+    return row | {"compared": int(both.sum())}
+
+
+def measure(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
+    """One body: cost and statuses, then errors against the finest mesh and against the independent line."""
+    body, directions = BODIES[name], fibonacci_directions(count)
+    found = swept(body, directions)
+    seconds, meshes = (
+        measured(call, REPEATS) / count
+        for call in (partial(swept, body, directions), partial(on_meshes, body, directions, (0, 1, 2)))
+    )
+    second = int(np.sum(on_meshes(body, directions, (0, 0, 0)).status != OK))
+    third = int(np.sum(on_meshes(body, directions, (0, 1, 1)).status != OK))
+    first: Row = {"body": name, "us a line": 1e6 * seconds, "on meshes": 1e6 * meshes}
+    for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
+        first[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
+    least = np.min(found.singular_distance)
+    first |= {"need mesh 2": second, "need mesh 3": third}
+    counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
+    first |= {"curves seen": " ".join(map(str, counts)), "least v": float(least) if np.isfinite(least) else np.nan}
+    finest = on_meshes(body, directions, (2, 2, 2))
+    # what even the finest mesh is not sure of is no reference
+    finest.length[finest.status == FOLLOWED] = np.nan
+    panels, each = independent(body, directions[::every])
+    few = Lines(*(values[::every] for values in found))
+    against = {"body": name, "s a line": each, **differences(few, panels)}
+    return first, {"body": name, **differences(found, finest)}, against
+
+
+def tables(names: tuple[str, ...] = tuple(BODIES), count: int = 1000, every: int = 10) -> dict[str, list[Row]]:
+    """All tables by their titles."""
+    rows = [measure(name, count, every) for name in names]
+    titles = (
+        f"{count} Fibonacci incidences: cost (and without following single lines), statuses, meshes, curves",
+        "Against the finest mesh: counts that differ and worst errors, of certain lines and of all",
+        f"Against shadow_line, every {every}th: the same",
+    )
+    return {title: list(table) for title, table in zip(titles, zip(*rows, strict=True), strict=True)}
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description="Shadow lines at sweep speed against two references.")
+    parser.add_argument("--quick", action="store_true", help="100 incidences")
+    given = parser.parse_args()
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.2f}")
+    with threads(1):
+        for title, rows in tables(count=100 if given.quick else 1000).items():
+            show(title, rows)
+
+
+if __name__ == "__main__":
+    main()
