@@ -30,10 +30,10 @@ SAMPLES = 512
 """Rays on which direct integration is measured and both are timed, fewer where F is dear."""
 BUDGET = 0.2
 """Seconds that one measurement may take."""
-QUICK = 0.05
+QUICK = 0.3
 """Seconds of direct integration below which nothing is tuned."""
-WORTH, PATIENCE = 0.85, 0.25
-"""Shares of direct integration: a map must be expected to take less than the one, its tuning less than the other."""
+WORTH = 0.85
+"""Share of direct integration that a map must be expected to take less than, and its tuning too."""
 SMALLEST = 60_000
 """Nodes of the smallest map that is worth estimating."""
 
@@ -105,7 +105,7 @@ def choose_flow(
         if reason:
             say(f"direct integration: {reason}")
             return direct
-        request.patience = max(PATIENCE * rays * each, 0.1)
+        request.direct = WORTH * rays * each
     else:
         found = None
 

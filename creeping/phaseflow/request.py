@@ -145,7 +145,7 @@ class Request:
         self.order, self.precision, self.ride_along, self.method = order, precision, ride_along, method
         self.periodic = _common_periodicity(body)
         self.nodes = None if grid is None else _nodes(grid, order or 5, self.periodic, least_cells(body))
-        self.rays, self.patience = RAYS, np.inf
+        self.rays, self.direct = RAYS, np.inf
         self.burn_in, self.base, self.stages = time_step, 0, stages or 0
         if method == "tower":
             if None in (horizon, grid, time_step, stages):

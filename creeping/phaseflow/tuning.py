@@ -99,6 +99,7 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
             plan = _scaled(plan, 0.6)
         for _ in range(6):
             say(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
+            began = clock()
             built = build_direct(body, model, plan, say, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
             result = _measured(built, request, cost)
             assert result.growth is not None
@@ -120,8 +121,14 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
                     break
                 if most < 1.0:
                     plan = _scaled(plan, 0.97 * most ** (1 / 3))
-            if clock() - started > request.patience:
-                raise ToleranceError(f"tuning took longer than {request.patience:.2g} s; direct integration is near")
+            # what was spent is spent: it is the next map and its rays that must pay, and no map is tuned for ever
+            own = float(built.parameters["seconds"])
+            more = int(np.prod(plan.grid.nodes)) / int(np.prod(built.grid.nodes))
+            ahead = clock() - began - own + own * more + request.rays * (request.length or 0.0) * candidate.leap
+            if max(ahead, clock() - started) > request.direct:
+                raise ToleranceError(
+                    f"tuning took {clock() - started:.2g} s, and {ahead:.2g} s are ahead: direct integration is near"
+                )
     assert best is not None
     reached, result = best
     what = f"rays of length {request.length:g}" if request.length else "one g_T0"
