@@ -40,7 +40,10 @@ PAPER = [name for name in studies.FIGURES if name.startswith("fig")]
 FIELD = [name for name in studies.FIGURES if name.startswith(("field", "sweep"))]
 
 
-@pytest.mark.parametrize("name", FIELD)
+SLOW = ("sweep-cross-section", "sweep-bistatic")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in FIELD])
 def test_field_figure_carries_its_error(name, drawn):
     card, pixels, folder = drawn(name)
     assert json.loads((folder / f"{name}.json").read_text()) == json.loads(json.dumps(card))

@@ -42,6 +42,7 @@ def test_fans_carry_their_errors():
         assert max(row["J"], row["att."]) < 3 * row["for"]
 
 
+@pytest.mark.slow
 def test_fields_are_compared_with_one_by_one():
     rows = sweep_speed.fields(("ellipsoid",), count=32, checked=2)
     assert [row["flow"] for row in rows] == ["order 8", "map"]

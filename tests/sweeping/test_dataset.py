@@ -79,6 +79,7 @@ def test_parts_of_complex_numbers_make_the_whole():
     assert np.array_equal(real.creeping_real + 1j * real.creeping_imag, ds.creeping)
 
 
+@pytest.mark.slow
 def test_a_sphere_answers_alike_in_all_directions():
     flow = cr.DirectFlow(sc.Sphere(), rtol=1e-8)
     asked = {"wavenumbers": 10.0, "n_rays": 16, "length": 4.0}
