@@ -78,6 +78,7 @@ def test_creeping_wave_beats_in_step_on_the_conducting_sphere(drawn):
     assert max(found["field_largest_beyond_10"], found["across_largest_beyond_10"]) < 0.025
 
 
+@pytest.mark.slow
 def test_cross_sections_of_a_sweep_are_those_of_one_incidence(drawn):
     card, _, _ = drawn("sweep-cross-section")
     twisted, ellipsoid = card["error"]["field"].values()
@@ -94,6 +95,7 @@ def test_cross_sections_of_a_sweep_are_those_of_one_incidence(drawn):
     assert 0 < twisted["without_return"]["hard"] < 0.1
 
 
+@pytest.mark.slow
 def test_bistatic_maps_are_reciprocal(drawn):
     card, _, _ = drawn("sweep-bistatic")
     ellipsoid, twisted = card["error"]["field"].values()
