@@ -1,4 +1,4 @@
-"""Costs that matter to a user; run with ``python -m pytest tests/benchmarks --benchmark-enable``."""
+"""Costs that matter to a user; run with ``python -m pytest tests/benchmarks -m slow --benchmark-enable``."""
 
 import os
 import subprocess
@@ -13,6 +13,7 @@ from creeping.phaseflow.bundle import random_bundle_points
 from creeping.phaseflow.choosing import tuned_direct
 from creeping.phaseflow.tracing import pack, trace_states
 
+pytestmark = pytest.mark.slow
 BODIES = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "twisted": sc.TwistedEllipsoid()}
 LENGTH = 8.0
 ENDS = np.array([LENGTH])
