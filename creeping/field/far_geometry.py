@@ -1,7 +1,7 @@
 """Geometry of the far field of one incidence in given directions; no wavenumber but in how finely it is sampled."""
 
+from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,7 +16,7 @@ from creeping.rays.shedding import ShedRays, shed_far
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
 from creeping.rays.visibility import occluded
-from creeping.surface import normal, project, size
+from creeping.surface import Surface, normal, project, size
 
 _KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionary()
 _STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()
@@ -24,64 +24,68 @@ NUDGE = 1e-6
 """Least angle between an observer and the forward direction in the forward integral, radians."""
 ALONG = 0.9
 """p.r above which a crossing is near a ray towards the observer."""
+EARLY = 0.28
+"""Time, in body sizes, before which a horizon crossing does not count for merging."""
 
 
-class Geometry(Protocol):
-    """What the far field in m directions is assembled from; see `FarGeometry`.
+class Geometry(ABC):
+    """What the far field in m directions is assembled from.
 
     The incidence is one, d (3,), or one for each observer, (m, 3); the forward lobe asks for a `FarGeometry`.
     """
 
+    body: Surface
     directions: FloatArray
     direction: FloatArray
 
     @property
+    @abstractmethod
     def angle(self) -> FloatArray:
         """Angle from d (m,)."""
-        ...
 
     @property
+    @abstractmethod
     def mean_root_radius(self) -> FloatArray | float:
-        """Mean of ρ^(1/3) over the launch points, one or (m,)."""
-        ...
+        """Mean of ρ^(1/3) over the launch points, one or (m,): m̄ = (k/2)^(1/3) times it."""
 
     @property
+    @abstractmethod
     def shed(self) -> ShedRays:
         """Rays with p = r."""
-        ...
 
     @property
-    def shed_normals(self) -> FloatArray:
-        """Normals where they leave (n, 3)."""
-        ...
-
-    @property
-    def leaves(self) -> BoolArray:
-        """Whether a shed ray misses the body on its way out (n,)."""
-        ...
-
-    @property
+    @abstractmethod
     def long(self) -> BoolArray:
         """Whether a shed ray has crossed the observer's horizon before (n,)."""
-        ...
 
     @property
+    @abstractmethod
     def specular(self) -> SpecularPoints:
         """Specular points of the lit side."""
-        ...
 
     @property
+    @abstractmethod
     def least_merging(self) -> FloatArray:
-        """Least χ over horizon crossings (m,)."""
-        ...
+        """Least χ = |J|/(|J| + ρ|J'|) over horizon crossings with p.r > ALONG, of each observer (m,); 0 without any."""
 
+    @abstractmethod
     def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
         """Nodes of the fan integral for the wanted observers."""
-        ...
+
+    @cached_property
+    def shed_normals(self) -> FloatArray:
+        """Normals where shed rays leave (n, 3)."""
+        return self.normals_of(self.shed.rays.points)
+
+    @cached_property
+    def leaves(self) -> BoolArray:
+        """Whether a shed ray misses the body on its way out (n,)."""
+        # interpolated points may lie below the surface by their error
+        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
 
     def normals_of(self, points: FloatArray) -> FloatArray:
         """N at points (n, 3)."""
-        ...
+        return normal(self.body, points)
 
 
 def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
@@ -129,7 +133,7 @@ def merging(rays: RayPoints) -> FloatArray:
         return np.nan_to_num(J / (J + rate / rays.curvature[1]))
 
 
-class FarGeometry:
+class FarGeometry(Geometry):
     """What every frequency shares: rays shed towards the observers, specular points, nodes of the integrals."""
 
     def __init__(self, fan: RayFan, directions: FloatArray) -> None:
@@ -156,17 +160,6 @@ class FarGeometry:
     def shed(self) -> ShedRays:
         """Rays with p = r."""
         return shed_far(self.strips, self.body, self.directions)
-
-    @cached_property
-    def shed_normals(self) -> FloatArray:
-        """Normals where they leave (n, 3)."""
-        return self.normals_of(self.shed.rays.points)
-
-    @cached_property
-    def leaves(self) -> BoolArray:
-        """Whether a shed ray misses the body on its way out (n,)."""
-        # interpolated points may lie below the surface by their error
-        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
 
     @cached_property
     def long(self) -> BoolArray:
@@ -196,7 +189,7 @@ class FarGeometry:
         nodes = HorizonGrid(self.strips, self.body, np.inf).crossings(back, self.directions)
         rays = nodes.rays
         near = np.sum(rays.directions * self.directions[nodes.observer], axis=1) > ALONG
-        near &= (rays.time > 0.28 * size(self.body)) & rays.alive
+        near &= (rays.time > EARLY * size(self.body)) & rays.alive
         np.minimum.at(least, nodes.observer[near], merging(rays)[near])
         found[nodes.observer[near]] = True
         return np.where(found, least, 0.0)
@@ -228,7 +221,3 @@ class FarGeometry:
             counts = (48 + 1.5 * reach).astype(np.int64)
             self._forward = kept = (key, forward_nodes(self.strips, self.line, rows, r, counts))
         return kept[1]
-
-    def normals_of(self, points: FloatArray) -> FloatArray:
-        """N at points (n, 3)."""
-        return normal(self.body, points)

@@ -15,7 +15,7 @@ from creeping._errors import IntegrationError, InvalidInputError, ToleranceError
 from creeping._typing import FloatArray
 from creeping.phaseflow.building import Progress, require_checked, settled, upper_bound
 from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.caching import cached_phase_map, is_cached
+from creeping.phaseflow.caching import cached_phase_map, is_cached, remember_choice, remembered_choice
 from creeping.phaseflow.compiled_models import CompiledModel
 from creeping.phaseflow.direct import DirectFlow
 from creeping.phaseflow.geodesic import natural_horizon
@@ -64,7 +64,8 @@ def choose_flow(
     ride_along : bool
         Whether the Jacobi matrix is wanted, as by fans.
     cache : bool or path
-        As for `build_phase_map`; a map in the cache costs nothing to build.
+        As for `build_phase_map`; a map in the cache costs nothing to build. The choice is kept there too: it rests on
+        measured times, and a later run is to carry its rays in the same way.
     progress : callable, optional
         Called with a line of text before each long step, and with the reason of the choice.
 
@@ -84,18 +85,40 @@ def choose_flow(
         raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
     if not 1e-12 <= tolerance <= 1e-1:
         raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-12 and 1e-1")
-    bounded = max(tolerance, 1e-9)
-    request = Request(body, bounded, length, outputs, None, None, None, None, ride_along, "direct", None, None)
+    request = Request(
+        body, max(tolerance, 1e-9), length, outputs, None, None, None, None, ride_along, "direct", None, None
+    )
     say = progress or (lambda _: None)
     require_checked(body)
     request.rays = int(rays)
+    key = request.key() | {"tolerance": tolerance, "rays": int(rays)}
+    before = remembered_choice(body, key, folder=cache) if cache is not False else None
+    if isinstance(before, DirectFlow):
+        say("direct integration, as chosen before")
+        return before
+    flow = _chosen(request, tolerance, cache, before is not None, say)
+    if cache is not False:
+        remember_choice(body, key, flow, folder=cache)
+    return flow
+
+
+def _chosen(
+    request: Request, tolerance: float, cache: bool | str | Path, before: bool, say: Progress
+) -> PhaseMap | DirectFlow:
+    """The flow that is cheaper by the clock, or the stored map if that was the choice ``before``."""
+    body, rays, outputs, ride_along = request.body, request.rays, request.outputs, request.ride_along
+    length = request.length
+    assert length is not None
     cost = tracing_cost(body)
     stored = cache is not False and tolerance >= 1e-9 and is_cached(body, request.key(), folder=cache)
     if not stored and cache is not False and tolerance >= 1e-9:
         # one tuned for the usual number of rays will do
         request.rays = RAYS
         stored = is_cached(body, request.key(), folder=cache)
-        request.rays = request.rays if stored else int(rays)
+        request.rays = request.rays if stored else rays
+    if stored and before:
+        say("phase map, as chosen before")
+        return cached_phase_map(body, request.key(), lambda: tuned_map(request, say), folder=cache, progress=say)
     if rays * length * cost < QUICK and not stored:
         say(f"direct integration: {rays} rays take about {rays * length * cost:.1g} s")
         return _untuned_direct(body, length, outputs, tolerance)

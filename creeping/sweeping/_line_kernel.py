@@ -118,7 +118,7 @@ def _work_of(mesh):
     marks = np.zeros(n, np.uint8), np.empty(m + 1, np.int64), np.full(m, -1, np.int64)
     wide = 8 * (cap // 8 + 2)
     raw_starts, kept = np.empty(COMPONENTS + 1, np.int64), np.empty(wide, np.int64)
-    # one piece of memory, or the last digits would depend on where the pieces lie: loops have versions for overlap
+    # one piece of memory: rows then start on cache lines
     space = aligned(29, wide)
     flat = space[3:15].reshape(-1)
     lines = flat[: 3 * wide], flat[3 * wide : 6 * wide], flat[6 * wide : 9 * wide], flat[9 * wide :]

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from creeping.field.far_geometry import ALONG
+from creeping.field.far_geometry import ALONG, EARLY, Geometry
 from creeping.field.forward import TAPER
 from creeping.phaseflow.geodesic import natural_horizon
 from creeping.rays.fan import Flow
@@ -18,14 +18,11 @@ from creeping.rays.horizon import HorizonRays
 from creeping.rays.ray_points import TURN
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints, specular_points
-from creeping.rays.visibility import occluded
-from creeping.surface import normal, project, size
+from creeping.surface import size
 from creeping.sweeping.carrying import carried
 from creeping.sweeping.shadow_lines import ShadowLines, prepared
 from creeping.sweeping.single_rays import SingleRayTracer
 
-EARLY = 0.28
-"""Time, in body sizes, before which a horizon crossing does not count for merging."""
 ALIKE = 1e-2
 """Distance, in cells, below which two rays found are one: searches end within 1e-4 or so of each other."""
 APART = 2.0
@@ -34,7 +31,7 @@ LONGEST_TIE = 12
 """Solutions of one incidence that may end at equal times: mirror images of each other, and what was found twice."""
 
 
-class BackscatterGeometry:
+class BackscatterGeometry(Geometry):
     """Rays shed back, specular points, and nodes of the fan integral; see `creeping.field.far_geometry.Geometry`.
 
     Parameters
@@ -118,17 +115,6 @@ class BackscatterGeometry:
         kept = kept[_distinct(row[kept], one.starts[kept], one.rays.time[kept], cell[kept])]
         return ShedRays(row[kept], np.zeros_like(kept), place[kept], one.rays[kept], np.full(len(kept), np.inf))
 
-    @cached_property
-    def shed_normals(self) -> FloatArray:
-        """Normals where they leave (m, 3)."""
-        return self.normals_of(self.shed.rays.points)
-
-    @cached_property
-    def leaves(self) -> BoolArray:
-        """Whether a shed ray misses the body on its way out (m,)."""
-        # interpolated points may lie below the surface by their error
-        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
-
     @property
     def long(self) -> BoolArray:
         """For the forward lobe only, which is not here."""
@@ -159,10 +145,6 @@ class BackscatterGeometry:
         rays = self.tracer.crossing(self.direction[row], self.directions[row], guess.reshape(-1, 3), time).rays
         ahead = np.sum(rays.directions * self.directions[row], axis=1) > 0
         return HorizonRays(row[ahead], rays[ahead], (weight * rays.width)[ahead])
-
-    def normals_of(self, points: FloatArray) -> FloatArray:
-        """N at points (m, 3)."""
-        return normal(self.body, points)
 
 
 def coarse_times(flow: Flow, length: float) -> FloatArray:

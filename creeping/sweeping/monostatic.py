@@ -32,12 +32,8 @@ def fill_monostatic(
         out["incidence_status"][rows[small][lost]] = SINGULAR
         rows = rows[~small]
         geometry = BackscatterGeometry(flow, lines.of(rows), tracer, max(request.wavenumbers))
-    scalar = 0
-    for name in request.boundaries:
+    for name, which, suffix in request.problems:
         for k, wavenumber in enumerate(request.wavenumbers):
             field = field_of(geometry, wavenumber, parse_boundary(name), request.order)
-            place: tuple[Any, ...] = (rows, k) if name == "pec" else (rows, scalar, k)
-            suffix = "_pec" if name == "pec" else ""
             for part in ("creeping", "reflected", "unresolved"):
-                out[part + suffix][place] = getattr(field, part)
-        scalar += name != "pec"
+                out[part + suffix][(rows, *which, k)] = getattr(field, part)

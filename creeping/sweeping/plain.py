@@ -8,11 +8,13 @@ import numpy as np
 from creeping._errors import SingularIncidenceError
 from creeping._typing import Any, FloatArray
 from creeping.field.coefficients import parse_boundary
-from creeping.field.far import FarField, far_field
+from creeping.field.far import far_field
 from creeping.rays.fan import Flow, RayFan, launch
 from creeping.rays.shadow import ShadowLine, shadow_line
 from creeping.surface import Surface
 from creeping.sweeping.request import NO_RAY, OK, SINGULAR, SweepRequest
+
+PARTS_OF_FIELD = ("creeping", "reflected", "forward", "unresolved")
 
 
 class PlainSweeper:
@@ -89,24 +91,16 @@ class PlainSweeper:
         observation = np.array(request.observation) if bistatic else -line.direction[None]
         # boundaries outermost would lose the geometry that far_field keeps for each wavenumber
         for k, wavenumber in enumerate(request.wavenumbers):
-            scalar = 0
-            for name in request.boundaries:
+            for name, which, suffix in request.problems:
                 far = far_field(
                     fan, observation, wavenumber=wavenumber, boundary=parse_boundary(name), order=request.order
                 )
-                place: tuple[Any, ...] = (row, k) if name == "pec" else (row, scalar, k)
-                suffix = "_pec" if name == "pec" else ""
-                scalar += name != "pec"
-                for part, values in _parts(far).items():
+                for part in PARTS_OF_FIELD:
                     if part + suffix in out:
-                        out[part + suffix][place] = values if bistatic else values[0]
+                        values = getattr(far, part)
+                        out[part + suffix][(row, *which, k)] = values if bistatic else values[0]
 
     def _fan(self, line: ShadowLine) -> RayFan:
         return launch(
             self.flow, line, length=self.request.length, n_rays=self.request.n_rays, n_steps=None, max_gap=np.inf
         )
-
-
-def _parts(far: FarField) -> dict[str, Any]:
-    names = ("creeping", "reflected", "forward", "unresolved")
-    return {name: getattr(far, name) for name in names}

@@ -148,6 +148,11 @@ class SweepRequest:
         return tuple(b for b in self.boundaries if b != "pec")
 
     @property
+    def problems(self) -> list[tuple[str, tuple[int, ...], str]]:
+        """Each boundary with its place among the scalar ones, none for "pec", and the suffix of its arrays."""
+        return [(b, (), "_pec") if b == "pec" else (b, (self.scalar_boundaries.index(b),), "") for b in self.boundaries]
+
+    @property
     def travel_times(self) -> FloatArray:
         """Times of the outputs of "rays": (n_steps,)."""
         return np.asarray(self.length * np.arange(1, self.n_steps + 1) / self.n_steps)

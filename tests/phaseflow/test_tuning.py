@@ -140,6 +140,30 @@ def test_stored_map_is_used_again(tmp_path):
     assert not any("tracing" in text for text in said)
 
 
+@pytest.mark.parametrize("rays", [10, 10**7])
+def test_a_choice_is_made_once(rays, tmp_path, monkeypatch):
+    body, said = sc.Ellipsoid(1.2, 0.8, 0.8), []
+    options = {"rays": rays, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
+    first = cr.choose_flow(body, **options)
+    # a machine on which the other flow would be the faster
+    monkeypatch.setattr("creeping.phaseflow.choosing.tracing_cost", lambda body: 1.0 if rays == 10 else 1e-12)
+    again = cr.choose_flow(body, progress=said.append, **options)
+    assert type(again) is type(first) and "as chosen before" in said[-1]
+    if rays == 10:
+        assert again == first
+    else:
+        assert np.array_equal(again.leaps[-1].state, first.leaps[-1].state)
+
+
+def test_a_damaged_choice_is_made_again(tmp_path):
+    options = {"rays": 10, "length": 2.0, "cache": tmp_path}
+    first = cr.choose_flow(sc.Sphere(), **options)
+    (kept,) = tmp_path.glob("*.json")
+    for text in ("", "[]", '{"kind": "direct", "rtol": "x"}', '{"kind": "direct", "rtol": 2, "horizon": 1, "step": 1}'):
+        kept.write_text(text)
+        assert cr.choose_flow(sc.Sphere(), **options) == first
+
+
 @pytest.mark.parametrize(
     "options, match",
     [
