@@ -6,7 +6,11 @@ Public names are imported when first used, so that ``import creeping`` costs nex
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from creeping._showing import present_with
 from creeping._version import __version__
+
+# by name: results show themselves by what only plotting knows, and import it when first asked
+present_with("creeping.plotting.showing")
 
 _HOMES = {
     "BodyError": "creeping.rays.body_error",

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._errors import InvalidInputError
+from creeping._showing import Drawn
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.coefficients import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.far_geometry import FarGeometry, Geometry, far_geometry, merging, off_axis
@@ -40,7 +41,7 @@ MERGED = (0.38, 0.52)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FarField:
+class FarField(Drawn):
     """Far field in m directions, a length; scalar, or (θ̂, φ̂) scattered by (θ̂, φ̂) incident.
 
     Attributes
@@ -83,11 +84,15 @@ class FarField:
     def __repr__(self) -> str:
         names, counts = np.unique(self.method, return_counts=True)
         served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
+        size = np.abs(self.total)
+        finite = np.isfinite(size)
+        largest = np.max(size, initial=0.0, where=finite)
+        lost = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
         return (
             f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
             f"order {self.order})\n"
             f"  {served or 'none'}\n"
-            f"  |f| up to {np.max(np.abs(self.total), initial=0.0):.4g} L; {int(self.unresolved.sum())} unresolved"
+            f"  |f| up to {largest:.4g} L; {int(self.unresolved.sum())} unresolved{lost}"
         )
 
 

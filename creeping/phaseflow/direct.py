@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._errors import InvalidInputError
+from creeping._showing import Shown, brief
 from creeping._typing import ArrayLike, FloatArray
 from creeping.phaseflow.attenuation import with_attenuation
 from creeping.phaseflow.bundle import bundle_points
@@ -12,8 +13,8 @@ from creeping.phaseflow.tracing import MapError, as_times, pack, trace_states, u
 from creeping.surface import Surface
 
 
-@dataclass(frozen=True)
-class DirectFlow:
+@dataclass(frozen=True, repr=False)
+class DirectFlow(Shown):
     """The flow by direct integration, with the protocol of a phase map (apply, flow, transport, horizon, error).
 
     Parameters
@@ -41,6 +42,14 @@ class DirectFlow:
         for name, value in (("horizon", self.horizon), ("step", self.step)):
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
+
+    def __repr__(self) -> str:
+        steps = f"rtol {self.rtol:g} per step" if self.step is None else f"equal steps of at most {self.step:g}"
+        e = self.error
+        error = "not measured" if e is None else f"rms {e.rms:.1e}, max {e.max:.1e} ({e.samples} samples)"
+        return (
+            f"DirectFlow({brief(self.body)})\n  order 8, {steps}, horizon {self.horizon:g}\n  error at the end: {error}"
+        )
 
     def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Advance by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from creeping._errors import InvalidInputError
+from creeping._showing import Drawn, brief
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping._version import __version__
 from creeping.phaseflow.attenuation import with_attenuation
@@ -63,7 +64,7 @@ class Growth:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhaseMap:
+class PhaseMap(Drawn):
     """Phase map of a body; make one with `build_phase_map`, or open a stored one with `load_phase_map`.
 
     Attributes
@@ -108,16 +109,15 @@ class PhaseMap:
     def __repr__(self) -> str:
         leap = self.leaps[-1]
         grid = " x ".join(map(str, (len(leap.state), *self.grid.nodes)))
-        rows = [
-            f"PhaseMap({self.body!r})",
+        error = f"rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} samples)"
+        growth = self.growth
+        grown = "" if growth is None else f"; after {growth.lengths[-1]:g}: rms {growth.rms[-1]:.1e}"
+        return (
+            f"PhaseMap({brief(self.body)})\n"
             f"  T0 = {self.horizon:g}, {grid} nodes, degree {self.grid.degree}, {leap.state.dtype}, "
-            f"{self.nbytes / 1e6:.1f} MB",
-            f"  error of one g_T0: rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} samples)",
-        ]
-        if self.growth is not None:
-            pairs = zip(self.growth.lengths, self.growth.rms, strict=True)
-            rows.append("  rms after a length: " + ", ".join(f"{t:g}: {e:.1e}" for t, e in pairs))
-        return "\n".join(rows)
+            f"{self.nbytes / 1e6:.1f} MB\n"
+            f"  error of one g_T0: {error if self.error.samples else 'not measured'}{grown}"
+        )
 
     def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Advance by one horizon.

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from creeping.plotting._polylines import polydata
     from creeping.plotting.display import GLProbe, gl_available
     from creeping.plotting.export import write_csv, write_text, write_vtp
     from creeping.plotting.far_cuts import far_cut_picture
@@ -24,6 +25,7 @@ __all__ = [
     "parameter_picture",
     "picture",
     "plot_parameters",
+    "polydata",
     "surface_field_picture",
     "write_csv",
     "write_ffe",
@@ -39,6 +41,7 @@ _HOMES = {
     "parameter_picture": "pictures",
     "picture": "pictures",
     "plot_parameters": "parameter_plane",
+    "polydata": "_polylines",
     "surface_field_picture": "field_pictures",
     "write_csv": "export",
     "write_ffe": "ffe",

@@ -85,6 +85,11 @@ class RayFanLike(Protocol):
         ...
 
     @property
+    def attenuation(self) -> FloatArray:
+        """Integral of c max(kappa_n, 0)^(2/3) over travel time (rays, steps), L^(1/3)."""
+        ...
+
+    @property
     def caustic_index(self) -> IntArray:
         """Zeros of J passed (rays, steps)."""
         ...

@@ -10,50 +10,13 @@ from typing import TextIO
 import numpy as np
 
 from creeping._errors import InvalidInputError
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any
 from creeping.plotting import _far_table, _vtp
 from creeping.plotting._files import written_aside
-from creeping.plotting._inputs import LINE_STATUSES, FarFieldLike, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.plotting._inputs import FarFieldLike, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.plotting._polylines import Polylines
 
-KINDS = ("shadow line", "ray", "iso-phase curve")
-_RAY_ARRAYS = ("eikonal", "spreading", "spreading_rate", "curvature")
-_ABSENT = -1  # of an integer array, where NaN stands in one of floats
-
-
-class _Collector:
-    """Polylines with their arrays; what a line does not have is NaN or -1."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.points: list[FloatArray] = []
-        self.lines: list[IntArray] = []
-        self.point_data: dict[str, list[Any]] = {name: [] for name in ("travel_time", *_RAY_ARRAYS)}
-        self.point_data |= {"caustic_index": [], "line_status": []}
-        self.cell_data: dict[str, list[Any]] = {name: [] for name in ("kind", "status", "curve_index", "level")}
-
-    def add(self, kind: str, points: FloatArray, closed: bool, at_points: dict[str, Any], **of_line: Any) -> None:
-        start = self.count
-        self.count += len(points)
-        numbers = np.arange(start, start + len(points), dtype=np.int64)
-        self.points.append(np.asarray(points, dtype=float))
-        self.lines.append(np.append(numbers, start) if closed else numbers)
-        integers = ("caustic_index", "line_status")
-        for name, parts in self.point_data.items():
-            absent = np.full(len(points), _ABSENT) if name in integers else np.full(len(points), np.nan)
-            parts.append(np.asarray(at_points.get(name, absent)))
-        of_line["kind"] = KINDS.index(kind)
-        for name, values in self.cell_data.items():
-            values.append(of_line.get(name, np.nan if name == "level" else _ABSENT))
-
-    def document(self) -> str:
-        points = np.concatenate(self.points) if self.points else np.zeros((0, 3))
-        point_data = {name: np.concatenate([np.zeros(0), *parts]) for name, parts in self.point_data.items()}
-        for name in ("caustic_index", "line_status"):
-            point_data[name] = point_data[name].astype(np.int64)
-        cell_data = {
-            name: np.array(v, dtype=float if name == "level" else np.int64) for name, v in self.cell_data.items()
-        }
-        return _vtp.document(points, self.lines, point_data, cell_data)
+_RAY_COLUMNS = ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
 
 
 def write_vtp(
@@ -65,9 +28,9 @@ def write_vtp(
     """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
 
     One polyline per curve of the shadow line, ray and iso-phase curve. Point arrays: travel_time, eikonal, spreading,
-    spreading_rate, curvature, caustic_index, line_status (0 attached, 1 occluded, 2 concave). Cell arrays: kind
-    (0 shadow line, 1 ray, 2 iso-phase curve), status, curve_index, level. Where an array does not apply it is NaN,
-    or -1 if of integers.
+    spreading_rate, curvature, attenuation, caustic_index, line_status (0 attached, 1 occluded, 2 concave), ray_status
+    (the ray's, from where it applies). Cell arrays: kind (0 shadow line, 1 ray, 2 iso-phase curve), ray (its number),
+    status (`RayStatus`), curve_index, level. Where an array does not apply it is NaN, or -1 if of integers.
 
     Parameters
     ----------
@@ -81,21 +44,10 @@ def write_vtp(
     CreepingError
         If the file cannot be written.
     """
-    collector = _Collector()
-    for number, shadow in enumerate(line.curves if line is not None else ()):
-        status = np.array([LINE_STATUSES.index(str(name)) for name in shadow.status], dtype=np.int64)
-        collector.add("shadow line", shadow.points, True, {"line_status": status}, curve_index=number)
-    if fan is not None:
-        for k in range(len(fan.points)):
-            arrays = {name: getattr(fan, name)[k] for name in (*_RAY_ARRAYS, "caustic_index")}
-            arrays["travel_time"] = fan.travel_time
-            numbers = {"status": int(fan.status[k]), "curve_index": int(fan.curve_index[k])}
-            collector.add("ray", fan.points[k], False, arrays, **numbers)
-    for curve in curves:
-        levels = {curve.of: np.full(len(curve.points), float(curve.level))}
-        collector.add("iso-phase curve", curve.points, bool(curve.closed), levels, level=float(curve.level))
+    collected = Polylines(line, fan, curves)
+    text = _vtp.document(collected.points, collected.lines, collected.point_data, collected.cell_data)
     with written_aside(path) as aside:
-        aside.write_text(collector.document(), encoding="ascii")
+        aside.write_text(text, encoding="ascii")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -200,7 +152,7 @@ def _fan_rows(fan: RayFanLike) -> Iterable[tuple[Any, ...]]:
     times = np.asarray(fan.travel_time).tolist()
     for ray in range(len(fan.points)):
         status = int(fan.status[ray])
-        columns = (fan.points, fan.directions, *(getattr(fan, name) for name in (*_RAY_ARRAYS, "caustic_index")))
+        columns = (fan.points, fan.directions, *(getattr(fan, name) for name in _RAY_COLUMNS))
         values = zip(times, *(np.asarray(column[ray]).tolist() for column in columns), strict=True)
         for step, (t, point, direction, *carried) in enumerate(values):
             yield (ray, step, t, *point, *direction, *carried, status)

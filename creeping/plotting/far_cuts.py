@@ -10,12 +10,12 @@ from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.plotting._decibels import cross_section_decibels, decibels, shown_range
 from creeping.plotting._inputs import FarFieldLike
-from creeping.plotting.pictures import new_figure, save_figure
+from creeping.plotting.pictures import add_legend, new_figure, save_figure
 
 KINDS = ("cartesian", "polar")
 QUANTITIES = {
-    "amplitude": ("20 log$_{10}$|f| (dB re 1 L)", decibels),
-    "rcs": ("4π|f|$^2$ (dB re 1 L$^2$)", cross_section_decibels),
+    "amplitude": ("20 log$_{10}$|f| (dB re 1 %s)", decibels),
+    "rcs": ("4π|f|$^2$ (dB re 1 %s$^2$)", cross_section_decibels),
 }
 COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
 """Scattered by incident component of a vector field: t is θ̂, p is φ̂."""
@@ -31,6 +31,11 @@ class Curve:
     label: str
     levels: FloatArray
     style: dict[str, Any]
+
+    @property
+    def thick(self) -> bool:
+        """Whether it sets the range: parts, which are thinner, may vanish."""
+        return bool(self.style["linewidth"] > 0.8)
 
 
 def far_cut_picture(
@@ -85,25 +90,53 @@ def far_cut_picture(
     """
     if kind not in KINDS:
         raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
-    angle = _angles(angles)
+    angle = checked_angles(angles)
     curves = cut_curves(len(angle), fields, quantity=quantity, exact=exact, parts=parts, components=components)
-    # parts may vanish: they do not set the range
-    low, high = shown_range([curve.levels for curve in curves if curve.style["linewidth"] > 0.8], span)
+    heights = shown_range([curve.levels for curve in curves if curve.thick], span)
     figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
     figure.set_layout_engine("constrained")
-    label = QUANTITIES[quantity][0]
-    if kind == "cartesian":
-        ax = _straight_axes(figure, angle, (low, high), label, angle_name)
+    ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
+    draw_cut(ax, angle, curves, heights, quantity=quantity, angle_name=angle_name)
+    ax.set_title(_title(fields) if title is None else title, fontsize=9)
+    add_legend(ax, fresh=True)
+    save_figure(figure, path, dpi)
+
+
+def draw_cut(
+    ax: Any,
+    angle: FloatArray,
+    curves: Sequence[Curve],
+    heights: tuple[float, float],
+    *,
+    quantity: str,
+    angle_name: str,
+    unit: str = "L",
+) -> None:
+    """Draw curves over an angle (m,), radians: straight axes in degrees, or polar ones; the first curve on top.
+
+    Axes that have curves already keep room for them. For the arguments see `far_cut_picture`; ``unit`` is that of
+    lengths.
+    """
+    low, high = heights
+    if ax.lines:
+        low, high = min(low, ax.get_ylim()[0]), max(high, ax.get_ylim()[1])
+    label = level_name(quantity, unit)
+    polar = ax.name == "polar"
+    if polar:
+        _round_axes(ax, (low, high), label, angle_name)
     else:
-        ax = _round_axes(figure, (low, high), label, angle_name)
+        _straight_axes(ax, angle, (low, high), label, angle_name)
     for curve in reversed(curves):
         # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
-        levels = np.maximum(curve.levels, low if kind == "polar" else low - (high - low))
-        x = angle if kind == "polar" else np.degrees(angle)
-        ax.plot(x, levels, label=curve.label, **curve.style)
-    ax.set_title(_title(fields) if title is None else title, fontsize=9)
-    _add_legend(figure, ax)
-    save_figure(figure, path, dpi)
+        levels = np.maximum(curve.levels, low if polar else low - (high - low))
+        ax.plot(angle if polar else np.degrees(angle), levels, label=curve.label, **curve.style)
+
+
+def level_name(quantity: str, unit: str) -> str:
+    """Name of the levels on an axis: decibels relative to a unit of length, of area dBsm if that is the metre."""
+    if quantity == "rcs" and unit == "m":
+        return "4π|f|$^2$ (dBsm)"
+    return QUANTITIES[quantity][0] % unit.replace("$", r"\$")
 
 
 def cut_curves(
@@ -144,7 +177,8 @@ def cut_curves(
     return thick + thin
 
 
-def _angles(angles: ArrayLike) -> FloatArray:
+def checked_angles(angles: ArrayLike) -> FloatArray:
+    """Angles of a cut (m,), radians, if they are usable."""
     angle = np.asarray(angles, dtype=float)
     if angle.ndim != 1 or len(angle) < 2 or not np.all(np.isfinite(angle)):
         raise InvalidInputError(f"angles of shape {angle.shape} are not two or more finite numbers in radians")
@@ -172,11 +206,12 @@ def _levels(values: ComplexArray, quantity: str) -> FloatArray:
     return np.where(np.isposinf(levels), np.nan, levels)
 
 
-def _straight_axes(figure: Any, angle: FloatArray, heights: tuple[float, float], label: str, angle_name: str) -> Any:
+def _straight_axes(ax: Any, angle: FloatArray, heights: tuple[float, float], label: str, angle_name: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    ax = figure.add_subplot()
     left, right = np.degrees(angle.min()), np.degrees(angle.max())
+    if ax.lines:
+        left, right = min(left, ax.get_xlim()[0]), max(right, ax.get_xlim()[1])
     ax.set_xlim(left, right)
     ax.set_ylim(*heights)
     # multiples of 15, 30, 45, ... degrees
@@ -187,11 +222,9 @@ def _straight_axes(figure: Any, angle: FloatArray, heights: tuple[float, float],
     ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
     for spine in ax.spines.values():
         spine.set_linewidth(0.5)
-    return ax
 
 
-def _round_axes(figure: Any, heights: tuple[float, float], label: str, angle_name: str) -> Any:
-    ax = figure.add_subplot(projection="polar")
+def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: str) -> None:
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
     ax.set_thetagrids(range(0, 360, 30), labels=[f"{v if v <= 180 else v - 360}°" for v in range(0, 360, 30)])
@@ -205,7 +238,6 @@ def _round_axes(figure: Any, heights: tuple[float, float], label: str, angle_nam
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.spines["polar"].set_linewidth(0.5)
     ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
-    return ax
 
 
 def _title(fields: Mapping[str, Any]) -> str:
@@ -213,15 +245,3 @@ def _title(fields: Mapping[str, Any]) -> str:
         f"k = {field.wavenumber:g}/L, {field.boundary} boundary" for field in fields.values() if hasattr(field, "total")
     }
     return known.pop() if len(known) == 1 else ""
-
-
-def _add_legend(figure: Any, ax: Any) -> None:
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(
-        handles[::-1],
-        labels[::-1],
-        loc="outside lower center",
-        ncols=min(4 if max(map(len, labels)) < 20 else 3, len(labels)),
-        frameon=False,
-        fontsize=8,
-    )

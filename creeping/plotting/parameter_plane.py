@@ -52,19 +52,25 @@ def plot_parameters(
                 piece for points in stroke.lines for piece in split_at_seam(body.parameters(points), closed=False)
             ]
             _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
+    colours = draw_curves(ax, curves)
+    for status in LINE_STATUSES:
+        lines = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
+        pieces = _in_plane(body, lines)
+        _add(ax, pieces, color=STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
+    frame(ax, torus=is_torus(line))
+    if legend:
+        _add_legend(ax, colours)
+    return ax
+
+
+def draw_curves(ax: Any, curves: Sequence[IsoPhaseCurveLike]) -> LevelColours:
+    """Draw iso-phase curves, and return the colours of their levels."""
     colours = LevelColours.of(curves)
     for curve in curves:
         # levels are read off the colour bar; a single one has none
         label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
         _add(ax, curve.parameter_pieces, color=colours(curve.level), linewidth=1.0, label=label, zorder=3)
-    for status in LINE_STATUSES:
-        lines = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
-        pieces = _in_plane(body, lines)
-        _add(ax, pieces, color=STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
-    _frame(ax, torus=is_torus(line))
-    if legend:
-        _add_legend(ax, colours)
-    return ax
+    return colours
 
 
 def _in_plane(body: Any, lines: Sequence[FloatArray]) -> list[FloatArray]:
@@ -89,7 +95,8 @@ def _add(ax: Any, pieces: Sequence[FloatArray], *, label: str = "", **style: Any
         ax.add_collection(LineCollection(lines, label=label or "_hidden", capstyle="round", **style))
 
 
-def _frame(ax: Any, *, torus: bool) -> None:
+def frame(ax: Any, *, torus: bool) -> None:
+    """Axes of the plane: (phi, theta), or (psi, theta) all the way round on a torus, in degrees."""
     name = "psi" if torus else "phi"
     ax.set_xlim(-180, 180)
     ax.set_xticks(range(-180, 181, 60))
@@ -115,4 +122,6 @@ def _add_legend(ax: Any, colours: LevelColours) -> None:
         frameon=False,
         fontsize=8,
     )
-    colours.add_bar(ax.figure, cax=ax.inset_axes((1.03, 0.0, 0.025, 1.0)))
+    # without levels to tell apart there is no bar, and no place for one
+    if colours.high > colours.low:
+        colours.add_bar(ax.figure, cax=ax.inset_axes((1.03, 0.0, 0.025, 1.0)))

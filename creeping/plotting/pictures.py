@@ -132,6 +132,28 @@ def new_figure(inches: tuple[float, float]) -> Any:
     return figure
 
 
+def axes_or_new(ax: Any, inches: tuple[float, float], *, projection: str | None = None) -> tuple[bool, Any]:
+    """Whether the axes are new, and the axes: those given, or those of a new figure."""
+    if ax is not None:
+        return False, ax
+    figure = new_figure(inches)
+    figure.set_layout_engine("constrained")
+    return True, figure.add_subplot(projection=projection)
+
+
+def add_legend(ax: Any, fresh: bool, legend: bool | None = None) -> None:
+    """Legend below a new figure, or on axes that were given if it is asked for; what was drawn last comes first."""
+    handles, labels = ax.get_legend_handles_labels()
+    if not (fresh if legend is None else legend) or not labels:
+        return
+    look: dict[str, Any] = {"frameon": False, "fontsize": 8}
+    if fresh:
+        columns = min(4 if max(map(len, labels)) < 20 else 3, len(labels))
+        ax.figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=columns, **look)
+    else:
+        ax.legend(handles[::-1], labels[::-1], **look)
+
+
 def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
     """Write the figure as PNG, at once when complete."""
     with written_aside(path) as aside:

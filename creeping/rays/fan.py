@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from creeping._errors import InvalidInputError
+from creeping._showing import DrawnOnBody, brief
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.phaseflow.geodesic import gaussian_curvature, normal_curvature, speed_values
 from creeping.phaseflow.storing import fingerprint
@@ -86,7 +87,7 @@ LINE_STATUS = {"attached": RayStatus.OK, "occluded": RayStatus.OCCLUDED, "concav
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RayFan:
+class RayFan(DrawnOnBody):
     """Creeping rays of one incidence, all at the same travel times.
 
     Rays of one arc of the shadow line are consecutive and in its order.
@@ -149,11 +150,13 @@ class RayFan:
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{int(np.sum(self.status == s))} {s.name}" for s in RayStatus if np.any(self.status == s))
+        error = f"rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
+        arcs = len(self.closed_arcs)
         return (
             f"RayFan({len(self.points)} rays x {len(self.travel_time)} steps to {self.length:g}, "
-            f"{len(self.closed_arcs)} arcs)\n"
-            f"  {counts or 'no rays'}; caustics passed: up to {int(self.caustic_index.max(initial=0))}\n"
-            f"  error at the end: rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
+            f"{arcs} arc{'s' * (arcs != 1)}, on {brief(self.body)})\n"
+            f"  {counts or 'no rays'}; caustics passed: up to {int(self.caustic_index[:, -1:].max(initial=0))}\n"
+            f"  error at the end: {error if self.error.samples else 'not measured'}"
         )
 
 

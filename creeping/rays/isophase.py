@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._errors import InvalidInputError
+from creeping._showing import DrawnOnBody
 from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.phaseflow.geodesic import speed_of, speed_values, vector_field
 from creeping.rays.fan import RayFan
@@ -18,7 +19,7 @@ from creeping.surface import project
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class IsoPhaseCurve:
+class IsoPhaseCurve(DrawnOnBody):
     """One connected curve of a level; a level may have several.
 
     Attributes
@@ -47,9 +48,19 @@ class IsoPhaseCurve:
         """The curve in the parameter plane, split where an angle jumps across its seam at +-pi: list of (k, 2)."""
         return split_at_seam(self.parameters, closed=self.closed)
 
+    @property
+    def length(self) -> float:
+        """Length of the chords from point to point, L."""
+        path = np.concatenate([self.points, self.points[: int(self.closed)]])
+        return float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+
     def __repr__(self) -> str:
         shape = "closed" if self.closed else "open"
-        return f"IsoPhaseCurve({self.of} = {self.level:g}, {len(self.points)} points, {shape})"
+        lost = int(np.sum(~np.all(np.isfinite(self.points), axis=1)))
+        return (
+            f"IsoPhaseCurve({self.of} = {self.level:g}, {len(self.points)} points, {shape}, length {self.length:.4g} L"
+            f"{f'; {lost} points not finite' * (lost > 0)})"
+        )
 
 
 def iso_phase_curves(

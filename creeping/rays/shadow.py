@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from creeping._errors import InvalidInputError
+from creeping._showing import DrawnOnBody, brief
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.rays.contour import shadow_curves
 from creeping.rays.panels import PanelCurve, newton_step
@@ -22,7 +23,7 @@ from creeping.triangulation import triangulate
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShadowCurve:
+class ShadowCurve(DrawnOnBody):
     """One closed curve of the shadow line, at points equally spaced by arclength.
 
     Attributes
@@ -72,18 +73,17 @@ class ShadowCurve:
         return self.panels.at(s.ravel()).reshape(*s.shape, 3)
 
     def __repr__(self) -> str:
-        shares = ", ".join(f"{share:.4g} {status}" for status, share in self.fractions.items() if share)
         n_dot_d = np.abs(self.normals @ self.panels.direction)
         return (
             f"ShadowCurve({len(self.points)} points, length {self.length:.10g} L)\n"
-            f"  {shares}; {len(self.arcs)} arcs\n"
+            f"  {_spelled(self.fractions)}; {_count(len(self.arcs), 'arc')}\n"
             f"  |n.d| at most {np.max(n_dot_d):.1e}; "
             f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/L"
         )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShadowLine:
+class ShadowLine(DrawnOnBody):
     """Shadow line of one incidence.
 
     Attributes
@@ -111,18 +111,19 @@ class ShadowLine:
     @property
     def fractions(self) -> dict[str, float]:
         """Share of the whole length with each status."""
+        length = self.length or 1.0
         return {
-            status: sum(curve.fractions[status] * curve.length for curve in self.curves) / self.length
-            for status in STATUSES
+            status: sum(curve.fractions[status] * curve.length for curve in self.curves) / length for status in STATUSES
         }
 
     def __repr__(self) -> str:
-        shares = ", ".join(f"{share:.4g} {status}" for status, share in self.fractions.items() if share)
-        worst = max(float(np.max(np.abs(curve.normals @ self.direction))) for curve in self.curves)
+        worst = max((float(np.max(np.abs(curve.normals @ self.direction))) for curve in self.curves), default=0.0)
         direction = ", ".join(f"{d:.4g}" for d in self.direction)
+        points = sum(len(curve.points) for curve in self.curves)
         return (
-            f"ShadowLine({len(self.curves)} curves, length {self.length:.10g} L, direction ({direction}))\n"
-            f"  {shares}\n"
+            f"ShadowLine({_count(len(self.curves), 'curve')}, {points} points, length {self.length:.10g} L, "
+            f"direction ({direction}))\n"
+            f"  {_spelled(self.fractions)}; on {brief(self.body)}\n"
             f"  |n.d| at most {worst:.1e}; singular distance {self.singular_distance:.3g}"
         )
 
@@ -161,6 +162,14 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     curves = [_sampled(panels, int(n_points)) for panels in shadow_curves(body, d, mesh, critical)]
     curves.sort(key=lambda curve: -curve.length)
     return ShadowLine(body, d, tuple(curves), critical.distance)
+
+
+def _spelled(fractions: dict[str, float]) -> str:
+    return ", ".join(f"{share:.4g} {status}" for status, share in fractions.items() if share) or "nothing"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 def _sampled(panels: PanelCurve, n_points: int) -> ShadowCurve:

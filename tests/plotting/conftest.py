@@ -1,12 +1,13 @@
-"""A shadow line, fan and iso-phase curves on the unit sphere, exact and without the engine."""
+"""Results to show: on the unit sphere, exact and without the engine; and some of the engine's own, made once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import creeping as cr
 import scatterers as sc
 from creeping.plotting import display
 
@@ -61,6 +62,7 @@ def sphere_fan(sphere_line):
         spreading=spreading,
         spreading_rate=np.tile(-np.sin(t), (rays, 1)),
         curvature=np.ones((rays, len(t))),
+        attenuation=np.tile(t, (rays, 1)),
         caustic_index=(spreading < 0).astype(int),
         status=np.arange(rays) % 3,
         curve_index=np.zeros(rays, dtype=int),
@@ -94,3 +96,52 @@ def opengl():
     probe = display.gl_available()
     if not probe.ok:
         pytest.skip(probe.reason)
+
+
+@pytest.fixture(scope="session")
+def twisted_fan():
+    """On the twisted ellipsoid, where some rays detach."""
+    body = sc.TwistedEllipsoid()
+    return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 1, 1)), length=2.0, n_rays=24, max_gap=np.inf)
+
+
+@pytest.fixture(scope="session")
+def torus_fan():
+    body = sc.Torus()
+    line = cr.shadow_line(body, (1, 0.3, 0.5), n_points=64)
+    return cr.launch(cr.DirectFlow(body), line, length=1.0, n_rays=12, n_steps=10, max_gap=np.inf, status="all")
+
+
+@pytest.fixture(scope="session")
+def twisted_curves(twisted_fan):
+    return cr.iso_phase_curves(twisted_fan, [0.5, 1.0])
+
+
+@pytest.fixture(scope="session")
+def ball_fan():
+    body = sc.Sphere()
+    return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=4.5, n_rays=32)
+
+
+@pytest.fixture(scope="session")
+def ball_cut(ball_fan):
+    """From 40 degrees on one side to 180 on the other, in the plane y = 0."""
+    angles = np.radians(np.arange(-40.0, 181.0, 5.0))
+    directions = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
+    return cr.far_field(ball_fan, directions, wavenumber=30.0, boundary="hard")
+
+
+@pytest.fixture(scope="session")
+def small_map():
+    return cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(12, 16), cache=False)
+
+
+@pytest.fixture(scope="session")
+def dark_fan(torus_fan):
+    """A line none of whose points is attached, and its fan without rays."""
+    line = torus_fan.line
+    curves = tuple(
+        replace(c, status=np.full(len(c.points), "concave"), arcs=((0.0, c.length, "concave"),)) for c in line.curves
+    )
+    line = replace(line, curves=curves)
+    return cr.launch(cr.DirectFlow(line.body), line, length=1.0)

@@ -1,0 +1,83 @@
+"""How results show themselves without knowing pictures: they ask a presenter that a layer above them has named.
+
+The root of the package names the module; it is imported when first asked, so that ``import creeping`` brings no
+drawing library.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_module = ""
+
+
+def present_with(module: str) -> None:
+    """Name the module whose ``html``, ``plot`` and ``to_polydata`` show results."""
+    global _module
+    _module = module
+
+
+def brief(value: object, width: int = 72) -> str:
+    """One line of a value's repr: a body may be a long expression, or of a user's own class."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= width else f"{text[: width - 3]}..."
+
+
+class Shown:
+    """A result with a table for notebooks."""
+
+    # no state: results stay frozen and weakly referable, and pickle as before
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        """Table of what it is, how large, how accurate and what is wrong, for notebooks."""
+        return str(import_module(_module).html(self))
+
+
+class Drawn(Shown):
+    """A result with a picture."""
+
+    __slots__ = ()
+
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """Draw with matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on; by default those of a new figure outside pyplot, which opens no window:
+            ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
+        **options
+            ``legend=True`` adds a legend to axes that were given; a new figure has one. All others depend on the type,
+            see `creeping.plotting.line_plots` and `creeping.plotting.level_plots`:
+
+            - `ShadowLine`, `ShadowCurve`, `RayFan` (``plot_line``): ``kind="parameters"``, the plane of (theta, phi) in
+              degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;
+              ``rays=``, ``until=``, ``view=``.
+            - `IsoPhaseCurve` (``plot_curve``): ``kind=``.
+            - `FarField` (``plot_far``): ``quantity="rcs"``, in dBsm, or ``"amplitude"``; ``parts=True`` for the
+              creeping, reflected and forward part; ``components=``, ``angles=``, ``unit=``, ``span=``.
+            - `PhaseMap` (``plot_growth``): ``tolerance=``.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return import_module(_module).plot(self, ax, **options)
+
+
+class DrawnOnBody(Drawn):
+    """A result of curves on the body."""
+
+    __slots__ = ()
+
+    def to_polydata(self) -> Any:
+        """Its curves for pyvista and VTK, with the arrays of a file of `creeping.plotting.write_vtp`.
+
+        Points are copies, and all of them: those of a ray in trouble too. No display or OpenGL is needed.
+
+        Returns
+        -------
+        pyvista.PolyData
+            Several results at once are joined by `creeping.plotting.polydata`.
+        """
+        return import_module(_module).to_polydata(self)

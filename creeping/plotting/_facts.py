@@ -1,0 +1,181 @@
+"""What the table of a result says, type by type: what it is, how large, how accurate, what is wrong."""
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._showing import brief
+from creeping._typing import Any, FloatArray
+from creeping.plotting._far_table import angles_of
+
+if TYPE_CHECKING:
+    from creeping.field.far import FarField
+    from creeping.phaseflow.direct import DirectFlow
+    from creeping.phaseflow.phase_map import PhaseMap
+    from creeping.phaseflow.tracing import MapError
+    from creeping.rays.fan import RayFan
+    from creeping.rays.isophase import IsoPhaseCurve
+    from creeping.rays.shadow import ShadowCurve, ShadowLine
+
+Facts = Iterable[tuple[str, str]]
+MOST = 6
+"""Rows of a kind shown at most: curves of a line, arcs of a curve."""
+
+
+def of_line(line: "ShadowLine") -> Facts:
+    """Facts of a shadow line."""
+    yield "body", brief(line.body, 200)
+    yield "direction", _direction(line.direction)
+    yield "curves", str(len(line.curves))
+    yield "points", str(sum(len(curve.points) for curve in line.curves))
+    yield "length", f"{line.length:.10g} L"
+    yield from _shares(line.fractions, line.length)
+    if len(line.curves) > 1:
+        yield from _cut_short(
+            (f"curve {k}", f"{curve.length:.10g} L, {len(curve.arcs)} arcs") for k, curve in enumerate(line.curves)
+        )
+    worst = max((float(np.max(np.abs(curve.normals @ line.direction))) for curve in line.curves), default=0.0)
+    yield "largest |n.d|", f"{worst:.1e}"
+    distance = line.singular_distance
+    yield "singular distance", f"{distance:.3g}, about {np.degrees(distance):.3g}°" if np.isfinite(distance) else "none"
+
+
+def of_shadow_curve(curve: "ShadowCurve") -> Facts:
+    """Facts of one curve of a shadow line."""
+    yield "body", brief(curve.panels.body, 200)
+    yield "direction", _direction(curve.panels.direction)
+    yield "points", str(len(curve.points))
+    yield "length", f"{curve.length:.10g} L"
+    yield from _shares(curve.fractions, curve.length)
+    yield from _cut_short(
+        (f"arc {k}", f"{status}, from {start:.6g} to {end:.6g} L") for k, (start, end, status) in enumerate(curve.arcs)
+    )
+    yield "largest |n.d|", f"{np.max(np.abs(curve.normals @ curve.panels.direction)):.1e}"
+    yield "kappa_n(d)", _range(curve.curvature, "1/L")
+
+
+def of_fan(fan: "RayFan") -> Facts:
+    """Facts of a fan."""
+    from creeping.rays.fan import RayStatus
+
+    yield "body", brief(fan.body, 200)
+    yield "direction", _direction(fan.line.direction)
+    yield "rays", str(len(fan.points))
+    yield "steps", str(len(fan.travel_time))
+    yield "length", f"{fan.length:g}"
+    yield "arcs", str(len(fan.closed_arcs))
+    for status in RayStatus:
+        count = int(np.sum(fan.status == status))
+        if count:
+            yield status.name, f"{count} rays"
+    if np.any(np.isfinite(fan.detachment)):
+        yield "first detachment", f"{np.min(fan.detachment):.6g}"
+    yield "caustics passed", f"up to {int(fan.caustic_index[:, -1:].max(initial=0))}"
+    yield "error at the end", _error(fan.error, "rays traced")
+    if fan.flow_error is not None:
+        yield "error of one g_T0", _error(fan.flow_error, "samples")
+
+
+def of_curve(curve: "IsoPhaseCurve") -> Facts:
+    """Facts of an iso-phase curve."""
+    yield "level", f"{curve.of} = {curve.level:g}"
+    yield "points", str(len(curve.points))
+    yield "closed", "yes" if curve.closed else "no"
+    yield "length", f"{curve.length:.6g} L"
+    yield "theta", _range(np.degrees(curve.parameters[:, 0]), "degrees")
+    yield "phi", _range(np.degrees(curve.parameters[:, 1]), "degrees")
+    if len(curve.rays):
+        yield "rays", f"{len(np.unique(curve.rays))}, from {curve.rays.min()} to {curve.rays.max()}"
+    yield from _lost(curve.points)
+
+
+def of_far(far: "FarField") -> Facts:
+    """Facts of a far field."""
+    total = far.total
+    size = np.abs(total[np.isfinite(total)])
+    largest = float(size.max(initial=0.0))
+    yield "directions", str(len(far.directions))
+    if len(far.directions):
+        angles = np.degrees(angles_of(far.directions))
+        yield "theta", _range(angles[:, 0], "degrees")
+        yield "phi", _range(angles[:, 1], "degrees")
+    yield "wavenumber", f"{far.wavenumber:g} 1/L (wavelength {2 * np.pi / far.wavenumber:.6g} L)"
+    yield "boundary", far.boundary
+    yield "order", str(far.order)
+    if total.ndim == 3:
+        yield "components", "θ and φ scattered by θ and φ incident"
+    for name, count in sorted(Counter(far.method.tolist()).items()):
+        yield f"served by {name or 'nothing'}", f"{count} directions"
+    yield "largest |f|", f"{largest:.6g} L"
+    if largest > 0:
+        yield "largest 4π|f|²", f"{10 * np.log10(4 * np.pi * largest**2):.2f} dB re 1 L²"
+    yield "unresolved", f"{int(far.unresolved.sum())} directions"
+    yield from _lost(total)
+
+
+def of_map(flow: "PhaseMap") -> Facts:
+    """Facts of a phase map."""
+    leap, growth = flow.leaps[-1], flow.growth
+    yield "body", brief(flow.body, 200)
+    yield "horizon T0", f"{flow.horizon:g}"
+    yield "coordinates", flow.model.name
+    yield "nodes", " x ".join(map(str, (len(leap.state), *flow.grid.nodes)))
+    yield "degree", str(flow.grid.degree)
+    yield "maps", str(len(flow.leaps))
+    yield "numbers", f"{leap.state.dtype}, {flow.nbytes / 1e6:.1f} MB"
+    yield "rides along", "Jacobi matrix" * flow.rides + " and curvatures" * leap.attenuates or "nothing"
+    yield "error of one g_T0", _error(flow.error, "samples")
+    if growth is not None:
+        for length, rms, largest in zip(growth.lengths, growth.rms, growth.max, strict=True):
+            yield f"error after {length:g}", f"rms {rms:.1e}, max {largest:.1e}"
+    for name, value in flow.parameters.items():
+        yield str(name), brief(value)
+
+
+def of_direct(flow: "DirectFlow") -> Facts:
+    """Facts of a direct flow."""
+    yield "body", brief(flow.body, 200)
+    yield "method", "direct integration, order 8"
+    if flow.step is None:
+        yield "rtol", f"{flow.rtol:g} per step"
+    else:
+        yield "step", f"equal, at most {flow.step:g}"
+    yield "horizon", f"{flow.horizon:g}"
+    yield "error at the end", _error(flow.error, "samples")
+
+
+def _direction(d: FloatArray) -> str:
+    theta, phi = np.degrees(angles_of(d))
+    return f"({', '.join(f'{x:.6g}' for x in d)}), theta {theta:.6g}°, phi {phi:.6g}°"
+
+
+def _shares(fractions: dict[str, float], length: float) -> Facts:
+    for status, share in fractions.items():
+        if share:
+            yield status, f"{share:.6g} of the length, {share * length:.6g} L"
+
+
+def _range(values: FloatArray, unit: str) -> str:
+    finite = np.asarray(values)[np.isfinite(values)]
+    return f"{finite.min():.6g} to {finite.max():.6g} {unit}" if len(finite) else "none"
+
+
+def _lost(values: Any) -> Facts:
+    lost = len(values) - int(np.all(np.isfinite(values.reshape(len(values), -1)), axis=1).sum()) if len(values) else 0
+    if lost:
+        yield "not finite", str(lost)
+
+
+def _error(error: "MapError | None", of: str) -> str:
+    if error is None or not error.samples:
+        return "not measured"
+    return f"rms {error.rms:.1e}, max {error.max:.1e} ({error.samples} {of})"
+
+
+def _cut_short(rows: Facts) -> Facts:
+    listed = list(rows)
+    yield from listed[:MOST]
+    if len(listed) > MOST:
+        yield "", f"and {len(listed) - MOST} more"

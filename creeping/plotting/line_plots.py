@@ -1,0 +1,167 @@
+"""Pictures that shadow lines, fans and iso-phase curves draw of themselves, in the plane of parameters or in space."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._errors import InvalidInputError
+from creeping._typing import Any, FloatArray
+from creeping.plotting._drawing import Drawing, compose
+from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowCurveLike
+from creeping.plotting._strokes import LEVEL_NAMES
+from creeping.plotting._view import View
+from creeping.plotting.parameter_plane import draw_curves, frame, plot_parameters
+from creeping.plotting.pictures import add_legend, axes_or_new, drawn_page
+from creeping.surface import Surface
+
+if TYPE_CHECKING:
+    from creeping.rays.fan import RayFan
+    from creeping.rays.isophase import IsoPhaseCurve
+    from creeping.rays.shadow import ShadowCurve, ShadowLine
+
+KINDS = ("parameters", "3d")
+PLANE = (6.4, 4.4)  # inches
+
+
+@dataclass(frozen=True)
+class LineOf:
+    """Some curves of a shadow line, shown as one."""
+
+    body: Surface
+    direction: FloatArray
+    curves: Sequence[ShadowCurveLike]
+
+
+def line_of(curve: "ShadowCurve") -> LineOf:
+    """Shadow line that consists of one curve."""
+    return LineOf(curve.panels.body, curve.panels.direction, (curve,))
+
+
+def plot_line(
+    line: "ShadowLine | LineOf",
+    ax: Any = None,
+    *,
+    kind: str | None = None,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] = (),
+    rays: int = 48,
+    until: float | None = None,
+    view: View | None = None,
+    legend: bool | None = None,
+) -> Any:
+    """Draw a shadow line, by default in the plane of the body's parameters, in degrees.
+
+    Parameters
+    ----------
+    line : ShadowLine
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure.
+    kind : {"parameters", "3d"}
+        By default what the axes are made for.
+    fan : RayFan, optional
+    curves : sequence of IsoPhaseCurve
+    rays : int
+        Rays drawn at most.
+    until : float, optional
+        Travel time up to which rays are drawn; by default to their end.
+    view : View, optional
+        Camera of ``kind="3d"``; by default on the shadow side.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        If the kind is unknown or not that of the axes, or a view is given for the plane.
+    """
+    shown: dict[str, Any] = {"rays": rays, "until": until}
+    if _in_space(ax, kind):
+        if ax is None:
+            return _page(compose(line, fan, curves, view=view, **shown), legend is not False)
+        from creeping.plotting.axes3d import plot_rays_3d
+
+        return plot_rays_3d(line, fan, curves, ax=ax, view=view, legend=bool(legend), **shown)
+    if view is not None:
+        raise InvalidInputError("a view is for kind='3d'; the plane of the parameters has none")
+    fresh, ax = axes_or_new(ax, PLANE)
+    return plot_parameters(line, fan, curves, ax=ax, legend=fresh if legend is None else legend, **shown)
+
+
+def plot_shadow_curve(curve: "ShadowCurve", ax: Any = None, **options: Any) -> Any:
+    """Draw one curve of a shadow line; options as for `plot_line`."""
+    return plot_line(line_of(curve), ax, **options)
+
+
+def plot_fan(fan: "RayFan", ax: Any = None, **options: Any) -> Any:
+    """Draw a fan and its shadow line; options as for `plot_line`."""
+    return plot_line(fan.line, ax, fan=fan, **options)
+
+
+def plot_curve(curve: "IsoPhaseCurve", ax: Any = None, *, kind: str | None = None, legend: bool | None = None) -> Any:
+    """Draw an iso-phase curve alone, or over what the axes have already.
+
+    Parameters
+    ----------
+    curve : IsoPhaseCurve
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure; `plot_line` draws curves with the body's picture.
+    kind : {"parameters", "3d"}
+        By default what the axes are made for.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        If the kind is unknown or not that of the axes.
+    """
+    space = _in_space(ax, kind)
+    fresh, ax = axes_or_new(ax, PLANE, projection="3d" if space else None)
+    if space:
+        points = np.concatenate([curve.points, curve.points[: int(curve.closed)]])
+        # above the body of a picture, which orders what it draws by hand
+        name = LEVEL_NAMES.get(curve.of, curve.of)
+        ax.plot(*points.T, linewidth=1.0, zorder=13, label=f"{name} = {curve.level:g}")
+        if fresh:
+            ax.set(xlabel="x (L)", ylabel="y (L)", zlabel="z (L)", aspect="equal")
+    else:
+        framed = bool(ax.get_xlabel())
+        draw_curves(ax, [curve])
+        if not framed:
+            # the body is not known here: a polar angle is never negative, that of a torus takes both signs
+            frame(ax, torus=bool(np.any(curve.parameters[:, 0] < 0)))
+    add_legend(ax, fresh, legend)
+    return ax
+
+
+def _in_space(ax: Any, kind: str | None) -> bool:
+    """Whether to draw in space."""
+    if kind is not None and kind not in KINDS:
+        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
+    space = kind == "3d"
+    if ax is None:
+        return space
+    made_for = "3d" if ax.name == "3d" else "parameters"
+    if kind is not None and kind != made_for:
+        raise InvalidInputError(f"kind {kind!r} does not fit the axes, which are made for {made_for!r}")
+    return made_for == "3d"
+
+
+def _page(drawing: Drawing, legend: bool) -> Any:
+    """Axes of a new figure as `picture` writes it."""
+    figure, bar = drawn_page(drawing, "matplotlib", dpi=150)
+    if legend:
+        drawing.add_legend(figure)
+        if drawing.colours.high > drawing.colours.low:
+            drawing.colours.add_bar(figure, cax=figure.add_axes(bar))
+    return figure.axes[0]

@@ -1,0 +1,32 @@
+"""Far fields of given values, and bodies with names that are none of ours."""
+
+import numpy as np
+
+import creeping as cr
+import scatterers as sc
+
+HOSTILE = "<script>alert('x')</script>&\"$\\frac"
+
+
+class Awkward(sc.Sphere):
+    """A body of the user's with a name that is none of ours."""
+
+    def __repr__(self):
+        return f"{HOSTILE}\n" * 3
+
+
+def far_of(directions, total, **changes):
+    """A FarField of given values."""
+    total = np.asarray(total, dtype=complex)
+    values = {
+        "directions": np.asarray(directions, dtype=float),
+        "creeping": total,
+        "reflected": 0 * total,
+        "forward": 0 * total,
+        "method": np.full(len(total), "rays"),
+        "unresolved": np.zeros(len(total), dtype=bool),
+        "wavenumber": 20.0,
+        "boundary": "hard",
+        "order": 2,
+    }
+    return cr.FarField(**values | changes)
