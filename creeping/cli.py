@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Group, Parameter
 
-from creeping import _checking, _sweep_command, _upkeep
+from creeping import _checking, _explore_command, _sweep_command, _upkeep
 from creeping._body_argument import AllowRough, Body, SpeedOption, Units, parse_body
 from creeping._version import __version__
 
@@ -205,6 +205,7 @@ def figure(
 
 app.command(_checking.check)
 app.command(_sweep_command.sweep)
+app.command(_explore_command.explore)
 cache_app.command(_upkeep.list_maps, name="ls")
 cache_app.command(_upkeep.verify_maps, name="verify")
 cache_app.command(_upkeep.clear_maps, name="clear")

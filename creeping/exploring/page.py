@@ -1,0 +1,209 @@
+"""The page itself: controls, two workers, and what the server lets in.
+
+One worker follows the hand, from the latest wish to the moving frame; another follows up when no newer wish has come.
+The server listens on the loopback address, and turns away connections that a page of another site opens.
+"""
+
+import html
+import sys
+import time
+import traceback
+from contextlib import redirect_stdout
+from io import StringIO
+from threading import Lock, Thread
+from urllib.parse import urlsplit
+
+import numpy as np
+import viser
+
+from creeping._errors import CreepingError
+from creeping._typing import Any
+from creeping.exploring.colours import RANGE
+from creeping.exploring.moving import MovingFrame, moving_frame, step_of
+from creeping.exploring.newest import Newest
+from creeping.exploring.panels import cut_svg, plane_svg
+from creeping.exploring.settled import settled
+from creeping.exploring.stage import Model, Stage, turned
+from creeping.exploring.summary import colour_bar, moving_text, settled_text
+from creeping.exploring.wishes import BOUNDARIES, RAYS, Wish, angles
+from creeping.rays.fan import Flow
+from creeping.surface import size
+
+HOST = "127.0.0.1"
+REST = 0.15
+"""Seconds for which the hand rests before work begins that would hold up its next move."""
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+class LocalServer(viser.ViserServer):  # type: ignore[misc]
+    """A quiet server for this machine alone."""
+
+    def __init__(self, port: int) -> None:
+        # the address is told by whoever starts it
+        with redirect_stdout(StringIO()):
+            super().__init__(HOST, port, label="creeping", verbose=False)
+        # viser offers no door before the scene is sent but this one
+        self._websock_server.on_client_connect(self._admit)
+
+    async def _admit(self, client: Any) -> None:
+        """Turn away a connection opened by another site's page, or that came by another name than this machine's."""
+        connection = self._websock_server._live_connections[client.client_id]
+        headers = connection.request.headers
+        given = [urlsplit(headers.get("Origin") or "").hostname, urlsplit(f"//{headers.get('Host') or ''}").hostname]
+        if any(host is not None and host not in LOOPBACK for host in given):
+            await connection.close()
+
+    def stop(self) -> None:
+        """End the server and its threads."""
+        with redirect_stdout(StringIO()):
+            super().stop()
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Give no address: a page may ask for a tunnel to the world, and gets none."""
+        return None
+
+
+class Explorer:
+    """A running page.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+    wish : Wish
+        What is shown first.
+    port : int
+        The next free one is taken if it is in use.
+    """
+
+    def __init__(self, flow: Flow, wish: Wish, *, port: int = 8080) -> None:
+        self.flow, self.wish = flow, wish
+        self.model = Model.of(flow.body)
+        self.step = step_of(flow.body)
+        self.server = LocalServer(port)
+        self.stage = Stage(self.server, self.model)
+        self._lock = Lock()
+        self._wishes: Newest[Wish] = Newest()
+        self._frames: Newest[tuple[MovingFrame, int]] = Newest()
+        self.seconds: list[float] = []
+        self._controls()
+        self.stage.look(wish.direction)
+        self.stage.turn(wish.direction)
+        self._workers = [Thread(target=work, daemon=True) for work in (self._move, self._settle)]
+        for worker in self._workers:
+            worker.start()
+        self._wishes.put(wish)
+
+    @property
+    def address(self) -> str:
+        """Where a browser finds the page."""
+        return f"http://{HOST}:{self.server.get_port()}"
+
+    def ask(self, **values: Any) -> None:
+        """Change the wish; what is out of range is told on the page and changes nothing."""
+        with self._lock:
+            try:
+                self.wish = self.wish.changed(**values)
+            except CreepingError as error:
+                self.status.content = told(error)
+                return
+            self._wishes.put(self.wish)
+
+    def close(self) -> None:
+        """Stop the workers and the server."""
+        self._wishes.close()
+        self._frames.close()
+        self.server.stop()
+
+    def _controls(self) -> None:
+        gui, wish, extent = self.server.gui, self.wish, size(self.flow.body)
+        gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+        sliders = {
+            "theta": gui.add_slider("theta (degrees)", 0.0, 180.0, 0.1, wish.theta, hint="Where the wave travels"),
+            "phi": gui.add_slider("phi (degrees)", -180.0, 180.0, 0.1, wish.phi),
+            "wavenumber": gui.add_slider(
+                "wavenumber (1/L)", *_range(5 / extent, 400 / extent, wish.wavenumber), wish.wavenumber
+            ),
+            "boundary": gui.add_dropdown("boundary", BOUNDARIES, initial_value=wish.boundary),
+            "length": gui.add_slider("length of rays (L)", *_range(0.2 * extent, 6 * extent, wish.length), wish.length),
+            "rays": gui.add_slider("rays", RAYS[0], RAYS[1], 16, wish.rays),
+            "spacing": gui.add_slider("iso-phase spacing (L)", *_range(0.0, extent, wish.spacing), wish.spacing),
+            "cut": gui.add_slider("far-field cut, phi (degrees)", -180.0, 180.0, 1.0, wish.cut),
+        }
+        self.sliders = sliders
+        for name, handle in sliders.items():
+            handle.on_update(lambda event, name=name: self._slid(name, event))
+        self.stage.incidence.on_update(self._dragged)
+        self.status = gui.add_markdown("")
+        self.found = gui.add_markdown("")
+        self.bar = gui.add_html("")
+        self.plane = gui.add_html("")
+        self.cut = gui.add_html("")
+
+    def _slid(self, name: str, event: Any) -> None:
+        # a value that the program sets, after the arrow was turned, is no new wish
+        if event.client is None:
+            return
+        value = event.target.value
+        self.ask(**{name: int(value) if name == "rays" else value})
+        if name in ("theta", "phi"):
+            self.stage.turn(self.wish.direction)
+
+    def _dragged(self, event: Any) -> None:
+        if event.client is None:
+            return
+        wxyz = np.asarray(event.target.wxyz, dtype=float)
+        if not (np.all(np.isfinite(wxyz)) and np.linalg.norm(wxyz) > 0.5):
+            return
+        theta, phi = angles(turned(wxyz / np.linalg.norm(wxyz)))
+        self.ask(theta=theta, phi=phi)
+        self.sliders["theta"].value, self.sliders["phi"].value = theta, phi
+
+    def _move(self) -> None:
+        """Follow the hand."""
+        while (taken := self._wishes.take()) is not None:
+            wish, number = taken
+            began = time.perf_counter()
+            try:
+                frame = moving_frame(self.flow, wish, self.step)
+                self.stage.show(frame)
+                self.seconds.append(time.perf_counter() - began)
+                self.bar.content = "" if frame.levels is None else colour_bar(RANGE, wish.boundary)
+                self.status.content = moving_text(frame, self.seconds[-1], RANGE)
+                self._frames.put((frame, number))
+            except Exception as error:
+                self.status.content = told(error)
+
+    def _settle(self) -> None:
+        """Follow up when the hand rests."""
+        while (taken := self._frames.take()) is not None:
+            (frame, number), _ = taken
+
+            def stale(number: int = number) -> bool:
+                return self._wishes.number != number
+
+            time.sleep(REST)
+            try:
+                found = None if stale() else settled(self.flow, frame, self.model.mesh.vertices, stale)
+                if found is None or stale():
+                    continue
+                self.stage.settle(found)
+                self.found.content = settled_text(found)
+                self.plane.content, self.cut.content = plane_svg(found), cut_svg(found)
+            except Exception as error:
+                self.found.content = told(error)
+
+
+def told(error: Exception) -> str:
+    """Words of an error for the page; one that is not ours goes to the terminal in full, and the page lives on."""
+    if not isinstance(error, CreepingError):
+        traceback.print_exception(error, file=sys.stderr)
+        return f"**this incidence failed: {html.escape(repr(error))}**"
+    return f"**{html.escape(str(error))}**"
+
+
+def _range(low: float, high: float, value: float) -> tuple[float, float, float]:
+    """Least, most and step of a slider that holds the value on one of its steps."""
+    step = float(10.0 ** np.floor(np.log10((high - low) / 200)))
+    low, high = min(low, value), max(high, value)
+    # steps are counted from the least value
+    return value - step * np.floor((value - low) / step), high, step

@@ -1,0 +1,78 @@
+"""What follows when the incidence rests: the line to rounding, a fan with its error, the field on the body and afar.
+
+Each step asks before it starts whether the wish still stands, so that a newer one does not wait for long.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.exploring.moving import MovingFrame
+from creeping.exploring.wishes import Wish
+from creeping.field.far import FarField, far_field
+from creeping.phaseflow.geodesic import speed_of
+from creeping.plotting.field_pictures import surface_levels
+from creeping.rays.fan import Flow, RayFan, launch
+from creeping.rays.shadow import ShadowLine, shadow_line
+
+CUT_STEP = 2.0
+"""Of the far-field cut, degrees."""
+Tell = Callable[[], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Everything that takes tenths of seconds.
+
+    Attributes
+    ----------
+    wish : Wish
+    line : ShadowLine
+    fan : RayFan
+    body_levels : (n,) or None
+        20 log10 of the total field on the vertices of the mesh; NaN where no ray passes, None on a weighted body.
+    cut_angles : (m,), degrees
+        Theta of the cut, from -180 to 180 through the directions of azimuth ``wish.cut`` and its opposite.
+    far : FarField or None
+    """
+
+    wish: Wish
+    line: ShadowLine
+    fan: RayFan
+    body_levels: FloatArray | None
+    cut_angles: FloatArray
+    far: FarField | None
+
+
+def settled(flow: Flow, frame: MovingFrame, vertices: FloatArray, stale: Tell = lambda: False) -> Settled | None:
+    """Follow up a moving frame; None as soon as ``stale()`` says that nobody waits for it any more.
+
+    Raises
+    ------
+    SingularIncidenceError
+        If the shadow line crosses itself.
+    """
+    wish, body = frame.wish, flow.body
+    line = shadow_line(body, wish.direction)
+    if stale():
+        return None
+    steps = len(frame.fan.travel_time) - 1
+    fan = launch(flow, line, length=frame.fan.length, n_rays=wish.rays, n_steps=steps)
+    if stale():
+        return None
+    angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
+    if speed_of(body) is not None:
+        return Settled(wish, line, fan, None, angles, None)
+    levels = surface_levels(fan, vertices, wavenumber=wish.wavenumber, boundary=wish.boundary)
+    if stale():
+        return None
+    far = far_field(fan, cut_directions(angles, wish.cut), wavenumber=wish.wavenumber, boundary=wish.boundary)
+    return Settled(wish, line, fan, levels, angles, far)
+
+
+def cut_directions(angles: FloatArray, azimuth: float) -> FloatArray:
+    """Directions of a cut: theta (m,) in degrees, negative on the opposite half plane: (m, 3)."""
+    theta, phi = np.radians(angles), np.radians(azimuth)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)

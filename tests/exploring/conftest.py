@@ -1,0 +1,97 @@
+"""A real browser without a window, and what its page holds."""
+
+import json
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+# three.js tells a listener of this name about every scene it makes; it is what its developer tools use
+LISTEN = """
+window.__scenes = [];
+window.__THREE_DEVTOOLS__ = new EventTarget();
+window.__THREE_DEVTOOLS__.addEventListener('observe', (event) => window.__scenes.push(event.detail));
+"""
+SEGMENTS = """
+const wanted = arguments[0];
+for (const scene of window.__scenes) {
+  if (!scene.isScene) continue;
+  let found = null;
+  scene.traverse((node) => {
+    const start = node.geometry && node.geometry.attributes && node.geometry.attributes.instanceStart;
+    if (!start) return;
+    let shown = true;
+    node.traverseAncestors((above) => { shown = shown && above.visible; });
+    if (shown && node.visible && start.count === wanted) found = start.data ? start.data.array : start.array;
+  });
+  if (found) return Array.from(found);
+}
+return null;
+"""
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+    "--window-size=1200,800",
+)
+
+
+class Browser:
+    """A page of Chromium.
+
+    Parameters
+    ----------
+    driver : selenium.webdriver.Chrome
+    """
+
+    def __init__(self, driver):
+        self.driver = driver
+        driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": LISTEN})
+
+    def open(self, address):
+        self.driver.get(address)
+
+    def segments(self, count, seconds=60.0):
+        """Ends of the lines with so many segments (count, 2, 3), once the page has them."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            held = self.driver.execute_script(SEGMENTS, count)
+            if held is not None:
+                return np.array(held, dtype=float).reshape(-1, 2, 3)
+            time.sleep(0.2)
+        raise AssertionError(f"no lines of {count} segments after {seconds} s: {self.errors()}")
+
+    def errors(self):
+        """Lines of the console that are errors."""
+        return [line for line in self.driver.get_log("browser") if line["level"] == "SEVERE"]
+
+    def requests(self):
+        """Addresses that the page has asked for."""
+        events = [json.loads(line["message"])["message"] for line in self.driver.get_log("performance")]
+        return [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
+
+
+@pytest.fixture
+def browser(tmp_path):
+    """A fresh Chromium, or a skipped test where there is none."""
+    selenium = pytest.importorskip("selenium.webdriver")
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if not (chromium and driver):
+        pytest.skip("chromium and chromedriver are not installed (Debian: chromium chromium-driver)")
+    options = selenium.ChromeOptions()
+    options.binary_location = chromium
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path / 'profile'}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    made = selenium.Chrome(options=options, service=selenium.ChromeService(driver))
+    made.set_script_timeout(60)
+    yield Browser(made)
+    made.quit()

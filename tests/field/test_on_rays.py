@@ -1,0 +1,30 @@
+"""The magnitude along rays is that of `surface_field` in first order, which traces them again."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping._errors import InvalidInputError
+from creeping.field.on_rays import creeps, ray_magnitude
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard", cr.Impedance(0.3 - 0.1j)])
+@pytest.mark.parametrize("body", [sc.Ellipsoid(1.2, 0.8, 0.6), sc.TwistedEllipsoid()], ids=["ellipsoid", "twisted"])
+def test_it_is_the_field_on_the_surface(body, boundary):
+    line = cr.shadow_line(body, (1, 1, 1))
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-11), line, length=3.0, n_rays=48, n_steps=64, max_gap=np.inf)
+    exact = np.abs(cr.surface_field(fan, wavenumber=30.0, boundary=boundary, order=1))
+    found = ray_magnitude(fan, wavenumber=30.0, boundary=boundary) * (30.0 if boundary == "soft" else 1.0)
+    sound = creeps(fan) & (np.abs(fan.spreading) > 1e-3)
+    # the last step before a ray detaches has no curvature left to divide by
+    np.testing.assert_allclose(found[sound], exact[sound], rtol=2e-4)
+    assert np.all(found[~creeps(fan)] == 0)
+    assert np.any(sound[:, -1])
+
+
+def test_a_weighted_body_has_none():
+    body = sc.Sphere(speed="1 + 0.3*x")
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=1.0, n_rays=4)
+    with pytest.raises(InvalidInputError, match="speed"):
+        ray_magnitude(fan, wavenumber=10.0)
