@@ -2,8 +2,8 @@
 
 Rays start at vertices that lie on an exact body, in random tangent directions, and run for t = 2. The tracer of
 geometry-central (through potpourri3d, if it is installed) unfolds triangles along straight lines; `scatterers.Mesh`
-fits a smooth F first and integrates its geodesics. Ends are compared with those of the exact body at 1e-12; costs are of
-one thread, the fit apart. Run ``python -m studies.mesh_geodesics [--quick]``.
+fits a smooth F first and integrates its geodesics. Ends are compared with those of the exact body at 1e-12; costs are
+of one thread, the fit apart. Run ``python -m studies.mesh_geodesics [--quick]``.
 """
 
 import argparse

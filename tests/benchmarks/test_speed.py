@@ -1,4 +1,4 @@
-"""Costs that matter to a user; run with ``python -m pytest tests/benchmarks -m slow --benchmark-enable``."""
+"""Costs that matter to a user; run with ``python -m pytest tests/benchmarks -m slow -n 0 --benchmark-enable``."""
 
 import os
 import subprocess
