@@ -53,9 +53,11 @@ def explore(
     shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, say=say)
     extent = size(shape)
     theta, phi = angles(unit_direction(direction))
-    far = 1.5 * extent if length is None else length
-    gap = far / 8 if spacing is None else spacing
-    wish = Wish(theta, phi, rays, far, gap, 40 / extent if wavenumber is None else wavenumber, boundary)
+    far = _round(1.5 * extent) if length is None else length
+    gap = _round(far / 8) if spacing is None else spacing
+    k = _round(40 / extent) if wavenumber is None else wavenumber
+    # the cut runs through the direction of the wave
+    wish = Wish(theta, phi, rays, far, gap, k, boundary, cut=float(round(phi)))
     flow = _flow(shape, wish, MOVES if export is None else 1, tolerance, cache, say)
     if export is not None:
         from creeping.exploring.export import export_page
@@ -70,13 +72,14 @@ def explore(
 def _flow(body: Any, wish: Any, moves: int, tolerance: float, cache: bool, say: Any) -> Any:
     """What carries the rays at the steps of the page."""
     import creeping as cr
-    from creeping.exploring.moving import step_of
+    from creeping.exploring.moving import step_of, steps_of
 
-    steps = max(2, round(wish.length / step_of(body)))
+    steps, step = steps_of(wish.length, step_of(body))
+    say(f"choosing what carries {moves} incidence{'s' * (moves != 1)} of {wish.rays} rays")
     return cr.choose_flow(
         body,
         rays=moves * wish.rays,
-        length=steps * step_of(body),
+        length=steps * step,
         outputs=steps,
         tolerance=tolerance,
         cache=cache,
@@ -84,13 +87,21 @@ def _flow(body: Any, wish: Any, moves: int, tolerance: float, cache: bool, say: 
     )
 
 
+def _round(value: float) -> float:
+    """Two digits of a number, as a slider shows them."""
+    return float(f"{value:.2g}")
+
+
 def _serve(flow: Any, wish: Any, port: int, browser: bool, say: Any) -> int:
     import webbrowser
 
     from creeping.exploring.page import Explorer
 
+    say("preparing the page; kernels are compiled once, which takes about a minute")
     page = Explorer(flow, wish, port=port)
     try:
+        if not page.address.endswith(f":{port}"):
+            say(f"port {port} is in use")
         say(f"{page.address} (Ctrl+C ends it)")
         if browser:
             webbrowser.open(page.address)

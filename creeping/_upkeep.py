@@ -9,14 +9,21 @@ from cyclopts import Parameter
 
 from creeping._version import __version__
 
-OPTIONAL = {"sympy": "expressions", "gmsh": "CAD files"}
+OPTIONAL = {
+    "sympy": "expressions",
+    "gmsh": "CAD files",
+    "xarray": "sweeps",
+    "zarr": "stored sweeps",
+    "dask": "sweeps on clusters",
+    "viser": "creeping explore",
+}
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 
 
 def list_maps(*, json_: Json = False) -> int:
     """List the stored maps and fitted bodies."""
     from creeping._errors import CreepingError
-    from creeping.phaseflow import caching, storing
+    from creeping.phaseflow import caching, choices, storing
 
     rows = []
     for folder in _stored():
@@ -33,7 +40,9 @@ def list_maps(*, json_: Json = False) -> int:
         print(json.dumps([*rows, *fits], indent=1))
     else:
         total = sum(float(r["MB"]) for r in (*rows, *fits))
-        print(f"{caching.cache_folder()}: {len(rows)} maps, {len(fits)} fitted bodies, {total:.1f} MB")
+        chosen = len(choices.choice_files())
+        kept = f"{len(rows)} maps, {len(fits)} fitted bodies, {total:.1f} MB; {chosen} choices of flows"
+        print(f"{caching.cache_folder()}: {kept}")
         for row in rows:
             print(f"  {row['map']}  {row['MB']:8.1f} MB  {row['body']}")
         for row in fits:
@@ -63,12 +72,15 @@ def verify_maps() -> int:
 
 
 def clear_maps() -> int:
-    """Remove every stored map and fitted body."""
+    """Remove every stored map, fitted body and choice between flows."""
     import shutil
 
+    from creeping.phaseflow.choices import choice_files
     from scatterers import _fit_cache
 
-    folders, files = _stored(), _fits()
+    folders, files, choices = _stored(), _fits(), choice_files()
+    for file in choices:
+        file.unlink(missing_ok=True)
     for folder in folders:
         shutil.rmtree(folder)
     for file in files:
@@ -76,7 +88,7 @@ def clear_maps() -> int:
     # of processes that were ended while they wrote
     for file in _fit_cache.cache_folder().glob(".writing-*"):
         file.unlink(missing_ok=True)
-    print(f"removed {len(folders)} maps and {len(files)} fitted bodies")
+    print(f"removed {len(folders)} maps, {len(files)} fitted bodies and {len(choices)} choices of flows")
     return 0
 
 
@@ -105,7 +117,7 @@ def doctor() -> int:
 
     print(f"creeping {__version__}, Python {platform.python_version()}, {os.cpu_count()} cores")
     missing = 0
-    for name in ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh", "sympy", "gmsh"):
+    for name in ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh", *OPTIONAL):
         try:
             print(f"  {name} {version(name)}")
         except PackageNotFoundError:

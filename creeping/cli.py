@@ -21,6 +21,8 @@ app = App(
     name="creeping",
     version=__version__,
     help="Creeping rays on smooth bodies by the phase flow method. Angles are in degrees.",
+    # stars of an expression are no markup
+    help_format="plaintext",
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )

@@ -95,7 +95,7 @@ def test_fitted_bodies_in_the_cache(ball, tmp_path, capsys, monkeypatch):
     file.write_bytes(file.read_bytes()[:-1])
     code, out, _ = creeping("cache", "verify", capsys=capsys)
     assert code == 3 and "DAMAGED" in out
-    assert "removed 0 maps and 1 fitted bodies" in creeping("cache", "clear", capsys=capsys)[1]
+    assert "removed 0 maps, 1 fitted bodies" in creeping("cache", "clear", capsys=capsys)[1]
     assert not file.exists()
 
 

@@ -50,11 +50,11 @@ def export_page(path: str | os.PathLike[str], flow: Flow, wish: Wish) -> Settled
     assert found is not None
     server = LocalServer(8400)
     try:
-        stage = Stage(server, model)
+        stage = Stage(server, model, still=True)
         stage.look(wish.direction)
         stage.turn(wish.direction)
         stage.show(frame)
-        stage.settle(found)
+        stage.settle(found, stage.painted_mesh(found))
         page = server.scene.as_html()
     finally:
         server.stop()
@@ -71,5 +71,6 @@ def with_panel(page: str, title: str, found: Settled) -> str:
         f'<style>{STYLE}</style><aside id="creeping"><h1>{html.escape(title)}</h1><p>{angles}</p>{text}'
         f"{bar}{plane_svg(found)}{cut_svg(found)}</aside>"
     )
+    page = page.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>", 1)
     end = page.rindex("</body>")
     return page[:end] + panel + page[end:]

@@ -85,9 +85,15 @@ def moving_frame(flow: Flow, wish: Wish, step: float) -> MovingFrame:
     SingularIncidenceError
         If the shadow line crosses itself.
     """
-    count = int(np.clip(round(wish.length / step), 2, MOST_STEPS))
+    count, step = steps_of(wish.length, step)
     fan = quick_fan(flow, wish.direction, length=count * step, n_rays=wish.rays, n_steps=count)
     return MovingFrame(wish, fan)
+
+
+def steps_of(length: float, step: float) -> tuple[int, float]:
+    """Number and length of the steps of rays: so many steps as the flow takes at once that MOST_STEPS suffice."""
+    step *= max(1, int(np.ceil(length / (MOST_STEPS * step) - 1e-9)))
+    return max(2, round(length / step)), step
 
 
 def step_of(body: Surface) -> float:

@@ -21,6 +21,11 @@ class Newest(Generic[T]):
         """Values put in so far."""
         return self._number
 
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._closed
+
     def put(self, value: T) -> None:
         """Replace what is waiting."""
         with self._changed:

@@ -16,21 +16,27 @@ from creeping.phaseflow.geodesic import speed_of
 from creeping.plotting.field_pictures import surface_levels
 from creeping.rays.fan import Flow, RayFan, launch
 from creeping.rays.shadow import ShadowLine, shadow_line
+from creeping.sweeping.quick_fan import measured
 
 CUT_STEP = 2.0
 """Of the far-field cut, degrees."""
+BLOCK = 512
+"""Points of the body at a time: a newer wish waits for no more."""
 Tell = Callable[[], bool]
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Everything that takes tenths of seconds.
+    """Everything that takes seconds.
 
     Attributes
     ----------
     wish : Wish
+    drawn : RayFan
+        The fan on the page, its error now measured.
     line : ShadowLine
     fan : RayFan
+        With rays inserted where neighbours part: that of the fields.
     body_levels : (n,) or None
         20 log10 of the total field on the vertices of the mesh; NaN where no ray passes, None on a weighted body.
     cut_angles : (m,), degrees
@@ -39,6 +45,7 @@ class Settled:
     """
 
     wish: Wish
+    drawn: RayFan
     line: ShadowLine
     fan: RayFan
     body_levels: FloatArray | None
@@ -55,7 +62,7 @@ def settled(flow: Flow, frame: MovingFrame, vertices: FloatArray, stale: Tell = 
         If the shadow line crosses itself.
     """
     wish, body = frame.wish, flow.body
-    line = shadow_line(body, wish.direction)
+    line, drawn = shadow_line(body, wish.direction), measured(frame.fan)
     if stale():
         return None
     steps = len(frame.fan.travel_time) - 1
@@ -64,12 +71,15 @@ def settled(flow: Flow, frame: MovingFrame, vertices: FloatArray, stale: Tell = 
         return None
     angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
     if speed_of(body) is not None:
-        return Settled(wish, line, fan, None, angles, None)
-    levels = surface_levels(fan, vertices, wavenumber=wish.wavenumber, boundary=wish.boundary)
-    if stale():
-        return None
+        return Settled(wish, drawn, line, fan, None, angles, None)
+    levels = np.empty(len(vertices))
+    for first in range(0, len(vertices), BLOCK):
+        part = slice(first, first + BLOCK)
+        levels[part] = surface_levels(fan, vertices[part], wavenumber=wish.wavenumber, boundary=wish.boundary)
+        if stale():
+            return None
     far = far_field(fan, cut_directions(angles, wish.cut), wavenumber=wish.wavenumber, boundary=wish.boundary)
-    return Settled(wish, line, fan, levels, angles, far)
+    return Settled(wish, drawn, line, fan, levels, angles, far)
 
 
 def cut_directions(angles: FloatArray, azimuth: float) -> FloatArray:

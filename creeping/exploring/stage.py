@@ -18,7 +18,7 @@ from creeping.plotting._view import shadow_view
 from creeping.surface import Surface, normal, size
 from creeping.triangulation import Triangulation, triangulate
 
-CELLS = 56
+CELLS = 44
 """Of the drawn body along each side of its box."""
 INSET = 0.004
 """How much smaller the drawn body is, in body sizes."""
@@ -68,9 +68,11 @@ class Stage:
     ----------
     server : viser.ViserServer
     model : Model
+    still : bool
+        Whether there is nobody to turn the incidence.
     """
 
-    def __init__(self, server: Any, model: Model) -> None:
+    def __init__(self, server: Any, model: Model, *, still: bool = False) -> None:
         self.server, self.model, self.scene = server, model, server.scene
         self.scene.set_up_direction("+z")
         self.scene.configure_default_lights(enabled=True, cast_shadow=False)
@@ -79,16 +81,19 @@ class Stage:
         )
         self.painted: Any = None
         self._lines: dict[str, Any] = {}
-        self.incidence = self.scene.add_transform_controls(
-            "/incidence",
-            scale=1.1 * model.radius,
-            disable_axes=True,
-            disable_sliders=True,
-            position=model.centre,
-            depth_test=True,
-        )
-        # along +z, and turned with the controls on the page itself
-        shaft = np.array([[[0, 0, -1.7], [0, 0, -1.15]]]) * model.radius
+        if still:
+            self.incidence: Any = self.scene.add_frame("/incidence", show_axes=False, position=model.centre)
+        else:
+            self.incidence = self.scene.add_transform_controls(
+                "/incidence",
+                scale=1.1 * model.radius,
+                disable_axes=True,
+                disable_sliders=True,
+                position=model.centre,
+                depth_test=True,
+            )
+        # along +z, and turned with the controls on the page itself; before and behind the body, which hides one of them
+        shaft = np.array([[[0, 0, -1.7], [0, 0, -1.15]], [[0, 0, 1.15], [0, 0, 1.7]]]) * model.radius
         thick = 0.025 * model.radius
         self.scene.add_arrows(
             "/incidence/arrow",
@@ -103,7 +108,7 @@ class Stage:
         """Start the camera on the shadow side."""
         toward = shadow_view(direction).toward
         self.server.initial_camera.look_at = self.model.centre
-        self.server.initial_camera.position = self.model.centre + 2.3 * self.model.radius * toward
+        self.server.initial_camera.position = self.model.centre + 2.0 * self.model.radius * toward
 
     def turn(self, direction: FloatArray) -> None:
         """Turn the arrow of the incidence."""
@@ -131,29 +136,31 @@ class Stage:
             for status in ("occluded", "concave"):
                 self._line(f"line/{status}", np.zeros((0, 2, 3)), STATUS_COLOURS[status])
 
-    def settle(self, found: Settled) -> None:
-        """Draw what takes longer."""
+    def painted_mesh(self, found: Settled) -> Any:
+        """The body in the colours of the field on it, None without a field."""
+        import trimesh
+
+        if found.body_levels is None:
+            return None
+        return trimesh.Trimesh(
+            self.model.inset,
+            self.model.mesh.triangles,
+            vertex_normals=self.model.normals,
+            vertex_colors=field_colours(found.body_levels),
+            process=False,
+        )
+
+    def settle(self, found: Settled, paint: Any) -> None:
+        """Draw what takes longer, with what `painted_mesh` has made."""
         with self.server.atomic():
             for status, colour in STATUS_COLOURS.items():
                 pieces = [p for c in found.line.curves for p in status_pieces(c.points, c.status, status)]
                 joined = [segments(p[None]) for p in pieces]
                 self._line(f"line/{status}", np.concatenate(joined) if joined else np.zeros((0, 2, 3)), colour)
             self._line("outline", np.zeros((0, 2, 3)), RAY_COLOUR)
-            if found.body_levels is not None:
-                self._paint(found.body_levels)
-
-    def _paint(self, levels: FloatArray) -> None:
-        import trimesh
-
-        mesh = trimesh.Trimesh(
-            self.model.inset,
-            self.model.mesh.triangles,
-            vertex_normals=self.model.normals,
-            vertex_colors=field_colours(levels),
-            process=False,
-        )
-        self.painted = self.scene.add_mesh_trimesh("/field", mesh, cast_shadow=False, receive_shadow=False)
-        self.plain.visible = False
+            if paint is not None:
+                self.painted = self.scene.add_mesh_trimesh("/field", paint, cast_shadow=False, receive_shadow=False)
+                self.plain.visible = False
 
     def _line(self, name: str, points: FloatArray, colours: Any) -> None:
         """Set the segments (m, 2, 3) of a line and their colours, one or (m, 2, 3)."""

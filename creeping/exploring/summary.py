@@ -15,25 +15,25 @@ def moving_text(frame: MovingFrame, seconds: float, span: tuple[float, float]) -
     kind = "" if frame.levels is None else f"; colours: {span[0]:g} to {span[1]:g} dB, {field_name(wish.boundary)}"
     return (
         f"d = ({', '.join(f'{c:.4f}' for c in wish.direction)}), theta {wish.theta:.1f}, phi {wish.phi:.1f} degrees\n\n"
-        f"{_counts(fan)}; length {fan.length:.3g} L; {1e3 * seconds:.0f} ms{kind}"
+        f"{_counts(fan)}; length {fan.length:.3g}; {1e3 * seconds:.0f} ms{kind}"
     )
 
 
 def settled_text(found: Settled) -> str:
     """Line, errors and what the far field leaves open."""
-    line, fan = found.line, found.fan
+    line, drawn = found.line, found.drawn
     shares = ", ".join(f"{share:.3g} {name}" for name, share in line.fractions.items() if share)
     lines = [
         f"shadow line: {len(line.curves)} {'curve' if len(line.curves) == 1 else 'curves'}, "
         f"length {line.length:.8g} L; {shares}",
-        f"rays: {_counts(fan)}; error at their ends rms {fan.error.rms:.1e}, max {fan.error.max:.1e} L "
-        f"({fan.error.samples} traced)",
+        f"rays drawn: {_counts(drawn)}, length {drawn.length:.4g}; error at their ends rms {drawn.error.rms:.1e}, "
+        f"max {drawn.error.max:.1e} ({drawn.error.samples} traced)",
     ]
     if found.far is not None:
-        doubt = int(np.sum(found.far.unresolved))
+        doubt, fan, wish = int(np.sum(found.far.unresolved)), found.fan, found.wish
         lines.append(
-            f"far field: k = {found.wish.wavenumber:g} 1/L, {found.wish.boundary}; "
-            f"{doubt} of {len(found.cut_angles)} directions unresolved"
+            f"fields of {len(fan.points)} rays, rms {fan.error.rms:.1e}: k = {wish.wavenumber:g} 1/L, {wish.boundary}; "
+            f"{doubt} of {len(found.cut_angles)} directions of the cut unresolved"
         )
     else:
         lines.append("a weighted body has no field here: only its rays")

@@ -1,6 +1,5 @@
-"""Opening stored phase maps, and the cache that spares building them, or choosing between flows, again."""
+"""Opening stored phase maps, and the cache that spares building them again."""
 
-import json
 import os
 import shutil
 from collections.abc import Callable
@@ -11,7 +10,6 @@ import numpy as np
 from creeping._errors import CreepingError, StoredMapError
 from creeping._typing import Any
 from creeping._version import __version__
-from creeping.phaseflow.direct import DirectFlow
 from creeping.phaseflow.grids import Grid, Leap
 from creeping.phaseflow.models import Model, model_of
 from creeping.phaseflow.phase_map import Growth, PhaseMap
@@ -90,7 +88,8 @@ def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Mode
             raise StoredMapError(f"{folder}: tables {leap.state.shape} do not fit grid {grid.nodes}; rebuild the map")
 
 
-def _place(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Path:
+def cached_place(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Path:
+    """Where the cache has, or would have, what a body and these parameters decide."""
     root = cache_folder() if folder is True else Path(str(folder))
     digest = content_digest({"schema": SCHEMA, "version": __version__, "body": fingerprint(body), **key})
     return root / f"{type(body).__name__.lower()}-{digest[:24]}"
@@ -98,7 +97,7 @@ def _place(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Pat
 
 def is_cached(body: Surface, key: dict[str, Any], *, folder: bool | str | Path) -> bool:
     """Whether a map of the body with these parameters is in the cache."""
-    return _place(body, key, folder).exists()
+    return cached_place(body, key, folder).exists()
 
 
 def cached_phase_map(
@@ -112,7 +111,7 @@ def cached_phase_map(
     """Open the map from the cache, or build it and store it; a second process waits for the first."""
     from filelock import FileLock
 
-    place = _place(body, key, folder)
+    place = cached_place(body, key, folder)
     root = place.parent
     try:
         root.mkdir(parents=True, exist_ok=True)
@@ -136,39 +135,3 @@ def cached_phase_map(
         return result
     finally:
         lock.release()
-
-
-def remembered_choice(body: Surface, key: dict[str, Any], *, folder: bool | str | Path) -> DirectFlow | str | None:
-    """The flow that was chosen for these parameters before: "map", or the direct one itself; None if there is none."""
-    try:
-        content = json.loads(_choice_file(body, key, folder).read_text(encoding="utf-8"))
-        if content["kind"] == "map":
-            return "map"
-        rtol, horizon, step = float(content["rtol"]), float(content["horizon"]), content["step"]
-        measured = MapError(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
-        return DirectFlow(body, rtol, horizon, None if step is None else float(step), measured)
-    except (OSError, ValueError, KeyError, TypeError, IndexError):
-        # what cannot be read is chosen again
-        return None
-
-
-def remember_choice(
-    body: Surface, key: dict[str, Any], flow: PhaseMap | DirectFlow, *, folder: bool | str | Path
-) -> None:
-    """Keep a choice, which rests on measured times, so that the next run makes the same, if there is a place for it."""
-    content: dict[str, Any] = {"kind": "map"}
-    if isinstance(flow, DirectFlow):
-        measured = flow.error and [flow.error.rms, flow.error.max, flow.error.samples]
-        content = {"kind": "direct", "rtol": flow.rtol, "horizon": flow.horizon, "step": flow.step, "error": measured}
-    place = _choice_file(body, key, folder)
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        part = place.with_name(f"{place.name}.{os.getpid()}")
-        part.write_text(json.dumps(content), encoding="utf-8")
-        part.replace(place)
-    except OSError:
-        return
-
-
-def _choice_file(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Path:
-    return _place(body, {"choice": key}, folder).with_suffix(".json")

@@ -15,7 +15,8 @@ from creeping._errors import IntegrationError, InvalidInputError, ToleranceError
 from creeping._typing import FloatArray
 from creeping.phaseflow.building import Progress, require_checked, settled, upper_bound
 from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.caching import cached_phase_map, is_cached, remember_choice, remembered_choice
+from creeping.phaseflow.caching import cached_phase_map, is_cached
+from creeping.phaseflow.choices import remember_choice, remembered_choice
 from creeping.phaseflow.compiled_models import CompiledModel
 from creeping.phaseflow.direct import DirectFlow
 from creeping.phaseflow.geodesic import natural_horizon
@@ -65,7 +66,8 @@ def choose_flow(
         Whether the Jacobi matrix is wanted, as by fans.
     cache : bool or path
         As for `build_phase_map`; a map in the cache costs nothing to build. The choice is kept there too: it rests on
-        measured times, and a later run is to carry its rays in the same way.
+        measured times, and a later run is to carry its rays in the same way; a map that has come into the cache since
+        reopens it.
     progress : callable, optional
         Called with a line of text before each long step, and with the reason of the choice.
 
@@ -85,21 +87,36 @@ def choose_flow(
         raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
     if not 1e-12 <= tolerance <= 1e-1:
         raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-12 and 1e-1")
-    request = Request(
-        body, max(tolerance, 1e-9), length, outputs, None, None, None, None, ride_along, "direct", None, None
-    )
+    bounded, riding = max(float(tolerance), 1e-9), bool(ride_along)
+    request = Request(body, bounded, length, outputs, None, None, None, None, riding, "direct", None, None)
     say = progress or (lambda _: None)
     require_checked(body)
     request.rays = int(rays)
-    key = request.key() | {"tolerance": tolerance, "rays": int(rays)}
-    before = remembered_choice(body, key, folder=cache) if cache is not False else None
+    if cache is False:
+        return _chosen(request, tolerance, False, False, say)
+    key = request.key() | {"tolerance": float(tolerance), "rays": int(rays)}
+    stored = _stored(request, tolerance, cache)
+    before = remembered_choice(body, key, length / outputs, stored=stored, folder=cache)
     if isinstance(before, DirectFlow):
         say("direct integration, as chosen before")
         return before
     flow = _chosen(request, tolerance, cache, before is not None, say)
-    if cache is not False:
-        remember_choice(body, key, flow, folder=cache)
+    remember_choice(body, key, flow, stored=_stored(request, tolerance, cache), folder=cache)
     return flow
+
+
+def _stored(request: Request, tolerance: float, cache: bool | str | Path) -> bool:
+    """Whether a map for the request is in the cache; one tuned for the usual number of rays will do."""
+    if cache is False or tolerance < 1e-9:
+        return False
+    rays = request.rays
+    if is_cached(request.body, request.key(), folder=cache):
+        return True
+    request.rays = RAYS
+    if is_cached(request.body, request.key(), folder=cache):
+        return True
+    request.rays = rays
+    return False
 
 
 def _chosen(
@@ -110,12 +127,7 @@ def _chosen(
     length = request.length
     assert length is not None
     cost = tracing_cost(body)
-    stored = cache is not False and tolerance >= 1e-9 and is_cached(body, request.key(), folder=cache)
-    if not stored and cache is not False and tolerance >= 1e-9:
-        # one tuned for the usual number of rays will do
-        request.rays = RAYS
-        stored = is_cached(body, request.key(), folder=cache)
-        request.rays = request.rays if stored else rays
+    stored = _stored(request, tolerance, cache)
     if stored and before:
         say("phase map, as chosen before")
         return cached_phase_map(body, request.key(), lambda: tuned_map(request, say), folder=cache, progress=say)

@@ -18,6 +18,8 @@ from pathlib import Path
 
 REMEDY = "on Debian or Ubuntu install libegl1 libgl1-mesa-dri libx11-6"
 TIMEOUT = 60.0
+LIBRARIES = ("/usr/lib", "/usr/lib64", f"/usr/lib/{platform.machine()}-linux-gnu", "/usr/share/glvnd")
+"""Folders of the libraries that a picture needs."""
 _SCRIPT = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
@@ -94,8 +96,8 @@ def _probe() -> tuple[GLProbe, bool]:
 def _key() -> str:
     """Everything the verdict hangs on.
 
-    The time of the linker's cache changes whenever a library is installed or removed, the machine's name keeps
-    apart the nodes that share one home folder.
+    The time of the linker's cache changes whenever a library is installed or removed; sizes of the libraries tell a
+    container that hides them. The machine's name keeps apart the nodes that share one home folder.
     """
     prefixes = ("PYVISTA", "VTK_", "LIBGL_", "EGL_", "MESA_", "__GLX", "__EGL")
     names = ("DISPLAY", "WAYLAND_DISPLAY", "LD_LIBRARY_PATH")
@@ -104,7 +106,14 @@ def _key() -> str:
         libraries = os.stat("/etc/ld.so.cache").st_mtime_ns
     except OSError:
         libraries = 0
-    parts = [sys.executable, platform.node(), _version("vtk"), _version("pyvista"), libraries, surroundings]
+    found = sorted(
+        (str(file), file.stat().st_size)
+        for root in LIBRARIES
+        for name in ("libX11.so*", "libEGL*.so*", "libGL*.so*", "libOpenGL.so*", "libgallium*.so*", "egl_vendor.d/*")
+        for file in Path(root).glob(name)
+        if file.is_file()
+    )
+    parts = [sys.executable, platform.node(), _version("vtk"), _version("pyvista"), libraries, found, surroundings]
     return hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
 
 

@@ -4,13 +4,15 @@ It is the fan of `creeping.rays.launch` with a line that has no curves to draw, 
 inserted, and an error that has not been measured.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from creeping._errors import SingularIncidenceError
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.phaseflow.geodesic import normal_curvature
-from creeping.phaseflow.tracing import MapError, compiled_parts, pack
-from creeping.rays.fan import Flow, RayFan, RayStatus, launch, rough_from
+from creeping.phaseflow.tracing import MapError, compiled_parts, pack, trace_states
+from creeping.rays.fan import CHECKED_RAYS, Flow, RayFan, RayStatus, launch, rough_from
 from creeping.rays.launch_points import line_tangents
 from creeping.rays.shadow import ShadowLine, shadow_line
 from creeping.rays.spreading import spread, zeros_passed
@@ -59,6 +61,18 @@ def quick_fan(flow: Flow, direction: ArrayLike, *, length: float, n_rays: int, n
     first = pack(starts, np.broadcast_to(d, starts.shape), lanes=12)[:, None]
     states = np.concatenate([first, carried(flow, lines, times[1:], lanes=12)[0, there]], axis=1)
     return _assembled(flow, ShadowLine(body, d, (), distance), lines, there, states, times)
+
+
+def measured(fan: RayFan) -> RayFan:
+    """The fan with the error of (x, p) at its end, against direct integration of some rays."""
+    if not len(fan.points):
+        return fan
+    chosen = np.unique(np.linspace(0, len(fan.points) - 1, CHECKED_RAYS).astype(int))
+    starts = pack(fan.points[chosen, 0], fan.directions[chosen, 0])
+    exact = trace_states(fan.body, starts, fan.travel_time[-1:], rtol=1e-12)[:, 0]
+    ends = np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1)
+    error = np.linalg.norm(ends - exact, axis=1)
+    return replace(fan, error=MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen)))
 
 
 def _assembled(flow: Flow, line: ShadowLine, lines: Any, there: Any, states: FloatArray, times: FloatArray) -> RayFan:

@@ -106,7 +106,18 @@ def test_a_singular_incidence_is_named():
         made.close()
 
 
-@pytest.mark.parametrize("origin, let_in", [("http://127.0.0.1:8123", True), (None, True), ("http://a.example", False)])
+@pytest.mark.parametrize(
+    "origin, let_in",
+    [
+        ("http://127.0.0.1:8123", True),
+        (None, True),
+        ("http://a.example", False),
+        ("null", False),
+        ("file://", False),
+        ("http://[::1", False),
+        ("http://127.0.0.1.a.example", False),
+    ],
+)
 def test_another_site_is_turned_away(page, origin, let_in):
     import viser
     from websockets.exceptions import ConnectionClosed
@@ -126,6 +137,60 @@ def test_another_site_is_turned_away(page, origin, let_in):
     assert closed is not let_in
 
 
-def test_nothing_is_shared_with_the_world(page):
+def test_nothing_is_shared_with_the_world(page, monkeypatch):
+    import viser._tunnel
+
+    asked = []
+    monkeypatch.setattr(viser._tunnel.ViserTunnel, "__init__", lambda *a, **k: asked.append(a))
     assert page.server.get_host() == "127.0.0.1"
-    assert page.server.request_share_url() is None
+    assert page.server.request_share_url() is None and asked == []
+
+
+def test_a_settled_result_is_not_drawn_over_a_newer_frame(page, monkeypatch):
+    from creeping.exploring import page as module
+
+    settled(page)
+    began, real = [], module.settled_text
+
+    def late(found):
+        # a newer wish is drawn after the work was found good, and before it is drawn
+        began.append(found.wish.theta)
+        if found.wish.theta == 60.0:
+            page.ask(theta=70.0)
+            until = time.monotonic() + 30
+            while "theta 70.0" not in page.status.content and time.monotonic() < until:
+                time.sleep(0.01)
+        return real(found)
+
+    monkeypatch.setattr(module, "settled_text", late)
+    drawn = []
+    monkeypatch.setattr(page.stage, "settle", lambda found, paint: drawn.append(found.wish.theta))
+    page.ask(theta=60.0)
+    until = time.monotonic() + 90
+    while 70.0 not in drawn:
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    assert began[0] == 60.0 and 60.0 not in drawn
+
+
+def test_iso_phase_curves_can_be_turned_off_and_a_refusal_resets_the_slider(page):
+    slider = page.sliders["spacing"]
+    assert slider.min == 0.0
+
+    class Event:
+        client, target = object(), slider
+
+    slider.value = 1e-4
+    page._slid("spacing", Event)
+    assert "curves" in page.status.content and slider.value == page.wish.spacing == WISH.spacing
+    slider.value = 0.0
+    page._slid("spacing", Event)
+    assert page.wish.spacing == 0.0
+
+
+def test_nothing_works_on_after_the_end():
+    from creeping.exploring.page import Explorer
+
+    made = Explorer(cr.DirectFlow(BODY, rtol=1e-6), WISH, port=8150)
+    made.close()
+    assert not any(worker.is_alive() for worker in made._workers)

@@ -159,9 +159,37 @@ def test_a_damaged_choice_is_made_again(tmp_path):
     options = {"rays": 10, "length": 2.0, "cache": tmp_path}
     first = cr.choose_flow(sc.Sphere(), **options)
     (kept,) = tmp_path.glob("*.json")
-    for text in ("", "[]", '{"kind": "direct", "rtol": "x"}', '{"kind": "direct", "rtol": 2, "horizon": 1, "step": 1}'):
+    whole = kept.read_text()
+    changed = (whole.replace('"rtol": ', '"rtol": 1'), whole.replace('"step": null', '"step": 0.9'))
+    for text in ("", "[]", "3", '{"kind": "direct", "rtol": "x"}', *changed):
+        assert text != whole
         kept.write_text(text)
-        assert cr.choose_flow(sc.Sphere(), **options) == first
+        said = []
+        assert cr.choose_flow(sc.Sphere(), progress=said.append, **options) == first
+        assert "as chosen before" not in said[-1]
+
+
+def test_a_map_that_has_come_since_reopens_the_choice(tmp_path):
+    body = sc.Sphere()
+    options = {"rays": 20_000, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
+    assert isinstance(cr.choose_flow(body, **options), cr.DirectFlow)
+    cr.build_phase_map(body, length=4.0, tolerance=1e-4, cache=tmp_path)
+    said = []
+    cr.choose_flow(body, progress=said.append, **options)
+    assert "as chosen before" not in said[-1]
+    again = []
+    cr.choose_flow(body, progress=again.append, **options)
+    assert "as chosen before" in again[-1]
+
+
+def test_numbers_of_numpy_make_the_same_choice(tmp_path):
+    options = {"length": 2.0, "cache": tmp_path}
+    first = cr.choose_flow(sc.Sphere(), rays=10, tolerance=1e-5, **options)
+    assert (
+        cr.choose_flow(sc.Sphere(), rays=np.int64(10), tolerance=np.float64(1e-5), ride_along=np.True_, **options)
+        == first
+    )
+    assert len(list(tmp_path.glob("*.json"))) == 1
 
 
 @pytest.mark.parametrize(
