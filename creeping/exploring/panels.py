@@ -88,7 +88,7 @@ def plane_svg(found: Settled) -> str:
 
 
 def cut_svg(found: Settled) -> str:
-    """Far field in dB over theta; empty for a weighted body."""
+    """Far field in dB over theta, unresolved directions as circles; empty for a weighted body."""
     if found.far is None:
         return ""
     curves = {
@@ -101,11 +101,19 @@ def cut_svg(found: Settled) -> str:
     axes = _Axes((-180, 180), (low, high), 0.56 * WIDTH)
     parts = []
     for number, name in reversed(list(enumerate(levels))):
-        inside = np.clip(levels[name], low, high)
+        inside = np.stack([found.cut_angles, np.clip(levels[name], low, high)], axis=1)
         colour = "#111111" if name == "total" else COLOURS[number - 1]
-        parts.append(
-            axes.lines([np.stack([found.cut_angles, inside], axis=1)], colour, 1.2 if name == "total" else 0.8)
-        )
+        if name == "total":
+            # what is not resolved is no curve
+            doubt = found.far.unresolved
+            runs = np.split(np.arange(len(doubt)), np.flatnonzero(np.diff(doubt)) + 1)
+            parts.append(axes.lines([inside[run] for run in runs if not doubt[run[0]]], colour, 1.2))
+            parts += [
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.5" fill="none" stroke="#888"/>'
+                for x, y in axes.place(inside[doubt])
+            ]
+        else:
+            parts.append(axes.lines([inside], colour, 0.8))
         label = f'x="{LEFT + 8 + 60 * number}" y="{TOP + 11}" font-size="9" font-family="sans-serif"'
         parts.append(f'<text {label} fill="{colour}">{name}</text>')
     ticks = np.arange(low, high + 1, 20.0 if high - low > 40 else 10.0)

@@ -22,6 +22,8 @@ CELLS = 44
 """Of the drawn body along each side of its box."""
 INSET = 0.004
 """How much smaller the drawn body is, in body sizes."""
+CAMERA = 3.9
+"""Distance of the camera, in radii of the body's box."""
 WIDTHS = {"rays": 1.0, "levels": 2.0, "line": 4.0, "outline": 1.5}
 """Of lines, in pixels."""
 
@@ -93,8 +95,8 @@ class Stage:
                 depth_test=True,
             )
         # along +z, and turned with the controls on the page itself; before and behind the body, which hides one of them
-        shaft = np.array([[[0, 0, -1.7], [0, 0, -1.15]], [[0, 0, 1.15], [0, 0, 1.7]]]) * model.radius
-        thick = 0.025 * model.radius
+        shaft = np.array([[[0, 0, -1.55], [0, 0, -1.1]], [[0, 0, 1.1], [0, 0, 1.55]]]) * model.radius
+        thick = 0.015 * model.radius
         self.scene.add_arrows(
             "/incidence/arrow",
             shaft,
@@ -108,7 +110,8 @@ class Stage:
         """Start the camera on the shadow side."""
         toward = shadow_view(direction).toward
         self.server.initial_camera.look_at = self.model.centre
-        self.server.initial_camera.position = self.model.centre + 2.0 * self.model.radius * toward
+        self.server.initial_camera.position = self.model.centre + CAMERA * self.model.radius * toward
+        self.server.initial_camera.fov = float(np.radians(40))
 
     def turn(self, direction: FloatArray) -> None:
         """Turn the arrow of the incidence."""
