@@ -99,14 +99,19 @@ def iso_phase_curves(
     last = np.full(len(fan.points), fan.length)
     if not beyond_detachment:
         last = np.minimum(last, fan.detachment)
-    curves = []
+    pieces = []
     for level in values:
         time = level - offset
         met = np.flatnonzero((time >= 0) & (time <= last))
-        for run, closed in _runs(fan, met):
-            points = hermite.at(run, time[run])
-            curves.append(IsoPhaseCurve(float(level), of, points, closed, fan.body.parameters(points), run))
-    return curves
+        pieces += [(float(level), run, time[run], closed) for run, closed in _runs(fan, met)]
+    if not pieces:
+        return []
+    # all points in one call: a level has few
+    points = hermite.at(np.concatenate([run for _, run, _, _ in pieces]), np.concatenate([t for _, _, t, _ in pieces]))
+    parameters = fan.body.parameters(points)
+    ends = np.cumsum([len(run) for _, run, _, _ in pieces])[:-1]
+    parts = zip(pieces, np.split(points, ends), np.split(parameters, ends), strict=True)
+    return [IsoPhaseCurve(level, of, x, closed, angles, run) for (level, run, _, closed), x, angles in parts]
 
 
 def _runs(fan: RayFan, met: IntArray) -> Iterable[tuple[IntArray, bool]]:
