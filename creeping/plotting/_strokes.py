@@ -115,7 +115,7 @@ def ray_strokes(fan: RayFanLike, rays: int, until: float, *, spacing: float = 0.
         bound += list(runs(fine, ok & (fine_times <= detachment)))
         # one point more, so that the two parts join
         free += list(runs(fine, ok & (fine_times >= detachment - np.max(np.diff(fine_times), initial=0.0))))
-    found = [Stroke(free, RAY_COLOUR, 0.45, alpha=0.3, label="ray after detachment")] if free else []
+    found = [Stroke(free, RAY_COLOUR, 0.5, alpha=0.5, label="ray after detachment")] if free else []
     return found + ([Stroke(bound, RAY_COLOUR, 0.6, label="creeping ray")] if bound else [])
 
 

@@ -164,15 +164,18 @@ def cut_curves(
             colour = COLOURS[len(thick) % len(COLOURS)]
             style = {"color": colour, "linewidth": 1.3}
             thick.append(Curve(label + suffix, _levels(pick(whole), quantity), style))
-            for part, dashes in PARTS.items() if parts and hasattr(field, "total") else ():
-                style = {"color": colour, "linewidth": 0.7, "linestyle": dashes}
+            for number, (part, dashes) in enumerate(PARTS.items() if parts and hasattr(field, "total") else ()):
+                # of one curve alone the parts have colours of their own, of several that of their curve
+                own = COLOURS[1 + number] if len(fields) == 1 and not suffix else colour
+                style = {"color": own, "linewidth": 0.7, "linestyle": dashes}
                 levels = _levels(pick(getattr(field, part)), quantity)
                 # a part that is nowhere has no line
                 if np.any(np.isfinite(levels)):
                     thin.append(Curve(f"{label}{suffix}, {part}", levels, style))
     if exact is not None:
         for suffix, pick in _picks("exact", exact, count, components):
-            style = {"color": EXACT, "linewidth": 0.81}
+            # broad and pale, so that a curve that lies on it hides it not
+            style = {"color": EXACT, "linewidth": 3.2, "alpha": 0.3}
             thin.append(Curve(f"exact{suffix}", _levels(pick(exact), quantity), style))
     return thick + thin
 
