@@ -225,7 +225,7 @@ def _readable(summary: dict[str, Any]) -> str:
     counts = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in summary["status"].items() if n)
     now = (
         f"{summary['incidences_now']} of them now, in {summary['seconds']:.1f} s "
-        f"({summary['incidences_per_second']:g} a second)"
+        f"({summary['incidences_per_second']:.3g} a second once under way)"
     )
     nothing = summary["complete"] and not summary["incidences_now"]
     rows = [

@@ -29,7 +29,7 @@ def draw(path: Path, quick: bool) -> dict[str, Any]:
     far_cut_picture(
         path,
         theta,
-        {"creeping rays": field},
+        {"asymptotic": field},
         exact=exact,
         parts=True,
         angle_name="angle from the forward direction",
