@@ -163,6 +163,7 @@ def test_start_is_near_the_distance(equations):
     assert np.median(np.abs(found[near] - distance[near])) < 0.1
 
 
+@pytest.mark.slow
 def test_orders_of_convergence():
     # h goes with the distance of the points
     steps = np.log([spacing(TRIAXIAL, n) for n in COUNTS])

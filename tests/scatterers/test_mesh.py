@@ -315,6 +315,7 @@ def drop():
     return points, triangles
 
 
+@pytest.mark.slow
 def test_rough_ground_is_at_the_tip_only():
     with pytest.raises(ValueError, match="not smooth enough"):
         sc.Mesh(Triangles(*drop()), cache=False)

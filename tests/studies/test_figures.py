@@ -40,7 +40,7 @@ PAPER = [name for name in studies.FIGURES if name.startswith("fig")]
 FIELD = [name for name in studies.FIGURES if name.startswith(("field", "sweep"))]
 
 
-SLOW = ("sweep-cross-section", "sweep-bistatic")
+SLOW = ("sweep-cross-section", "sweep-bistatic", "sweep-sphere-rcs")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in FIELD])
@@ -64,6 +64,7 @@ def test_field_on_the_body_is_measured(drawn):
     assert np.median(card["error"]["field"]["median_relative_by_arclength"]) < 10.5
 
 
+@pytest.mark.slow
 def test_creeping_wave_beats_in_step_on_the_conducting_sphere(drawn):
     card, _, _ = drawn("sweep-sphere-rcs")
     found = card["error"]["field"]

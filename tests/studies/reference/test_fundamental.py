@@ -60,6 +60,7 @@ def test_reciprocity(boundary):
     assert abs(there) > 0.01
 
 
+@pytest.mark.slow
 def test_mirrors_change_nothing():
     kept = [fundamental.scatter(replace(TWISTED, mirrors=m), 6.0, OBLIQUE, "hard", depth=0.15) for m in ((), (0, 2))]
     r = sphere_of_directions(8)[0]
