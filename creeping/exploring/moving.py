@@ -14,13 +14,15 @@ from creeping.field.on_rays import ray_magnitude
 from creeping.phaseflow.geodesic import natural_horizon, speed_of
 from creeping.plotting._decibels import decibels
 from creeping.rays.fan import Flow, RayFan
-from creeping.rays.isophase import iso_phase_curves
+from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
 from creeping.surface import Surface
 from creeping.sweeping.quick_fan import quick_fan
 from creeping.triangulation import Triangulation
 
 MOST_STEPS = 192
 """Of a ray."""
+NOTHING: FloatArray = np.zeros((0, 2, 3), dtype=np.float32)
+"""No segments, in the precision of the page."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +57,18 @@ class MovingFrame:
     @cached_property
     def level_segments(self) -> tuple[FloatArray, FloatArray]:
         """Segments of the iso-phase curves (m, 2, 3), and the level of each (m,)."""
-        levels = self.wish.levels
-        curves = iso_phase_curves(self.fan, levels[levels <= self.fan.length])
+        curves = wished_curves(self.wish, self.fan)
         pieces = [segments(c.points[None], closed=c.closed) for c in curves]
-        values = [np.full(len(piece), c.level) for piece, c in zip(pieces, curves, strict=True)]
-        return (np.concatenate(pieces), np.concatenate(values)) if pieces else (np.zeros((0, 2, 3), "f4"), np.zeros(0))
+        return joined(pieces), np.concatenate(
+            [np.zeros(0), *(np.full(len(p), c.level) for p, c in zip(pieces, curves, strict=True))]
+        )
 
     @cached_property
     def launch_segments(self) -> FloatArray:
         """The attached part of the shadow line through the launch points (m, 2, 3)."""
         start, fan = self.fan.points[:, 0], self.fan
         arcs = [np.flatnonzero(fan.arc_index == k) for k in range(len(fan.closed_arcs))]
-        pieces = [segments(start[a][None], closed=c) for a, c in zip(arcs, fan.closed_arcs, strict=True) if len(a)]
-        return np.concatenate(pieces) if pieces else np.zeros((0, 2, 3), "f4")
+        return joined([segments(start[a][None], closed=c) for a, c in zip(arcs, fan.closed_arcs, strict=True)])
 
 
 def moving_frame(flow: Flow, wish: Wish, step: float) -> MovingFrame:
@@ -99,6 +100,16 @@ def steps_of(length: float, step: float) -> tuple[int, float]:
 def step_of(body: Surface) -> float:
     """Travel time between the points of a ray on the page: a quarter of the natural horizon."""
     return natural_horizon(body) / 4
+
+
+def wished_curves(wish: Wish, fan: RayFan) -> list[IsoPhaseCurve]:
+    """Iso-phase curves of a fan at the levels that its rays reach."""
+    return iso_phase_curves(fan, wish.levels[wish.levels <= fan.length])
+
+
+def joined(pieces: list[FloatArray]) -> FloatArray:
+    """All segments of several lines (m, 2, 3)."""
+    return np.concatenate([NOTHING, *pieces])
 
 
 def segments(points: FloatArray, *, closed: bool = False) -> FloatArray:

@@ -9,12 +9,12 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.exploring.colours import LEVEL_COLOURS
+from creeping.exploring.moving import wished_curves
 from creeping.exploring.settled import Settled
 from creeping.plotting._decibels import cross_section_decibels, shown_range
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, status_pieces
 from creeping.plotting.far_cuts import COLOURS
 from creeping.plotting.parameter_plane import is_torus
-from creeping.rays.isophase import iso_phase_curves
 from creeping.rays.seam import split_at_seam
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 34.0, 8.0, 8.0, 30.0
@@ -75,8 +75,7 @@ def plane_svg(found: Settled) -> str:
     axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
     chosen = np.unique(np.linspace(0, len(fan.points) - 1, min(DRAWN, len(fan.points))).astype(int))
     parts = [axes.lines(_flat(body.parameters(fan.points[k]) for k in chosen), RAY_COLOUR, 0.5, 0.6)]
-    levels = found.wish.levels
-    for curve in iso_phase_curves(fan, levels[levels <= fan.length]):
+    for curve in wished_curves(found.wish, fan):
         pieces = [np.degrees(piece[:, ::-1]) for piece in curve.parameter_pieces]
         parts.append(axes.lines(pieces, LEVEL_COLOURS.hexadecimal(curve.level / fan.length), 0.9))
     for status, colour in STATUS_COLOURS.items():

@@ -16,6 +16,7 @@ from creeping.phaseflow.geodesic import speed_of
 from creeping.plotting.field_pictures import surface_levels
 from creeping.rays.fan import Flow, RayFan, launch
 from creeping.rays.shadow import ShadowLine, shadow_line
+from creeping.sweeping.directions import directions_from_angles
 from creeping.sweeping.quick_fan import measured
 
 CUT_STEP = 2.0
@@ -84,5 +85,4 @@ def settled(flow: Flow, frame: MovingFrame, vertices: FloatArray, stale: Tell = 
 
 def cut_directions(angles: FloatArray, azimuth: float) -> FloatArray:
     """Directions of a cut: theta (m,) in degrees, negative on the opposite half plane: (m, 3)."""
-    theta, phi = np.radians(angles), np.radians(azimuth)
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    return directions_from_angles(np.radians(angles), np.radians(azimuth))

@@ -10,7 +10,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.exploring.colours import ENDED, LEVEL_COLOURS, field_colours
-from creeping.exploring.moving import MovingFrame, outline, segments
+from creeping.exploring.moving import NOTHING, MovingFrame, joined, outline, segments
 from creeping.exploring.settled import Settled
 from creeping.field.on_rays import creeps
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, status_pieces
@@ -53,9 +53,7 @@ class Model:
         """Triangulate a body."""
         mesh = triangulate(body.level, body.gradient, body.bounds, cells=CELLS)
         box = np.asarray(body.bounds, dtype=float)
-        return cls(
-            body, mesh, normal(body, mesh.vertices), 0.5 * float(np.linalg.norm(box[1] - box[0])), box.mean(axis=0)
-        )
+        return cls(body, mesh, normal(body, mesh.vertices), size(body), box.mean(axis=0))
 
     @property
     def inset(self) -> FloatArray:
@@ -119,7 +117,7 @@ class Stage:
 
     def show(self, frame: MovingFrame) -> None:
         """Draw what follows at once; the field on the body is hidden until it is known again."""
-        levels, shape = frame.levels, frame.fan.spreading.shape
+        levels = frame.levels
         if levels is None:
             alive = creeps(frame.fan)[..., None]
             colours = np.where(alive, np.array(rgb(RAY_COLOUR)), np.array(ENDED)).astype(np.uint8)
@@ -132,12 +130,12 @@ class Stage:
             if self.painted is not None:
                 self.painted.visible = False
             self.plain.visible = True
-            self._line("rays", frame.ray_segments if shape[0] else np.zeros((0, 2, 3)), pairs)
+            self._line("rays", frame.ray_segments, pairs)
             self._line("levels", curves, shades)
             self._line("outline", outline(self.model.mesh, self.model.normals, frame.wish.direction), RAY_COLOUR)
             self._line("line/attached", frame.launch_segments, STATUS_COLOURS["attached"])
             for status in ("occluded", "concave"):
-                self._line(f"line/{status}", np.zeros((0, 2, 3)), STATUS_COLOURS[status])
+                self._line(f"line/{status}", NOTHING, STATUS_COLOURS[status])
 
     def painted_mesh(self, found: Settled) -> Any:
         """The body in the colours of the field on it, None without a field."""
@@ -158,9 +156,8 @@ class Stage:
         with self.server.atomic():
             for status, colour in STATUS_COLOURS.items():
                 pieces = [p for c in found.line.curves for p in status_pieces(c.points, c.status, status)]
-                joined = [segments(p[None]) for p in pieces]
-                self._line(f"line/{status}", np.concatenate(joined) if joined else np.zeros((0, 2, 3)), colour)
-            self._line("outline", np.zeros((0, 2, 3)), RAY_COLOUR)
+                self._line(f"line/{status}", joined([segments(p[None]) for p in pieces]), colour)
+            self._line("outline", NOTHING, RAY_COLOUR)
             if paint is not None:
                 self.painted = self.scene.add_mesh_trimesh("/field", paint, cast_shadow=False, receive_shadow=False)
                 self.plain.visible = False

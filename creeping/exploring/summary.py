@@ -6,7 +6,7 @@ from creeping._version import __version__
 from creeping.exploring.colours import FIELD_COLOURS
 from creeping.exploring.moving import MovingFrame
 from creeping.exploring.settled import Settled
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 
 
 def moving_text(frame: MovingFrame, seconds: float, span: tuple[float, float]) -> str:
@@ -62,5 +62,5 @@ def colour_bar(span: tuple[float, float], boundary: str) -> str:
 
 
 def _counts(fan: RayFan) -> str:
-    counts = ", ".join(f"{int(np.sum(fan.status == s))} {s.name}" for s in RayStatus if np.any(fan.status == s))
+    counts = ", ".join(f"{count} {name}" for name, count in fan.status_counts.items())
     return f"{len(fan.points)} rays" + (f" ({counts})" if counts else ": no part of the line launches any")

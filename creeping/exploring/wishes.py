@@ -11,6 +11,7 @@ import numpy as np
 from creeping._errors import InvalidInputError
 from creeping._typing import Any, FloatArray
 from creeping.field.coefficients import parse_boundary
+from creeping.sweeping.directions import angles_of, directions_from_angles
 
 BOUNDARIES = ("soft", "hard")
 RAYS = (16, 1024)
@@ -68,8 +69,7 @@ class Wish:
     @property
     def direction(self) -> FloatArray:
         """Unit vector d (3,)."""
-        theta, phi = np.radians([self.theta, self.phi])
-        return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+        return directions_from_angles(*np.radians([self.theta, self.phi]))
 
     @property
     def levels(self) -> FloatArray:
@@ -85,5 +85,5 @@ class Wish:
 
 def angles(direction: FloatArray) -> tuple[float, float]:
     """Theta in 0..180 and phi in -180..180, degrees, of a vector (3,) that is not zero."""
-    x, y, z = (float(c) for c in direction)
-    return float(np.degrees(np.arctan2(np.hypot(x, y), z))), float(np.degrees(np.arctan2(y, x)))
+    theta, phi = angles_of(direction)
+    return float(np.degrees(theta)), float(np.degrees(phi))

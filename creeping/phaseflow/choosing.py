@@ -93,21 +93,21 @@ def choose_flow(
     require_checked(body)
     request.rays = int(rays)
     if cache is False:
-        return _chosen(request, tolerance, False, False, say)
+        return _chosen(request, tolerance, False, False, False, say)
     key = request.key() | {"tolerance": float(tolerance), "rays": int(rays)}
     stored = _stored(request, tolerance, cache)
     before = remembered_choice(body, key, length / outputs, stored=stored, folder=cache)
     if isinstance(before, DirectFlow):
         say("direct integration, as chosen before")
         return before
-    flow = _chosen(request, tolerance, cache, before is not None, say)
+    flow = _chosen(request, tolerance, cache, stored, before is not None, say)
     remember_choice(body, key, flow, stored=_stored(request, tolerance, cache), folder=cache)
     return flow
 
 
 def _stored(request: Request, tolerance: float, cache: bool | str | Path) -> bool:
-    """Whether a map for the request is in the cache; one tuned for the usual number of rays will do."""
-    if cache is False or tolerance < 1e-9:
+    """Whether a map for the request is in the cache; one for the usual number of rays will do and is taken."""
+    if tolerance < 1e-9:
         return False
     rays = request.rays
     if is_cached(request.body, request.key(), folder=cache):
@@ -120,14 +120,13 @@ def _stored(request: Request, tolerance: float, cache: bool | str | Path) -> boo
 
 
 def _chosen(
-    request: Request, tolerance: float, cache: bool | str | Path, before: bool, say: Progress
+    request: Request, tolerance: float, cache: bool | str | Path, stored: bool, before: bool, say: Progress
 ) -> PhaseMap | DirectFlow:
-    """The flow that is cheaper by the clock, or the stored map if that was the choice ``before``."""
+    """The flow that is cheaper by the clock, or the map if it is ``stored`` and was the choice ``before``."""
     body, rays, outputs, ride_along = request.body, request.rays, request.outputs, request.ride_along
     length = request.length
     assert length is not None
     cost = tracing_cost(body)
-    stored = _stored(request, tolerance, cache)
     if stored and before:
         say("phase map, as chosen before")
         return cached_phase_map(body, request.key(), lambda: tuned_map(request, say), folder=cache, progress=say)

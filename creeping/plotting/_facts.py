@@ -58,18 +58,14 @@ def of_shadow_curve(curve: "ShadowCurve") -> Facts:
 
 def of_fan(fan: "RayFan") -> Facts:
     """Facts of a fan."""
-    from creeping.rays.fan import RayStatus
-
     yield "body", brief(fan.body, 200)
     yield "direction", _direction(fan.line.direction)
     yield "rays", str(len(fan.points))
     yield "steps", str(len(fan.travel_time))
     yield "length", f"{fan.length:g}"
     yield "arcs", str(len(fan.closed_arcs))
-    for status in RayStatus:
-        count = int(np.sum(fan.status == status))
-        if count:
-            yield status.name, f"{count} rays"
+    for name, count in fan.status_counts.items():
+        yield name, f"{count} rays"
     if np.any(np.isfinite(fan.detachment)):
         yield "first detachment", f"{np.min(fan.detachment):.6g}"
     yield "caustics passed", f"up to {int(fan.caustic_index[:, -1:].max(initial=0))}"

@@ -148,8 +148,13 @@ class RayFan(DrawnOnBody):
         """Travel time of the last step."""
         return float(self.travel_time[-1])
 
+    @property
+    def status_counts(self) -> dict[str, int]:
+        """Number of rays of each status that occurs, by name."""
+        return {s.name: int(np.sum(self.status == s)) for s in RayStatus if np.any(self.status == s)}
+
     def __repr__(self) -> str:
-        counts = ", ".join(f"{int(np.sum(self.status == s))} {s.name}" for s in RayStatus if np.any(self.status == s))
+        counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
         error = f"rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
         arcs = len(self.closed_arcs)
         return (
@@ -271,20 +276,60 @@ def _assemble(
     states: FloatArray,
     times: FloatArray,
 ) -> RayFan:
+    curve_index = np.array([arcs[k].curve for k in arc], dtype=np.int64)
+    lengths = np.array([curve.length for curve in line.curves])
+    first = pack(starts[:, :3], np.broadcast_to(line.direction, (len(starts), 3)))
+    return fan_of(
+        flow,
+        line,
+        starts,
+        states,
+        times,
+        launched=np.array([LINE_STATUS[one] for one in position_statuses(line, arcs, arc, arclength)], dtype=np.int64),
+        curve_index=curve_index,
+        arc_index=arc,
+        arclength=arclength % lengths[curve_index] if len(arc) else arclength,
+        closed_arcs=tuple(a.closed for a in arcs),
+        error=end_error(line.body, first, states[:, -1, :6], float(times[-1])),
+    )
+
+
+def fan_of(
+    flow: Flow,
+    line: ShadowLine,
+    starts: FloatArray,
+    states: FloatArray,
+    times: FloatArray,
+    *,
+    launched: IntArray,
+    **places: Any,
+) -> RayFan:
+    """Fan of rays that have been carried.
+
+    Parameters
+    ----------
+    flow, line : Flow, ShadowLine
+    starts : (rays, 6)
+        Points and tangents of the line where rays start.
+    states : (rays, steps, 12)
+        At the times, the first of which is 0.
+    times : (steps,)
+    launched : (rays,)
+        Codes of `RayStatus` where they start.
+    **places
+        ``curve_index``, ``arc_index``, ``arclength``, ``closed_arcs`` and ``error`` of the fan.
+    """
     body = line.body
     points, directions = states[..., :3].copy(), states[..., 3:6].copy()
     spreading, rate, stalled = spread(body, starts, np.broadcast_to(line.direction, (len(starts), 3)), states)
-    curvature = normal_curvature(body, points, directions)
+    # a flow writes where a ray detaches beside every state
     detachment = states[:, -1, 11].copy()
-    status = np.array([LINE_STATUS[one] for one in position_statuses(line, arcs, arc, arclength)], dtype=np.int64)
+    status = launched.copy()
     # a ray that never was a creeping ray keeps the reason
     status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
     rough = rough_from(body, points, times)
     status[((status == RayStatus.OK) | (status == RayStatus.DETACHED)) & (rough < detachment)] = RayStatus.ROUGH
-    detachment = np.minimum(detachment, rough)
     status[stalled] = RayStatus.STALLED
-    curve_index = np.array([arcs[k].curve for k in arc], dtype=np.int64)
-    lengths = np.array([curve.length for curve in line.curves])
     return RayFan(
         body=body,
         line=line,
@@ -294,17 +339,13 @@ def _assemble(
         eikonal=(starts[:, :3] @ line.direction)[:, None] + times,
         spreading=spreading,
         spreading_rate=rate,
-        curvature=curvature,
+        curvature=normal_curvature(body, points, directions),
         attenuation=states[..., 10].copy(),
         caustic_index=zeros_passed(spreading),
         status=status,
-        detachment=detachment,
-        curve_index=curve_index,
-        arc_index=arc,
-        arclength=arclength % lengths[curve_index] if len(arc) else arclength,
-        closed_arcs=tuple(a.closed for a in arcs),
-        error=_measure(body, starts, line, states, times),
+        detachment=np.minimum(detachment, rough),
         flow_error=flow.error,
+        **places,
     )
 
 
@@ -328,12 +369,11 @@ def rough_from(body: Surface, points: FloatArray, times: FloatArray) -> FloatArr
     return found
 
 
-def _measure(body: Surface, starts: FloatArray, line: ShadowLine, states: FloatArray, times: FloatArray) -> MapError:
-    """Error of (x, p) at the end against direct integration of evenly chosen rays."""
-    if not len(starts):
+def end_error(body: Surface, first: FloatArray, last: FloatArray, time: float) -> MapError:
+    """Error of (x, p) at the end (rays, 6) against direct integration of evenly chosen rays from their start."""
+    if not len(first):
         return MapError(0.0, 0.0, 0)
-    chosen = np.unique(np.linspace(0, len(starts) - 1, CHECKED_RAYS).astype(int))
-    direct = pack(starts[chosen, :3], np.broadcast_to(line.direction, (len(chosen), 3)))
-    exact = trace_states(body, direct, times[-1:], rtol=1e-12)[:, 0]
-    error = np.linalg.norm(states[chosen, -1, :6] - exact, axis=1)
+    chosen = np.unique(np.linspace(0, len(first) - 1, CHECKED_RAYS).astype(int))
+    exact = trace_states(body, first[chosen], np.array([time]), rtol=1e-12)[:, 0]
+    error = np.linalg.norm(last[chosen] - exact, axis=1)
     return MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))
