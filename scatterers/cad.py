@@ -1,4 +1,4 @@
-"""Body from a CAD file: points and exact normals of its faces by gmsh, and the fit of `scatterers._fitted_body`.
+"""Body from a CAD file: points and exact normals of its faces by gmsh, and the fit of `scatterers.base.fitted_body`.
 
 gmsh is an optional library under the GPL: ``pip install 'creeping[cad]'``.
 """
@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers._cad_files import kind_of, read_cad
-from scatterers._fit_cache import key_of
-from scatterers._fitted_body import FittedBody, PointCloud, checked_options
-from scatterers._jet_points import signed_distance
-from scatterers._jets import osculating_jets
-from scatterers._mesh_quality import assess
+from scatterers.base.fitted_body import FittedBody, PointCloud, checked_options
+from scatterers.cad_file.files import kind_of, read_cad
+from scatterers.spline.cache import key_of
+from scatterers.triangles.jet_points import signed_distance
+from scatterers.triangles.jets import osculating_jets
+from scatterers.triangles.quality import assess
 
 FloatArray = NDArray[np.float64]
 POINTS = 10_000

@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers._level_body import LevelBody
-from scatterers._samples import Samples
-from scatterers._star import star_map
-from scatterers._tensor_spline import TensorSpline, coefficients
+from scatterers.base.level_body import LevelBody
+from scatterers.sphere_map.star import star_map
+from scatterers.spline.samples import Samples
+from scatterers.spline.tensor import TensorSpline, coefficients
 
 FloatArray = NDArray[np.float64]
 FEWEST = 8

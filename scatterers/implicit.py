@@ -1,7 +1,7 @@
 """Body F(x, y, z) = 0 from an expression: differentiated by sympy, compiled, and examined before use.
 
-The body is looked for on grids (`scatterers._body_search`): F < 0 in one connected region inside the box, F > 0 in one
-around it. Then places are looked for where it is not smooth (`scatterers._singularities`).
+The body is looked for on grids (`scatterers.expression.search`): F < 0 in one connected region inside the box, F > 0 in
+one around it. Then places are looked for where it is not smooth (`scatterers.expression.singularities`).
 """
 
 import hashlib
@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers._body_search import FINE, SIZES, examine, found_box, samples_of, tightened
-from scatterers._expression_space import ExpressionSpace
-from scatterers._level_body import LevelBody
-from scatterers._samples import Samples
-from scatterers._singularities import refuse_edges, refuse_kinks, singular_points
-from scatterers._star import star_map
+from scatterers.base.level_body import LevelBody
+from scatterers.expression.search import FINE, SIZES, examine, found_box, samples_of, tightened
+from scatterers.expression.singularities import refuse_edges, refuse_kinks, singular_points
+from scatterers.expression.space import ExpressionSpace
+from scatterers.sphere_map.star import star_map
+from scatterers.spline.samples import Samples
 
 FloatArray = NDArray[np.float64]
 MOST_TIPS = 8

@@ -1,8 +1,8 @@
 """Body from a triangle mesh: checked, repaired where that is safe, and replaced by a smooth F.
 
-Vertices are taken to lie on the body. Their normals are those of osculating jets (`scatterers._jets`), which give
-points between them, too; to both a quintic tensor-product B-spline is fitted (`scatterers._fitting`), twice, on grids
-of different spacing: by their difference the curvatures' error is known.
+Vertices are taken to lie on the body. Their normals are those of osculating jets (`scatterers.triangles.jets`), which
+give points between them, too; to both a quintic tensor-product B-spline is fitted (`scatterers.spline.fitting`), twice,
+on grids of different spacing: by their difference the curvatures' error is known.
 """
 
 import json
@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers._fit_cache import key_of
-from scatterers._fitted_body import FittedBody, PointCloud, checked_options
-from scatterers._fitting import spacing_of
-from scatterers._jet_points import centroids, signed_distance
-from scatterers._jets import Jets, angle_weighted_normals, osculating_jets
-from scatterers._mesh_files import TriangleMesh, mesh_bytes, read_mesh
-from scatterers._mesh_quality import MeshQuality, assess
+from scatterers.base.fitted_body import FittedBody, PointCloud, checked_options
+from scatterers.spline.cache import key_of
+from scatterers.spline.fitting import spacing_of
+from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
+from scatterers.triangles.jet_points import centroids, signed_distance
+from scatterers.triangles.jets import Jets, angle_weighted_normals, osculating_jets
+from scatterers.triangles.quality import MeshQuality, assess
 
 FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers._compile import Compiled
+from scatterers.kernels.compiled import Compiled
 
 FloatArray = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class ExpressionSpeed:
 
     @cached_property
     def _functions(self) -> Any:
-        from scatterers._expressions import differentiate
+        from scatterers.expression.parsing import differentiate
 
         return differentiate(self.expression)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from scatterers._quadrics import BentEllipsoid, positive
+from scatterers.base.quadrics import BentEllipsoid, positive
 
 
 @dataclass(frozen=True)

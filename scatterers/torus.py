@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers._body import Body, positive
-from scatterers._charts import PeriodicAtlas, PeriodicChart
-from scatterers._compile import Compiled
-from scatterers._trigonometry import cos_pi, sin_pi
+from scatterers.atlas.charts import PeriodicAtlas, PeriodicChart
+from scatterers.base.body import Body, positive
+from scatterers.kernels.compiled import Compiled
+from scatterers.kernels.trigonometry import cos_pi, sin_pi
 
 FloatArray = NDArray[np.float64]
 

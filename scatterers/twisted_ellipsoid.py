@@ -7,7 +7,7 @@ y'' = -pi^2 d + b/c^2 on the default body, negative, so kappa_n < 0 along z ther
 from dataclasses import dataclass
 from typing import Any
 
-from scatterers._quadrics import BentEllipsoid, finite, positive
+from scatterers.base.quadrics import BentEllipsoid, finite, positive
 
 
 @dataclass(frozen=True)

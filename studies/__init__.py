@@ -59,9 +59,9 @@ def draw(name: str, folder: str | Path, *, quick: bool = False) -> dict[str, Any
     CreepingError
         If a file cannot be written.
     """
-    from creeping._errors import InvalidInputError
+    from creeping.errors import InvalidInputError
     from creeping.plotting import write_text
-    from creeping.plotting._files import written_aside
+    from creeping.storage.atomic import written_aside
 
     if name not in FIGURES:
         raise InvalidInputError(f"unknown figure {name!r}; figures are {', '.join(FIGURES)}")

@@ -42,7 +42,7 @@ def main(arguments: list[str] | None = None) -> None:
         return
     name, *options = given
     if name in FIGURES:
-        from creeping import cli
+        from creeping.commands import main as cli
 
         cli.main(["figure", name, *options])
     known = sources()

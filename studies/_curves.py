@@ -11,12 +11,13 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
+from creeping.geometry.frames import polar_frame
+from creeping.geometry.surface import Surface, size
+from creeping.geometry.triangulation import triangulate
 from creeping.plotting import axes3d
 from creeping.plotting._drawing import Drawing, Mark
 from creeping.plotting._strokes import ARROW_COLOUR, RAY_COLOUR, LevelColours, Stroke, closed, refined
 from creeping.plotting._view import View
-from creeping.surface import Surface, polar_frame, size
-from creeping.triangulation import triangulate
 
 SOURCE_COLOUR = "#c2185b"
 

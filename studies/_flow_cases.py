@@ -13,13 +13,13 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
-from creeping._errors import ToleranceError
 from creeping._typing import Any, FloatArray
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.choosing import tuned_direct
-from creeping.phaseflow.request import Request
-from creeping.phaseflow.tracing import pack, trace_states
-from creeping.surface import normal
+from creeping.errors import ToleranceError
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.integrator import pack, trace_states
+from creeping.geometry.surface import normal
+from creeping.phaseflow.tuning.flow_choice import tuned_direct
+from creeping.phaseflow.tuning.request import Request
 from studies._peers import heyoka_at_error, measured, scipy_flow
 
 Row = dict[str, Any]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from creeping.surface import normal
-from creeping.triangulation import triangulate
+from creeping.geometry.surface import normal
+from creeping.geometry.triangulation import triangulate
 
 Mesh = tuple[FloatArray, IntArray]
 

@@ -13,10 +13,10 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.field.far_geometry import fan_strips
+from creeping.geometry.surface import normal, project
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_near
-from creeping.rays.visibility import occluded
-from creeping.surface import normal, project
+from creeping.shadow.occlusion import occluded
 from studies.reference import clouds, fundamental
 
 INCIDENCES = {

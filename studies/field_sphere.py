@@ -13,7 +13,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.coefficients import scalar_boundaries
+from creeping.field.boundary import scalar_boundaries
 from creeping.field.far import isolated_rays
 from creeping.field.far_geometry import far_geometry
 from creeping.field.forward import fan_half

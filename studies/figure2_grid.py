@@ -16,8 +16,8 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.grids import Grid
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.phaseflow.grid import Grid
 from creeping.plotting._strokes import Stroke
 from creeping.plotting._view import View
 from studies._curves import draw_curves, tag

@@ -11,9 +11,9 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
-from creeping.plotting._decibels import cross_section_decibels
+from creeping.field.decibels import cross_section_decibels
+from creeping.geometry.directions import great_circle
 from creeping.plotting.pictures import new_figure
-from creeping.sweeping.directions import great_circle
 
 CASES: dict[str, tuple[Any, tuple[float, float, float], str]] = {
     "ellipsoid 1, 0.8, 0.6": (sc.Ellipsoid(1.0, 0.8, 0.6), (1, 1, 0), "x + y"),

@@ -13,10 +13,10 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.plotting._decibels import cross_section_decibels
+from creeping.field.decibels import cross_section_decibels
+from creeping.geometry.directions import directions_from_angles, theta_phi_grid
 from creeping.plotting.pictures import new_figure
-from creeping.sweeping.directions import directions_from_angles, theta_phi_grid
-from creeping.sweeping.request import NEAR_SINGULAR, SINGULAR
+from creeping.shadow.status import NEAR_SINGULAR, SINGULAR
 
 BODIES: dict[str, Any] = {
     "twisted ellipsoid": sc.TwistedEllipsoid(),

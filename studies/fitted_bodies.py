@@ -21,9 +21,9 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import FloatArray, IntArray
-from creeping.phaseflow.bundle import project_bundle, random_bundle_points
-from creeping.phaseflow.tracing import pack
-from creeping.surface import normal, project
+from creeping.geodesics.bundle import project_bundle, random_bundle_points
+from creeping.geodesics.integrator import pack
+from creeping.geometry.surface import normal, project
 from studies._meshes import on_body, scattered, slivers
 
 POINTS, RAYS, LENGTH = 3000, 60, 2.0

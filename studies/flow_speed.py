@@ -18,8 +18,8 @@ import numpy as np
 
 import creeping as cr
 from creeping._typing import Any
-from creeping.phaseflow.choosing import tuned_direct
-from creeping.phaseflow.tracing import trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.phaseflow.tuning.flow_choice import tuned_direct
 from studies import _flow_cases as cases
 from studies._flow_cases import BODIES, DEAR, FAN_OUTPUTS, LENGTH, TOLERANCE, Row, body, rms, sample, seconds_each, show
 from studies._peers import measured

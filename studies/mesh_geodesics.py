@@ -14,7 +14,7 @@ import numpy as np
 
 import creeping as cr
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.phaseflow.bundle import project_bundle
+from creeping.geodesics.bundle import project_bundle
 from studies._meshes import on_body
 from studies.fitted_bodies import mesh_body
 

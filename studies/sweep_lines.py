@@ -15,11 +15,11 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
-from creeping._errors import SingularIncidenceError
 from creeping._typing import Any, FloatArray
-from creeping.sweeping.directions import fibonacci_directions
-from creeping.sweeping.request import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
-from creeping.sweeping.shadow_lines import prepared, shadow_lines
+from creeping.errors import SingularIncidenceError
+from creeping.geometry.directions import fibonacci_directions
+from creeping.shadow.many import prepared, shadow_lines
+from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
 from studies._flow_cases import Row, show, threads
 from studies._peers import measured
 
@@ -47,7 +47,7 @@ class Lines(NamedTuple):
 
 def on_meshes(body: Any, directions: FloatArray, tiers: tuple[int, int, int]) -> Lines:
     """Lines on chosen meshes, one for each attempt; none is followed by other means."""
-    from creeping.sweeping._line_kernel import trace_lines
+    from creeping.shadow.kernels.trace import trace_lines
 
     n, lines = len(directions), prepared(body)
     summary, status = np.empty((n, 7)), np.empty(n, np.int8)

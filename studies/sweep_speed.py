@@ -15,13 +15,14 @@ import numpy as np
 
 import creeping as cr
 from creeping._typing import Any, FloatArray
-from creeping.phaseflow.choosing import tuned_direct
-from creeping.phaseflow.tracing import pack
-from creeping.sweeping.compiled import CompiledSweeper
-from creeping.sweeping.directions import fibonacci_directions
-from creeping.sweeping.plain import PlainSweeper
-from creeping.sweeping.request import SINGULAR, sweep_request
-from creeping.sweeping.shadow_lines import shadow_lines
+from creeping.geodesics.integrator import pack
+from creeping.geometry.directions import fibonacci_directions
+from creeping.phaseflow.tuning.flow_choice import tuned_direct
+from creeping.shadow.many import shadow_lines
+from creeping.shadow.status import SINGULAR
+from creeping.sweeping.request import sweep_request
+from creeping.sweeping.sweepers.compiled import CompiledSweeper
+from creeping.sweeping.sweepers.plain import PlainSweeper
 from studies._flow_cases import Row, body, closed_form, show, threads
 from studies._peers import measured, scipy_flow
 

@@ -9,9 +9,10 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
-from creeping.sweeping.directions import fibonacci_directions
-from creeping.sweeping.planning import SweepPlan
-from creeping.sweeping.request import OK, sweep_request
+from creeping.geometry.directions import fibonacci_directions
+from creeping.shadow.status import OK
+from creeping.sweeping.plan import SweepPlan
+from creeping.sweeping.request import sweep_request
 
 REQUEST = sweep_request("monostatic", length=1.0, n_rays=4, wavenumbers=[10.0, 20.0], boundary="soft")
 FLOW = cr.DirectFlow(sc.Sphere(), rtol=1e-6)
@@ -69,7 +70,7 @@ def bytes_of(folder):
 
 def drive(folder, count, chunk, workers):
     """A driver for tests that kill it: fills a new store, or an old one, and prints as it goes."""
-    from creeping.sweeping.running import fill, open_store
+    from creeping.sweeping.run import fill, open_store
 
     work = plan(count, chunk)
     store = open_store(work, folder, resume=True)
@@ -77,7 +78,7 @@ def drive(folder, count, chunk, workers):
     if not workers:
         fill(work, store, progress=say)
         return
-    from creeping.sweeping.cluster import local_client
+    from creeping.sweeping.cluster.driver import local_client
 
     with local_client(workers) as client:
         fill(work, store, client=client, progress=say)

@@ -13,17 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
-from creeping._showing import Drawn
+from creeping._presenting import Drawn
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.coefficients import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.far_geometry import FarGeometry, Geometry, far_geometry, merging, off_axis
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
-from creeping.field.launching import scales, shed_wave, smoothstep
 from creeping.field.polarisation import dyads, wave_frame
 from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude
+from creeping.field.shed_wave import scales, shed_wave, smoothstep
 from creeping.rays.fan import RayFan
-from creeping.rays.ray_points import RayPoints
+from creeping.rays.quantities import RayPoints
 
 FORWARD = (0.55, 0.85)
 """m̄ θ between which the forward lobe gives way."""

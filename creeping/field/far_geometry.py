@@ -6,17 +6,17 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
-from creeping.field.coefficients import fock_scale
+from creeping.errors import InvalidInputError
+from creeping.field.creeping_modes import fock_scale
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.fan import RayFan
-from creeping.rays.horizon import HorizonGrid, HorizonRays, MidHorizon, forward_nodes
-from creeping.rays.ray_points import RayPoints
+from creeping.rays.observer_contour import HorizonGrid, HorizonRays, MidHorizon, forward_nodes
+from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays, shed_far
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
-from creeping.rays.visibility import occluded
-from creeping.surface import Surface, normal, project, size
+from creeping.shadow.occlusion import occluded
 
 _KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionary()
 _STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()

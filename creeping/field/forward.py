@@ -12,12 +12,13 @@ over every crossing, tapered in p.r; it replaces isolated rays where they merge.
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.coefficients import Boundary, fock_scale
-from creeping.field.fock import pekeris_slope, pekeris_star
-from creeping.field.launching import SECOND_ORDER, fock_parameter, scales, shared_pole, shed_wave, smoothstep
-from creeping.rays.horizon import HorizonRays, MidHorizon
-from creeping.rays.launch_points import line_tangents
-from creeping.rays.shadow import ShadowLine
+from creeping.field.boundary import Boundary
+from creeping.field.creeping_modes import fock_scale
+from creeping.field.shed_wave import SECOND_ORDER, fock_parameter, scales, shared_pole, shed_wave, smoothstep
+from creeping.field.special.fock import pekeris_slope, pekeris_star
+from creeping.rays.observer_contour import HorizonRays, MidHorizon
+from creeping.shadow.attachment import line_tangents
+from creeping.shadow.line import ShadowLine
 
 TAPER = (0.3, 0.7)
 """p.r between which a crossing comes to count."""

@@ -13,14 +13,13 @@ N counts zeros of J on (0, s) and of J + l' J' on (0, l).
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
-from creeping.field.airy import MODES
-from creeping.field.coefficients import Boundary, BoundaryLike, modes_of
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import Boundary, BoundaryLike
+from creeping.field.creeping_modes import modes_of
 from creeping.field.far import checked
 from creeping.field.far_geometry import fan_strips
-from creeping.field.fock import FAR_HEIGHT, height_gain, near_pekeris, pekeris, transition
-from creeping.field.launching import (
+from creeping.field.shed_wave import (
     amplitude_factor,
     end_residue,
     fock_parameter,
@@ -29,13 +28,15 @@ from creeping.field.launching import (
     scales,
     smoothstep,
 )
-from creeping.field.on_surface import scalar_boundary, surface_amplitude, surface_waves
-from creeping.phaseflow.bundle import as_points
+from creeping.field.special.airy import MODES
+from creeping.field.special.fock import FAR_HEIGHT, height_gain, near_pekeris, pekeris, transition
+from creeping.field.surface import scalar_boundary, surface_amplitude, surface_waves
+from creeping.geodesics.bundle import as_points
+from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
-from creeping.rays.ray_points import RayPoints
+from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import shed_near, shed_on
-from creeping.rays.visibility import occluded
-from creeping.surface import size
+from creeping.shadow.occlusion import occluded
 
 SERIES = (0.5, 0.9)
 """ξ + √Y between which the second order of decay and amplitude comes in: it is what the height gain adds to ξ."""

@@ -1,6 +1,6 @@
 """The magnitude of each ray's own field from what the fan carries already; for pictures that follow a hand.
 
-First order of `creeping.field.on_surface`, with ξ = (k/2)^(1/3) A and A the fan's attenuation integral:
+First order of `creeping.field.surface`, with ξ = (k/2)^(1/3) A and A the fan's attenuation integral:
 
     |u| = (ρ1/ρ2)^(1/6) |J|^(-1/2) |g(ξ)|          hard, impedance
     |du/dn|/k = the same with |F(ξ)|/m2             soft
@@ -8,13 +8,14 @@ First order of `creeping.field.on_surface`, with ξ = (k/2)^(1/3) A and A the fa
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import BoolArray, FloatArray
-from creeping.field.coefficients import BoundaryLike, fock_scale
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import BoundaryLike
+from creeping.field.creeping_modes import fock_scale
 from creeping.field.far import checked
-from creeping.field.fock import surface_function
-from creeping.field.on_surface import scalar_boundary
-from creeping.phaseflow.geodesic import speed_of
+from creeping.field.special.fock import surface_function
+from creeping.field.surface import scalar_boundary
+from creeping.geodesics.equations import speed_of
 from creeping.rays.fan import RayFan, RayStatus
 
 

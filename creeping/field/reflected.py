@@ -16,9 +16,10 @@ derivatives of the surface (`creeping.rays.specular.shape_term`), is 1/(2a) on a
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.coefficients import Boundary, fock_scale
-from creeping.field.fock import FARTHEST, pekeris, pekeris_slope
-from creeping.field.launching import limited, smoothstep
+from creeping.field.boundary import Boundary
+from creeping.field.creeping_modes import fock_scale
+from creeping.field.shed_wave import limited, smoothstep
+from creeping.field.special.fock import FARTHEST, pekeris, pekeris_slope
 from creeping.rays.specular import SpecularPoints
 
 NORMAL = (0.0, 0.2)

@@ -3,9 +3,9 @@
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
-from creeping.field.coefficients import BoundaryLike
+from creeping.field.boundary import BoundaryLike
 from creeping.field.far import far_field
-from creeping.rays.body_error import coarser_fan
+from creeping.rays.body_uncertainty import coarser_fan
 from creeping.rays.fan import RayFan
 
 
@@ -20,7 +20,7 @@ def far_field_uncertainty(
     Parameters
     ----------
     fan : RayFan
-        Of a body from a file; see `creeping.rays.body_error`.
+        Of a body from a file; see `creeping.rays.body_uncertainty`.
     observation, wavenumber, boundary, order
         As of `far_field`.
 

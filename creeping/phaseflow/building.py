@@ -12,20 +12,20 @@ from time import perf_counter as clock
 
 import numpy as np
 
-from creeping._errors import ToleranceError
 from creeping._typing import Any, FloatArray
-from creeping.phaseflow.ambient import AmbientModel
-from creeping.phaseflow.attenuation import NODES, chebyshev_times, curvature_values
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.compiled_models import CompiledModel
-from creeping.phaseflow.geodesic import natural_horizon
-from creeping.phaseflow.grids import Grid, Leap
-from creeping.phaseflow.models import Model, nodes_of
+from creeping.errors import ToleranceError
+from creeping.geodesics.attenuation import NODES, chebyshev_times, curvature_values
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.equations import natural_horizon
+from creeping.geodesics.integrator import MapError, pack, runge_kutta_4, trace_states
+from creeping.geometry.checks import check_surface
+from creeping.geometry.surface import Surface, fingerprint
+from creeping.phaseflow.coordinates.ambient import AmbientModel
+from creeping.phaseflow.coordinates.base import Model, nodes_of
+from creeping.phaseflow.coordinates.rotation import CompiledModel
+from creeping.phaseflow.grid import Grid, Leap
 from creeping.phaseflow.phase_map import Growth, PhaseMap
 from creeping.phaseflow.splines import prefilter
-from creeping.phaseflow.storing import fingerprint
-from creeping.phaseflow.tracing import MapError, pack, runge_kutta_4, trace_states
-from creeping.surface import Surface, check_surface
 
 Progress = Callable[[str], None]
 SAMPLES = 2000

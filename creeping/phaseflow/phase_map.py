@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
-from creeping._showing import Drawn, brief
+from creeping._presenting import Drawn, brief
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping._version import __version__
-from creeping.phaseflow.attenuation import with_attenuation
-from creeping.phaseflow.bundle import bundle_points
-from creeping.phaseflow.grids import Grid, Leap
-from creeping.phaseflow.models import Model
-from creeping.phaseflow.storing import fingerprint, write_folder
-from creeping.phaseflow.tracing import MapError, as_times, pack, trace_states, unpack
-from creeping.surface import Surface
+from creeping.errors import InvalidInputError
+from creeping.geodesics.attenuation import with_attenuation
+from creeping.geodesics.bundle import bundle_points
+from creeping.geodesics.integrator import MapError, as_times, pack, trace_states, unpack
+from creeping.geometry.surface import Surface, fingerprint
+from creeping.phaseflow.coordinates.base import Model
+from creeping.phaseflow.grid import Grid, Leap
+from creeping.storage.folder import write_folder
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from creeping.plotting._polylines import polydata
+    from creeping.files.ffe import write_ffe
+    from creeping.files.polylines import polydata
+    from creeping.files.tables import write_csv, write_text, write_vtp
     from creeping.plotting.display import GLProbe, gl_available
-    from creeping.plotting.export import write_csv, write_text, write_vtp
     from creeping.plotting.far_cuts import far_cut_picture
-    from creeping.plotting.ffe import write_ffe
     from creeping.plotting.field_pictures import decay_picture, surface_field_picture
     from creeping.plotting.parameter_plane import plot_parameters
     from creeping.plotting.pictures import parameter_picture, picture

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import FloatArray, IntArray
-from creeping.plotting._far_table import angles_of
+from creeping.errors import InvalidInputError
+from creeping.files.far_table import angles_of
 
 TOLERANCE = 1e-6
 """Distance of unit directions from the plane or the cone."""

@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.geometry.surface import Surface
+from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.plotting._strokes import LevelColours, Stroke, strokes
 from creeping.plotting._view import View, shadow_view
-from creeping.surface import Surface
-from creeping.triangulation import Triangulation, triangulate
 
 
 @dataclass(frozen=True)

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._showing import brief
+from creeping._presenting import brief
 from creeping._typing import Any, FloatArray
-from creeping.plotting._far_table import angles_of
+from creeping.files.far_table import angles_of
 
 if TYPE_CHECKING:
     from creeping.field.far import FarField
-    from creeping.phaseflow.direct import DirectFlow
+    from creeping.geodesics.direct_flow import DirectFlow
+    from creeping.geodesics.integrator import MapError
     from creeping.phaseflow.phase_map import PhaseMap
-    from creeping.phaseflow.tracing import MapError
     from creeping.rays.fan import RayFan
     from creeping.rays.isophase import IsoPhaseCurve
-    from creeping.rays.shadow import ShadowCurve, ShadowLine
+    from creeping.shadow.line import ShadowCurve, ShadowLine
 
 Facts = Iterable[tuple[str, str]]
 MOST = 6

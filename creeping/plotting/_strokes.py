@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.plotting._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
-from creeping.surface import size
+from creeping.errors import InvalidInputError
+from creeping.files._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.geometry.surface import size
 
 BODY_COLOUR = "#dfe5ea"
 RAY_COLOUR = "#55606b"

@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import ArrayLike, BoolArray, FloatArray
-from creeping.surface import Surface, normal, size, unit_direction
+from creeping.geometry.directions import unit_direction
+from creeping.geometry.surface import Surface, normal, size
 
 
 @dataclass(frozen=True)

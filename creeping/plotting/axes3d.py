@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.geometry.surface import normal
 from creeping.plotting._drawing import Drawing, compose
-from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
 from creeping.plotting._view import View
-from creeping.surface import normal
 
 
 def plot_rays_3d(

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
-from creeping.plotting._decibels import cross_section_decibels, decibels, shown_range
-from creeping.plotting._inputs import FarFieldLike
+from creeping.errors import InvalidInputError
+from creeping.field.decibels import cross_section_decibels, decibels, shown_range
+from creeping.files._inputs import FarFieldLike
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
 
 KINDS = ("cartesian", "polar")

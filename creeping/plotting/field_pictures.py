@@ -10,21 +10,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.field.coefficients import Boundary, BoundaryLike, fock_scale
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import Boundary, BoundaryLike
+from creeping.field.creeping_modes import fock_scale
+from creeping.field.decibels import decibels, shown_range
 from creeping.field.far import checked
-from creeping.field.fock import surface_function
-from creeping.field.on_surface import scalar_boundary, surface_field
-from creeping.plotting._decibels import decibels, shown_range
+from creeping.field.special.fock import surface_function
+from creeping.field.surface import scalar_boundary, surface_field
+from creeping.geometry.surface import normal
 from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays
 from creeping.plotting._view import View
 from creeping.plotting.far_cuts import COLOURS
 from creeping.plotting.pictures import chosen_backend, drawn_page, new_figure, save_figure
 from creeping.rays.fan import RayFan
-from creeping.rays.visibility import occluded
-from creeping.surface import normal
+from creeping.shadow.occlusion import occluded
 
 NO_RAY = "#b4b9bd"
 PENUMBRA = -8.0

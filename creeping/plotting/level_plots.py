@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
-from creeping._showing import brief
+from creeping._presenting import brief
 from creeping._typing import Any, ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.decibels import shown_range
+from creeping.files._inputs import FarFieldLike
 from creeping.plotting._cut_angles import CutAngles, cut_angles
-from creeping.plotting._decibels import shown_range
-from creeping.plotting._inputs import FarFieldLike
 from creeping.plotting.far_cuts import COLOURS, Curve, checked_angles, cut_curves, draw_cut
 from creeping.plotting.pictures import add_legend, axes_or_new
 

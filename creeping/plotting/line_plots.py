@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import Any, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowCurveLike
+from creeping.geometry.surface import Surface
 from creeping.plotting._drawing import Drawing, compose
-from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowCurveLike
 from creeping.plotting._strokes import LEVEL_NAMES
 from creeping.plotting._view import View
 from creeping.plotting.parameter_plane import draw_curves, frame, plot_parameters
 from creeping.plotting.pictures import add_legend, axes_or_new, drawn_page
-from creeping.surface import Surface
 
 if TYPE_CHECKING:
     from creeping.rays.fan import RayFan
     from creeping.rays.isophase import IsoPhaseCurve
-    from creeping.rays.shadow import ShadowCurve, ShadowLine
+    from creeping.shadow.line import ShadowCurve, ShadowLine
 
 KINDS = ("parameters", "3d")
 PLANE = (6.4, 4.4)  # inches

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.plotting._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.files._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._strokes import STATUS_COLOURS, LevelColours, ray_strokes, status_pieces
-from creeping.rays.seam import split_at_seam
+from creeping.rays.angle_seams import split_at_seam
 
 
 def plot_parameters(

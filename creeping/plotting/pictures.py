@@ -5,14 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import Any
+from creeping.errors import InvalidInputError
+from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._drawing import Drawing, compose
-from creeping.plotting._files import written_aside
-from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._strokes import ARROW_COLOUR
 from creeping.plotting._view import View
 from creeping.plotting.display import gl_available
+from creeping.storage.atomic import written_aside
 
 BACKENDS = ("auto", "pyvista", "matplotlib")
 WIDTH = 6.4  # inches

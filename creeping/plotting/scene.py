@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from creeping._errors import CreepingError
 from creeping._typing import Any, FloatArray
+from creeping.errors import CreepingError
+from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.geometry.surface import normal
 from creeping.plotting._drawing import Drawing, compose
-from creeping.plotting._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
 from creeping.plotting._view import View
 from creeping.plotting.display import gl_available
-from creeping.surface import normal
 
 DEPTH_UNITS = 40.0  # of 1/65000 of the depth of the scene
 

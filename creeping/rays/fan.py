@@ -5,7 +5,7 @@ Ray sigma starts at x0(sigma) with p = d; on a plain body t is arclength. Neighb
     I(t) = I(0) M11(t) + I'(0) M12(t),   I(0) = 1/c,   I'(0) = (J'(0) - (p.grad c))/c,
 
 M the Jacobi matrix that the flow carries along, sigma measured across the ray, J(0) = 1 and J'(0) as in
-`creeping.phaseflow.geodesic.launch_spreading`. Every zero of J passed is a caustic. A creeping ray needs kappa_n > 0:
+`creeping.geodesics.equations.launch_spreading`. Every zero of J passed is a caustic. A creeping ray needs kappa_n > 0:
 where kappa_n first falls to 0 it is detached; its geometry goes on, its field does not.
 """
 
@@ -15,13 +15,15 @@ from typing import Protocol
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
-from creeping._showing import DrawnOnBody, brief
+from creeping._presenting import DrawnOnBody, brief
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.phaseflow.geodesic import gaussian_curvature, normal_curvature, speed_values
-from creeping.phaseflow.storing import fingerprint
-from creeping.phaseflow.tracing import MapError, pack, trace_states
-from creeping.rays.launch_points import (
+from creeping.errors import InvalidInputError
+from creeping.geodesics.equations import speed_values
+from creeping.geodesics.integrator import MapError, pack, trace_states
+from creeping.geometry.curvature import gaussian_curvature, normal_curvature
+from creeping.geometry.surface import Surface, fingerprint, size
+from creeping.rays.spreading import spread, zeros_passed
+from creeping.shadow.attachment import (
     Arc,
     launch_positions,
     launching_arcs,
@@ -29,9 +31,7 @@ from creeping.rays.launch_points import (
     parting_positions,
     position_statuses,
 )
-from creeping.rays.shadow import ShadowLine
-from creeping.rays.spreading import spread, zeros_passed
-from creeping.surface import Surface, size
+from creeping.shadow.line import ShadowLine
 
 MAX_RAYS = 200_000
 """Rays beyond which refinement stops."""

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
-from creeping._showing import DrawnOnBody
+from creeping._presenting import DrawnOnBody
 from creeping._typing import ArrayLike, FloatArray, IntArray
-from creeping.phaseflow.geodesic import speed_of, speed_values, vector_field
+from creeping.errors import InvalidInputError
+from creeping.geodesics.equations import speed_of, speed_values, vector_field
+from creeping.geometry.surface import project
+from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
-from creeping.rays.seam import split_at_seam
-from creeping.surface import project
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from creeping.rays.ray_points import RayPoints
+from creeping.geometry.surface import Surface, normal, size
+from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
-from creeping.surface import Surface, normal, size
 
 BLOCK = 4_000_000
 """Values of a function on a strip for several observers that are held at once."""

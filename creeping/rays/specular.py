@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from creeping.rays.visibility import occluded
-from creeping.surface import Surface, normal, project, size
-from creeping.triangulation import Triangulation, triangulate
+from creeping.geometry.surface import Surface, normal, project, size
+from creeping.geometry.triangulation import Triangulation, triangulate
+from creeping.shadow.occlusion import occluded
 
 CONVERGED = 1e-10
 """Residual of the normal at a specular point."""

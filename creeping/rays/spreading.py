@@ -2,14 +2,14 @@
 
     J = c I,  I(t) = I(0) M11(t) + I'(0) M12(t),  I(0) = 1/c,  I'(0) = (J'(0) - (p.grad c))/c,
 
-M the Jacobi matrix that the flow carries along; J(0), J'(0) of `creeping.phaseflow.geodesic.launch_spreading`.
+M the Jacobi matrix that the flow carries along; J(0), J'(0) of `creeping.geodesics.equations.launch_spreading`.
 """
 
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from creeping.phaseflow.geodesic import launch_spreading, speed_of, speed_values
-from creeping.surface import Surface
+from creeping.geodesics.equations import launch_spreading, speed_of, speed_values
+from creeping.geometry.surface import Surface
 
 
 def spread(

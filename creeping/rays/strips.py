@@ -10,9 +10,9 @@ import numpy as np
 from scipy.interpolate import NdBSpline, make_interp_spline
 
 from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geometry.surface import Surface, normal
 from creeping.rays.fan import RayFan
-from creeping.rays.ray_points import LANES, START_LANES, RayPoints, ray_points
-from creeping.surface import Surface, normal
+from creeping.rays.quantities import LANES, START_LANES, RayPoints, ray_points
 
 DEGREE = 5
 COARSE = 64

@@ -9,23 +9,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from creeping._errors import InvalidInputError
 from creeping._typing import Any, ArrayLike, FloatArray
-from creeping.field.coefficients import BoundaryLike, parse_boundary
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.far import checked
+from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
-OK, NEAR_SINGULAR, FOLLOWED, SINGULAR, FAILED = range(5)
-INCIDENCE_STATUSES = {
-    OK: "ok",
-    NEAR_SINGULAR: "near singular: the number of curves is not certain",
-    FOLLOWED: "followed one by one: the meshes did not resolve the line",
-    SINGULAR: "singular: the line crosses itself, nothing is given",
-    FAILED: "failed: an error, nothing is given",
-}
-NO_RAY = -1
-"""Status of a place for a ray that the incidence did not fill."""
 MOST_RAYS, MOST_STEPS = 65_536, 4096
 
 

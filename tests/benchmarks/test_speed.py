@@ -9,9 +9,9 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.choosing import tuned_direct
-from creeping.phaseflow.tracing import pack, trace_states
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.integrator import pack, trace_states
+from creeping.phaseflow.tuning.flow_choice import tuned_direct
 
 pytestmark = pytest.mark.slow
 BODIES = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "twisted": sc.TwistedEllipsoid()}
@@ -107,5 +107,5 @@ def test_fan(benchmark, which, phase_map):
 
 
 def test_help_of_the_command_line(benchmark):
-    command = [sys.executable, "-c", "from creeping.cli import main; main(['--help'])"]
+    command = [sys.executable, "-c", "from creeping.commands.main import main; main(['--help'])"]
     benchmark.pedantic(subprocess.run, (command,), {"capture_output": True, "env": {**os.environ}}, rounds=5)

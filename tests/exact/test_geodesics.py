@@ -6,9 +6,10 @@ from tolerances import INVARIANT, TRACE
 
 import creeping as cr
 import scatterers as sc
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.geodesic import gaussian_curvature, metric_curvature
-from creeping.phaseflow.tracing import pack, trace_states
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.equations import metric_curvature
+from creeping.geodesics.integrator import pack, trace_states
+from creeping.geometry.curvature import gaussian_curvature
 
 TIMES = np.array([0.4, 1.0, 2.5, 4.0])
 

@@ -5,7 +5,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping._errors import InvalidInputError
+from creeping.errors import InvalidInputError
 from creeping.field.on_rays import creeps, ray_magnitude
 
 

@@ -6,7 +6,7 @@ from scipy.special import spherical_jn, spherical_yn
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.coefficients import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary, scalar_boundaries
+from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary, scalar_boundaries
 from creeping.field.reflected import plane_reflection, reflected_amplitude, reflection
 from creeping.rays.specular import specular_points
 

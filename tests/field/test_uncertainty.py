@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.rays.body_error import coarser_fan
+from creeping.rays.body_uncertainty import coarser_fan
 from studies._meshes import on_body
 
 D, K = (0.3, 0.2, 0.9), 20.0

@@ -6,9 +6,9 @@ from tolerances import ORDER
 
 import creeping as cr
 import scatterers as sc
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.integrator import pack, trace_states
 from creeping.phaseflow.building import measure
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.tracing import pack, trace_states
 
 
 def slope(sizes, errors):

@@ -6,12 +6,12 @@ from tolerances import COMPOSED, MAP
 
 import creeping as cr
 import scatterers as sc
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.integrator import pack, trace_states
 from creeping.phaseflow.building import Plan, build_direct
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.grids import Grid
-from creeping.phaseflow.models import has_mirrors, model_of
+from creeping.phaseflow.coordinates.base import has_mirrors, model_of
+from creeping.phaseflow.grid import Grid
 from creeping.phaseflow.phase_map import PhaseMap
-from creeping.phaseflow.tracing import pack, trace_states
 
 
 def rms(a, b):

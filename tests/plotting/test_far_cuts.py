@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from creeping._errors import CreepingError, InvalidInputError
+from creeping.errors import CreepingError, InvalidInputError
+from creeping.field.decibels import cross_section_decibels, decibels, shown_range
 from creeping.plotting import far_cut_picture
-from creeping.plotting._decibels import cross_section_decibels, decibels, shown_range
 from creeping.plotting.far_cuts import cut_curves
 
 ANGLES = np.radians(np.arange(-180.0, 181.0, 5.0))

@@ -5,7 +5,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping._errors import InvalidInputError
+from creeping.errors import InvalidInputError
 from creeping.plotting import decay_picture, field_pictures, surface_field_picture
 from creeping.plotting.display import GLProbe
 from creeping.plotting.field_pictures import lit_points, surface_levels

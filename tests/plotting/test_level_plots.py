@@ -8,7 +8,7 @@ from fake_fields import far_of
 
 import creeping as cr
 import scatterers as sc
-from creeping._errors import InvalidInputError
+from creeping.errors import InvalidInputError
 from creeping.plotting.pictures import new_figure
 from studies.reference import sphere
 

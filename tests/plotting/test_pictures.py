@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scatterers as sc
-from creeping._errors import CreepingError, InvalidInputError
+from creeping.errors import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
 from creeping.plotting._strokes import chosen_rays, refined, runs, status_pieces, strokes
 from creeping.plotting._view import View, shadow_view

@@ -6,8 +6,8 @@ from tolerances import SPREADING
 
 import creeping as cr
 import scatterers as sc
-from creeping.rays.launch_points import line_tangents
-from creeping.surface import normal
+from creeping.geometry.surface import normal
+from creeping.shadow.attachment import line_tangents
 
 INCIDENCE = (0.3, 0.5, 0.81)
 

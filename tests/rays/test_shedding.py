@@ -6,9 +6,9 @@ from tolerances import SHED
 
 import creeping as cr
 import scatterers as sc
+from creeping.geometry.surface import project
 from creeping.rays.shedding import shed_far, shed_near, shed_on
 from creeping.rays.strips import strips_of
-from creeping.surface import project
 
 D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
 SPHERE, TRIAXIAL = sc.Sphere(), sc.Ellipsoid(1.0, 0.8, 0.6)

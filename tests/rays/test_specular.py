@@ -5,9 +5,9 @@ import pytest
 from tolerances import SHAPE_TERM, SPECULAR
 
 import scatterers as sc
-from creeping.phaseflow.geodesic import gaussian_curvature, normal_curvature
+from creeping.geometry.curvature import gaussian_curvature, normal_curvature
+from creeping.geometry.surface import normal, project
 from creeping.rays.specular import specular_points
-from creeping.surface import normal, project
 
 D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
 

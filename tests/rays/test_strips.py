@@ -6,8 +6,8 @@ from tolerances import STRIP, STRIP_SLOPE
 
 import creeping as cr
 import scatterers as sc
+from creeping.geometry.surface import normal
 from creeping.rays.strips import gather, strips_of
-from creeping.surface import normal
 
 INCIDENCE = (0.3, 0.5, 0.81)
 

@@ -6,8 +6,9 @@ from numba import njit
 
 import creeping as cr
 import scatterers as sc
-from creeping.surface import Surface, polar_frame
-from scatterers._trigonometry import cos_pi, sin_pi
+from creeping.geometry.frames import polar_frame
+from creeping.geometry.surface import Surface
+from scatterers.kernels.trigonometry import cos_pi, sin_pi
 
 COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 

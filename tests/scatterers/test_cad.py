@@ -12,9 +12,9 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.surface import normal, project
-from scatterers import _cad_files
-from scatterers._cad_files import read_cad
+from creeping.geometry.surface import normal, project
+from scatterers.cad_file import files as _cad_files
+from scatterers.cad_file.files import read_cad
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 

@@ -8,10 +8,11 @@ from numba import njit
 
 import creeping as cr
 import scatterers as sc
-from creeping.phaseflow.bundle import project_bundle, random_bundle_points
-from creeping.surface import normal, polar_frame, project
-from scatterers._radial import Spine
-from scatterers._tensor_spline import TensorSpline, coefficients, interpolation_operator, weights
+from creeping.geodesics.bundle import project_bundle, random_bundle_points
+from creeping.geometry.frames import polar_frame
+from creeping.geometry.surface import normal, project
+from scatterers.sphere_map.radial import Spine
+from scatterers.spline.tensor import TensorSpline, coefficients, interpolation_operator, weights
 
 COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 PARENT = sc.TwistedEllipsoid()

@@ -9,10 +9,11 @@ from tolerances import FRACTION, MAP, TRACE
 
 import creeping as cr
 import scatterers as sc
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.surface import polar_frame, project
-from scatterers._cloud import body_cloud
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geometry.frames import polar_frame
+from creeping.geometry.surface import project
 from scatterers.implicit import Implicit
+from scatterers.spline.cloud import body_cloud
 
 COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 LENGTH = 1e-7

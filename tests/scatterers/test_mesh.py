@@ -11,10 +11,10 @@ import trimesh
 
 import creeping as cr
 import scatterers as sc
-from creeping.surface import normal, project, size
-from scatterers import _fit_cache
-from scatterers._fit_report import FitReport
-from scatterers._mesh_quality import MeshQuality
+from creeping.geometry.surface import normal, project, size
+from scatterers.spline import cache as _fit_cache
+from scatterers.spline.report import FitReport
+from scatterers.triangles.quality import MeshQuality
 from studies._meshes import almond, capsule, geodesic_sphere, on_body, scattered, slivers, torus_grid
 
 NAMES = ("ellipsoid", "torus", "twisted")

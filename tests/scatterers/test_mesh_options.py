@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scatterers as sc
-from creeping.surface import project
+from creeping.geometry.surface import project
 from studies._meshes import geodesic_sphere
 
 

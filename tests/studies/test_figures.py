@@ -9,7 +9,7 @@ import pytest
 
 import creeping as cr
 import studies
-from creeping._errors import CreepingError, InvalidInputError
+from creeping.errors import CreepingError, InvalidInputError
 from studies import figure3_circles, figure5_weighted
 
 MAP = 1e-4
@@ -154,7 +154,7 @@ def test_exact_solution_is_one():
 
 def test_caustic_is_where_neighbours_meet():
     """On the conjugate locus x(t, alpha) stops moving with alpha; it moves by sin t or so elsewhere."""
-    from creeping.phaseflow.tracing import pack, trace_states
+    from creeping.geodesics.integrator import pack, trace_states
     from studies._curves import directions_at
 
     body, source = figure3_circles.BODY, figure3_circles.SOURCE

@@ -43,7 +43,7 @@ def test_requested_tolerances_are_met():
 
 
 def test_refusals_keep_their_reason(monkeypatch):
-    from creeping._errors import ToleranceError
+    from creeping.errors import ToleranceError
 
     def none(*_args):
         raise ToleranceError("no map")

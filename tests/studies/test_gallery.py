@@ -14,9 +14,9 @@ import pytest
 import creeping
 import scatterers
 import studies
-from creeping._errors import InvalidInputError
-from creeping.cli import app
-from creeping.sweeping.study import parse_study
+from creeping.commands.main import app
+from creeping.errors import InvalidInputError
+from creeping.sweeping.studyfile.study import parse_study
 from studies import __main__ as command
 from studies import field_sphere
 from studies.gallery import building

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import scatterers as sc
-from creeping.phaseflow.bundle import random_bundle_points
-from creeping.phaseflow.geodesic import normal_curvature
-from creeping.phaseflow.tracing import pack, trace_states
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.integrator import pack, trace_states
+from creeping.geometry.curvature import normal_curvature
 from studies._peers import HeyokaFlow, heyoka_at_error, measured, scipy_flow
 
 BODIES = {"triaxial": sc.Ellipsoid(1.0, 0.8, 0.6), "torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tolerances import FRACTION, LINE_LENGTH
 
-from creeping.sweeping.directions import fibonacci_directions
-from creeping.sweeping.request import FOLLOWED
+from creeping.geometry.directions import fibonacci_directions
+from creeping.shadow.status import FOLLOWED
 from studies import figure_bistatic_map as bistatic
 from studies import sweep_lines, sweep_speed
 

@@ -14,9 +14,9 @@ import fake_sweeps as fake
 import numpy as np
 import pytest
 
-from creeping import _sweep_command
-from creeping.sweeping.running import fill, open_store
-from creeping.sweeping.store import SweepStore
+from creeping.commands import sweep as _sweep_command
+from creeping.sweeping.run import fill, open_store
+from creeping.sweeping.storage.store import SweepStore
 
 ROOT = Path(__file__).parents[2]
 STUDY = """
@@ -103,7 +103,7 @@ def test_kill_9_while_the_store_is_made_leaves_none(tmp_path):
 def test_one_interrupt_ends_the_command_with_4_and_tells_how_to_go_on(tmp_path):
     (tmp_path / "a study.toml").write_text(STUDY)
     folder = tmp_path / "a study.zarr"
-    command = ("-c", "from creeping.cli import main; main()", "sweep")
+    command = ("-c", "from creeping.commands.main import main; main()", "sweep")
     process = started(*command, str(tmp_path / "a study.toml"))
     wait_for_tasks(folder, 4, process)
     process.send_signal(signal.SIGINT)

@@ -1,0 +1,115 @@
+"""The BODY of a command: a name with parameters, a file, or an expression. Part of the command line."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+BODIES = {
+    "sphere": "Sphere",
+    "ellipsoid": "Ellipsoid",
+    "torus": "Torus",
+    "twisted-ellipsoid": "TwistedEllipsoid",
+}
+MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf")
+CAD = (".step", ".stp", ".iges", ".igs", ".brep")
+Say = Callable[[str], None]
+
+Body = Annotated[
+    str,
+    Parameter(
+        help="Name with parameters, e.g. torus or ellipsoid:a=1.2,b=0.8,c=0.8; a file, e.g. hull.stl or hull.step; "
+        "or an expression F(x, y, z), negative inside, e.g. 'x**2 + y**4 + z**2 - 1'."
+    ),
+]
+Units = Annotated[
+    str | None,
+    Parameter(help="Unit of a file's numbers: m, mm, cm, um, in, ft or km; lengths are metres from there on."),
+]
+AllowRough = Annotated[
+    bool, Parameter(negative="", help="Take a body with tips or other rough places: rays end there.")
+]
+SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
+
+
+def parse_body(
+    text: str,
+    speed: str | None = None,
+    *,
+    units: str | None = None,
+    allow_rough: bool = False,
+    cache: bool = True,
+    say: Say | None = None,
+) -> Any:
+    """Make a body from ``name``, ``name:key=value,...``, a file's name or an expression.
+
+    Raises
+    ------
+    InvalidInputError
+        Names the unknown body, parameter or value, and what is known; or what is wrong with the file or expression.
+    """
+    import scatterers
+    from creeping.errors import InvalidInputError
+
+    suffix = Path(text).suffix.lower()
+    is_file = suffix in MESHES + CAD
+    if units is not None and not is_file:
+        raise InvalidInputError(f"--units belongs to a file; {text!r} is none")
+    name, _, rest = text.partition(":")
+    if name in BODIES and allow_rough:
+        raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is smooth")
+    if not (is_file or name in BODIES or _like_expression(text)):
+        raise InvalidInputError(
+            f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
+            f"({', '.join(MESHES + CAD)}), or an expression in x, y, z"
+        )
+    try:
+        if is_file:
+            kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
+            shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=say)
+            return _with_charts(shape, say)
+        if name in BODIES:
+            return _named(name, rest, speed)
+        if say:
+            say("examining the expression")
+        return _with_charts(scatterers.Implicit(text, allow_rough=allow_rough, speed=speed), say)
+    except InvalidInputError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"{text if len(text) < 60 else text[:57] + '...'}: {error}") from error
+    except ModuleNotFoundError as error:
+        extra, use = ("cad", "a CAD file") if error.name == "gmsh" else ("expr", "an expression")
+        raise InvalidInputError(f"{use} needs {error.name}: pip install 'creeping[{extra}]'") from error
+
+
+def _with_charts(shape: Any, say: Say | None) -> Any:
+    """Body whose charts are made: every flow needs them, and of thin or sharp parts there may be none."""
+    if say:
+        say("charts")
+    _ = shape.atlas
+    return shape
+
+
+def _named(name: str, rest: str, speed: str | None) -> Any:
+    import scatterers
+    from creeping.errors import InvalidInputError
+
+    values: dict[str, Any] = {}
+    for item in filter(None, rest.split(",")):
+        key, equals, number = item.partition("=")
+        try:
+            values[key.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise InvalidInputError(f"body parameter {item!r} is not of the form name=number")
+    if speed is not None:
+        values["speed"] = speed
+    return getattr(scatterers, BODIES[name])(**values)
+
+
+def _like_expression(text: str) -> bool:
+    """Whether the text has an operation or a bracket, and one of x, y, z as a word of its own."""
+    return bool(re.search(r"[-+*/(]", text) and re.search(r"(?<![A-Za-z_])[xyz](?![A-Za-z_])", text))

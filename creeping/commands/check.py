@@ -1,0 +1,108 @@
+"""``creeping check``: what is right and wrong with a body, before anything is traced. Part of the command line."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from creeping.commands.body import CAD, MESHES, AllowRough, Body, SpeedOption, Units, parse_body
+
+Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
+Wavenumber = Annotated[float | None, Parameter(help="k, 1/L: the size of a file's body in wavelengths, too.")]
+Output = Annotated[
+    Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")
+]
+
+
+def check(
+    body: Body,
+    *,
+    speed: SpeedOption = None,
+    units: Units = None,
+    allow_rough: AllowRough = False,
+    wavenumber: Wavenumber = None,
+    output: Output = None,
+    json_: Json = False,
+) -> int:
+    """Verify a body: derivatives, closedness, orientation, cover and overlap of its charts; of a file its quality too.
+
+    Exit code 3 if something is wrong.
+    """
+    from creeping.errors import InvalidInputError
+
+    if wavenumber is not None and not 0 < wavenumber < float("inf"):
+        raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
+    suffix = Path(body).suffix.lower()
+    if output is not None and suffix not in MESHES:
+        raise InvalidInputError(f"-o is for the picture of a mesh ({', '.join(MESHES)}); {body!r} is none")
+    if wavenumber is not None and suffix not in MESHES + CAD:
+        raise InvalidInputError(f"--wavenumber tells the size of a file's body; {body!r} is no file")
+    answer: dict[str, Any] = {}
+    texts: list[str] = []
+    shape, refusal = None, None
+    try:
+        shape = parse_body(body, speed, units=units, allow_rough=allow_rough)
+    except InvalidInputError as error:
+        if suffix not in MESHES:
+            raise
+        refusal = error
+    if refusal is not None or output is not None:
+        # what is known of a mesh that can be read is worth more than the refusal alone
+        _mesh(body, units, wavenumber, output, answer, texts)
+    if shape is None:
+        ok, answer["refused"] = False, str(refusal)
+        texts.append(f"refused: {refusal}")
+    else:
+        ok = _surface(shape, wavenumber, answer, texts)
+    answer["ok"] = ok
+    print(json.dumps(answer, indent=1) if json_ else "\n".join(texts))
+    return 0 if ok else 3
+
+
+def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str]) -> bool:
+    from creeping import check_surface
+
+    report = check_surface(shape)
+    rows = [asdict(c) | {"ok": c.ok} for c in report.checks]
+    answer |= {"genus": report.genus, "area": report.area, "checks": rows}
+    if getattr(shape, "fit", None) is not None:
+        answer |= {"fit": shape.fit.to_json(), "quality": shape.quality.to_json(), "repairs": list(shape.repairs)}
+        if not texts:
+            texts += [*shape.repairs, shape.quality.summary(wavenumber)]
+        texts.append(str(shape.fit))
+    texts.append(str(report))
+    return report.ok
+
+
+def _mesh(
+    body: str,
+    units: str | None,
+    wavenumber: float | None,
+    output: Path | None,
+    answer: dict[str, Any],
+    texts: list[str],
+) -> None:
+    """The quality of a mesh as it is in the file, and its picture; also of one that cannot be fitted."""
+    from creeping.errors import InvalidInputError
+    from scatterers import examined_mesh
+
+    try:
+        mesh, quality = examined_mesh(body, units)
+    except ValueError as error:
+        raise InvalidInputError(f"{body}: {error}") from error
+    answer |= {"quality": quality.to_json(), "repairs": list(mesh.repairs)}
+    texts += [*mesh.repairs, quality.summary(wavenumber)]
+    if output is None:
+        return
+    from creeping.plotting.mesh_picture import MeshValues, mesh_picture
+
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
+    shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)
+    mesh_picture(output / "quality.png", shown)
+    answer["picture"] = str(output / "quality.png")
+    texts.append(f"picture: {output / 'quality.png'}")

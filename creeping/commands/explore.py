@@ -1,0 +1,114 @@
+"""``creeping explore``: the page that follows the hand, or one incidence as a page that needs no server."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Group, Parameter
+
+from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body
+
+_field = Group("Field")
+_page = Group("Page")
+MOVES = 1000
+"""Incidences that a page may be asked for: what a flow is chosen for."""
+
+
+def explore(
+    body: Body,
+    *,
+    direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels at first.")] = (1, 1, 1),
+    length: Annotated[float | None, Parameter(help="Travel time of the rays; 1.5 body sizes.")] = None,
+    rays: Annotated[int, Parameter(help="Rays of the fan, 16 to 1024.")] = 256,
+    spacing: Annotated[
+        float | None, Parameter(help="Of iso-phase curves; an eighth of the length, 0 for none.")
+    ] = None,
+    wavenumber: Annotated[float | None, Parameter(group=_field, help="In 1/L; 40 over the body's size.")] = None,
+    boundary: Annotated[Literal["soft", "hard"], Parameter(group=_field, help="Of the field shown.")] = "hard",
+    export: Annotated[
+        Path | None, Parameter(group=_page, help="Write one incidence as an HTML file, and serve nothing.")
+    ] = None,
+    port: Annotated[int, Parameter(group=_page, help="The next free one is taken if it is in use.")] = 8080,
+    browser: Annotated[bool, Parameter(group=_page, help="Open the page in a browser.")] = True,
+    tolerance: Annotated[float, Parameter(help="Error at the ends of the rays.")] = 1e-5,
+    speed: SpeedOption = None,
+    units: Units = None,
+    allow_rough: AllowRough = False,
+    cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
+) -> int:
+    """Turn the incidence by hand, and watch shadow line, rays, iso-phase curves and field follow."""
+    from creeping.errors import CreepingError, InvalidInputError
+    from creeping.explorer.request import Wish, angles
+    from creeping.geometry.directions import unit_direction
+    from creeping.geometry.surface import size
+
+    def say(text: str) -> None:
+        print(f"creeping: {text}", file=sys.stderr)
+
+    if not 1 <= port <= 65535:
+        raise InvalidInputError(f"port = {port} is not between 1 and 65535")
+    try:
+        import viser  # noqa: F401
+    except ImportError as error:
+        raise CreepingError(f"the page needs viser ({error}); pip install 'creeping[web]'") from error
+    shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, say=say)
+    extent = size(shape)
+    theta, phi = angles(unit_direction(direction))
+    far = _round(1.5 * extent) if length is None else length
+    gap = _round(far / 8) if spacing is None else spacing
+    k = _round(40 / extent) if wavenumber is None else wavenumber
+    # the cut runs through the direction of the wave
+    wish = Wish(theta, phi, rays, far, gap, k, boundary, cut=float(round(phi)))
+    flow = _flow(shape, wish, MOVES if export is None else 1, tolerance, cache, say)
+    if export is not None:
+        from creeping.explorer.export import export_page
+
+        found = export_page(export, flow, wish)
+        megabytes, rms = export.stat().st_size / 1e6, found.fan.error.rms
+        print(f"{export}  {megabytes:.1f} MB  {len(found.fan.points)} rays, rms {rms:.1e}")
+        return 0
+    return _serve(flow, wish, port, browser, say)
+
+
+def _flow(body: Any, wish: Any, moves: int, tolerance: float, cache: bool, say: Any) -> Any:
+    """What carries the rays at the steps of the page."""
+    import creeping as cr
+    from creeping.explorer.preview import step_of, steps_of
+
+    steps, step = steps_of(wish.length, step_of(body))
+    say(f"choosing what carries {moves} incidence{'s' * (moves != 1)} of {wish.rays} rays")
+    return cr.choose_flow(
+        body,
+        rays=moves * wish.rays,
+        length=steps * step,
+        outputs=steps,
+        tolerance=tolerance,
+        cache=cache,
+        progress=say,
+    )
+
+
+def _round(value: float) -> float:
+    """Two digits of a number, as a slider shows them."""
+    return float(f"{value:.2g}")
+
+
+def _serve(flow: Any, wish: Any, port: int, browser: bool, say: Any) -> int:
+    import webbrowser
+
+    from creeping.explorer.page import Explorer
+
+    say("preparing the page; kernels are compiled once, which takes about a minute")
+    page = Explorer(flow, wish, port=port)
+    try:
+        if not page.address.endswith(f":{port}"):
+            say(f"port {port} is in use")
+        say(f"{page.address} (Ctrl+C ends it)")
+        if browser:
+            webbrowser.open(page.address)
+        page.server.sleep_forever()
+    except KeyboardInterrupt:
+        say("the page is closed")
+    finally:
+        page.close()
+    return 0

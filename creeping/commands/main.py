@@ -1,0 +1,245 @@
+"""The ``creeping`` command: the only place that joins creeping and scatterers.
+
+Exit codes: 0 done, 2 usage, 3 bad input, 4 partial sweep, 130 interrupted. Libraries are imported inside the commands,
+so that ``creeping --help`` answers at once.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import App, Group, Parameter
+
+from creeping._version import __version__
+from creeping.commands import check as _checking
+from creeping.commands import explore as _explore_command
+from creeping.commands import sweep as _sweep_command
+from creeping.commands import upkeep as _upkeep
+from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body
+
+app = App(
+    name="creeping",
+    version=__version__,
+    help="Creeping rays on smooth bodies by the phase flow method. Angles are in degrees.",
+    # stars of an expression are no markup
+    help_format="plaintext",
+    result_action="return_value",
+    suppress_keyboard_interrupt=False,
+)
+cache_app = App(name="cache", help="Stored phase maps and fitted bodies: list, verify, clear.")
+app.command(cache_app)
+
+_output = Group("Output")
+_field = Group("Field")
+Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
+Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line (of the process, unless arguments are given) and exit with its code."""
+    from creeping.errors import CreepingError
+
+    try:
+        code = app(sys.argv[1:] if arguments is None else arguments)
+    except CreepingError as error:
+        print(f"creeping: {error}", file=sys.stderr)
+        code = 3
+    except KeyboardInterrupt:
+        print("creeping: interrupted", file=sys.stderr)
+        code = 130
+    except BrokenPipeError:
+        code = 0
+    raise SystemExit(code if isinstance(code, int) else 0)
+
+
+@app.command
+def run(
+    body: Body,
+    *,
+    direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels; need not be unit.")],
+    output: Folder,
+    length: Annotated[float | None, Parameter(help="Travel time of the rays; 1.5 body sizes, 3 with a field.")] = None,
+    rays: Annotated[int, Parameter(help="Rays at the start; more are inserted where neighbours part.")] = 256,
+    spacing: Annotated[float | None, Parameter(help="Spacing of iso-phase curves; length/16 if not given.")] = None,
+    of: Annotated[
+        Literal["travel_time", "eikonal"], Parameter(help="What is constant on an iso-phase curve.")
+    ] = "travel_time",
+    launch_from: Annotated[
+        Literal["attached", "all"], Parameter(help="Points of the shadow line that launch.")
+    ] = "attached",
+    tolerance: Annotated[float, Parameter(help="Rms error of points and directions at the ends of rays.")] = 1e-6,
+    flow: Annotated[
+        Literal["auto", "map", "direct"],
+        Parameter(help="Phase map or direct integration; auto takes what is faster, its preparation included."),
+    ] = "auto",
+    speed: SpeedOption = None,
+    units: Units = None,
+    allow_rough: AllowRough = False,
+    wavenumber: Annotated[float | None, Parameter(group=_field, help="k, 1/L: adds the field to the results.")] = None,
+    boundary: Annotated[
+        str | None, Parameter(group=_field, help="soft (if not given), hard, pec or impedance:ETA, e.g. 0.5+0.2j.")
+    ] = None,
+    observe: Annotated[
+        list[str] | None,
+        Parameter(
+            group=_field,
+            negative="",
+            help="Where the far field is wanted; may be repeated. cut:PHI is theta from -180 to 180 in the plane PHI, "
+            "grid:STEP all theta and phi (gives far.ffe), THETA,PHI one direction, backscatter the way back. "
+            "If not given, the cut through the direction of the wave.",
+        ),
+    ] = None,
+    cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
+    backend: Annotated[
+        Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")
+    ] = "auto",
+    json_: Json = False,
+) -> int:
+    """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
+    import numpy as np
+
+    import creeping as cr
+    from creeping.commands import run_field as _field_run
+    from creeping.commands import run_report as _run_results
+    from creeping.geometry.surface import size
+
+    started = time.perf_counter()
+    for name, value in (("length", length), ("spacing", spacing)):
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
+    job = _field_run.job(wavenumber, boundary, observe, direction, weighted=speed is not None)
+    with _Progress(quiet=json_) as say:
+        shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, say=say)
+        say("shadow line")
+        line = cr.shadow_line(shape, direction)
+        length = length or (3 if job else 1.5) * size(shape)
+        say("flow")
+        carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, say)
+        say("creeping rays")
+        fan = cr.launch(carrier, line, length=length, n_rays=rays, n_steps=steps, status=launch_from)
+        step = spacing or fan.length / 16
+        curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
+        summary = _run_results.summary_of(body, speed, line, carrier, fan, curves)
+        if job:
+            say("field")
+            far, field_seconds = job.far_field(fan)
+        say("pictures and files")
+        summary["files"], summary["drawn_by"] = _run_results.write_results(output, line, fan, curves, backend)
+        if job:
+            summary["field"], names = job.write(far, fan, output, backend)
+            summary["field"]["seconds"] = field_seconds
+            summary["files"][-1:-1] = names
+        summary["seconds"] = round(time.perf_counter() - started, 2)
+        from creeping.plotting import write_text
+
+        write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+    print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))
+    return 0
+
+
+def levels_of(fan: Any, step: float, of: str) -> Any:
+    """Multiples of the step that rays of the fan meet, at most 1000."""
+    import numpy as np
+
+    from creeping.errors import InvalidInputError
+
+    values = fan.travel_time if of == "travel_time" else fan.eikonal
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+    if last - first > 1000:
+        raise InvalidInputError(
+            f"spacing {step:g} makes {last - first + 1} iso-phase levels; give one above {(high - low) / 1000:g}"
+        )
+    return step * np.arange(first, last + 1)
+
+
+def _carrier(
+    flow: str, shape: Any, line: Any, rays: int, length: float, tolerance: float, cache: bool, say: Any
+) -> tuple[Any, int]:
+    """Flow that carries the fan, and the number of its steps."""
+    import creeping as cr
+    from creeping.rays.fan import enough_steps
+
+    steps = enough_steps(shape, line, length)
+    if flow == "direct":
+        # errors of the steps add up and grow along the rays
+        return cr.DirectFlow(shape, rtol=min(max(1e-4 * tolerance, 1e-13), 1e-8)), steps
+    asked = {"length": length, "outputs": steps, "tolerance": tolerance, "cache": cache, "progress": say}
+    if flow == "map":
+        return cr.build_phase_map(shape, **asked), steps
+    # rays are inserted where neighbours part
+    return cr.choose_flow(shape, rays=2 * rays, **asked), steps
+
+
+@app.command
+def figure(
+    name: Annotated[str | None, Parameter(help="Name of the figure; see --list.")] = None,
+    /,
+    *,
+    output: Folder = Path("out"),
+    all_: Annotated[bool, Parameter(name="--all", negative="", help="Draw every figure.")] = False,
+    list_: Annotated[bool, Parameter(name="--list", negative="", help="List the figures.")] = False,
+    quick: Annotated[bool, Parameter(negative="", help="Coarser and faster.")] = False,
+    json_: Json = False,
+) -> int:
+    """Draw figures of the paper, each with a sidecar of its parameters, error and seconds."""
+    import studies
+    from creeping.errors import InvalidInputError
+
+    if list_:
+        print("\n".join(f"{key:16} {title}" for key, title in studies.titles().items()))
+        return 0
+    if all_ == (name is not None):
+        raise InvalidInputError(f"give one figure or --all; figures are {', '.join(studies.FIGURES)}")
+    if name is not None and name not in studies.FIGURES:
+        raise InvalidInputError(f"unknown figure {name!r}; figures are {', '.join(studies.FIGURES)}")
+    cards = []
+    with _Progress(quiet=json_) as say:
+        for key in studies.FIGURES if name is None else [name]:
+            say(f"figure {key}")
+            cards.append(studies.draw(key, output, quick=quick))
+    if json_:
+        print(json.dumps(cards, indent=1))
+    else:
+        for card in cards:
+            print(f"{output / card['file']}  {card['seconds']:.1f} s  {card['headline']}")
+    return 0
+
+
+app.command(_checking.check)
+app.command(_sweep_command.sweep)
+app.command(_explore_command.explore)
+cache_app.command(_upkeep.list_maps, name="ls")
+cache_app.command(_upkeep.verify_maps, name="verify")
+cache_app.command(_upkeep.clear_maps, name="clear")
+app.command(_upkeep.doctor)
+
+
+class _Progress:
+    """What is being done, on standard error: a spinner on a terminal, plain lines elsewhere."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self.quiet = quiet
+        self._status: Any = None
+
+    def __enter__(self) -> Callable[[str], None]:
+        if not self.quiet and sys.stderr.isatty():
+            from rich.console import Console
+
+            self._status = Console(stderr=True).status("starting")
+            self._status.start()
+        return self.say
+
+    def say(self, text: str) -> None:
+        """Show what is being done now."""
+        if self._status is not None:
+            self._status.update(text)
+        elif not self.quiet:
+            print(f"creeping: {text} ...", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._status is not None:
+            self._status.stop()

@@ -1,0 +1,133 @@
+"""What one ``creeping run`` says and writes. Part of the command line."""
+
+from pathlib import Path
+from typing import Any
+
+from creeping._version import __version__
+
+
+def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any]) -> dict[str, Any]:
+    """What the summary file holds."""
+    import numpy as np
+
+    from creeping.rays.fan import RayStatus
+
+    summary: dict[str, Any] = {
+        "body": body,
+        "speed": speed,
+        "version": __version__,
+        "direction": line.direction.tolist(),
+        "shadow_line": [{"length": c.length, "fractions": c.fractions} for c in line.curves],
+        "flow": "map" if hasattr(carrier, "leaps") else "direct",
+        "rays": len(fan.points),
+        "steps": len(fan.travel_time),
+        "length": fan.length,
+        "ray_status": {s.name: int(np.sum(fan.status == s)) for s in RayStatus},
+        "earliest_detachment": float(fan.detachment.min()) if np.isfinite(fan.detachment).any() else None,
+        "caustics_passed": int(fan.caustic_index.max(initial=0)),
+        "iso_phase_curves": len(curves),
+        "error_of_rays": {"rms": fan.error.rms, "max": fan.error.max, "rays_traced": fan.error.samples},
+    }
+    if summary["flow"] == "map":
+        summary["phase_map"] = {
+            "horizon": carrier.horizon,
+            "charts": len(carrier.leaps[-1].state),
+            "nodes": list(carrier.grid.nodes),
+            "degree": carrier.grid.degree,
+            "megabytes": round(carrier.nbytes / 1e6, 1),
+            "type": str(carrier.leaps[-1].state.dtype),
+            "rms": carrier.error.rms,
+            "max": carrier.error.max,
+            "samples": carrier.error.samples,
+        }
+    summary |= _of_the_body(fan)
+    return summary
+
+
+def _of_the_body(fan: Any) -> dict[str, Any]:
+    """How well a body from a file is known, and what that does to its rays; nothing for other bodies."""
+    from dataclasses import asdict
+
+    from creeping.rays.body_uncertainty import body_error
+
+    fit = getattr(fan.body, "fit", None)
+    if fit is None:
+        return {}
+    error = body_error(fan)
+    return {
+        "fit": fit.to_json(),
+        "verdict": fan.body.quality.verdict,
+        "repairs": list(fan.body.repairs),
+        "error_of_body": None if error is None else asdict(error),
+    }
+
+
+def write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend: str) -> tuple[list[str], str]:
+    """Write pictures and data files; their names, and what drew the pictures."""
+    from creeping import plotting
+    from creeping.errors import InvalidInputError
+
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
+    # pictures last: a graphics driver that ends the process shall not take the numbers with it
+    plotting.write_vtp(output / "line.vtp", line=line)
+    plotting.write_vtp(output / "rays.vtp", fan=fan)
+    plotting.write_vtp(output / "curves.vtp", curves=curves)
+    plotting.write_csv(output / "line.csv", line=line)
+    plotting.write_csv(output / "rays.csv", fan=fan)
+    plotting.write_csv(output / "curves.csv", curves=curves)
+    drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend)
+    plotting.parameter_picture(output / "parameters.png", line, fan, curves)
+    names = ["rays.png", "parameters.png"] + [
+        f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")
+    ]
+    return [*names, "summary.json"], str(drawn_by)
+
+
+def readable(summary: dict[str, Any], output: Path) -> str:
+    """The summary as a person reads it."""
+    rows = [f"{summary['body']}, d = ({', '.join(f'{v:.4f}' for v in summary['direction'])})"]
+    for k, curve in enumerate(summary["shadow_line"]):
+        shares = ", ".join(f"{100 * v:.1f} % {name}" for name, v in curve["fractions"].items() if v > 0)
+        rows.append(f"shadow line {k + 1}: length {curve['length']:.10f}, {shares}")
+    if "phase_map" in summary:
+        m = summary["phase_map"]
+        grid = " x ".join(map(str, [m["charts"], *m["nodes"]]))
+        rows.append(
+            f"phase map: T0 = {m['horizon']:g}, {grid} nodes, degree {m['degree']}; rms error {m['rms']:.1e} a leap"
+        )
+    else:
+        rows.append("direct integration of order 8")
+    statuses = ", ".join(f"{n} {name}" for name, n in summary["ray_status"].items() if n)
+    rows.append(f"rays: {summary['rays']} of length {summary['length']:g} ({statuses or 'none launched'})")
+    error = summary["error_of_rays"]
+    rows.append(
+        f"error at their ends, against independent integration at 1e-12: rms {error['rms']:.1e}, max {error['max']:.1e}"
+    )
+    if "fit" in summary:
+        fit, off = summary["fit"], summary["error_of_body"]
+        rows.append(
+            f"body: a fit to {fit['points']} points, off by {fit['misfit']:.1e} m rms; kappa_n uncertain by "
+            f"{fit['normal_curvature_error'] / fit['normal_curvature']:.1e} of its rms"
+        )
+        rows.extend(f"body: {text}" for text in summary["repairs"])
+        if off is not None:
+            rows.append(
+                f"error at the ends of {off['rays']} rays because of it: points {off['points']:.1e} m, J "
+                f"{off['spreading']:.1e}, attenuation {off['attenuation']:.1e} m^(1/3)"
+            )
+    if "field" in summary:
+        f = summary["field"]
+        rows.append(
+            f"field: k = {f['wavenumber']:g}, {f['boundary']}, {f['directions']} directions, "
+            f"|f| up to {f['largest']:.4g}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
+        )
+        if "uncertain_by" in f:
+            off = f["uncertain_by"]
+            known = off["reason"] or f"rms {off['rms']:.1e}, max {off['max']:.1e}"
+            rows.append(f"error of the field because of the body: {known}")
+    rows.append(f"{summary['iso_phase_curves']} iso-phase curves; 3-D picture by {summary['drawn_by']}")
+    rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
+    return "\n".join(rows)

@@ -1,0 +1,309 @@
+"""``creeping sweep``: runs a study file, goes on with one that was interrupted, alone or on a cluster."""
+
+import json
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from creeping.commands.body import CAD, MESHES, parse_body
+
+PARTIAL, ALL_FAILED = 4, 3
+"""Exit codes: of a sweep that --resume would go on with, for what is missing or failed; of one without results."""
+PILOT = 2
+"""Tasks by which a sweep is timed; the first may have to compile."""
+LARGE = 1800.0
+"""Seconds left from which a sweep is shared among the cores by itself."""
+QUIET = 5.0
+"""Seconds between lines of progress."""
+_output = Group("Output")
+_workers = Group("Workers")
+
+
+def sweep(
+    study: Annotated[Path, Parameter(help="Study file, TOML; --example prints one.")] = Path("study.toml"),
+    /,
+    *,
+    output: Annotated[
+        Path | None,
+        Parameter(name=["-o", "--output"], group=_output, help="Folder for the results (zarr); else of the study."),
+    ] = None,
+    resume: Annotated[
+        bool,
+        Parameter(negative="", help="Go on with what is there: tasks that are missing, or have failed incidences."),
+    ] = False,
+    verify: Annotated[
+        bool,
+        Parameter(negative="", help="With --resume: check what is there; compute damaged tasks again."),
+    ] = False,
+    scheduler: Annotated[str | None, Parameter(group=_workers, help="Address of a Dask scheduler.")] = None,
+    workers: Annotated[
+        int | None,
+        Parameter(group=_workers, help="Worker processes on this machine; one for each core if it takes long."),
+    ] = None,
+    cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
+    example: Annotated[bool, Parameter(negative="", help="Print a study file to start from.")] = False,
+    json_: Annotated[
+        bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")
+    ] = False,
+) -> int:
+    """Run the sweep of a study file; interrupted, it can be resumed.
+
+    Exit code 4 if --resume would go on: some incidences are missing or failed. 3 if all of them failed.
+    """
+    from creeping.errors import InvalidInputError
+    from creeping.sweeping.studyfile.study import EXAMPLE, read_study
+
+    if example:
+        print(EXAMPLE, end="")
+        return 0
+    if verify and not resume:
+        raise InvalidInputError("--verify goes with --resume")
+    if scheduler is not None and workers is not None:
+        raise InvalidInputError("--scheduler and --workers are both given; give one")
+    if workers is not None and workers < 1:
+        raise InvalidInputError(f"--workers {workers} is not a whole number >= 1")
+    read = read_study(study)
+    folder = output or (read.folder / read.output if read.output else study.with_suffix(".zarr"))
+    if folder.exists() and not resume:
+        raise InvalidInputError(f"{folder} exists; give --resume to go on with it, or another -o")
+    started = time.perf_counter()
+    if scheduler is None and workers is None:
+        workers = read.workers
+    with _Meter(quiet=json_) as meter:
+        plan, store = _prepared(read, folder, resume, cache, meter.say)
+        again = ["creeping", "sweep", str(study), "--resume", "-o", str(folder)]
+        again += ["--scheduler", scheduler] if scheduler else []
+        again += ["--workers", str(workers)] if workers else []
+        # one lock for all: nobody slips in between
+        with store.locked():
+            if verify:
+                meter.say("verifying")
+                for task, reason in store.verify(repair=True):
+                    meter.say(f"task {task} is computed anew: {reason}")
+            missing = sum(plan.rows(task).stop - plan.rows(task).start for task in store.missing())
+            meter.begin(len(plan.incidences) - missing, len(plan.incidences))
+            running = time.perf_counter()
+            try:
+                complete, done = _run(plan, store, scheduler, workers, meter)
+            except BaseException:
+                meter.tell(f"what is done is kept; to go on: {shlex.join(again)}")
+                raise
+        now = time.perf_counter()
+    summary = _summary(plan, store, complete)
+    summary |= {"incidences_now": done, "incidences_per_second": round(done / (now - running), 2)}
+    summary["seconds"] = round(now - started, 2)
+    failed = summary["status"]["failed"]
+    if failed or not complete:
+        summary["resume"] = shlex.join(again)
+    print(json.dumps(summary, indent=1) if json_ else _readable(summary))
+    if failed == len(plan.incidences):
+        return ALL_FAILED
+    return PARTIAL if failed or not complete else 0
+
+
+def _prepared(read: Any, folder: Path, resume: bool, cache: bool, say: Any) -> tuple[Any, Any]:
+    """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
+    from creeping.sweeping.plan import SweepPlan, task_size
+    from creeping.sweeping.results import require
+    from creeping.sweeping.run import open_store
+    from creeping.sweeping.storage.store import SweepStore
+
+    for package in ("xarray", "zarr"):
+        require(package)
+    is_file = Path(read.body).suffix.lower() in MESHES + CAD
+    text = str(read.folder / read.body) if is_file else read.body
+    say("body")
+    body = parse_body(text, read.speed, units=read.units, allow_rough=read.allow_rough, cache=cache, say=say)
+    request = read.request_for(body)
+    say("flow")
+    if resume and folder.exists():
+        store = SweepStore.open(folder)
+        # the size of its tasks is the store's, whatever the study says now
+        flow, chunk = store.flow(body), store.chunk
+    else:
+        flow, chunk = _flow(read, body, request, cache, say), task_size(request, len(read.incidences), read.chunk)
+    plan = SweepPlan(
+        flow,
+        request,
+        read.incidences,
+        chunk,
+        asked={"flow": read.flow, "tolerance": read.tolerance},
+        text=read.text,
+    )
+    return plan, open_store(plan, folder, resume=resume)
+
+
+def _flow(read: Any, body: Any, request: Any, cache: bool, say: Any) -> Any:
+    import creeping as cr
+
+    if read.flow == "direct":
+        # errors of the steps add up and grow along the rays
+        return cr.DirectFlow(body, rtol=min(max(1e-4 * read.tolerance, 1e-13), 1e-8))
+    from creeping.sweeping.sweepers.selection import outputs_of
+
+    asked = {"length": request.length, "outputs": outputs_of(body, request), "tolerance": read.tolerance}
+    asked |= {"rays": len(read.incidences) * request.n_rays, "cache": cache, "progress": say}
+    return cr.build_phase_map(body, **asked) if read.flow == "map" else cr.choose_flow(body, **asked)
+
+
+def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, meter: "_Meter") -> tuple[bool, int]:
+    """Fill the store: whether it is complete, and the number of incidences done now."""
+    from creeping.kernels.threads import thread_count
+    from creeping.sweeping.run import fill
+
+    with _stopping(meter) as asked:
+        options: dict[str, Any] = {"progress": meter.progress, "stop": asked.is_set}
+        if scheduler is None and workers is None:
+            complete = fill(plan, store, most=PILOT, **options)
+            # cores, unless the user has fewer in mind
+            if complete or asked.is_set() or meter.left() < LARGE or thread_count() == 1:
+                return complete or fill(plan, store, **options), meter.done_now
+            workers = thread_count()
+            meter.say(f"about {meter.left():.0f} s are left: sharing them among {workers} worker processes")
+        if workers is not None:
+            from creeping.sweeping.results import require
+
+            require("distributed")
+            from creeping.sweeping.cluster.driver import local_client
+
+            meter.say(f"starting {workers} worker processes")
+            with local_client(workers) as client:
+                return fill(plan, store, client=client, **options), meter.done_now
+        return fill(plan, store, client=scheduler, **options), meter.done_now
+
+
+@contextmanager
+def _stopping(meter: "_Meter") -> Iterator[Any]:
+    """Event that the first SIGINT or SIGTERM sets; the second is an interrupt as always."""
+    import threading
+
+    asked = threading.Event()
+
+    def ask(*_: Any) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+        meter.say("finishing the tasks that have begun; interrupt again to stop at once")
+
+    if threading.current_thread() is not threading.main_thread():
+        yield asked
+        return
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _summary(plan: Any, store: Any, complete: bool) -> dict[str, Any]:
+    dataset = store.dataset()
+    names = [name for name in dataset.attrs if name.startswith("incidences_")]
+    return {
+        "output": str(store.folder),
+        "complete": complete,
+        "incidences": len(plan.incidences),
+        "status": {name.removeprefix("incidences_"): int(dataset.attrs[name]) for name in names},
+        "failures": [{"incidence": row, "error": text} for row, text in store.failures()],
+        "quantity": plan.request.quantity,
+        "flow": store.key["flow"],
+        "tasks": store.tasks,
+        "chunk": store.chunk,
+        "seconds_of_sweep": dataset.attrs["seconds"],
+        "digest": plan.digest,
+    }
+
+
+def _readable(summary: dict[str, Any]) -> str:
+    counts = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in summary["status"].items() if n)
+    now = (
+        f"{summary['incidences_now']} of them now, in {summary['seconds']:.1f} s "
+        f"({summary['incidences_per_second']:.3g} a second once under way)"
+    )
+    nothing = summary["complete"] and not summary["incidences_now"]
+    rows = [
+        f"{summary['incidences']} incidences, {summary['quantity']}: {counts}",
+        "nothing was missing" if nothing else now,
+    ]
+    rows += [f"incidence {item['incidence']} failed: {item['error']}" for item in summary["failures"][:5]]
+    if summary["status"]["failed"] > 5:
+        rows.append(f"... {summary['status']['failed']} incidences failed; their incidence_status is 4")
+    rows.append(f"results in {summary['output']}: xarray.open_zarr({summary['output']!r}, consolidated=False)")
+    if "resume" in summary:
+        why = "to try again those that failed" if summary["complete"] else "not complete; to go on"
+        rows.append(f"{why}: {summary['resume']}")
+    return "\n".join(rows)
+
+
+class _Meter:
+    """Progress on standard error: a bar with the time left on a terminal, now and then a line elsewhere."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self.quiet = quiet
+        self._begun = 0
+        self._first: tuple[int, float] | None = None
+        self._last: tuple[int, int, float] = (0, 0, 0.0)
+        self._shown = time.monotonic()
+        self._bar: Any = None
+        self._bars: Any = nullcontext()
+
+    def __enter__(self) -> "_Meter":
+        if not self.quiet and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+            self._bars = Progress(*columns, TextColumn("{task.fields[left]}"), console=Console(stderr=True))
+            self._bar = self._bars.add_task("starting", total=None, left="")
+        self._bars.__enter__()
+        return self
+
+    def __exit__(self, *details: Any) -> None:
+        self._bars.__exit__(*details)
+
+    def say(self, text: str) -> None:
+        """Say what is being done now."""
+        if not self.quiet:
+            self.tell(text)
+
+    def tell(self, text: str) -> None:
+        """Say what must be known, quiet or not."""
+        if self._bar is not None:
+            self._bars.console.print(f"creeping: {text}", highlight=False, markup=False, soft_wrap=True)
+        else:
+            print(f"creeping: {text}", file=sys.stderr, flush=True)
+
+    @property
+    def done_now(self) -> int:
+        """Incidences that were done since `begin`."""
+        return self._last[0] - self._begun
+
+    def begin(self, done: int, total: int) -> None:
+        """Say how many incidences are done already."""
+        self._begun, self._last = done, (done, total, time.monotonic())
+
+    def progress(self, done: int, total: int, _: float) -> None:
+        """Show how many incidences are done."""
+        now = time.monotonic()
+        if self._first is None:
+            self._first = (done, now)
+        self._last = (done, total, now)
+        left = f"{self.left():.0f} s left" if self.left() else ""
+        if self._bar is not None:
+            self._bars.update(self._bar, description="sweep", completed=done, total=total, left=left)
+        elif now - self._shown > QUIET or done == total:
+            self._shown = now
+            self.say(f"{done} of {total} incidences" + (f", {left}" if left else ""))
+
+    def left(self) -> float:
+        """Seconds left, by what came after the first task."""
+        done, total, now = self._last
+        first, then = self._first or (0, 0.0)
+        return (total - done) * (now - then) / (done - first) if done > first else 0.0

@@ -1,0 +1,140 @@
+"""Commands that look after an installation: stored maps and fitted bodies, and what the machine offers."""
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from creeping._version import __version__
+
+OPTIONAL = {
+    "sympy": "expressions",
+    "gmsh": "CAD files",
+    "xarray": "sweeps",
+    "zarr": "stored sweeps",
+    "dask": "sweeps on clusters",
+    "viser": "creeping explore",
+}
+Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
+
+
+def list_maps(*, json_: Json = False) -> int:
+    """List the stored maps and fitted bodies."""
+    from creeping.errors import CreepingError
+    from creeping.phaseflow import cache as caching
+    from creeping.phaseflow.tuning import choice_record as choices
+    from creeping.storage import folder as storing
+
+    rows = []
+    for folder in _stored():
+        size = sum(f.stat().st_size for f in folder.iterdir())
+        try:
+            content = storing.read_manifest(folder)
+            rows.append(
+                {"map": folder.name, "MB": round(size / 1e6, 1), "body": content["body"], "error": content["error"][0]}
+            )
+        except CreepingError as error:
+            rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": f"unreadable: {error}", "error": None})
+    fits = [{"fit": file.stem, "MB": round(file.stat().st_size / 1e6, 1)} for file in _fits()]
+    if json_:
+        print(json.dumps([*rows, *fits], indent=1))
+    else:
+        total = sum(float(r["MB"]) for r in (*rows, *fits))
+        chosen = len(choices.choice_files())
+        kept = f"{len(rows)} maps, {len(fits)} fitted bodies, {total:.1f} MB; {chosen} choices of flows"
+        print(f"{caching.cache_folder()}: {kept}")
+        for row in rows:
+            print(f"  {row['map']}  {row['MB']:8.1f} MB  {row['body']}")
+        for row in fits:
+            print(f"  {row['fit']}  {row['MB']:8.1f} MB")
+    return 0
+
+
+def verify_maps() -> int:
+    """Check every stored map and fitted body against its digests; exit code 3 if one is damaged."""
+    from creeping.errors import CreepingError
+    from creeping.storage import folder as storing
+    from scatterers.spline import cache as _fit_cache
+
+    damaged = 0
+    for folder in _stored():
+        try:
+            storing.verify_files(folder)
+            print(f"ok       {folder.name}")
+        except CreepingError as error:
+            damaged += 1
+            print(f"DAMAGED  {folder.name}: {error}")
+    for file in _fits():
+        whole = _fit_cache.load(file.parent, file.stem) is not None
+        damaged += not whole
+        print(f"ok       {file.stem}" if whole else f"DAMAGED  {file.stem}: it is fitted anew when it is asked for")
+    return 3 if damaged else 0
+
+
+def clear_maps() -> int:
+    """Remove every stored map, fitted body and choice between flows."""
+    import shutil
+
+    from creeping.phaseflow.tuning.choice_record import choice_files
+    from scatterers.spline import cache as _fit_cache
+
+    folders, files, choices = _stored(), _fits(), choice_files()
+    for file in choices:
+        file.unlink(missing_ok=True)
+    for folder in folders:
+        shutil.rmtree(folder)
+    for file in files:
+        file.unlink(missing_ok=True)
+    # of processes that were ended while they wrote
+    for file in _fit_cache.cache_folder().glob(".writing-*"):
+        file.unlink(missing_ok=True)
+    print(f"removed {len(folders)} maps, {len(files)} fitted bodies and {len(choices)} choices of flows")
+    return 0
+
+
+def _stored() -> list[Path]:
+    from creeping.phaseflow import cache as caching
+    from creeping.storage import folder as storing
+
+    root = caching.cache_folder()
+    return sorted(p.parent for p in root.glob(f"*/{storing.MANIFEST}")) if root.is_dir() else []
+
+
+def _fits() -> list[Path]:
+    from scatterers.spline import cache as _fit_cache
+
+    root = _fit_cache.cache_folder()
+    return sorted(root.glob("*.npz")) if root.is_dir() else []
+
+
+def doctor() -> int:
+    """Report versions, compiled kernels, graphics and the cache folder; exit code 3 if something is missing."""
+    import os
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    from creeping.phaseflow.cache import cache_folder
+    from creeping.plotting import gl_available
+
+    print(f"creeping {__version__}, Python {platform.python_version()}, {os.cpu_count()} cores")
+    missing = 0
+    for name in ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh", *OPTIONAL):
+        try:
+            print(f"  {name} {version(name)}")
+        except PackageNotFoundError:
+            missing += name not in OPTIONAL
+            print(f"  {name} is not installed" + (f" (needed for {OPTIONAL[name]})" if name in OPTIONAL else ""))
+    started = time.perf_counter()
+    import creeping.geodesics.kernels.integrator  # noqa: F401
+
+    print(f"  compiled kernels: import {time.perf_counter() - started:.1f} s")
+    probe = gl_available()
+    print(f"  3-D graphics: {'pyvista' if probe.ok else f'matplotlib, because {probe.reason}'}")
+    root = cache_folder()
+    nearest = next(p for p in [root, *root.parents] if p.exists())
+    print(
+        f"  cache: {root} ({'writable' if os.access(nearest, os.W_OK) else 'NOT writable: maps are rebuilt each time'})"
+    )
+    return 3 if missing else 0

@@ -1,0 +1,76 @@
+"""A page of one incidence that opens without a server: the scene, the plane pictures and the numbers in one file."""
+
+import html
+import os
+from pathlib import Path
+
+from creeping.explorer.colours import RANGE
+from creeping.explorer.page import LocalServer
+from creeping.explorer.preview import moving_frame, step_of
+from creeping.explorer.refined import Settled, settled
+from creeping.explorer.request import Wish
+from creeping.explorer.scene import Model, Stage
+from creeping.explorer.svg import cut_svg, plane_svg
+from creeping.explorer.text import colour_bar, settled_text
+from creeping.plotting import write_text
+from creeping.rays.fan import Flow
+
+STYLE = """
+#creeping{position:fixed;top:0;right:0;width:340px;max-height:100vh;overflow:auto;box-sizing:border-box;padding:10px;
+background:rgba(255,255,255,.92);font:12px/1.4 sans-serif;color:#222;z-index:10}
+#creeping h1{font-size:14px;margin:0 0 6px}#creeping p{margin:0 0 6px}
+"""
+
+
+def export_page(path: str | os.PathLike[str], flow: Flow, wish: Wish) -> Settled:
+    """Write a self-contained page of one incidence.
+
+    Parameters
+    ----------
+    path : str or path
+        HTML file to write.
+    flow : PhaseMap or DirectFlow
+    wish : Wish
+
+    Returns
+    -------
+    Settled
+        What the page shows.
+
+    Raises
+    ------
+    SingularIncidenceError
+        If the shadow line crosses itself.
+    CreepingError
+        If the file cannot be written.
+    """
+    model = Model.of(flow.body)
+    frame = moving_frame(flow, wish, step_of(flow.body))
+    found = settled(flow, frame, model.mesh.vertices)
+    assert found is not None
+    server = LocalServer(8400)
+    try:
+        stage = Stage(server, model, still=True)
+        stage.look(wish.direction)
+        stage.turn(wish.direction)
+        stage.show(frame)
+        stage.settle(found, stage.painted_mesh(found))
+        page = server.scene.as_html()
+    finally:
+        server.stop()
+    write_text(Path(path), with_panel(page, repr(flow.body), found))
+    return found
+
+
+def with_panel(page: str, title: str, found: Settled) -> str:
+    """The page of a scene with the numbers and plane pictures beside it."""
+    bar = "" if found.body_levels is None else colour_bar(RANGE, found.wish.boundary)
+    text = "".join(f"<p>{html.escape(part)}</p>" for part in settled_text(found).split("\n\n"))
+    angles = f"theta {found.wish.theta:.1f}, phi {found.wish.phi:.1f} degrees"
+    panel = (
+        f'<style>{STYLE}</style><aside id="creeping"><h1>{html.escape(title)}</h1><p>{angles}</p>{text}'
+        f"{bar}{plane_svg(found)}{cut_svg(found)}</aside>"
+    )
+    page = page.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>", 1)
+    end = page.rindex("</body>")
+    return page[:end] + panel + page[end:]

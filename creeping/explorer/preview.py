@@ -1,0 +1,138 @@
+"""What follows while the incidence moves: rays coloured by their field, iso-phase curves, the outline n.d = 0.
+
+Everything is handed over as line segments (m, 2, 3) in single precision, without NaN, as a graphics card takes them.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from creeping._typing import FloatArray, IntArray
+from creeping.explorer.request import Wish
+from creeping.field.decibels import decibels
+from creeping.field.on_rays import ray_magnitude
+from creeping.geodesics.equations import natural_horizon, speed_of
+from creeping.geometry.surface import Surface
+from creeping.geometry.triangulation import Triangulation
+from creeping.rays.fan import Flow, RayFan
+from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
+from creeping.rays.preview import quick_fan
+
+MOST_STEPS = 192
+"""Of a ray."""
+NOTHING: FloatArray = np.zeros((0, 2, 3), dtype=np.float32)
+"""No segments, in the precision of the page."""
+
+
+@dataclass(frozen=True, eq=False)
+class MovingFrame:
+    """The fan of a wish and what is drawn of it at once.
+
+    Attributes
+    ----------
+    wish : Wish
+    fan : RayFan
+        Its error is not measured.
+    """
+
+    wish: Wish
+    fan: RayFan
+
+    @cached_property
+    def levels(self) -> FloatArray | None:
+        """20 log10 of |u|, or |du/dn|/k of a soft body, along the rays (rays, steps); None on a weighted body.
+
+        -inf where a ray has ended, inf on caustics.
+        """
+        if speed_of(self.fan.body) is not None:
+            return None
+        return decibels(ray_magnitude(self.fan, wavenumber=self.wish.wavenumber, boundary=self.wish.boundary))
+
+    @cached_property
+    def ray_segments(self) -> FloatArray:
+        """Segments of all rays (rays (steps - 1), 2, 3)."""
+        return segments(self.fan.points)
+
+    @cached_property
+    def level_segments(self) -> tuple[FloatArray, FloatArray]:
+        """Segments of the iso-phase curves (m, 2, 3), and the level of each (m,)."""
+        curves = wished_curves(self.wish, self.fan)
+        pieces = [segments(c.points[None], closed=c.closed) for c in curves]
+        return joined(pieces), np.concatenate(
+            [np.zeros(0), *(np.full(len(p), c.level) for p, c in zip(pieces, curves, strict=True))]
+        )
+
+    @cached_property
+    def launch_segments(self) -> FloatArray:
+        """The attached part of the shadow line through the launch points (m, 2, 3)."""
+        start, fan = self.fan.points[:, 0], self.fan
+        arcs = [np.flatnonzero(fan.arc_index == k) for k in range(len(fan.closed_arcs))]
+        return joined([segments(start[a][None], closed=c) for a, c in zip(arcs, fan.closed_arcs, strict=True)])
+
+
+def moving_frame(flow: Flow, wish: Wish, step: float) -> MovingFrame:
+    """The fan of a wish, its length rounded to whole steps.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+    wish : Wish
+    step : float, L
+        Travel time between the points of a ray: one that the flow takes at once.
+
+    Raises
+    ------
+    SingularIncidenceError
+        If the shadow line crosses itself.
+    """
+    count, step = steps_of(wish.length, step)
+    fan = quick_fan(flow, wish.direction, length=count * step, n_rays=wish.rays, n_steps=count)
+    return MovingFrame(wish, fan)
+
+
+def steps_of(length: float, step: float) -> tuple[int, float]:
+    """Number and length of the steps of rays: so many steps as the flow takes at once that MOST_STEPS suffice."""
+    step *= max(1, int(np.ceil(length / (MOST_STEPS * step) - 1e-9)))
+    return max(2, round(length / step)), step
+
+
+def step_of(body: Surface) -> float:
+    """Travel time between the points of a ray on the page: a quarter of the natural horizon."""
+    return natural_horizon(body) / 4
+
+
+def wished_curves(wish: Wish, fan: RayFan) -> list[IsoPhaseCurve]:
+    """Iso-phase curves of a fan at the levels that its rays reach."""
+    return iso_phase_curves(fan, wish.levels[wish.levels <= fan.length])
+
+
+def joined(pieces: list[FloatArray]) -> FloatArray:
+    """All segments of several lines (m, 2, 3)."""
+    return np.concatenate([NOTHING, *pieces])
+
+
+def segments(points: FloatArray, *, closed: bool = False) -> FloatArray:
+    """Segments of lines (n, m, 3): (k, 2, 3) of float32."""
+    if closed:
+        points = np.concatenate([points, points[:, :1]], axis=1)
+    pairs = np.stack([points[:, :-1], points[:, 1:]], axis=2)
+    return np.ascontiguousarray(pairs.reshape(-1, 2, 3), dtype=np.float32)
+
+
+def outline(mesh: Triangulation, normals: FloatArray, direction: FloatArray) -> FloatArray:
+    """Where n.d = 0 on the mesh, n linear on each triangle: (m, 2, 3), to the square of an edge."""
+    height = normals @ direction
+    lit = height < 0
+    bright = np.sum(lit[mesh.triangles], axis=1)
+    corners: IntArray = mesh.triangles[(bright > 0) & (bright < 3)]
+    ends = []
+    for one, other in ((0, 1), (1, 2), (2, 0)):
+        a, b = corners[:, one], corners[:, other]
+        crossed = lit[a] != lit[b]
+        share = np.where(crossed, height[a] / np.where(crossed, height[a] - height[b], 1.0), np.nan)[:, None]
+        ends.append((1 - share) * mesh.vertices[a] + share * mesh.vertices[b])
+    # two of the three edges are crossed
+    three = np.stack(ends, axis=1)
+    order = np.argsort(np.isnan(three[..., 0]), axis=1, kind="stable")[:, :2]
+    return np.take_along_axis(three, order[..., None], axis=1).astype(np.float32)

@@ -1,0 +1,89 @@
+"""What the page is asked to show: one incidence, its fan, and the wave.
+
+d = (sin θ cos φ, sin θ sin φ, cos θ)
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import parse_boundary
+from creeping.geometry.directions import angles_of, directions_from_angles
+
+BOUNDARIES = ("soft", "hard")
+RAYS = (16, 1024)
+"""Fewest and most rays."""
+LEVELS = 400
+"""Most iso-phase levels along a ray."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What to show; every number is checked, as it may come over a wire.
+
+    Attributes
+    ----------
+    theta, phi : float, degrees
+        Where the wave travels: from +z, and from +x towards +y.
+    rays : int
+    length : float, L (travel time for a weighted body)
+        Of the rays.
+    spacing : float, L
+        Between iso-phase curves; 0 for none.
+    wavenumber : float, 1/L
+    boundary : {"soft", "hard"}
+    cut : float, degrees
+        Azimuth of the half plane whose directions the far-field cut runs through, with its opposite.
+    """
+
+    theta: float
+    phi: float
+    rays: int
+    length: float
+    spacing: float
+    wavenumber: float
+    boundary: Literal["soft", "hard"]
+    cut: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("theta", "phi", "length", "spacing", "wavenumber", "cut"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+                raise InvalidInputError(f"{name} = {value!r} is not a finite number")
+        if isinstance(self.rays, bool) or not isinstance(self.rays, int) or not RAYS[0] <= self.rays <= RAYS[1]:
+            raise InvalidInputError(f"rays = {self.rays!r} is not a whole number from {RAYS[0]} to {RAYS[1]}")
+        if not (self.length > 0 and self.wavenumber > 0 and self.spacing >= 0):
+            raise InvalidInputError(
+                f"length = {self.length:g} and wavenumber = {self.wavenumber:g} must be positive, "
+                f"spacing = {self.spacing:g} not negative"
+            )
+        if self.spacing and self.length / self.spacing > LEVELS:
+            raise InvalidInputError(f"spacing = {self.spacing:g} makes more than {LEVELS} curves; widen it")
+        parse_boundary(self.boundary)
+        if self.boundary not in BOUNDARIES:
+            raise InvalidInputError(f"boundary = {self.boundary!r} is not one of {', '.join(BOUNDARIES)}")
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector d (3,)."""
+        return directions_from_angles(*np.radians([self.theta, self.phi]))
+
+    @property
+    def levels(self) -> FloatArray:
+        """Travel times of the iso-phase curves (m,)."""
+        if not self.spacing:
+            return np.zeros(0)
+        return np.asarray(self.spacing * np.arange(1, int(self.length / self.spacing + 1e-9) + 1))
+
+    def changed(self, **values: Any) -> "Wish":
+        """The wish with other values."""
+        return replace(self, **values)
+
+
+def angles(direction: FloatArray) -> tuple[float, float]:
+    """Theta in 0..180 and phi in -180..180, degrees, of a vector (3,) that is not zero."""
+    theta, phi = angles_of(direction)
+    return float(np.degrees(theta)), float(np.degrees(phi))

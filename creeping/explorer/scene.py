@@ -1,0 +1,200 @@
+"""The scene of the page: what of a frame is drawn where, by viser's handles.
+
+The body stays and lines move: only their positions and colours are sent. Numbers go to the page in single precision;
+none of them is NaN. The drawn body is a little smaller than the true one, so that lines on it are not cut by triangles.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.explorer.colours import ENDED, LEVEL_COLOURS, field_colours
+from creeping.explorer.preview import NOTHING, MovingFrame, joined, outline, segments
+from creeping.explorer.refined import Settled
+from creeping.field.on_rays import creeps
+from creeping.geometry.surface import Surface, normal, size
+from creeping.geometry.triangulation import Triangulation, triangulate
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, status_pieces
+from creeping.plotting._view import shadow_view
+
+CELLS = 44
+"""Of the drawn body along each side of its box."""
+INSET = 0.004
+"""How much smaller the drawn body is, in body sizes."""
+CAMERA = 3.9
+"""Distance of the camera, in radii of the body's box."""
+WIDTHS = {"rays": 1.0, "levels": 2.0, "line": 4.0, "outline": 1.5}
+"""Of lines, in pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A body as it is drawn.
+
+    Attributes
+    ----------
+    body : Surface
+    mesh : Triangulation
+    normals : (n, 3)
+    radius : float, L
+        Of a ball about ``centre`` that holds the body's box.
+    centre : (3,), L
+    """
+
+    body: Surface
+    mesh: Triangulation
+    normals: FloatArray
+    radius: float
+    centre: FloatArray
+
+    @classmethod
+    def of(cls, body: Surface) -> "Model":
+        """Triangulate a body."""
+        mesh = triangulate(body.level, body.gradient, body.bounds, cells=CELLS)
+        box = np.asarray(body.bounds, dtype=float)
+        return cls(body, mesh, normal(body, mesh.vertices), size(body), box.mean(axis=0))
+
+    @property
+    def inset(self) -> FloatArray:
+        """Vertices as drawn (n, 3)."""
+        return np.asarray(self.mesh.vertices - INSET * size(self.body) * self.normals)
+
+
+class Stage:
+    """The scene of one server.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    model : Model
+    still : bool
+        Whether there is nobody to turn the incidence.
+    """
+
+    def __init__(self, server: Any, model: Model, *, still: bool = False) -> None:
+        self.server, self.model, self.scene = server, model, server.scene
+        self.scene.set_up_direction("+z")
+        self.scene.configure_default_lights(enabled=True, cast_shadow=False)
+        self.plain = self.scene.add_mesh_simple(
+            "/body", model.inset, model.mesh.triangles, color=rgb(BODY_COLOUR), cast_shadow=False, receive_shadow=False
+        )
+        self.painted: Any = None
+        self._lines: dict[str, Any] = {}
+        if still:
+            self.incidence: Any = self.scene.add_frame("/incidence", show_axes=False, position=model.centre)
+        else:
+            self.incidence = self.scene.add_transform_controls(
+                "/incidence",
+                scale=1.1 * model.radius,
+                disable_axes=True,
+                disable_sliders=True,
+                position=model.centre,
+                depth_test=True,
+            )
+        # along +z, and turned with the controls on the page itself; before and behind the body, which hides one of them
+        shaft = np.array([[[0, 0, -1.55], [0, 0, -1.1]], [[0, 0, 1.1], [0, 0, 1.55]]]) * model.radius
+        thick = 0.015 * model.radius
+        self.scene.add_arrows(
+            "/incidence/arrow",
+            shaft,
+            rgb(ARROW_COLOUR),
+            shaft_radius=thick,
+            head_radius=3 * thick,
+            head_length=8 * thick,
+        )
+
+    def look(self, direction: FloatArray) -> None:
+        """Start the camera on the shadow side."""
+        toward = shadow_view(direction).toward
+        self.server.initial_camera.look_at = self.model.centre
+        self.server.initial_camera.position = self.model.centre + CAMERA * self.model.radius * toward
+        self.server.initial_camera.fov = float(np.radians(40))
+
+    def turn(self, direction: FloatArray) -> None:
+        """Turn the arrow of the incidence."""
+        self.incidence.wxyz = quaternion(direction)
+
+    def show(self, frame: MovingFrame) -> None:
+        """Draw what follows at once; the field on the body is hidden until it is known again."""
+        levels = frame.levels
+        if levels is None:
+            alive = creeps(frame.fan)[..., None]
+            colours = np.where(alive, np.array(rgb(RAY_COLOUR)), np.array(ENDED)).astype(np.uint8)
+        else:
+            colours = field_colours(levels)
+        pairs = np.stack([colours[:, :-1], colours[:, 1:]], axis=2).reshape(-1, 2, 3)
+        curves, of = frame.level_segments
+        shades = np.repeat(LEVEL_COLOURS(of / frame.fan.length)[:, None], 2, axis=1)
+        with self.server.atomic():
+            if self.painted is not None:
+                self.painted.visible = False
+            self.plain.visible = True
+            self._line("rays", frame.ray_segments, pairs)
+            self._line("levels", curves, shades)
+            self._line("outline", outline(self.model.mesh, self.model.normals, frame.wish.direction), RAY_COLOUR)
+            self._line("line/attached", frame.launch_segments, STATUS_COLOURS["attached"])
+            for status in ("occluded", "concave"):
+                self._line(f"line/{status}", NOTHING, STATUS_COLOURS[status])
+
+    def painted_mesh(self, found: Settled) -> Any:
+        """The body in the colours of the field on it, None without a field."""
+        import trimesh
+
+        if found.body_levels is None:
+            return None
+        return trimesh.Trimesh(
+            self.model.inset,
+            self.model.mesh.triangles,
+            vertex_normals=self.model.normals,
+            vertex_colors=field_colours(found.body_levels),
+            process=False,
+        )
+
+    def settle(self, found: Settled, paint: Any) -> None:
+        """Draw what takes longer, with what `painted_mesh` has made."""
+        with self.server.atomic():
+            for status, colour in STATUS_COLOURS.items():
+                pieces = [p for c in found.line.curves for p in status_pieces(c.points, c.status, status)]
+                self._line(f"line/{status}", joined([segments(p[None]) for p in pieces]), colour)
+            self._line("outline", NOTHING, RAY_COLOUR)
+            if paint is not None:
+                self.painted = self.scene.add_mesh_trimesh("/field", paint, cast_shadow=False, receive_shadow=False)
+                self.plain.visible = False
+
+    def _line(self, name: str, points: FloatArray, colours: Any) -> None:
+        """Set the segments (m, 2, 3) of a line and their colours, one or (m, 2, 3)."""
+        handle = self._lines.get(name)
+        if not len(points):
+            # nothing to draw is not an empty array, which the page could not bound
+            if handle is not None:
+                handle.visible = False
+            return
+        paint = np.array(rgb(colours), dtype=np.uint8) if isinstance(colours, str) else colours
+        if handle is None:
+            width = WIDTHS[name.split("/")[0]]
+            self._lines[name] = self.scene.add_line_segments(
+                f"/{name}", points, paint, thickness=width, thickness_units="screen"
+            )
+            return
+        handle.points, handle.colors, handle.visible = points, paint, True
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Bytes of a hexadecimal colour."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def quaternion(direction: FloatArray) -> FloatArray:
+    """Unit quaternion (w, x, y, z) of the shortest turn from +z to a unit vector (3,)."""
+    x, y, z = (float(c) for c in direction)
+    if z < -1 + 1e-12:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    turn = np.array([1 + z, -y, x, 0.0])
+    return np.asarray(turn / np.linalg.norm(turn))
+
+
+def turned(wxyz: FloatArray) -> FloatArray:
+    """Where a unit quaternion turns +z: (4,) -> (3,)."""
+    w, x, y, z = (float(c) for c in wxyz)
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])

@@ -1,0 +1,108 @@
+"""Boundaries: soft, hard, impedance, perfect conductor, and the scalar problems that each leads to.
+
+    soft        u = 0
+    hard        du/dn = 0
+    impedance   du/dn + i k eta u = 0
+    conductor   "electric soft" for E along b, "electric hard" for E along n
+
+Of the Airy functions of a mode (`creeping.field.creeping_modes`), q is i m eta: infinite if soft, 0 if hard.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+
+
+@dataclass(frozen=True)
+class Impedance:
+    """Impedance boundary du/dn + i k eta u = 0.
+
+    Parameters
+    ----------
+    eta : complex
+        Relative admittance: 0 is hard, infinite is soft, 1 absorbs at normal incidence; Re eta >= 0 is passive.
+    """
+
+    eta: complex
+
+    def __post_init__(self) -> None:
+        try:
+            eta = complex(self.eta)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"eta = {self.eta!r} is not a complex number") from error
+        if not np.isfinite(eta):
+            raise InvalidInputError(f"eta = {self.eta!r} is not finite; for an infinite one use 'soft'")
+        if eta.real < 0:
+            raise InvalidInputError(f"eta = {self.eta!r} gives energy off (Re eta < 0); give Re eta >= 0")
+        object.__setattr__(self, "eta", eta)
+
+
+BoundaryLike = Literal["soft", "hard", "pec"] | Impedance
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """One scalar boundary: ``kind`` is "soft", "hard", "impedance", "electric soft" or "electric hard"."""
+
+    kind: str
+    eta: complex = 0j
+
+    @property
+    def sign(self) -> float:
+        """Sign of the transverse curvature's term."""
+        return -1.0 if self.kind == "electric hard" else 1.0
+
+    def q(self, m: FloatArray) -> ComplexArray | float | None:
+        """Parameter q of the Airy functions at a Fock scale m (...): None if soft, 0 if hard, else (...)."""
+        if self.kind == "impedance":
+            return np.asarray(1j * m * self.eta)
+        return None if self.kind.endswith("soft") else 0.0
+
+
+SOFT, HARD = Boundary("soft"), Boundary("hard")
+ELECTRIC_SOFT, ELECTRIC_HARD = Boundary("electric soft"), Boundary("electric hard")
+
+
+def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
+    """Scalar problems of a boundary: one, or for "pec" those of E along b and along n.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none of those known.
+    """
+    if isinstance(boundary, Impedance):
+        if boundary.eta == 0:
+            return (HARD,)
+        return (Boundary("impedance", boundary.eta),)
+    known = {"soft": (SOFT,), "hard": (HARD,), "pec": (ELECTRIC_SOFT, ELECTRIC_HARD)}
+    if isinstance(boundary, str) and boundary in known:
+        return known[boundary]
+    raise InvalidInputError(f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or Impedance(eta)")
+
+
+def parse_boundary(text: str) -> BoundaryLike:
+    """Boundary of ``soft``, ``hard``, ``pec`` or ``impedance:ETA``.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none of these, or ETA is not a complex number with Re ETA >= 0.
+    """
+    scalar: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard", "pec": "pec"}
+    if text in scalar:
+        return scalar[text]
+    name, _, number = text.partition(":")
+    if name != "impedance":
+        raise InvalidInputError(f"boundary {text!r} is not soft, hard, pec or impedance:ETA, e.g. impedance:0.5+0.2j")
+    try:
+        eta = complex(number.replace(" ", ""))
+    except ValueError:
+        raise InvalidInputError(
+            f"boundary {text!r}: {number!r} is not a complex number such as 1 or 0.5+0.2j"
+        ) from None
+    return Impedance(eta)

@@ -1,0 +1,227 @@
+"""The wave that a creeping ray sheds: Pekeris function, mode sum of second order, and the passage between them.
+
+    ξ = (k/2)^(1/3) ∫ κₙ^(2/3) ds,   m = (kρ/2)^(1/3),   D = -√(m1 m2) √(2/k) P
+    P = 2i√π e^{iπ/4} Σ_p R_p A_p exp{i ξ τ_p + i (2/k)^(1/3) ∫ c_p κₙ^(4/3) ds}
+
+At small ξ the corrected series diverges. There each power of τ is read as one of t under the integral of P, where it is
+a derivative of P, and M0 = dτ/dq as a change of q; both forms are the same series. For an impedance q varies along the
+ray: τ_p is taken at the mean of q weighted by κₙ^(2/3), so that its first-order variation is exact, and R_p at the
+geometric mean of both ends.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.boundary import Boundary
+from creeping.field.creeping_modes import BETA, decay_slopes, decay_terms, fock_scale, modes_of
+from creeping.field.special.airy import MODES, Modes
+from creeping.field.special.fock import pekeris_slope, pekeris_star, pole
+from creeping.rays.quantities import RayPoints
+
+SECOND_ORDER = (0.5, 0.9)
+"""ξ between which the series of second order takes over."""
+
+
+def smoothstep(x: FloatArray, start: float, end: float) -> FloatArray:
+    """0 below start, 1 above end, cubic between."""
+    t = np.clip((x - start) / (end - start), 0.0, 1.0)
+    return np.asarray(t * t * (3 - 2 * t))
+
+
+def fock_parameter(rays: RayPoints, wavenumber: float) -> FloatArray:
+    """ξ (...)."""
+    return np.asarray(np.cbrt(wavenumber / 2) * rays.integrals[..., 1])
+
+
+def scales(rays: RayPoints, wavenumber: float) -> tuple[FloatArray, FloatArray]:
+    """m at attachment and launch (...)."""
+    first, last = rays.curvature
+    return fock_scale(wavenumber, first), fock_scale(wavenumber, last)
+
+
+def mean_scale(rays: RayPoints, wavenumber: float) -> FloatArray:
+    """Mean of m along the ray, weighted by κₙ^(2/3) (...); m at the launch point where the ray has no length."""
+    some = rays.integrals[..., 1] > 0
+    mean = np.divide(rays.integrals[..., 0], rays.integrals[..., 1], out=np.zeros(some.shape), where=some)
+    return np.asarray(np.where(some, np.cbrt(wavenumber / 2) * mean, scales(rays, wavenumber)[0]))
+
+
+def limited(change: ComplexArray, bound: ComplexArray | FloatArray | float) -> ComplexArray:
+    """A correction held below a bound in magnitude; below a third of it, untouched to 1e-2 of itself (...)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.nan_to_num(np.abs(change) / np.abs(bound), nan=0.0, posinf=1e30)
+    return np.asarray(change / np.sqrt(np.sqrt(1 + ratio**4)))
+
+
+def mode_waves(
+    rays: RayPoints,
+    modes: Modes,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+    *,
+    launch_share: FloatArray | float | None = 1.0,
+) -> ComplexArray:
+    """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
+
+    ``launch_share`` (...) is the power of the launch factor: 0 on the body, 1 far away; None leaves both ends out. The
+    correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
+    down.
+    """
+    leading = fock_parameter(rays, wavenumber)[..., None] * modes.tau
+    if order == 1:
+        return np.asarray(np.exp(1j * leading))
+    plain, across, varying = decay_terms(modes, boundary.sign)
+    i = rays.integrals[..., None]
+    change = np.cbrt(2 / wavenumber) * (plain * i[..., 2, :] + across * i[..., 3, :] + varying * i[..., 4, :])
+    if launch_share is not None:
+        (rate1, rate2), (m1, m2) = rays.radius_rate, scales(rays, wavenumber)
+        change = change + modes.tau**2 * ((launch_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
+    return np.asarray(np.exp(1j * (leading + limited(change, 0.5 * leading))))
+
+
+def amplitude_factor(
+    rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary, transverse_weight: float
+) -> ComplexArray:
+    """1 + (1/2) Σ [∂c/∂τ + ω r τ + β τ ρρ'']/m² over both ends: (..., n)."""
+    plain, across = decay_slopes(modes, boundary.sign)
+    change = np.zeros((*rays.time.shape, 1), dtype=complex)
+    for m, r, bend in _ends(rays, wavenumber):
+        by_curvature = transverse_weight * r + BETA * bend
+        change = change + 0.5 * (
+            plain / m**2 + across * r / m**2 + modes.tau * by_curvature / m**2 - modes.m0**2 * bend / (60 * m**2)
+        )
+    return np.asarray(1 + limited(change, 2.0))
+
+
+def _ends(rays: RayPoints, wavenumber: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """m, r and ρρ'' at both ends, each (..., 1); m is inf and the rest 0 where κₙ <= 0."""
+    found = []
+    for k in range(2):
+        values = (transverse_ratios(rays)[k], rays.radius_bend[k])
+        m = scales(rays, wavenumber)[k][..., None]
+        r, bend = (np.where(np.isfinite(m), np.nan_to_num(v)[..., None], 0.0) for v in values)
+        found.append((m, r, bend))
+    return found
+
+
+def transverse_ratios(rays: RayPoints) -> tuple[FloatArray, FloatArray]:
+    """R = ρ κ_t at attachment and launch (...)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = [t / c for t, c in zip(rays.transverse, rays.curvature, strict=True)]
+    return np.nan_to_num(ratios[0]), np.nan_to_num(ratios[1])
+
+
+def mode_sum(
+    rays: RayPoints, wavenumber: float, boundary: Boundary, order: int, transverse_weight: float
+) -> ComplexArray:
+    """P by its residue series (...)."""
+    modes = modes_of(boundary, mean_scale(rays, wavenumber))
+    residue = end_residue(rays, wavenumber, boundary, "residue")
+    terms = residue * mode_waves(rays, modes, wavenumber, boundary, order)
+    if order == 2:
+        terms = terms * amplitude_factor(rays, modes, wavenumber, boundary, transverse_weight)
+    return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))
+
+
+def end_residue(rays: RayPoints, wavenumber: float, boundary: Boundary, name: str, n: int = MODES) -> ComplexArray:
+    """Constant of the modes, at the geometric mean of both ends' q where it varies: (n,) or (..., n)."""
+    m1, m2 = scales(rays, wavenumber)
+    return np.asarray(getattr(modes_of(boundary, np.sqrt(m1 * m2), n), name))
+
+
+def shed_wave(
+    rays: RayPoints,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+    *,
+    transverse_weight: float = 0.25,
+    pole_share: FloatArray | float = 1.0,
+) -> ComplexArray:
+    """e^{iπ/4} [p* - share/(2√π ξ)] of each ray (...): P where the share is 1, 0 where the creeping ray has ended.
+
+    Parameters
+    ----------
+    transverse_weight : float
+        ω: 1/4 for one ray, 1/2 under an integral over the shadow line.
+    pole_share : (...) or float
+        Where the pole is taken care of otherwise, second order leaves it alone too.
+    """
+    share = np.broadcast_to(np.asarray(pole_share, dtype=float), rays.time.shape)
+    if not np.all(rays.alive):
+        out = np.zeros(rays.time.shape, dtype=complex)
+        out[rays.alive] = shed_wave(
+            rays[rays.alive],
+            wavenumber,
+            boundary,
+            order,
+            transverse_weight=transverse_weight,
+            pole_share=share[rays.alive],
+        )
+        return out
+    m1, m2 = scales(rays, wavenumber)
+    xi = fock_parameter(rays, wavenumber)
+    q = boundary.q(np.sqrt(m1 * m2))
+    total = pekeris_star(xi, q) - shared_pole(xi, share)
+    if order == 2:
+        weight = smoothstep(xi, *SECOND_ORDER)
+        early, late = weight < 1, weight > 0
+        if np.any(early):
+            some = rays[early]
+            change = early_correction(some, wavenumber, boundary, transverse_weight)
+            q_early = q if q is None or np.ndim(q) == 0 else q[early]  # type: ignore[index]
+            total[early] += (1 - weight[early]) * limited(change, 0.5 * np.abs(pekeris_star(xi[early], q_early)))
+        if np.any(late):
+            some = rays[late]
+            change = np.exp(-0.25j * np.pi) * (
+                mode_sum(some, wavenumber, boundary, 2, transverse_weight)
+                - mode_sum(some, wavenumber, boundary, 1, transverse_weight)
+            )
+            squared, linear = pole_operator(some, wavenumber, transverse_weight)
+            change += (1 - share[late]) * (squared * pole(xi[late], 2) + linear * pole(xi[late], 1))
+            total[late] += weight[late] * change
+    return np.asarray(np.exp(0.25j * np.pi) * total)
+
+
+def shared_pole(xi: FloatArray, share: FloatArray, power: int = 0) -> ComplexArray:
+    """Share of the pole, 0 where the share or ξ is: a ray of no length sheds nothing (...)."""
+    some = (share > 0) & (xi != 0)
+    out = np.zeros(xi.shape, dtype=complex)
+    out[some] = share[some] * pole(xi[some], power)
+    return out
+
+
+def pole_operator(rays: RayPoints, wavenumber: float, transverse_weight: float) -> tuple[ComplexArray, FloatArray]:
+    """Factors of τ² and τ in the second order of a mode: from c, the ends, and the amplitude (...)."""
+    i = rays.integrals
+    turn = np.cbrt(2 / wavenumber) * (i[..., 2] / 60 - 2 / 45 * i[..., 4])
+    linear = np.zeros(rays.time.shape)
+    rates = rays.radius_rate
+    for sign, rate, (m, r, bend) in zip((-1, 1), rates, _ends(rays, wavenumber), strict=True):
+        with np.errstate(invalid="ignore"):
+            turn = turn + sign * np.nan_to_num(rate / m[..., 0]) / 12
+        linear = linear + 0.5 * ((1 / 30 + transverse_weight * r + BETA * bend) / m**2)[..., 0]
+    return 1j * turn, linear
+
+
+def early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary, transverse_weight: float) -> ComplexArray:
+    """What second order adds to p* at small ξ, where its series diverges (...); a pole is left alone.
+
+    Under the integral of p* each power of τ is one of t, and M0 is dτ/dq:
+    c = τ²/60 - (2/45) B τ² - (1/10 ± r/4 - B/60) M0 - (2/15) q τ M0, B = ρρ'' - (2/3) ρ'². In amplitudes B is ρρ''.
+    """
+    xi = fock_parameter(rays, wavenumber)
+    m1, m2 = scales(rays, wavenumber)
+    q = boundary.q(np.sqrt(m1 * m2))
+    squared, linear = pole_operator(rays, wavenumber, transverse_weight)
+    total = squared * pekeris_star(xi, q, 2) + linear * pekeris_star(xi, q, 1)
+    if q is not None:
+        shift = sum(
+            ((bend / 60 - 0.1 - 0.25 * boundary.sign * r) / (2 * m**2))[..., 0]
+            for m, r, bend in _ends(rays, wavenumber)
+        )
+        total = total + shift * pekeris_slope(xi, q)
+        if np.ndim(q):
+            total = total - 2 / 15 * q / (m1 * m2) * pekeris_slope(xi, q, 1)
+    return np.asarray(total)

@@ -1,0 +1,1 @@
+"""Special functions of diffraction by smooth bodies: Airy, Fock and Pekeris."""

@@ -1,0 +1,310 @@
+"""Fock functions of the transition across the shadow boundary, for time factor e^{-iωt}.
+
+    V = (v' - q v)/(w₁' - q w₁),   W = (w₂' - q w₂)/(w₁' - q w₁)
+    √π p*(ξ) = ∫₀^∞ V e^{iξt} dt + (1/2i) ∫₀^{∞e^{2πi/3}} W e^{iξt} dt,   P(ξ) = e^{iπ/4} [p*(ξ) - 1/(2√π ξ)]
+    √π g(ξ) = ∫ e^{iξt}/(w₁' - q w₁) dt,   soft: √π F(ξ) = ∫ e^{iξt}/w₁ dt,   from ∞e^{2πi/3} to ∞
+
+q = 0 hard, q = ∞ soft, q = i m η impedance. The path to +∞ is turned to ∞e^{-iπ/6}, below every root. On the lit side
+these integrals lose digits; there, in one, over the line of steepest descent through t = -ξ²/4 (-ξ² for g, F),
+
+    P(ξ) = (e^{iπ/4}/2i√π) ∫ W e^{iξt} dt = -S e^{-iξ³/12}/√(-4/ξ),
+
+S the reflection coefficient, which tends to that of a plane boundary. A ``power`` n stands for t^n under each integral,
+which is (-i d/dξ)^n of the function and τ^n in its residue series.
+"""
+
+from functools import cache
+from math import factorial
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.special import wofz
+
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping.field.special.airy import MODES, Modes, hard_modes, impedance_modes, scaled_ai, soft_modes
+
+LIT = -2.5
+"""Below it the line of steepest descent is used."""
+SERIES = 2.5
+"""Above it ten modes are good to 1e-9."""
+FAR_HEIGHT = 40.0
+"""Largest Y of the integral with height gain; beyond it the observer is far."""
+FARTHEST = -200.0
+"""Beyond it the reflection coefficient is taken as constant, an error below 1e-6."""
+
+_DOWN = np.exp(-1j * np.pi / 6)
+_UP = np.exp(2j * np.pi / 3)
+_FACTOR = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
+
+
+class _Path(NamedTuple):
+    """Quadrature nodes on both legs of the path, the functions below and above the line, scaled, and their ζ."""
+
+    t: ComplexArray
+    weight: ComplexArray
+    lower: ComplexArray
+    lower_slope: ComplexArray
+    upper: ComplexArray
+    upper_slope: ComplexArray
+    fall: ComplexArray
+    rise: ComplexArray
+
+
+@cache
+def _path() -> _Path:
+    """Gauss panels on both legs."""
+    legs = []
+    # reaches: the integrands fall below 1e-12 of their maximum for LIT <= ξ <= SERIES
+    for turn, reach, panels in ((_DOWN, 24.0, 14), (_UP, 24.0, 14)):
+        nodes, weights = np.polynomial.legendre.leggauss(16)
+        edges = np.linspace(0, reach, panels + 1)
+        r = (edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2).ravel()
+        w = (np.diff(edges)[:, None] * weights / 2).ravel()
+        t = r * turn
+        # numerator: v on the lower leg, w2/2i on the upper one
+        upper, upper_slope, rise = _v(t) if turn is _DOWN else _w2(t)
+        lower, lower_slope, fall = _w1(t)
+        legs.append((t, w * turn, lower, lower_slope, upper, upper_slope, fall, rise))
+    return _Path(*(np.concatenate(parts) for parts in zip(*legs, strict=True)))
+
+
+def _v(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """v and v' without the factor e^{-ζ}, and ζ."""
+    value, slope, zeta = scaled_ai(t)
+    return np.sqrt(np.pi) * value, np.sqrt(np.pi) * slope, zeta
+
+
+def _w1(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """w1 and w1' without the factor e^{-ζ}, and ζ."""
+    value, slope, zeta = scaled_ai(t * _UP)
+    return _FACTOR * value, _FACTOR * _UP * slope, zeta
+
+
+def _w2(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """w2/2i and w2'/2i without the factor e^{-ζ}, and ζ."""
+    value, slope, zeta = scaled_ai(t / _UP)
+    factor = np.conj(_FACTOR) / 2j
+    return factor * value, factor / _UP * slope, zeta
+
+
+def _by_path(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
+    """p*, its derivative in q, or the surface function by both legs: xi (n,), q (n,) or None for soft."""
+    path = _path()
+    out = np.empty(len(xi), dtype=complex)
+    # on the upper leg the path runs towards 0 in g and F; d/dq of V is -1/(..)², of W/2i it is 1/(..)² (Wronskians)
+    turned = np.where(path.t.imag > 0, 1.0, -1.0)
+    # blocks bound the memory of points x nodes
+    for first in range(0, len(xi), 4096):
+        part = slice(first, first + 4096)
+        below, above = (
+            (path.lower, path.upper)
+            if q is None
+            else (path.lower_slope - q[part, None] * path.lower, path.upper_slope - q[part, None] * path.upper)
+        )
+        phase = 1j * xi[part, None] * path.t
+        if which == "pekeris":
+            terms = above / below * np.exp(phase + path.fall - path.rise)
+        elif which == "slope":
+            terms = turned / below**2 * np.exp(phase + 2 * path.fall)
+        elif which == "surface":
+            terms = -turned / below * np.exp(phase + path.fall)
+        else:
+            terms = -turned * path.lower / below**2 * np.exp(phase + path.fall)
+        out[part] = terms @ (path.weight * path.t**power) / np.sqrt(np.pi)
+    return out
+
+
+def boundary_modes(q: ComplexArray | float | None, n: int = MODES) -> Modes:
+    """Modes of soft (None), hard (0) or impedance parameters q (...): (n,) or (..., n)."""
+    if q is None:
+        return soft_modes(n)
+    if np.ndim(q) == 0 and q == 0:
+        return hard_modes(n)
+    return impedance_modes(q, n)
+
+
+def pekeris_star(xi: ArrayLike, q: ComplexArray | float | None, power: int = 0) -> ComplexArray:
+    """Pekeris function p*(ξ), entire in ξ: (...) -> (...).
+
+    Parameters
+    ----------
+    xi : (...)
+    q : None for soft, 0 for hard, else complex, broadcast with xi, of one argument
+    power : int
+        (-i d/dξ)^power of it.
+    """
+    return _evaluate("pekeris", np.asarray(xi, dtype=float), q, power)
+
+
+def pekeris(xi: ArrayLike, q: ComplexArray | float | None) -> ComplexArray:
+    """P(ξ) = e^{iπ/4} [p*(ξ) - 1/(2√π ξ)], infinite at ξ = 0: (...) -> (...)."""
+    xi = np.asarray(xi, dtype=float)
+    return np.asarray(np.exp(0.25j * np.pi) * (pekeris_star(xi, q) - pole(xi)))
+
+
+def pole(xi: FloatArray, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of 1/(2√π ξ), infinite at 0 (...)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(1j**power * factorial(power) / (2 * np.sqrt(np.pi) * xi ** (power + 1)))
+
+
+def pekeris_slope(xi: ArrayLike, q: ComplexArray | float, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of dp*/dq, not for soft: (...) -> (...)."""
+    return _evaluate("slope", np.asarray(xi, dtype=float), q, power)
+
+
+def surface_function(xi: ArrayLike, q: ComplexArray | float | None, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of Fock's surface function g(ξ) of u, or F(ξ) of du/dn if soft: (...) -> (...)."""
+    return _evaluate("surface", np.asarray(xi, dtype=float), q, power)
+
+
+def surface_slope(xi: ArrayLike, q: ComplexArray | float, power: int = 0) -> ComplexArray:
+    """(-i d/dξ)^power of dg/dq, not for soft: (...) -> (...)."""
+    return _evaluate("surface slope", np.asarray(xi, dtype=float), q, power)
+
+
+def _evaluate(which: str, xi: FloatArray, q: ComplexArray | float | None, power: int) -> ComplexArray:
+    if q is None or np.ndim(q) == 0:
+        return _tabulated(which, xi.ravel(), None if q is None else complex(q), power).reshape(xi.shape)
+    full_xi, full_q = np.broadcast_arrays(xi, np.asarray(q, dtype=complex))
+    return _direct(which, full_xi.ravel(), full_q.ravel(), power).reshape(full_xi.shape)
+
+
+def _direct(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
+    """Without a table: xi (n,), q (n,) or None."""
+    out = np.empty(len(xi), dtype=complex)
+    lit, deep = xi < LIT, xi > SERIES
+    for mask, function in ((lit, _by_descent), (~(lit | deep), _by_path), (deep, _by_series)):
+        if np.any(mask):
+            out[mask] = function(which, xi[mask], None if q is None else q[mask], power)
+    return out
+
+
+def _by_descent(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
+    """The lit side: trapezoidal rule, which converges exponentially, over the line of steepest descent."""
+    out = np.empty(len(xi), dtype=complex)
+    on_surface = which.startswith("surface")
+    for first in range(0, len(xi), 4096):
+        part = slice(first, first + 4096)
+        x = xi[part, None]
+        # the integrand is a Gaussian of variance |ξ|/2, or 2|ξ|, times a slow factor
+        step = (0.24 if on_surface else 0.12) * np.sqrt(-x)
+        t = -(x**2) * (1.0 if on_surface else 0.25) + step * np.arange(-55, 56) * np.exp(0.75j * np.pi)
+        lower, lower_slope, fall = _w1(t)
+        below = lower if q is None else lower_slope - q[part, None] * lower
+        if which == "pekeris":
+            upper, upper_slope, rise = _w2(t)
+            above = upper if q is None else upper_slope - q[part, None] * upper
+            terms = above / below * np.exp(1j * x * t + fall - rise)
+        elif which == "slope":
+            terms = 1 / below**2 * np.exp(1j * x * t + 2 * fall)
+        elif which == "surface":
+            terms = -1 / below * np.exp(1j * x * t + fall)
+        else:
+            terms = -lower / below**2 * np.exp(1j * x * t + fall)
+        out[part] = np.sum(terms * t**power, axis=1) * step[:, 0] * np.exp(0.75j * np.pi) / np.sqrt(np.pi)
+    return out + pole(xi, power) if which == "pekeris" else out
+
+
+def _by_series(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
+    """Residue series of the shadow; d/dq by a central difference."""
+    if which.endswith("slope"):
+        assert q is not None
+        step = 1e-4 * np.where(q == 0, 1j, q / np.where(q == 0, 1, np.abs(q)))
+        whole = "pekeris" if which == "slope" else "surface"
+        pair = [_by_series(whole, xi, q + sign * step, power) for sign in (1, -1)]
+        return np.asarray((pair[0] - pair[1]) / (2 * step))
+    modes = boundary_modes(0.0 if q is not None and np.all(q == 0) else q)
+    amplitude = modes.surface if which == "surface" else modes.residue
+    terms = amplitude * modes.tau**power * np.exp(1j * xi[:, None] * modes.tau)
+    total = 2j * np.sqrt(np.pi) * np.sum(terms, axis=-1)
+    return np.asarray(total if which == "surface" else total + pole(xi, power))
+
+
+@cache
+def _tables(which: str, q: complex | None, power: int) -> tuple[Any, Any]:
+    """Splines of one boundary: of the function between LIT and SERIES, and of its slow factor on the lit side."""
+    xi = np.linspace(LIT, SERIES, 301)
+    inverse = np.linspace(1 / LIT, 1 / FARTHEST, 201)
+    values = [None if q is None else np.full(len(x), q) for x in (xi, inverse)]
+    slow = _by_descent(which, 1 / inverse, values[1], power)
+    if which == "pekeris":
+        slow -= pole(1 / inverse, power)
+    return (
+        make_interp_spline(xi, _by_path(which, xi, values[0], power), k=7),
+        make_interp_spline(inverse, slow * _unwind(which, q, 1 / inverse, power), k=7),
+    )
+
+
+def _unwind(which: str, q: complex | None, xi: FloatArray, power: int) -> ComplexArray:
+    """Inverse of the fast and the growing factor on the lit side."""
+    if which.startswith("surface"):
+        # F grows like ξ, g does not
+        return np.asarray(np.exp(1j * xi**3 / 3) / xi ** (2 * power + (q is None)))
+    return np.asarray(np.exp(1j * xi**3 / 12) / (np.sqrt(-xi) * xi ** (2 * power)))
+
+
+def _tabulated(which: str, xi: FloatArray, q: complex | None, power: int) -> ComplexArray:
+    """One boundary: splines, and the series beyond them."""
+    out = np.empty(len(xi), dtype=complex)
+    lit, deep = xi < LIT, xi > SERIES
+    middle = ~(lit | deep)
+    between, slow = _tables(which, q, power)
+    out[middle] = between(xi[middle])
+    if np.any(lit):
+        out[lit] = slow(1 / np.maximum(xi[lit], FARTHEST)) / _unwind(which, q, xi[lit], power)
+        if which == "pekeris":
+            out[lit] += pole(xi[lit], power)
+    if np.any(deep):
+        out[deep] = _by_series(which, xi[deep], None if q is None else np.full(int(deep.sum()), q), power)
+    return out
+
+
+def transition(X: ArrayLike) -> ComplexArray:
+    """UTD transition function F_t(X) = -2i √X e^{-iX} ∫_√X^∞ e^{it²} dt, X >= 0; tends to 1: (...) -> (...)."""
+    root = np.sqrt(np.asarray(X, dtype=float))
+    return np.asarray(-1j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * root * wofz(np.exp(0.25j * np.pi) * root))
+
+
+def height_gain(tau: ComplexArray, Y: ArrayLike) -> ComplexArray:
+    """Height gain H = w₁(τ - Y)/[Y^(-1/4) exp(i (2/3) Y^(3/2) - i τ √Y + iπ/4)]: (..., n), (..., 1) -> (..., n).
+
+    Tends to 1 far from the body and to 0 on it, like Y^(1/4).
+    """
+    Y = np.asarray(Y, dtype=float)
+    value, _, zeta = scaled_ai((tau - Y) * np.exp(2j * np.pi / 3))
+    root = np.sqrt(Y)
+    # both exponents grow like Y^(3/2): subtract before the exponential
+    exponent = -zeta - 2j / 3 * Y * root + 1j * tau * root - 0.25j * np.pi
+    return np.asarray(_FACTOR * value * np.sqrt(root) * np.exp(exponent))
+
+
+def near_pekeris(xi: FloatArray, Y: FloatArray, q: ComplexArray | float | None) -> ComplexArray:
+    """Sum of modes with height gain, as an integral that holds down to ξ = 0 (n,), (n,) -> (n,); Y up to FAR_HEIGHT.
+
+    -(1/√π) Y^(1/4) e^{-i(2/3)Y^(3/2)} ∫ e^{i(ξ + √Y)t} [v(t - Y) - V(t) w₁(t - Y)] dt,   from ∞e^{2πi/3} over 0 to ∞
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    edges = np.linspace(0.0, 1.0, 33)
+    r = (edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2).ravel()
+    w = np.tile(weights / 2 * edges[1], len(edges) - 1)
+    Y = Y[:, None]
+    zeta = xi[:, None] + np.sqrt(Y)
+    q_column = None if q is None else np.broadcast_to(np.asarray(q, dtype=complex), xi.shape)[:, None]
+    total = np.zeros(len(xi), dtype=complex)
+    for turn in (1.0 + 0j, _UP):
+        reach = Y + 12.0 if turn == 1 else np.full_like(Y, 24.0)
+        t = np.asarray(turn * reach * r, dtype=np.complex128)
+        plain, _, plain_fall = _v(t - Y) if turn == 1 else _w2(t - Y)
+        above, above_slope, rise = _v(t) if turn == 1 else _w2(t)
+        below, below_slope, fall = _w1(t)
+        if q_column is not None:
+            above, below = above_slope - q_column * above, below_slope - q_column * below
+        high, _, high_fall = _w1(t - Y)
+        # on the upper leg the bracket is W w1(t - Y) - w2(t - Y), over 2i, and the path runs towards 0
+        echo = above / below * high * np.exp(1j * zeta * t + fall - rise - high_fall)
+        direct = plain * np.exp(1j * zeta * t - plain_fall)
+        total += np.sum((direct - echo) * w * reach, axis=1) * turn
+    Y = Y[:, 0]
+    return np.asarray(-np.sqrt(np.sqrt(Y)) * np.exp(-2j / 3 * Y**1.5) / np.sqrt(np.pi) * total)

@@ -1,0 +1,171 @@
+"""The field on the body in the shadow: u, or du/dn where u = 0.
+
+    u = e^{ik(d.x0 + s)} (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} g(ξ)          hard, impedance
+    du/dn: the same with (k/m2) F(ξ)                                        soft
+
+Second order, as a factor of 1 + ( )/(m1 m2) of each mode or, at small ξ, under the integrals of g and F, r the mean of
+both ends:
+
+    soft          τ (1/10 + r/4)
+    otherwise     τ (r/4 - 1/30) - (1/10 ± r/4 + (2/15) q τ) d/dq
+
+from the expansions of Hankel functions in the transition region [AS64, sec. 9.3] for the circular cylinder
+and the sphere; the decay c and the attachment factor exp{-i τ² ρ1'/(12 m1)} are those of `creeping.field.boundary`.
+"""
+
+import numpy as np
+
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.creeping_modes import modes_of
+from creeping.field.far import checked
+from creeping.field.far_geometry import fan_strips
+from creeping.field.shed_wave import (
+    SECOND_ORDER,
+    end_residue,
+    fock_parameter,
+    limited,
+    mean_scale,
+    mode_waves,
+    scales,
+    smoothstep,
+    transverse_ratios,
+)
+from creeping.field.special.airy import Modes
+from creeping.field.special.fock import surface_function, surface_slope
+from creeping.geodesics.bundle import as_points, on_body
+from creeping.rays.fan import RayFan
+from creeping.rays.quantities import RayPoints, substeps
+from creeping.rays.shedding import shed_on
+
+
+def surface_field(
+    fan: RayFan,
+    points: ArrayLike | None = None,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+) -> ComplexArray:
+    """Field on the body: u, or du/dn (1/L) of the soft boundary.
+
+    Parameters
+    ----------
+    fan : RayFan
+    points : (..., 3), L, optional
+        Points on the body, in the shadow.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard" or Impedance
+    order : 2 or 1
+
+    Returns
+    -------
+    complex
+        (rays, steps), each ray's own contribution, infinite at its caustics and 0 where it has detached; with points
+        (...), all rays through each of them summed, 0 where none passes.
+
+    Raises
+    ------
+    InvalidInputError
+        On bad points, wavenumber, boundary or order, and for a weighted body.
+    """
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    if points is None:
+        times = [strip.rays[:, :: substeps(fan)] for strip in fan_strips(fan, single=True)]
+        if not times:
+            return np.zeros(fan.spreading.shape, dtype=complex)
+        out = np.empty(fan.spreading.shape, dtype=complex)
+        for number, rays in enumerate(times):
+            out[fan.arc_index == np.unique(fan.arc_index)[number]] = surface_waves(rays, k, kind, order)
+        return out
+    y = as_points(points)
+    flat = on_body(fan.body, y).reshape(-1, 3)
+    found = shed_on(fan_strips(fan), fan.body, flat)
+    total = np.zeros(len(flat), dtype=complex)
+    np.add.at(total, found.observer, surface_waves(found.rays, k, kind, order))
+    return total.reshape(y.shape[:-1])
+
+
+def scalar_boundary(boundary: BoundaryLike) -> Boundary:
+    """The scalar problem of a boundary.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is unknown, or "pec", whose fields near the body are vectors that this package does not assemble.
+    """
+    kinds = scalar_boundaries(boundary)
+    if len(kinds) > 1:
+        raise InvalidInputError(
+            "boundary 'pec' is for the far field; on and near the body give 'soft', 'hard' or Impedance"
+        )
+    return kinds[0]
+
+
+def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
+    """Contribution of each ray at its point (...), 0 where the creeping ray has ended."""
+    if not np.all(rays.alive):
+        out = np.zeros(rays.time.shape, dtype=complex)
+        out[rays.alive] = surface_waves(rays[rays.alive], wavenumber, boundary, order)
+        return out
+    m1, m2 = scales(rays, wavenumber)
+    xi = fock_parameter(rays, wavenumber)
+    wave = surface_function(xi, boundary.q(np.sqrt(m1 * m2)))
+    if order == 2:
+        weight = smoothstep(xi, *SECOND_ORDER)
+        early, late = weight < 1, weight > 0
+        change = _early_correction(rays[early], wavenumber, boundary)
+        wave[early] += (1 - weight[early]) * limited(change, 0.5 * np.abs(wave[early]))
+        part = rays[late]
+        wave[late] += weight[late] * (_series(part, wavenumber, boundary, 2) - _series(part, wavenumber, boundary, 1))
+    first, last = rays.curvature
+    phase = wavenumber * rays.eikonal - 0.5 * np.pi * rays.caustics
+    with np.errstate(divide="ignore", over="ignore"):
+        factor = np.cbrt(np.sqrt(last / first)) / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * phase)
+    return np.asarray(wave * factor * (wavenumber / m2 if boundary.kind == "soft" else 1.0))
+
+
+def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
+    """g or F by its residues (...)."""
+    modes = modes_of(boundary, mean_scale(rays, wavenumber))
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=0.0)
+    terms = end_residue(rays, wavenumber, boundary, "surface") * waves
+    if order == 2:
+        terms = terms * surface_amplitude(rays, modes, wavenumber, boundary)
+    return np.asarray(2j * np.sqrt(np.pi) * np.sum(terms, axis=-1))
+
+
+def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) -> ComplexArray:
+    """What second order adds to g or F at small ξ: each power of τ is one of t under their integral (...)."""
+    m1, m2 = scales(rays, wavenumber)
+    q = boundary.q(np.sqrt(m1 * m2))
+    xi = fock_parameter(rays, wavenumber)
+    first, last = transverse_ratios(rays)
+    r = 0.5 * (first + last)
+    i = rays.integrals
+    attachment = rays.radius_rate[0] / m1 / 12
+    turn = np.cbrt(2 / wavenumber) * (i[..., 2] / 60 - 2 / 45 * i[..., 4]) - attachment
+    linear = (1 / 10 if q is None else -1 / 30) + r / 4
+    total = 1j * turn * surface_function(xi, q, 2) + linear / (m1 * m2) * surface_function(xi, q, 1)
+    if q is not None:
+        total = total - (0.1 + 0.25 * boundary.sign * r) / (m1 * m2) * surface_slope(xi, q)
+        if np.ndim(q):
+            total = total - 2 / 15 * q / (m1 * m2) * surface_slope(xi, q, 1)
+    return np.asarray(total)
+
+
+def surface_amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary) -> ComplexArray:
+    """Second-order amplitude of each mode (..., n)."""
+    m1, m2 = scales(rays, wavenumber)
+    first, last = transverse_ratios(rays)
+    r: FloatArray = 0.5 * (first + last)[..., None]
+    tau, m0, q_m0 = modes.tau, modes.m0, modes.q_m0
+    if boundary.kind == "soft":
+        bracket = tau * (1 / 10 + r / 4)
+    else:
+        # q² M0 = τ M0 - 1
+        crossed = tau * (tau * m0 - 1) - tau * q_m0 * m0 + q_m0
+        bracket = tau * (r / 4 - 1 / 30) + (0.1 + 0.25 * boundary.sign * r) * (m0**2 - q_m0) - 2 / 15 * crossed
+    return np.asarray(1 + limited(bracket / (m1 * m2)[..., None], 2.0))

@@ -1,0 +1,1 @@
+"""What other programs read: tables, lines on the body, far-field files."""

@@ -1,0 +1,71 @@
+"""A far field as a table: one row per direction, the total and its parts, for a vector field each component."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from creeping._typing import Any, ComplexArray, FloatArray
+from creeping.field.decibels import decibels
+from creeping.files._inputs import FarFieldLike
+
+PARTS = ("creeping", "reflected", "forward")
+_COMPONENTS = ("_tt", "_tp", "_pt", "_pp")
+
+
+def angles_of(directions: FloatArray) -> FloatArray:
+    """θ and φ in radians, 0 <= φ < 2π and 0 at the poles: (..., 3) -> (..., 2)."""
+    x, y, z = np.moveaxis(np.asarray(directions, dtype=float), -1, 0)
+    across = np.hypot(x, y)
+    phi = np.where(across < 1e-12, 0.0, np.mod(np.arctan2(y, x), 2 * np.pi))
+    # just below 0 the remainder rounds to 2π
+    return np.stack([np.arctan2(across, z), np.where(phi >= 2 * np.pi, 0.0, phi)], axis=-1)
+
+
+def notes(far: FarFieldLike) -> dict[str, str]:
+    """Columns and what they hold."""
+    of = f"k = {far.wavenumber!r} 1/L, {far.boundary} boundary, order {far.order}, time factor exp(-i w t)"
+    columns = {
+        "x": "direction from the body to the observer",
+        "y": "direction",
+        "z": "direction",
+        "theta": "degrees from z",
+        "phi": "degrees from x, 0 at the poles",
+    }
+    for suffix in _suffixes(far):
+        name = f", {_spelled(suffix)} by {_spelled(suffix[0] + suffix[2:])} incident" if suffix else ""
+        columns[f"re{suffix}"] = f"real part of the far field f, L{name}; {of}"
+        columns[f"im{suffix}"] = "imaginary part"
+        columns[f"dB{suffix}"] = "20 log10 |f|, -inf where f is 0"
+        for part in PARTS:
+            columns[f"{part}_re{suffix}"] = f"part of f, L{name}"
+            columns[f"{part}_im{suffix}"] = "imaginary part"
+    columns["method"] = "what served the creeping part"
+    columns["unresolved"] = "1 where a part was not found or its expansion fails"
+    return columns
+
+
+def rows(far: FarFieldLike) -> Iterable[tuple[Any, ...]]:
+    """One tuple for each direction, in the order of `notes`."""
+    columns: list[Any] = [*np.asarray(far.directions).T, *np.degrees(angles_of(far.directions)).T]
+    for k in range(len(_suffixes(far))):
+        total = _component(far.total, k)
+        columns += [total.real, total.imag, decibels(total)]
+        for part in PARTS:
+            values = _component(getattr(far, part), k)
+            columns += [values.real, values.imag]
+    numbers = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
+    for row, method, lost in zip(numbers, far.method, far.unresolved, strict=True):
+        yield (*row, method, int(lost))
+
+
+def _suffixes(far: FarFieldLike) -> tuple[str, ...]:
+    return ("",) if np.ndim(far.total) == 1 else _COMPONENTS
+
+
+def _component(values: ComplexArray, number: int) -> ComplexArray:
+    """One component (m,) of a field (m,) or (m, 2, 2)."""
+    return np.asarray(values).reshape(len(values), -1)[:, number]
+
+
+def _spelled(suffix: str) -> str:
+    return {"t": "theta", "p": "phi"}[suffix[1]]

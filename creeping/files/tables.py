@@ -1,0 +1,165 @@
+"""Files of shadow lines, fans, iso-phase curves and far fields for other programs: VTK PolyData (.vtp) and CSV.
+
+Numbers keep all 17 digits, so that what is read back is what was written. Nothing here imports VTK.
+"""
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import TextIO
+
+import numpy as np
+
+from creeping._typing import Any
+from creeping.errors import InvalidInputError
+from creeping.files import far_table as _far_table
+from creeping.files import vtp as _vtp
+from creeping.files._inputs import FarFieldLike, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
+from creeping.files.polylines import Polylines
+from creeping.storage.atomic import written_aside
+
+_RAY_COLUMNS = ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
+
+
+def write_vtp(
+    path: str | os.PathLike[str],
+    line: ShadowLineLike | None = None,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] = (),
+) -> None:
+    """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
+
+    One polyline per curve of the shadow line, ray and iso-phase curve. Point arrays: travel_time, eikonal, spreading,
+    spreading_rate, curvature, attenuation, caustic_index, line_status (0 attached, 1 occluded, 2 concave), ray_status
+    (the ray's, from where it applies). Cell arrays: kind (0 shadow line, 1 ray, 2 iso-phase curve), ray (its number),
+    status (`RayStatus`), curve_index, level. Where an array does not apply it is NaN, or -1 if of integers.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write; replaced at once when complete.
+    line, fan, curves
+        What to write; leave out what is not wanted.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    collected = Polylines(line, fan, curves)
+    text = _vtp.document(collected.points, collected.lines, collected.point_data, collected.cell_data)
+    with written_aside(path) as aside:
+        aside.write_text(text, encoding="ascii")
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text file in UTF-8, replaced at once when complete.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    with written_aside(path) as aside:
+        aside.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_csv(
+    path: str | os.PathLike[str],
+    *,
+    line: ShadowLineLike | None = None,
+    fan: RayFanLike | None = None,
+    curves: Sequence[IsoPhaseCurveLike] | None = None,
+    far: FarFieldLike | None = None,
+) -> None:
+    """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write; replaced at once when complete.
+    line, fan, curves, far
+        Exactly one of them: they have different columns.
+
+    Raises
+    ------
+    InvalidInputError
+        If not exactly one is given.
+    CreepingError
+        If the file cannot be written.
+    """
+    parts = {"line": line, "fan": fan, "curves": curves, "far": far}
+    given = [name for name, value in parts.items() if value is not None]
+    if len(given) != 1:
+        raise InvalidInputError(
+            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(parts)}, a file for each"
+        )
+    with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+        if line is not None:
+            _write_table(stream, _LINE_NOTES, _line_rows(line))
+        elif fan is not None:
+            _write_table(stream, _FAN_NOTES, _fan_rows(fan))
+        elif curves is not None:
+            _write_table(stream, _CURVE_NOTES, _curve_rows(curves))
+        elif far is not None:
+            _write_table(stream, _far_table.notes(far), _far_table.rows(far))
+
+
+_POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}
+_LINE_NOTES = {
+    "curve": "number of the closed curve",
+    "s": "arclength along it, L",
+    **_POSITION,
+    "status": "attached, occluded or concave",
+}
+_FAN_NOTES = {
+    "ray": "number of the ray",
+    "step": "number of the point on it",
+    "t": "travel time; L where the speed is 1",
+    **_POSITION,
+    "px": "unit tangent",
+    "py": "unit tangent",
+    "pz": "unit tangent",
+    "eikonal": "as t",
+    "J": "spreading, 1 on the shadow line",
+    "dJ": "its rate along the ray",
+    "kappa_n": "normal curvature along the ray, 1/L, positive where convex",
+    "caustic_index": "zeros of J passed",
+    "status": "status code of the ray",
+}
+_CURVE_NOTES = {
+    "curve": "number of the curve",
+    "of": "travel_time or eikonal",
+    "level": "its constant value",
+    "closed": "1 if the last point joins the first",
+    **_POSITION,
+}
+
+
+def _write_table(stream: TextIO, notes: dict[str, str], rows: Iterable[tuple[Any, ...]]) -> None:
+    stream.writelines(f"# {name}: {note}\n" for name, note in notes.items())
+    stream.write(",".join(notes) + "\n")
+    # str of a Python float is its repr: the shortest text that reads back to the same number
+    stream.writelines(",".join(map(str, row)) + "\n" for row in rows)
+
+
+def _line_rows(line: ShadowLineLike) -> Iterable[tuple[Any, ...]]:
+    for number, curve in enumerate(line.curves):
+        arclength, points = np.asarray(curve.arclength).tolist(), np.asarray(curve.points).tolist()
+        for s, point, status in zip(arclength, points, curve.status, strict=True):
+            yield (number, s, *point, status)
+
+
+def _fan_rows(fan: RayFanLike) -> Iterable[tuple[Any, ...]]:
+    times = np.asarray(fan.travel_time).tolist()
+    for ray in range(len(fan.points)):
+        status = int(fan.status[ray])
+        columns = (fan.points, fan.directions, *(getattr(fan, name) for name in _RAY_COLUMNS))
+        values = zip(times, *(np.asarray(column[ray]).tolist() for column in columns), strict=True)
+        for step, (t, point, direction, *carried) in enumerate(values):
+            yield (ray, step, t, *point, *direction, *carried, status)
+
+
+def _curve_rows(curves: Sequence[IsoPhaseCurveLike]) -> Iterable[tuple[Any, ...]]:
+    for number, curve in enumerate(curves):
+        for point in np.asarray(curve.points).tolist():
+            yield (number, curve.of, float(curve.level), int(curve.closed), *point)

@@ -1,0 +1,1 @@
+"""Geodesics of a body, each by direct integration; knows no waves."""

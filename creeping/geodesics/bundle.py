@@ -1,0 +1,161 @@
+"""Points (x, p) of the unit tangent bundle T1Q = {F(x) = 0, p.grad F(x) = 0, |p| = 1}.
+
+Projection: x <- x - F grad F/|grad F|^2 until |F| is at rounding level, p <- its tangential part, normalised.
+"""
+
+import numpy as np
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError, SurfaceError
+from creeping.geometry.frames import polar_frame
+from creeping.geometry.surface import Surface, normal, project, size
+
+OFF_BODY = 1e-3
+"""Largest distance of a given point from the body, in units of its size, that projection silently mends."""
+
+
+def project_bundle(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Bring (x, p) onto T1Q: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    points = project(body, points)
+    n = normal(body, points)
+    tangent = directions - np.sum(directions * n, axis=-1, keepdims=True) * n
+    return points, tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
+
+
+def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Check points and directions of a caller, broadcast them together and project them onto T1Q.
+
+    Parameters
+    ----------
+    body : Surface
+    points : (..., 3), L
+        Points on the body, or within 1e-3 of its size from it.
+    directions : (..., 3)
+        Directions, not normal to the body; need not be unit nor exactly tangent.
+
+    Returns
+    -------
+    points, directions : (..., 3), (..., 3)
+
+    Raises
+    ------
+    InvalidInputError
+        On a wrong shape, a value that is not finite, a point off the body, a direction that is zero or normal.
+    """
+    try:
+        x, p = np.broadcast_arrays(np.asarray(points, dtype=float), np.asarray(directions, dtype=float))
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"points and directions are not arrays that broadcast together: {error}") from error
+    if x.ndim == 0 or x.shape[-1] != 3:
+        raise InvalidInputError(f"points have shape {np.shape(points)}; the last axis must hold x, y, z")
+    for name, values in (("points", x), ("directions", p)):
+        bad = ~np.all(np.isfinite(values), axis=-1)
+        if bad.any():
+            raise InvalidInputError(f"{int(bad.sum())} of {bad.size} {name} are not finite")
+    length = np.linalg.norm(p, axis=-1, keepdims=True)
+    if np.any(length == 0):
+        raise InvalidInputError(f"{int(np.sum(length == 0))} of {length.size} directions are zero")
+    x = on_body(body, x)
+    n = normal(body, x)
+    p = p / length
+    tangent = p - np.sum(p * n, axis=-1, keepdims=True) * n
+    norm = np.linalg.norm(tangent, axis=-1, keepdims=True)
+    if np.any(norm < 1e-6):
+        raise InvalidInputError(
+            f"{int(np.sum(norm < 1e-6))} of {norm.size} directions are normal to the body; a ray needs a tangent"
+        )
+    return x, tangent / norm
+
+
+def as_points(points: ArrayLike) -> FloatArray:
+    """Points of a caller as an array (..., 3).
+
+    Raises
+    ------
+    InvalidInputError
+        If they are not numbers, of another shape, or not finite.
+    """
+    try:
+        x = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"points are not an array of numbers: {error}") from error
+    if x.ndim == 0 or x.shape[-1] != 3:
+        raise InvalidInputError(f"points have shape {x.shape}; the last axis must hold x, y, z")
+    bad = ~np.all(np.isfinite(x), axis=-1)
+    if bad.any():
+        raise InvalidInputError(
+            f"{int(bad.sum())} of {bad.size} points are not finite (first: row {int(np.argmax(bad.ravel()))})"
+        )
+    return x
+
+
+def on_body(body: Surface, points: FloatArray) -> FloatArray:
+    """Put points within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
+
+    Raises
+    ------
+    InvalidInputError
+        On a point farther off.
+    """
+    distance = distance_to_body(body, points)
+    off = ~(distance <= OFF_BODY * size(body))
+    if off.any():
+        worst = float(np.nanmax(np.where(off, distance, 0.0)))
+        raise InvalidInputError(
+            f"{int(off.sum())} of {off.size} points are off the body (worst by {worst:.3g} L); project them first",
+            count=int(off.sum()),
+            worst=worst,
+        )
+    return project(body, points)
+
+
+def distance_to_body(body: Surface, points: FloatArray) -> FloatArray:
+    """First-order distance |F|/|grad F|, L: (..., 3) -> (...)."""
+    slope = np.linalg.norm(body.gradient(points), axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.abs(body.level(points)) / slope)
+
+
+def random_bundle_points(body: Surface, count: int, *, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Draw points of T1Q uniformly by area and angle: (count, 3), (count, 3).
+
+    A point is drawn in the unit square of a chart and kept if the atlas assigns it to that chart, with a probability
+    proportional to |x_u x x_v|.
+
+    Raises
+    ------
+    SurfaceError
+        If no point of the charts is assigned to its own chart.
+    """
+    charts = body.atlas.charts
+    probe = rng.random((64, 2))
+    largest = 1.5 * max(float(np.max(_area_element(chart.tangents(probe)))) for chart in charts)
+    found: list[FloatArray] = []
+    for _ in range(1000):
+        number = rng.integers(len(charts), size=4 * count)
+        uv = rng.random((4 * count, 2))
+        keep = rng.random(4 * count)
+        for index, chart in enumerate(charts):
+            mine = uv[number == index]
+            points = chart.point(mine)
+            accepted = _area_element(chart.tangents(mine)) > keep[number == index] * largest
+            accepted &= body.atlas.locate(points)[0] == index
+            found.append(points[accepted])
+        if sum(map(len, found)) >= count:
+            break
+    else:
+        raise SurfaceError("the atlas assigns almost none of its charts' points to their own chart; run check_surface")
+    # charts were visited in order: mix before cutting, or the last charts would be missing
+    points = rng.permutation(np.concatenate(found))[:count]
+    angle = 2 * np.pi * rng.random(count)
+    chosen, uv = body.atlas.locate(points)
+    directions = np.empty_like(points)
+    for k, chart in enumerate(charts):
+        mine = chosen == k
+        frame = polar_frame(chart.tangents(uv[mine]))
+        directions[mine] = frame[..., 0] * np.cos(angle[mine, None]) + frame[..., 1] * np.sin(angle[mine, None])
+    return project_bundle(body, points, directions)
+
+
+def _area_element(tangents: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=-1))

@@ -1,0 +1,68 @@
+"""Direct integration as a flow, interchangeable with a phase map."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._presenting import Shown, brief
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.geodesics.attenuation import with_attenuation
+from creeping.geodesics.bundle import bundle_points
+from creeping.geodesics.integrator import MapError, as_times, pack, trace_states, unpack
+from creeping.geometry.surface import Surface
+
+
+@dataclass(frozen=True, repr=False)
+class DirectFlow(Shown):
+    """The flow by direct integration, with the protocol of a phase map (apply, flow, transport, horizon, error).
+
+    Parameters
+    ----------
+    body : Surface
+    rtol : float
+        Relative tolerance per step; the step adapts to the worst of 64 rays.
+    horizon : float, L (travel time for a weighted body)
+        Time of one `apply`.
+    step : float, optional, L (travel time for a weighted body)
+        Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
+    error : MapError, optional
+        At the end of rays, if `choose_flow` has measured it.
+    """
+
+    body: Surface
+    rtol: float = 1e-10
+    horizon: float = 1.0
+    step: float | None = None
+    error: MapError | None = None
+
+    def __post_init__(self) -> None:
+        if not 1e-14 <= self.rtol <= 1e-2:
+            raise InvalidInputError(f"rtol = {self.rtol!r} is not between 1e-14 and 1e-2")
+        for name, value in (("horizon", self.horizon), ("step", self.step)):
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
+
+    def __repr__(self) -> str:
+        steps = f"rtol {self.rtol:g} per step" if self.step is None else f"equal steps of at most {self.step:g}"
+        e = self.error
+        error = "not measured" if e is None else f"rms {e.rms:.1e}, max {e.max:.1e} ({e.samples} samples)"
+        return (
+            f"DirectFlow({brief(self.body)})\n  order 8, {steps}, horizon {self.horizon:g}\n  error at the end: {error}"
+        )
+
+    def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Advance by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+        return self.flow(points, directions, self.horizon)
+
+    def flow(self, points: ArrayLike, directions: ArrayLike, times: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Advance to times >= 0; same shapes as `trace`."""
+        values, scalar = as_times(times)
+        x, p = bundle_points(self.body, points, directions)
+        return unpack(self.transport(pack(x, p), values), x.shape, scalar)
+
+    def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
+        """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same); see `PhaseMap.transport`."""
+        if states.shape[1] > 10:
+            return with_attenuation(self.body, states, times, rtol=self.rtol, step=self.step)
+        return trace_states(self.body, states, times, rtol=self.rtol if self.step is None else 0.0, step=self.step)

@@ -1,0 +1,107 @@
+"""The geodesic flow of a body, plain and weighted, and the curvatures along it.
+
+With n = grad F/|grad F|, H the Hessian of F, p (u when weighted) the unit tangent [YC06b]:
+
+    plain      x' = p,    p' = -(p.Hp)/|grad F|^2 grad F
+    weighted   x' = c u,  u' = -grad c + (grad c.n) n + (grad c.u) u - c (u.Hu)/|grad F| n
+
+The weighted flow is that of the metric ds/c, time being travel time. Neighbouring rays part by J, with
+J = c I and I'' + G I = 0; G is the Gaussian curvature of that metric,
+
+    K = (grad F.adj(H) grad F)/|grad F|^4,    G = c^2 K + c Lap c - |grad_Q c|^2,
+
+Lap the Laplacian on Q, Lap c = tr(P Hess c) - (kappa_1 + kappa_2) n.grad c with P = 1 - n n^T.
+Normal curvature kappa_n = p.Hp/|grad F| is positive where the body is convex along p.
+"""
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.geometry.curvature import gaussian_curvature, principal_curvature_bound
+from creeping.geometry.surface import Surface, size
+
+
+def speed_of(body: Surface) -> Any:
+    """Speed c of the body's weighted flow, or None."""
+    return getattr(body, "speed", None)
+
+
+def speed_values(body: Surface, points: FloatArray) -> FloatArray:
+    """Speed c, 1 without a weight: (..., 3) -> (...)."""
+    speed = speed_of(body)
+    return np.ones(np.shape(points)[:-1]) if speed is None else np.asarray(speed.value(points), dtype=float)
+
+
+def speed_hessian(body: Surface, points: FloatArray) -> FloatArray:
+    """Hessian of c: (..., 3) -> (..., 3, 3), by central differences where the speed offers none."""
+    speed = speed_of(body)
+    if hasattr(speed, "hessian"):
+        return np.asarray(speed.hessian(points), dtype=float)
+    # rounding and truncation balance near eps^(1/3): relative error about 1e-10
+    step = 6e-6 * size(body)
+    columns = [(speed.gradient(points + step * e) - speed.gradient(points - step * e)) / (2 * step) for e in np.eye(3)]
+    hessian = np.stack(columns, axis=-1)
+    return np.asarray(0.5 * (hessian + np.swapaxes(hessian, -1, -2)))
+
+
+def points_of_charts(body: Surface) -> FloatArray:
+    """Points all over a body (n, 3), L."""
+    uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.concatenate([chart.point(uv) for chart in body.atlas.charts])
+
+
+def natural_horizon(body: Surface) -> float:
+    """Power of two next to the time a ray takes over the smallest radius of curvature."""
+    points = points_of_charts(body)
+    fastest = float(np.max(speed_values(body, points)))
+    return float(2.0 ** np.round(np.log2(1 / (principal_curvature_bound(body, points) * fastest))))
+
+
+def metric_curvature(body: Surface, points: FloatArray) -> FloatArray:
+    """Curvature G of the metric ds/c, 1/time^2; the Gaussian K without a weight: (..., 3) -> (...)."""
+    gauss = gaussian_curvature(body, points)
+    speed = speed_of(body)
+    if speed is None:
+        return gauss
+    g, h = body.gradient(points), body.hessian(points)
+    norm = np.linalg.norm(g, axis=-1)
+    n = g / norm[..., None]
+    c, dc, ddc = speed.value(points), speed.gradient(points), speed_hessian(body, points)
+    along_n = np.sum(n * dc, axis=-1)
+    mean = (np.trace(h, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, h, n)) / norm
+    laplacian = np.trace(ddc, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, ddc, n) - mean * along_n
+    return np.asarray(c**2 * gauss + c * laplacian - (np.sum(dc * dc, axis=-1) - along_n**2))
+
+
+def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Right-hand sides (x', p') of the flow: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    g, h = body.gradient(points), body.hessian(points)
+    bent = np.einsum("...i,...ij,...j->...", directions, h, directions)
+    turning = -(bent / np.sum(g * g, axis=-1))[..., None] * g
+    speed = speed_of(body)
+    if speed is None:
+        return directions, turning
+    c, dc = speed.value(points)[..., None], speed.gradient(points)
+    n = g / np.linalg.norm(g, axis=-1, keepdims=True)
+    along_n = np.sum(dc * n, axis=-1, keepdims=True)
+    along_u = np.sum(dc * directions, axis=-1, keepdims=True)
+    return c * directions, -dc + along_n * n + along_u * directions + c * turning
+
+
+def launch_spreading(body: Surface, points: FloatArray, directions: FloatArray, along: FloatArray) -> FloatArray:
+    """Initial (J, J') of rays launched with the constant direction d from a line: (n, 3) x 3 -> (n, 2).
+
+    J = b.dx/dsigma with b = n x p and sigma measured across the ray, so J(0) = 1. Differentiating b.dx along the ray
+    with dp/dsigma = 0 leaves J'(0) = (b.grad c)(p.dx/dsigma): zero without a weight, whatever the line's obliquity.
+    ``along`` holds the tangents of the line.
+    """
+    spreading = np.zeros((len(points), 2))
+    spreading[:, 0] = 1.0
+    speed = speed_of(body)
+    if speed is not None:
+        g = body.gradient(points)
+        b = np.cross(g / np.linalg.norm(g, axis=-1, keepdims=True), directions)
+        across = np.sum(b * along, axis=-1)
+        oblique = np.divide(np.sum(directions * along, axis=-1), across, out=np.zeros_like(across), where=across != 0)
+        spreading[:, 1] = np.sum(b * speed.gradient(points), axis=-1) * oblique
+    return spreading

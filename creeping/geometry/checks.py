@@ -1,0 +1,154 @@
+"""Numerical verification of a body: derivatives, closedness, orientation, cover and overlap of its charts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.errors import SurfaceError
+from creeping.geometry.surface import Surface, size
+from creeping.geometry.triangulation import triangulate
+
+
+@dataclass(frozen=True)
+class Check:
+    """One property of a body: the worst value found, its limit, and what to do about a failure."""
+
+    name: str
+    worst: float
+    limit: float
+    remedy: str
+
+    @property
+    def ok(self) -> bool:
+        """Whether the worst value is within the limit (NaN is not)."""
+        return self.worst <= self.limit
+
+
+@dataclass(frozen=True, repr=False)
+class SurfaceReport:
+    """What `check_surface` found.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    genus : int
+        Handles of the body.
+    area : float
+        L^2, of a triangulation: a few digits.
+    """
+
+    checks: tuple[Check, ...]
+    genus: int
+    area: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether every check passed."""
+        return all(check.ok for check in self.checks)
+
+    def require(self) -> None:
+        """Raise SurfaceError naming every failed check."""
+        failed = [f"{c.name}: {c.worst:.3g} > {c.limit:.3g} ({c.remedy})" for c in self.checks if not c.ok]
+        if failed:
+            raise SurfaceError(f"{len(failed)} of {len(self.checks)} checks of the body failed: " + "; ".join(failed))
+
+    def __repr__(self) -> str:
+        rows = [f"  {'ok ' if c.ok else 'BAD'} {c.name}: {c.worst:.2g} (limit {c.limit:.2g})" for c in self.checks]
+        return "\n".join([f"SurfaceReport(genus {self.genus}, area {self.area:.4g} L^2)", *rows])
+
+
+def check_surface(body: Surface) -> SurfaceReport:
+    """Verify a body numerically: derivatives, closedness, orientation, cover and overlap of its charts.
+
+    Parameters
+    ----------
+    body : Surface
+
+    Returns
+    -------
+    SurfaceReport
+
+    Raises
+    ------
+    SurfaceError
+        If F = 0 cannot be triangulated at all: empty, open, not finite, or not smooth.
+    """
+    mesh = triangulate(body.level, body.gradient, body.bounds)
+    points = mesh.vertices
+    corners = points[mesh.triangles]
+    doubled_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
+    components = mesh.components
+    return SurfaceReport(
+        checks=(
+            Check("components beyond one", float(components - 1), 0, "give one body at a time"),
+            *_derivative_checks(body, points),
+            *_atlas_checks(body, points),
+        ),
+        genus=components - mesh.euler_characteristic // 2,
+        area=float(doubled_area.sum() / 2),
+    )
+
+
+def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:
+    """Analytic against central differences, relative to the largest value."""
+    step = 6e-6 * size(body)
+    level, gradient, hessian = body.level, body.gradient(points), body.hessian(points)
+    axes = step * np.eye(3)
+    by_level = np.stack([level(points + e) - level(points - e) for e in axes], axis=-1) / (2 * step)
+    by_gradient = np.stack([body.gradient(points + e) - body.gradient(points - e) for e in axes], axis=-1) / (2 * step)
+    checks = [
+        Check("gradient against differences of F", _relative(gradient, by_level), 1e-6, "mend gradient()"),
+        Check("Hessian against differences of the gradient", _relative(hessian, by_gradient), 1e-6, "mend hessian()"),
+    ]
+    speed = getattr(body, "speed", None)
+    if speed is not None:
+        value, slope = speed.value(points), speed.gradient(points)
+        by_value = np.stack([speed.value(points + e) - speed.value(points - e) for e in axes], axis=-1) / (2 * step)
+        checks += [
+            Check("negative speed", float(np.max(-value)), 0, "give c(x) > 0 on the body"),
+            Check(
+                "speed gradient against differences", _relative(slope, by_value), 1e-6, "mend the speed's gradient()"
+            ),
+        ]
+    return checks
+
+
+def _atlas_checks(body: Surface, points: FloatArray) -> list[Check]:
+    """Cover (every point in the unit square of its chart), inverse, tangents and orientation."""
+    index, uv = body.atlas.locate(points)
+    charts = body.atlas.charts
+    outside, gap, tangent, turned, off = 0.0, 0.0, 0.0, 0.0, 0.0
+    step = 1e-5
+    for k, chart in enumerate(charts):
+        mine = uv[index == k]
+        if not len(mine):
+            continue
+        free = [axis for axis in (0, 1) if not chart.periodic[axis]]
+        if free:
+            outside = max(outside, float(np.max(np.maximum(-mine[:, free], mine[:, free] - 1))))
+        back = chart.point(mine)
+        gap = max(gap, float(np.max(np.linalg.norm(back - points[index == k], axis=-1))) / size(body))
+        off = max(
+            off, float(np.max(np.abs(body.level(back)) / np.linalg.norm(body.gradient(back), axis=-1))) / size(body)
+        )
+        columns = chart.tangents(mine)
+        shifts = np.eye(2) * step
+        differences = np.stack([chart.point(mine + e) - chart.point(mine - e) for e in shifts], axis=-1) / (2 * step)
+        tangent = max(tangent, _relative(columns, differences))
+        facing = np.sum(np.cross(columns[..., 0], columns[..., 1]) * body.gradient(back), axis=-1)
+        turned = max(turned, float(np.mean(~(facing > 0))))
+    return [
+        Check("share of points in no chart", float(np.mean((index < 0) | (index >= len(charts)))), 0, "mend locate()"),
+        Check("points outside the unit square of their chart", outside, 1e-9, "widen the charts or mend locate()"),
+        Check("chart inverse, in body sizes", gap, 1e-9, "make locate() the inverse of point()"),
+        Check("chart points off the body, in body sizes", off, 1e-9, "make point() satisfy F = 0"),
+        Check("tangents against differences", tangent, 1e-6, "mend tangents()"),
+        Check("share of chart points turned inside out", turned, 0, "swap u and v, or the sign of F"),
+    ]
+
+
+def _relative(given: FloatArray, expected: FloatArray) -> float:
+    if given.shape != expected.shape:
+        return float("nan")
+    return float(np.max(np.abs(given - expected)) / max(float(np.max(np.abs(expected))), 1e-300))

@@ -1,0 +1,36 @@
+"""Curvatures of the body F = 0.
+
+With g = grad F, H the Hessian of F and p, b unit tangents:
+
+    kappa_n = p.Hp/|g|          normal curvature along p, positive where the body is convex along p
+    K = (g.adj(H) g)/|g|^4      Gaussian curvature
+"""
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.geometry.surface import Surface
+
+
+def normal_curvature(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:
+    """kappa_n = p.Hp/|grad F| along unit tangents p, 1/L: (..., 3), (..., 3) -> (...)."""
+    bent = np.einsum("...i,...ij,...j->...", directions, body.hessian(points), directions)
+    return np.asarray(bent / np.linalg.norm(body.gradient(points), axis=-1))
+
+
+def gaussian_curvature(body: Surface, points: FloatArray) -> FloatArray:
+    """K = (g.adj(H) g)/|g|^4 with g = grad F, 1/L^2: (..., 3) -> (...)."""
+    g, h = body.gradient(points), body.hessian(points)
+    # the columns of the adjugate of a symmetric matrix are cross products of its rows
+    adjugate = np.stack([np.cross(h[..., (k + 1) % 3, :], h[..., (k + 2) % 3, :]) for k in range(3)], axis=-2)
+    return np.asarray(np.einsum("...i,...ij,...j->...", g, adjugate, g) / np.sum(g * g, axis=-1) ** 2)
+
+
+def principal_curvature_bound(body: Surface, points: FloatArray) -> float:
+    """Largest |kappa_1| or |kappa_2| over the points, 1/L."""
+    g, h = body.gradient(points), body.hessian(points)
+    norm = np.linalg.norm(g, axis=-1)
+    n = g / norm[..., None]
+    tangential = np.eye(3) - n[..., :, None] * n[..., None, :]
+    shape = tangential @ h @ tangential / norm[..., None, None]
+    return float(np.max(np.abs(np.linalg.eigvalsh(shape))))

@@ -1,0 +1,155 @@
+"""What creeping asks of a body: small protocols, satisfied structurally by any class.
+
+The body is Q = {x : F(x) = 0}, F > 0 outside, with outward normal n = grad F/|grad F| and Hessian H.
+A chart is a map (u, v) -> x; its part used for look-ups is the unit square, its grid reaches beyond
+it by the margin of the spline. The isometric frame of a chart with tangents T = [x_u, x_v] (3 x 2) is
+the orthogonal polar factor E = T (T^T T)^(-1/2): orthonormal, tangent, and nearest to T.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+
+
+class Compiled(Protocol):
+    """A compiled block function with its parameters; see `scatterers.kernels.compiled.Compiled`.
+
+    A body that offers none is evaluated by its numpy methods: same results, slower.
+    """
+
+    @property
+    def function(self) -> Any:
+        """The compiled function."""
+        ...
+
+    @property
+    def parameters(self) -> FloatArray:
+        """Its parameters (k,)."""
+        ...
+
+
+class Chart(Protocol):
+    """One smooth map from (u, v) to the body; ``periodic`` says which variables have period 1."""
+
+    @property
+    def periodic(self) -> tuple[bool, bool]:
+        """Whether u and v have period 1."""
+        ...
+
+    def point(self, uv: FloatArray) -> FloatArray:
+        """Point of the body: (..., 2) -> (..., 3), L."""
+        ...
+
+    def tangents(self, uv: FloatArray) -> FloatArray:
+        """Columns x_u, x_v: (..., 2) -> (..., 3, 2), L."""
+        ...
+
+
+class Atlas(Protocol):
+    """Charts whose unit squares cover the body, right-handed: x_u x x_v points along n."""
+
+    @property
+    def charts(self) -> Sequence[Chart]:
+        """All charts, of one kind of periodicity."""
+        ...
+
+    def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Chart number (...) and chart variables (..., 2) of points (..., 3) on the body."""
+        ...
+
+
+class Speed(Protocol):
+    """Speed c(x) > 0 of the weighted flow; an optional ``hessian`` (..., 3, 3) spares differencing."""
+
+    def value(self, points: FloatArray) -> FloatArray:
+        """Speed: (..., 3) -> (...)."""
+        ...
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of the speed: (..., 3) -> (..., 3)."""
+        ...
+
+
+@runtime_checkable
+class Surface(Protocol):
+    """A smooth closed body.
+
+    Optional members: ``speed`` (a `Speed`), ``compiled`` (a `Compiled` level), ``fingerprint`` (a string that
+    changes with the body), of its atlas ``compiled`` (a locator) and ``margin`` (how far charts reach beyond their unit
+    squares, in half widths; without bound if not given), ``rough(points)`` (where it is not smooth enough for
+    creeping rays, (..., 3) -> (...)), and ``coarser`` (the same body known less well, a `Surface`: what differs on it
+    is uncertain).
+    """
+
+    @property
+    def atlas(self) -> Atlas:
+        """Charts that cover the body."""
+        ...
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Box (2, 3) that contains the body, L."""
+        ...
+
+    def level(self, points: FloatArray) -> FloatArray:
+        """F, positive outside: (..., 3) -> (...)."""
+        ...
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of F: (..., 3) -> (..., 3)."""
+        ...
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        ...
+
+    def parameters(self, points: FloatArray) -> FloatArray:
+        """Parameters for display, (theta, phi) or (theta, psi) in radians: (..., 3) -> (..., 2)."""
+        ...
+
+
+def size(body: Surface) -> float:
+    """Half the diagonal of the body's box, the length that absolute tolerances refer to."""
+    box = np.asarray(body.bounds, dtype=float)
+    return float(0.5 * np.linalg.norm(box[1] - box[0]))
+
+
+def normal(body: Surface, points: FloatArray) -> FloatArray:
+    """Outward unit normal n = grad F/|grad F|: (..., 3) -> (..., 3)."""
+    gradient = body.gradient(points)
+    return np.asarray(gradient / np.linalg.norm(gradient, axis=-1, keepdims=True))
+
+
+def project(body: Surface, points: FloatArray, *, iterations: int = 8) -> FloatArray:
+    """Newton steps x <- x - F grad F/|grad F|^2 until |F| is at rounding level: (..., 3) -> (..., 3)."""
+    points = np.array(points, dtype=float)
+    for _ in range(iterations):
+        gradient = body.gradient(points)
+        step = body.level(points) / np.sum(gradient * gradient, axis=-1)
+        points -= step[..., None] * gradient
+        moved = np.abs(step) * np.linalg.norm(gradient, axis=-1)
+        if np.all(moved <= 1e-15 * size(body)):
+            break
+    return points
+
+
+def fingerprint(body: Surface) -> str:
+    """Text that tells bodies apart: their own, or a digest of F and the speed at points of the charts."""
+    own = getattr(body, "fingerprint", None)
+    if isinstance(own, str):
+        return own
+    uv = np.stack(np.meshgrid(*[np.linspace(0.03, 0.97, 9)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = np.concatenate([chart.point(uv) for chart in body.atlas.charts])
+    parts: list[FloatArray] = [points, body.level(1.1 * points), body.gradient(points)]
+    speed = getattr(body, "speed", None)
+    if speed is not None:
+        parts += [speed.value(points), speed.gradient(points)]
+    digest = hashlib.blake2b(digest_size=16)
+    for part in parts:
+        # ten digits: the same on every machine, however its libraries round
+        digest.update(" ".join(f"{value:.9e}" for value in np.ravel(part)).encode())
+    return f"{type(body).__name__}:{digest.hexdigest()}"

@@ -1,0 +1,231 @@
+"""Closed triangulation of F = 0 by dual contouring of its sign on a box grid (surface nets).
+
+Every cell of the grid with corners of both signs gives one vertex, every grid edge whose ends differ in sign one
+quadrilateral between the four cells around it; vertices are then brought onto F = 0. The mesh is closed and
+oriented by construction and follows the topology of F at the grid's resolution, whatever the genus.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.errors import SurfaceError
+
+MAX_POINTS = 12_000_000
+"""Grid points of the finest triangulation."""
+
+
+@dataclass(frozen=True, repr=False)
+class Triangulation:
+    """Closed oriented triangle mesh with vertices on the body.
+
+    Attributes
+    ----------
+    vertices : (n, 3), L
+    triangles : (m, 3)
+        Vertex numbers, counter-clockwise seen from outside.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+
+    @property
+    def edge_length(self) -> float:
+        """Root mean square of the edge lengths, L."""
+        corners = self.vertices[self.triangles]
+        return float(np.sqrt(np.mean(np.sum((corners - np.roll(corners, 1, axis=1)) ** 2, axis=-1))))
+
+    @property
+    def components(self) -> int:
+        """Number of connected bodies."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        edges = self.triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T
+        n = len(self.vertices)
+        return int(connected_components(coo_array((np.ones(edges.shape[1]), edges), shape=(n, n)))[0])
+
+    @property
+    def euler_characteristic(self) -> int:
+        """V - E + F: 2 for genus 0, 0 for a torus."""
+        return len(self.vertices) - len(self.triangles) // 2
+
+    def __repr__(self) -> str:
+        return f"Triangulation({len(self.vertices)} vertices, edge {self.edge_length:.3g} L)"
+
+
+def triangulate(
+    level: Callable[[FloatArray], FloatArray],
+    gradient: Callable[[FloatArray], FloatArray],
+    bounds: FloatArray,
+    *,
+    cells: int = 48,
+) -> Triangulation:
+    """Triangulate F = 0 inside its box.
+
+    Parameters
+    ----------
+    level, gradient : callable
+        F and its gradient, (..., 3) -> (...) and (..., 3).
+    bounds : (2, 3), L
+        Box that contains the body; it is widened by two cells.
+    cells : int
+        Cells along the side of a cube of the box's volume; raised by half where that does not resolve the topology.
+
+    Returns
+    -------
+    Triangulation
+
+    Raises
+    ------
+    SurfaceError
+        If F has no zero in the box, reaches its faces, or no grid of at most MAX_POINTS resolves its topology.
+    """
+    box = np.asarray(bounds, dtype=float)
+    if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
+        raise SurfaceError(f"bounds {box.tolist()} are not two corners of a box; give [[xmin, ...], [xmax, ...]]")
+    while True:
+        axes = _grid_axes(box, cells)
+        values = _grid_values(level, axes)
+        vertices, number = _cell_vertices(values, values < 0, axes)
+        triangles = _quadrilaterals(values < 0, number)
+        if _closed(triangles):
+            break
+        finer = cells + cells // 2
+        if np.prod([len(axis) for axis in _grid_axes(box, finer)]) > MAX_POINTS:
+            raise SurfaceError(
+                f"{values.size} grid points do not resolve the surface; it is too thin, or crosses itself"
+            )
+        cells = finer
+    reach = max(float(axis[1] - axis[0]) for axis in axes)
+    return Triangulation(_onto_surface(level, gradient, vertices, reach), triangles)
+
+
+def _grid_axes(box: FloatArray, cells: int) -> list[FloatArray]:
+    """Grid coordinates per axis, two cells beyond the box: cubic cells, but at least 24 across each side.
+
+    Cells much flatter than long would miss the topology of a ring, hence cubes.
+    """
+    side = box[1] - box[0]
+    count = np.clip(np.round(side / (np.prod(side) ** (1 / 3) / cells)), 24, 1000).astype(int)
+    spacing = side / count
+    # an irrational shift keeps grid points off the symmetry planes, where F is often exactly 0
+    low = box[0] - (2 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing
+    return [low[k] + spacing[k] * np.arange(count[k] + 6) for k in range(3)]
+
+
+def _grid_values(level: Callable[[FloatArray], FloatArray], axes: list[FloatArray]) -> FloatArray:
+    """F on the grid, checked: finite, negative somewhere, positive on the faces."""
+    values = np.asarray(level(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)), dtype=float)
+    if not np.all(np.isfinite(values)):
+        count = int(np.sum(~np.isfinite(values)))
+        raise SurfaceError(f"F is not finite at {count} of {values.size} grid points of its box; check the expression")
+    inside = values < 0
+    if not inside.any():
+        raise SurfaceError(f"F has no negative value in its box ({values.size} points): no body; check bounds and sign")
+    faces = int(sum(inside.take([0, -1], axis=k).sum() for k in range(3)))
+    if faces:
+        raise SurfaceError(f"F < 0 at {faces} points on the faces of its box: open, inverted or larger than its bounds")
+    return values
+
+
+def _cell_vertices(values: FloatArray, inside: BoolArray, axes: list[FloatArray]) -> tuple[FloatArray, IntArray]:
+    """One vertex in each cell of mixed sign: the mean of the sign changes on its edges."""
+    n = [len(axis) - 1 for axis in axes]
+    total = np.zeros((*n, 3))
+    count = np.zeros(n)
+    for axis in range(3):
+        start = [slice(None)] * 3
+        stop = [slice(None)] * 3
+        start[axis], stop[axis] = slice(None, -1), slice(1, None)
+        first, last = values[tuple(start)], values[tuple(stop)]
+        crossed = inside[tuple(start)] != inside[tuple(stop)]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fraction = np.where(crossed, first / (first - last), 0.0)
+        b, c = (axis + 1) % 3, (axis + 2) % 3
+        for corner_b in (0, 1):
+            for corner_c in (0, 1):
+                part = [slice(None)] * 3
+                part[b] = slice(corner_b, corner_b + n[b])
+                part[c] = slice(corner_c, corner_c + n[c])
+                mask = crossed[tuple(part)]
+                count += mask
+                total[..., axis] += np.where(mask, fraction[tuple(part)], 0.0)
+                total[..., b] += mask * corner_b
+                total[..., c] += mask * corner_c
+    mixed = count > 0
+    number = np.full(mixed.shape, -1, dtype=np.int64)
+    number[mixed] = np.arange(int(mixed.sum()))
+    cell = np.argwhere(mixed)
+    offset = total[mixed] / count[mixed][:, None]
+    origin = np.array([axis[0] for axis in axes])
+    spacing = np.array([axis[1] - axis[0] for axis in axes])
+    return origin + (cell + offset) * spacing, number
+
+
+def _quadrilaterals(inside: BoolArray, number: IntArray) -> IntArray:
+    """Two triangles around each grid edge whose ends differ in sign, seen counter-clockwise from outside."""
+    triangles = []
+    for axis in range(3):
+        b, c = (axis + 1) % 3, (axis + 2) % 3
+        start = [slice(1, -1)] * 3
+        stop = [slice(1, -1)] * 3
+        start[axis], stop[axis] = slice(None, -1), slice(1, None)
+        at_start, at_stop = inside[tuple(start)], inside[tuple(stop)]
+        for outward in (True, False):
+            edge = np.argwhere(at_start & ~at_stop) if outward else np.argwhere(~at_start & at_stop)
+            edge[:, b] += 1
+            edge[:, c] += 1
+            corners = []
+            for shift_b, shift_c in ((0, 0), (-1, 0), (-1, -1), (0, -1)):
+                cell = edge.copy()
+                cell[:, b] += shift_b
+                cell[:, c] += shift_c
+                corners.append(number[tuple(cell.T)])
+            quad = np.stack(corners, axis=1)
+            if not outward:
+                quad = quad[:, ::-1]
+            triangles += [quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]]
+    return np.concatenate(triangles)
+
+
+def _closed(triangles: IntArray) -> bool:
+    """Whether every directed edge occurs once and its reverse once."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    code = edges.min(axis=1) * (triangles.max() + 1) + edges.max(axis=1)
+    forward = edges[:, 0] < edges[:, 1]
+    keys, counts = np.unique(code[forward], return_counts=True)
+    reverse_keys, reverse_counts = np.unique(code[~forward], return_counts=True)
+    return bool(np.array_equal(keys, reverse_keys) and np.all(counts == 1) and np.all(reverse_counts == 1))
+
+
+def _onto_surface(
+    level: Callable[[FloatArray], FloatArray],
+    gradient: Callable[[FloatArray], FloatArray],
+    vertices: FloatArray,
+    reach: float,
+) -> FloatArray:
+    """Newton along the gradient, each step at most ``reach``; a vertex that fails raises."""
+    points = vertices.copy()
+    distance = np.full(len(points), np.inf)
+    for _ in range(20):
+        slope = gradient(points)
+        norm = np.linalg.norm(slope, axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = level(points) / norm
+            step = np.clip(distance, -reach, reach) / norm
+        points = points - step[:, None] * slope
+        if not np.all(np.isfinite(points)):
+            break
+        if np.max(np.abs(distance)) < 1e-14 * max(1.0, float(np.abs(points).max())):
+            break
+    bad = ~(np.abs(distance) < 1e-9 * max(1.0, float(np.nanmax(np.abs(points)))))
+    if bad.any():
+        worst = vertices[bad][0]
+        raise SurfaceError(
+            f"{int(bad.sum())} of {len(points)} vertices found no point with F = 0 and grad F != 0 "
+            f"(first near {np.round(worst, 4).tolist()}); the surface is not smooth there"
+        )
+    return points

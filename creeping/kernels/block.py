@@ -1,0 +1,36 @@
+"""What kernels share: blocks of rays, memory that vectors like, the compiler's options.
+
+Rays go in blocks of BLOCK, stored component by component, so that the loops over a block vectorise.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from creeping.kernels.cache import discard_stale
+
+discard_stale(Path(__file__).parents[1])
+
+BLOCK = 64
+
+# Inlined whole: of a callee that stays a call, a process that compiles it alone and one that loads it from the cache
+# within its caller have differently optimised copies, and sums that may be reordered differ in their last digits.
+options = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "forceinline": True,
+    "fastmath": {"contract", "reassoc", "nsz", "arcp"},
+}
+# For kernels too large to be inlined whole: they keep to the letter of floating-point arithmetic, so that results are
+# the same however the compiler has cut the calls.
+strict_options = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@njit(**options)
+def aligned(rows, columns):
+    """Uninitialised array whose rows of whole vectors do not straddle cache lines."""
+    flat = np.empty(rows * columns + 8)
+    skip = (64 - flat.ctypes.data % 64) % 64 // 8
+    return flat[skip : skip + rows * columns].reshape(rows, columns)

@@ -1,0 +1,137 @@
+"""Opening stored phase maps, and the cache that spares building them again."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from creeping._typing import Any
+from creeping._version import __version__
+from creeping.errors import CreepingError, StoredMapError
+from creeping.geodesics.integrator import MapError
+from creeping.geometry.surface import Surface, fingerprint
+from creeping.phaseflow.coordinates.base import Model, model_of
+from creeping.phaseflow.grid import Grid, Leap
+from creeping.phaseflow.phase_map import Growth, PhaseMap
+from creeping.storage.folder import SCHEMA, content_digest, open_array, read_manifest
+
+
+def cache_folder() -> Path:
+    """Folder of cached maps: $CREEPING_CACHE, or ``maps`` in the user's cache folder."""
+    import platformdirs
+
+    named = os.environ.get("CREEPING_CACHE")
+    return Path(named) if named else platformdirs.user_cache_path("creeping") / "maps"
+
+
+def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
+    """Open a stored map of a body.
+
+    Parameters
+    ----------
+    folder : path
+    body : Surface
+        The body the map was built for; it is compared with the stored fingerprint.
+
+    Returns
+    -------
+    PhaseMap
+        Its arrays are mapped from the files, read-only.
+
+    Raises
+    ------
+    StoredMapError
+        If the folder is no map, is damaged, of another version or of another body.
+    """
+    folder = Path(folder)
+    content = read_manifest(folder)
+    if content["body"] != fingerprint(body):
+        raise StoredMapError(f"{folder} is a map of {content['body']}, not of {fingerprint(body)}; rebuild it")
+    try:
+        grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
+        error = MapError(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
+        rows = content["growth"] and [tuple(map(float, row)) for row in content["growth"]]
+        growth = Growth(rows[0], rows[1], rows[2], rows[3][0]) if rows else None
+        leaps = tuple(
+            Leap(
+                float(time),
+                open_array(folder, f"state-{k}.npy", content),
+                np.array([float(value) for value in content["centres"][k]]),
+                open_array(folder, f"jacobi-{k}.npy", content),
+                np.array([float(value) for value in content["matrices"][k]]),
+                open_array(folder, f"curvature-{k}.npy", content),
+            )
+            for k, time in enumerate(content["times"])
+        )
+        model = model_of(body, str(content["model"]))
+    except (KeyError, TypeError, IndexError, ValueError) as reason:
+        if isinstance(reason, CreepingError):
+            raise
+        raise StoredMapError(f"{folder}: the manifest is incomplete ({reason!r}); rebuild the map") from reason
+    if model.name != content["model"]:
+        raise StoredMapError(f"{folder} is stored as {content['model']!r}, which {body!r} does not offer; rebuild it")
+    _check_shapes(folder, grid, leaps, model)
+    return PhaseMap(body, model, grid, leaps, error, growth, content["parameters"])
+
+
+def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Model) -> None:
+    """Kernels trust shapes and types, so they must follow from the grid."""
+    whole = (model.charts, *grid.sides)
+    for leap in leaps:
+        fits = leap.state.shape == (*whole, model.lanes) and grid.degree in (3, 5)
+        fits &= leap.centre.shape == (model.lanes,) and leap.matrix.shape == (4,)
+        fits &= leap.curvature.shape in ((*whole, 8), (0, *grid.sides, 8)) and leap.curvature.dtype == leap.state.dtype
+        fits &= leap.jacobi.shape in ((*whole, 4), (0, *grid.sides, 4)) and leap.jacobi.dtype == leap.state.dtype
+        if not fits:
+            raise StoredMapError(f"{folder}: tables {leap.state.shape} do not fit grid {grid.nodes}; rebuild the map")
+
+
+def cached_place(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Path:
+    """Where the cache has, or would have, what a body and these parameters decide."""
+    root = cache_folder() if folder is True else Path(str(folder))
+    digest = content_digest({"schema": SCHEMA, "version": __version__, "body": fingerprint(body), **key})
+    return root / f"{type(body).__name__.lower()}-{digest[:24]}"
+
+
+def is_cached(body: Surface, key: dict[str, Any], *, folder: bool | str | Path) -> bool:
+    """Whether a map of the body with these parameters is in the cache."""
+    return cached_place(body, key, folder).exists()
+
+
+def cached_phase_map(
+    body: Surface,
+    key: dict[str, Any],
+    build: Callable[[], PhaseMap],
+    *,
+    folder: bool | str | Path,
+    progress: Callable[[str], None],
+) -> PhaseMap:
+    """Open the map from the cache, or build it and store it; a second process waits for the first."""
+    from filelock import FileLock
+
+    place = cached_place(body, key, folder)
+    root = place.parent
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(root / f".{place.name}.lock")
+        lock.acquire()
+    except OSError as error:
+        progress(f"no cache in {root} ({error}); building without it")
+        return build()
+    try:
+        if place.exists():
+            try:
+                return load_phase_map(place, body)
+            except StoredMapError as error:
+                progress(f"rebuilding: {error}")
+                shutil.rmtree(place, ignore_errors=True)
+        result = build()
+        try:
+            result.save(place)
+        except StoredMapError as error:
+            progress(f"not cached: {error}")
+        return result
+    finally:
+        lock.release()

@@ -1,0 +1,1 @@
+"""Coordinates of the unit tangent bundle in which maps are stored and composed."""

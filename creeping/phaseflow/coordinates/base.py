@@ -1,0 +1,95 @@
+"""Coordinates of the bundle in which a map is stored and composed.
+
+A model says where a ray lies on the grid, what displacement is stored there, and how a displacement moves a ray:
+
+    AmbientModel    (x, p) itself; any atlas. Stored: x' - x - t p and p' - p. Each leap ends back on T1Q.
+    RotationModel   x = psi(s), s on the unit sphere: the rotation R = [s, q, s x q]. Stored: the quaternion of R^-1 R'.
+    OctantModel     the same on an eighth of the sphere, if the coordinate planes are mirrors of the body.
+    AngleModel      one doubly periodic chart: (u, v, angle) in turns. Stored: their differences.
+
+The last three stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
+"""
+
+from typing import Protocol
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.geodesics.integrator import compiled_parts
+from creeping.geometry.surface import Surface, size
+from creeping.phaseflow.coordinates.ambient import AmbientModel
+from creeping.phaseflow.coordinates.rotation import AngleModel, OctantModel, RotationModel
+from creeping.phaseflow.grid import Grid, Leap
+
+
+class Model(Protocol):
+    """What a map needs of its coordinates; see the module head."""
+
+    @property
+    def name(self) -> str:
+        """What stored maps call it."""
+        ...
+
+    @property
+    def lanes(self) -> int:
+        """Numbers stored for a displacement."""
+        ...
+
+    @property
+    def charts(self) -> int:
+        """Charts of the grid."""
+        ...
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """Coordinates of points of a chart, u and v in [0, 1] on its square, angle in radians: (n,) x 3 -> (n, k)."""
+        ...
+
+    def states(self, coordinates: FloatArray) -> FloatArray:
+        """Points and directions: (n, k) -> (n, 6)."""
+        ...
+
+    def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
+        """Stored quantity of the last of the traced states (n, m, 6 or more), followed to it: (n, lanes)."""
+        ...
+
+    def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
+        """Compose counts[0], then counts[1], ... maps on states (n, 6, 10 or 12): (n, m, the same)."""
+        ...
+
+    def leap_numpy(self, grid: Grid, leap: Leap, states: FloatArray) -> FloatArray:
+        """One map on states (n, 6, 10 or 12), by numpy alone."""
+        ...
+
+
+def nodes_of(model: Model, grid: Grid) -> FloatArray:
+    """Coordinates of the nodes of all charts: (charts nu nv na, k)."""
+    shape = [values.ravel() for values in np.meshgrid(*grid.axes(), indexing="ij")]
+    return np.concatenate([model.at(chart, *shape) for chart in range(model.charts)])
+
+
+def model_of(body: Surface, name: str | None = None) -> Model:
+    """Model of a body: the one named, or the fastest it allows."""
+    if name != "ambient" and compiled_parts(body) is not None:
+        atlas: Any = body.atlas
+        if hasattr(getattr(atlas, "sphere_map", None), "compiled_forward"):
+            folds = name == "octant" or (name is None and has_mirrors(body))
+            return OctantModel(body) if folds else RotationModel(body)
+        if getattr(atlas, "compiled_forward", None) is not None and all(atlas.charts[0].periodic):
+            return AngleModel(body)
+    return AmbientModel(body)
+
+
+def has_mirrors(body: Surface) -> bool:
+    """Whether the body says that the coordinate planes are its mirrors, and its sphere map agrees.
+
+    A speed has no say in it: a weighted flow is not folded.
+    """
+    if not getattr(body, "mirrors", False) or getattr(body, "speed", None) is not None:
+        return False
+    sphere_map: Any = getattr(body.atlas, "sphere_map", None)
+    s = np.random.default_rng(0).normal(size=(50, 3))
+    s /= np.linalg.norm(s, axis=1, keepdims=True)
+    points = sphere_map.forward(s)
+    flips = 1.0 - 2.0 * np.eye(3)
+    gaps = [np.abs(sphere_map.forward(s * flip) - points * flip).max() for flip in flips]
+    return bool(max(gaps) <= 1e-13 * size(body))

@@ -1,0 +1,316 @@
+"""Maps stored as displacements of rotations or of angles: what their kernels need, and the plain numpy twins.
+
+Formulas are those of `phaseflow.kernels.rotation` and `phaseflow.kernels.angles`.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.errors import ToleranceError
+from creeping.geodesics.attenuation import halves, kernel_rules
+from creeping.geometry.frames import polar_frame
+from creeping.geometry.surface import Surface, size
+from creeping.kernels.threads import in_threads
+from creeping.phaseflow.coordinates.ambient import carry_riding
+from creeping.phaseflow.coordinates.quaternions import quaternion_product, quaternions
+from creeping.phaseflow.grid import Grid, Leap
+from creeping.phaseflow.splines import evaluate, interpolation_operator
+
+REACH = float(np.sqrt(2) - 1)
+"""Stereographic coordinate of a chart's edge; see `phaseflow.kernels.rotation`."""
+ORDERED = 16_384
+"""Rays from which on composing them in the order of their cells pays,"""
+NEAR = 24_000_000
+"""if what a leap reads has so many bytes: more than the caches hold."""
+SHARE = 65_536
+"""Rays ordered at a time."""
+EXIT_SIDES = (48, 72, 108, 160)
+EXIT_ERROR = 1e-9
+"""Rms error of (x, p) by such a table, x in body sizes."""
+SUREST = 0.3
+"""Least cosine between successive displacements of a rotation that leaves no doubt about its sign."""
+
+
+class CompiledModel:
+    """What rotations and angles share: four lanes, composed by `phaseflow.kernels.composition`."""
+
+    name: str
+    lanes = 4
+    kind: int
+    charts: int
+
+    def __init__(self, body: Surface) -> None:
+        self.body = body
+        atlas: Any = body.atlas
+        source = getattr(atlas, "sphere_map", atlas)
+        there, back = source.compiled_forward, source.compiled_inverse
+        self._there = there.function, there.parameters
+        self._back = back.function, back.parameters
+
+    @cached_property
+    def _exits(self) -> FloatArray:
+        """Table of x(u, v) for the kernels, none if psi itself is to be used."""
+        return np.zeros((0, 1, 1, 4))
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """Scale and shift from the coordinates of ``locate`` to those of the grid."""
+        raise NotImplementedError
+
+    def states(self, coordinates: FloatArray) -> FloatArray:
+        """See `Model`."""
+        from creeping.phaseflow.kernels.nodes import to_body
+
+        out = np.empty((len(coordinates), 6))
+        to_body(self.kind, self._exits, *self._there, coordinates, out)
+        return out
+
+    def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
+        """See `Model`.
+
+        Raises
+        ------
+        ToleranceError
+            If the states are too far apart in time to follow.
+        """
+        from creeping.phaseflow.kernels.nodes import displacements
+
+        out = np.empty((len(nodes), 4))
+        surest = displacements(self.kind, self._exits, *self._there, *self._back, nodes, traced, out)
+        if not surest >= SUREST:
+            raise ToleranceError(
+                f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {surest:.2f}); "
+                "give a shorter horizon"
+            )
+        return out
+
+    def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
+        """See `Model`."""
+        from creeping.phaseflow.kernels.cell_ordered import flow_ordered
+        from creeping.phaseflow.kernels.composition import flow
+
+        out = np.empty((len(states), len(counts), states.shape[1]))
+        states = np.ascontiguousarray(states, dtype=float)
+        counts = np.asarray(counts, dtype=np.int64)
+        tables = _tables(leap), leap.time, kernel_rules(), grid.degree, *self.placement(grid)
+        used = leap.state.nbytes if states.shape[1] == 6 else leap.nbytes
+        many = len(states) >= ORDERED and used > NEAR and int(counts.sum()) > 0
+        kernel = flow_ordered if many else flow
+
+        def run(part: slice) -> None:
+            # shares of a thread stay small, so that what is known of their rays stays in the cache
+            for start in range(part.start, part.stop, SHARE):
+                some = slice(start, min(start + SHARE, part.stop))
+                kernel(self.kind, self._exits, *self._there, *self._back, *tables, states[some], counts, out[some])
+
+        in_threads(run, len(states))
+        return out
+
+    def doubled(self, grid: Grid, leap: Leap, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Displacement (n, 4), Jacobi matrix (n, 4) and curvatures (n, 8) of two leaps from the nodes.
+
+        The last two are empty if the leap does not carry them.
+        """
+        from creeping.phaseflow.kernels.nodes import double
+
+        out = np.empty((len(nodes), 4))
+        matrices = np.empty((len(nodes) if leap.rides else 0, 4))
+        curvatures = np.empty((len(nodes) if leap.attenuates else 0, 16))
+        tables = _tables(leap), grid.degree, *self.placement(grid)
+
+        def run(part: slice) -> None:
+            double(self.kind, *tables, nodes[part], out[part], matrices[part], curvatures[part])
+
+        in_threads(run, len(nodes))
+        return out, matrices, curvatures @ halves().T
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        raise NotImplementedError
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        raise NotImplementedError
+
+    def leap_numpy(self, grid: Grid, leap: Leap, states: FloatArray) -> FloatArray:
+        """See `Model`."""
+        inner, chart, located = self._locate_numpy(states)
+        scale, shift = self.placement(grid)
+        place = shift + scale * located
+        d = evaluate(leap.state, chart, place, grid.degree) + leap.centre
+        out = np.empty_like(states)
+        out[:, :3], out[:, 3:6] = self._move_numpy(inner, d)
+        carry_riding(grid, leap, chart, place, states, out)
+        return out
+
+
+class RotationModel(CompiledModel):
+    """Rotations [s, q, s x q]; six stereographic charts."""
+
+    name = "rotation"
+    kind = 0
+    charts = 6
+
+    @cached_property
+    def _exits(self) -> FloatArray:
+        return exit_table(self.body, self)
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """See `CompiledModel`."""
+        half = 0.5 * grid.cells[:2]
+        return np.array([*half, grid.cells[2]]), np.array([*(grid.origin + half), 0.0])
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`."""
+        # [s, q, s x q] is the chart's own rotation, times that of (u, v) at angle 0, times a turn about s
+        u, v = (REACH * (2 * np.asarray(value) - 1) for value in (u, v))
+        across = 1 + u * u + v * v
+        s = np.stack([(2 - across) / across, 2 * u / across, 2 * v / across], axis=1)
+        q = np.stack([-s[:, 1], 1 - u * s[:, 1], -v * s[:, 1]], axis=1)
+        half = 0.5 * np.asarray(angle)
+        zero = np.zeros_like(half)
+        spin = np.stack([np.cos(half), np.sin(half), zero, zero], axis=1)
+        order = [(k - chart // 2) % 3 for k in range(3)]
+        sign = -1.0 if chart % 2 else 1.0
+        own = np.diag([sign, sign, 1.0])[order]
+        first = quaternions(own[None, :, 0], own[None, :, 1])
+        return quaternion_product(quaternion_product(first, quaternions(s, q)), spin)
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        source: Any = getattr(self.body.atlas, "sphere_map", None)
+        s = source.inverse(states[:, :3])
+        s = s / np.linalg.norm(s, axis=1, keepdims=True)
+        basis = _across(s)
+        frame = polar_frame(source.derivative(s) @ basis)
+        q = np.einsum("nik,nk->ni", basis, np.einsum("nik,ni->nk", frame, states[:, 3:6]))
+        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        axis = np.argmax(np.abs(s), axis=1)
+        order = (axis[:, None] + np.arange(3)) % 3
+        s_abc, q_abc = np.take_along_axis(s, order, 1), np.take_along_axis(q, order, 1)
+        sign = np.where(s_abc[:, 0] < 0, -1.0, 1.0)
+        s_abc[:, :2] *= sign[:, None]
+        q_abc[:, :2] *= sign[:, None]
+        uv = s_abc[:, 1:] / (1 + s_abc[:, :1])
+        along = q_abc[:, 1:] - uv * q_abc[:, :1]
+        angle = np.arctan2(along[:, 1], along[:, 0]) / (2 * np.pi) % 1.0
+        located = np.concatenate([uv / REACH, angle[:, None]], axis=1)
+        return quaternions(s, q), 2 * axis + (sign < 0), located
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        source: Any = getattr(self.body.atlas, "sphere_map", None)
+        r = quaternion_product(inner, d)
+        r /= np.linalg.norm(r, axis=1, keepdims=True)
+        w, x, y, z = r.T
+        s = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
+        q = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1)
+        basis = np.stack([q, np.cross(s, q)], axis=-1)
+        return source.forward(s), polar_frame(source.derivative(s) @ basis)[..., 0]
+
+
+class OctantModel(RotationModel):
+    """Rotations on a body with the three coordinate planes as mirrors: the table covers s >= 0 only.
+
+    A mirror sends R to D_1 R D_2, D_2 = diag(1, 1, -1), and a displacement Q of the reflected ray is D_2 Q D_2 of the
+    ray. Splines reach beyond the mirrors by their margin, so nothing is assumed there.
+    """
+
+    name = "octant"
+    kind = 2
+    charts = 3
+
+    @cached_property
+    def _exits(self) -> FloatArray:
+        return RotationModel(self.body)._exits
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """See `CompiledModel`."""
+        return grid.cells, np.array([*grid.origin, 0.0])
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`; u and v in [0, 1] are those in [1/2, 1] of the whole chart."""
+        return super().at(2 * chart, 0.5 + 0.5 * np.asarray(u), 0.5 + 0.5 * np.asarray(v), angle)
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        source: Any = self.body.atlas
+        s = source.sphere_map.inverse(states[:, :3])
+        mirrors = np.where(s < 0, -1.0, 1.0)
+        _, chart, located = super()._locate_numpy(states[:, :6] * np.tile(mirrors, 2))
+        inner, _, _ = super()._locate_numpy(states)
+        return (inner, np.prod(mirrors, axis=1)), chart // 2, located
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rotation, parity = inner
+        own = d.copy()
+        own[:, 1:3] *= parity[:, None]
+        return super()._move_numpy(rotation, own)
+
+
+class AngleModel(CompiledModel):
+    """(u, v, angle) in turns on one doubly periodic chart."""
+
+    name = "angles"
+    kind = 1
+    charts = 1
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """See `CompiledModel`."""
+        return grid.cells, np.zeros(3)
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`."""
+        return np.stack([u, v, angle / (2 * np.pi), np.zeros_like(u)], axis=1)
+
+    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
+        chart, uv = self.body.atlas.locate(states[:, :3])
+        frame = polar_frame(self.body.atlas.charts[0].tangents(uv))
+        along = np.einsum("nik,ni->nk", frame, states[:, 3:6])
+        angle = np.arctan2(along[:, 1], along[:, 0]) / (2 * np.pi) % 1.0
+        located = np.concatenate([uv, angle[:, None]], axis=1)
+        return located, chart, located
+
+    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
+        chart = self.body.atlas.charts[0]
+        moved = inner + d[:, :3]
+        frame = polar_frame(chart.tangents(moved[:, :2]))
+        angle = 2 * np.pi * moved[:, 2:]
+        return chart.point(moved[:, :2]), np.cos(angle) * frame[..., 0] + np.sin(angle) * frame[..., 1]
+
+
+def _tables(leap: Leap) -> tuple[Any, ...]:
+    """Arrays of a leap in the order of the kernels."""
+    return leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature
+
+
+def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
+    """Coefficients (6, n, n, 4) of x(u, v) on the charts where psi is an iteration, none (0, 1, 1, 4) elsewhere."""
+    found = np.zeros((0, 1, 1, 4))
+    model._exits = found
+    if not getattr(getattr(body.atlas, "sphere_map", None), "iterative", False):
+        return found
+    rng = np.random.default_rng(0)
+    chart = rng.integers(6, size=2048)
+    one, other, angle = rng.random((3, 2048))
+    at = np.concatenate([model.at(c, one[chart == c], other[chart == c], angle[chart == c]) for c in range(6)])
+    exact = model.states(at)
+    for side in EXIT_SIDES:
+        grid = Grid((side, side, 1), 5, (False, False))
+        u, v = (values.ravel() for values in np.meshgrid(*grid.axes()[:2], indexing="ij"))
+        points = np.stack([model.states(model.at(c, u, v, np.zeros_like(u)))[:, :3] for c in range(6)])
+        values = np.zeros((6, side, side, 4))
+        values[..., :3] = points.reshape(6, side, side, 3)
+        for axis in (1, 2):
+            operator = interpolation_operator(side, 5, False)
+            values = np.moveaxis(np.tensordot(operator, values, axes=(1, axis)), 0, axis)
+        model._exits = np.ascontiguousarray(values)
+        error = (model.states(at) - exact) / np.array([size(body)] * 3 + [1.0] * 3)
+        model._exits = found
+        if float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) < EXIT_ERROR:
+            return np.ascontiguousarray(values)
+    return found
+
+
+def _across(s: FloatArray) -> FloatArray:
+    """Orthonormal basis of the planes across unit vectors: (n, 3) -> (n, 3, 2)."""
+    other = np.eye(3)[np.argmin(np.abs(s), axis=1)]
+    first = np.cross(other, s)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(s, first)], axis=-1)

@@ -1,0 +1,95 @@
+"""The grid of a map, and the splines on it for one time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.geometry.surface import Surface
+
+MARGIN = 2
+"""Nodes of a chart beyond each edge of its unit square: every point finds a chart two grid points from the edge."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Nodes of a map along u, v and the angle; MARGIN of them lie outside the unit square on each side."""
+
+    nodes: tuple[int, int, int]
+    degree: int
+    periodic: tuple[bool, bool]
+
+    @property
+    def origin(self) -> FloatArray:
+        """Grid coordinates of u = v = 0."""
+        return np.array([0.0 if wraps else float(MARGIN) for wraps in self.periodic])
+
+    @property
+    def cells(self) -> FloatArray:
+        """Cells per unit of u, v and per turn of the angle."""
+        sides = [n if wraps else n - 1 - 2 * MARGIN for n, wraps in zip(self.nodes[:2], self.periodic, strict=True)]
+        return np.array([*sides, self.nodes[2]], dtype=float)
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """Coefficients along each axis: periodic ones are continued by the degree."""
+        p, wraps = self.degree, (*self.periodic, True)
+        return tuple(n + p if around else n + p - 1 for n, around in zip(self.nodes, wraps, strict=True))
+
+    def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Node values of u, v and the angle (radians)."""
+        u, v = ((np.arange(self.nodes[k]) - self.origin[k]) / self.cells[k] for k in (0, 1))
+        return u, v, 2 * np.pi * np.arange(self.nodes[2]) / self.nodes[2]
+
+
+@dataclass(frozen=True, eq=False)
+class Leap:
+    """The splines of one time.
+
+    Attributes
+    ----------
+    time : float
+    state : (charts, nu, nv, na, lanes), float64 or float32
+        Coefficients of the displacement less its mean.
+    centre : (lanes,)
+        The mean: float32 coefficients resolve what is left of it.
+    jacobi : (charts, nu, nv, na, 4), of the same type
+        Coefficients of M less ``matrix``; no charts if the map does not carry M.
+    matrix : (4,)
+        Mean of (M11, M21, M12, M22); (1, 0, t, 1) if there is none.
+    curvature : (charts, nu, nv, na, 8), of the same type
+        Coefficients of c^(3/2) kappa_n at Chebyshev times (`attenuation`); no charts if the map does not carry it.
+    """
+
+    time: float
+    state: Any
+    centre: FloatArray
+    jacobi: Any
+    matrix: FloatArray
+    curvature: Any
+
+    def __post_init__(self) -> None:
+        # read-only like the arrays of a stored map: kernels are compiled for one kind of array
+        for table in (self.state, self.jacobi, self.curvature):
+            table.flags.writeable = False
+
+    @property
+    def rides(self) -> bool:
+        """Whether the Jacobi matrix rides along."""
+        return len(self.jacobi) > 0
+
+    @property
+    def attenuates(self) -> bool:
+        """Whether the curvatures ride along too."""
+        return len(self.curvature) > 0
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the tables."""
+        return int(self.state.nbytes + self.jacobi.nbytes + self.curvature.nbytes)
+
+
+def least_cells(body: Surface) -> int:
+    """Cells of a chart's unit square at which the grid's margin ends within the chart."""
+    margin = getattr(body.atlas, "margin", None)
+    return 1 if margin is None else int(np.ceil(2 * MARGIN / margin - 1e-9))

@@ -1,0 +1,1 @@
+"""Compiled look-up and composition of maps."""

@@ -1,0 +1,121 @@
+"""Compiled composition of maps stored in space, for any atlas; the numpy twin is `ambient.AmbientModel.leap_numpy`.
+
+A body enters as the addresses of its block evaluator and of its locator (see `creeping.geometry.surface.Compiled`), so
+the kernel compiles once for all bodies.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from creeping.geodesics.kernels.integrator import project_block
+from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.contraction import contraction
+
+
+@njit(**options)
+def spline_weights(t, degree, w):
+    """Weights of the degree + 1 uniform B-splines that do not vanish at fraction t of a cell."""
+    w[0] = 1.0
+    for d in range(1, degree + 1):
+        w[d] = t * w[d - 1] / d
+        for j in range(d - 1, 0, -1):
+            w[j] = ((t + d - j) * w[j - 1] + (j + 1 - t) * w[j]) / d
+        w[0] = (1.0 - t) * w[0] / d
+
+
+@njit(**options)
+def _cell(t, cells, degree, w):
+    """Cell number of grid coordinate t, held inside the grid, and the weights there."""
+    # written so that a coordinate that is not a number gets cell 0
+    i = int(min(t, cells - 1.0)) if t > 0.0 else 0
+    spline_weights(t - i, degree, w)
+    return i
+
+
+_state_3, _state_5 = contraction(3, 8), contraction(5, 8)
+_jacobi_3, _jacobi_5 = contraction(3, 4), contraction(5, 4)
+
+
+@njit(**options)
+def _stencil(table, jacobi, ride_along, degree, chart, iu, iv, ia, wu, wv, wa, out):
+    """Interpolate the state lanes into out[:8] and, on the ride-along, the Jacobi lanes into out[8:12]."""
+    row = table.shape[3]
+    plane = row * table.shape[2]
+    first = (chart * table.shape[1] + iu) * plane + iv * row + ia
+    if degree == 3:
+        _state_3(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, 0, 1, out, 0)
+    else:
+        _state_5(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, 0, 1, out, 0)
+    if ride_along:
+        if degree == 3:
+            _jacobi_3(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, 0, 1, out, 8)
+        else:
+            _jacobi_5(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, 0, 1, out, 8)
+
+
+@njit(**options)
+def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, cells, horizon, leaps, tolerance, states):
+    """Compose the map ``leaps`` times on states (n, 6 or 10), in place.
+
+    table (charts, nu, nv, na, 8) holds x' - x - T0 p and p' - p, jacobi (charts, nu, nv, na, 4) M - [[1, T0], [0, 1]];
+    grid coordinates are origin + cells * (u, v, angle/2 pi). Afterwards x is brought back to |F| <= tolerance |grad F|,
+    which leaves grad F for the locator of the next leap.
+    """
+    n, lanes = states.shape
+    y, geometry = aligned(6, BLOCK), aligned(10, BLOCK)
+    chart, uv, frame = np.empty(BLOCK, np.int64), np.empty((2, BLOCK)), np.empty((6, BLOCK))
+    wu, wv, wa, d = np.empty(8), np.empty(8), np.empty(8), np.empty(12)
+    last_u = table.shape[1] - degree
+    last_v = table.shape[2] - degree
+    turns = cells[2] / (2 * math.pi)
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        for i in range(BLOCK):
+            for lane in range(6):
+                y[lane, i] = states[start + min(i, count - 1), lane]
+        off = math.inf
+        for _ in range(leaps):
+            # else the last evaluation was within the tolerance of where the rays are
+            if not off <= tolerance:
+                level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+            locate(y[:3], geometry[1:4], chart, uv, frame, locate_par)
+            for i in range(count):
+                px, py, pz = y[3, i], y[4, i], y[5, i]
+                across = px * frame[3, i] + py * frame[4, i] + pz * frame[5, i]
+                along = px * frame[0, i] + py * frame[1, i] + pz * frame[2, i]
+                angle = math.atan2(across, along) * turns
+                if angle < 0.0:
+                    angle += cells[2]
+                ia = _cell(angle, int(cells[2]), degree, wa)
+                iu = _cell(origin[0] + cells[0] * uv[0, i], last_u, degree, wu)
+                iv = _cell(origin[1] + cells[1] * uv[1, i], last_v, degree, wv)
+                _stencil(table, jacobi, lanes > 6, degree, chart[i], iu, iv, ia, wu, wv, wa, d)
+                y[0, i] += horizon * px + d[0]
+                y[1, i] += horizon * py + d[1]
+                y[2, i] += horizon * pz + d[2]
+                y[3, i] += d[3]
+                y[4, i] += d[4]
+                y[5, i] += d[5]
+                if lanes > 6:
+                    state = states[start + i]
+                    m11, m21, m12, m22 = 1.0 + d[8], d[9], horizon + d[10], 1.0 + d[11]
+                    i1, j1, i2, j2 = state[6], state[7], state[8], state[9]
+                    state[6], state[7] = m11 * i1 + m12 * j1, m21 * i1 + m22 * j1
+                    state[8], state[9] = m11 * i2 + m12 * j2, m21 * i2 + m22 * j2
+            for i in range(count, BLOCK):
+                for lane in range(6):
+                    y[lane, i] = y[lane, count - 1]
+            for _newton in range(4):
+                level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+                off = 0.0
+                for i in range(BLOCK):
+                    slope = math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
+                    off = max(off, abs(geometry[0, i]) / slope)
+                project_block(y, geometry)
+                if off <= tolerance:
+                    break
+        for i in range(count):
+            for lane in range(6):
+                states[start + i, lane] = y[lane, i]

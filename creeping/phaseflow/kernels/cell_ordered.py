@@ -1,0 +1,118 @@
+"""Compiled composition of many rays in the order of their cells.
+
+Rays anywhere on the body read stencils anywhere in the table, and a table beyond the nearest cache makes each of its 16
+to 36 rows wait. Where there are many rays, they are sorted by (chart, cell of u, cell of v) before each leap, by
+counting: the rows of one ray's stencil are then those of the next. Only indices are sorted; a ray's own data is one
+cache line.
+"""
+
+import numpy as np
+from numba import njit
+
+from creeping.geodesics.kernels.attenuation import SAMPLES, extend
+from creeping.kernels.block import BLOCK, aligned, options
+from creeping.phaseflow.kernels.composition import WORK, enter, leap_block, leave, place_block
+
+
+@njit(**options)
+def flow_ordered(
+    kind, exits, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out
+):
+    """Do what `composition.flow` does, for many rays."""
+    n, lanes = states.shape
+    table, more = leap[0], lanes - 6
+    riding = 0 if lanes == 6 else (1 if lanes == 10 else 2)
+    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
+    m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
+    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
+    place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    odd = np.zeros(BLOCK)
+    # coordinates, fractions of the cell, number of the stencil's first coefficient plus 1/2 where an odd number of
+    # mirrors has folded the ray: one cache line
+    ray = aligned(n, 8)
+    flat = ray.reshape(-1)
+    carried = np.empty((n, more))
+    order, bucket = np.empty(n, np.int64), np.empty(n, np.int32)
+    ends = np.zeros(table.shape[0] * table.shape[1] * table.shape[2] + 1, np.int64)
+    # a whole number times the next number above 1/na never falls below the quotient, and division is slow
+    inverse = (1.0 + 1e-15) / table.shape[3]
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        for i in range(BLOCK):
+            source = start + min(i, count - 1)
+            for k in range(3):
+                x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
+        enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
+        place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
+        for i in range(count):
+            order[start + i] = start + i
+            for k in range(more):
+                carried[start + i, k] = states[start + i, 6 + k]
+        _put(flat, order[start : start + count], r, uva, place, work[7], inverse, bucket, ends)
+    now = 0.0
+    for output in range(counts.shape[0]):
+        for _ in range(counts[output]):
+            _sort(bucket, ends, order)
+            ends[:] = 0
+            for start in range(0, n, BLOCK):
+                count = min(BLOCK, n - start)
+                mine = order[start : start + count]
+                for i in range(BLOCK):
+                    at = 8 * mine[min(i, count - 1)]
+                    r[0, i], r[1, i], r[2, i], r[3, i] = flat[at], flat[at + 1], flat[at + 2], flat[at + 3]
+                    uva[0, i], uva[1, i], uva[2, i] = flat[at + 4], flat[at + 5], flat[at + 6]
+                    place[i] = np.int64(flat[at + 7])
+                    odd[i] = 2.0 * (flat[at + 7] - place[i])
+                for i in range(BLOCK):
+                    at = mine[min(i, count - 1)]
+                    for k in range(more):
+                        m[k, i] = carried[at, k]
+                creeping = leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d)
+                if creeping > 0:
+                    extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
+                place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
+                _put(flat, mine, r, uva, place, work[7], inverse, bucket, ends)
+                for i in range(count):
+                    for k in range(more):
+                        carried[mine[i], k] = m[k, i]
+            now += time
+        for start in range(0, n, BLOCK):
+            count = min(BLOCK, n - start)
+            for i in range(BLOCK):
+                for k in range(4):
+                    r[k, i] = ray[start + min(i, count - 1), k]
+            leave(kind, exits, there, there_par, r, work, x, p)
+            for i in range(count):
+                for k in range(3):
+                    out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
+                for k in range(more):
+                    out[start + i, output, 6 + k] = carried[start + i, k]
+
+
+@njit(**options)
+def _put(flat, mine, r, uva, place, odd, inverse, bucket, ends):
+    """Keep a block's rays, and count them into ends[1:] by bucket."""
+    for i in range(mine.shape[0]):
+        at = 8 * mine[i]
+        flat[at], flat[at + 1], flat[at + 2], flat[at + 3] = r[0, i], r[1, i], r[2, i], r[3, i]
+        flat[at + 4], flat[at + 5], flat[at + 6], flat[at + 7] = (
+            uva[0, i],
+            uva[1, i],
+            uva[2, i],
+            place[i] + 0.5 * odd[i],
+        )
+    for i in range(mine.shape[0]):
+        number = np.int32(place[i] * inverse)
+        bucket[mine[i]] = number
+        ends[number + 1] += 1
+
+
+@njit(**options)
+def _sort(bucket, ends, order):
+    """Order of the rays by bucket, from the numbers of rays in ends[1:]."""
+    for number in range(1, ends.shape[0]):
+        ends[number] += ends[number - 1]
+    for i in range(bucket.shape[0]):
+        number = bucket[i]
+        order[ends[number]] = i
+        ends[number] += 1

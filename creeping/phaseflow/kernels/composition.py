@@ -1,0 +1,159 @@
+"""Compiled composition of phase maps in the model coordinates of a body; the numpy twins are in `compiled_models`.
+
+Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`rotation`), and ANGLES, turns (`angles`). A map
+is a table of their displacement; a ray enters the model once, is composed there, and leaves it for an output. FOLDED
+are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes.
+"""
+
+import numpy as np
+from numba import njit
+
+from creeping.geodesics.kernels.attenuation import SAMPLES, extend
+from creeping.kernels.block import BLOCK, aligned, options
+from creeping.phaseflow.kernels import angles as _angles
+from creeping.phaseflow.kernels import rotation as _rotations
+from creeping.phaseflow.kernels import surface_table as _surface_exits
+from creeping.phaseflow.kernels.stencil import cells_and_fractions, interpolate, interpolate_where, weights
+
+ROTATION, ANGLES, FOLDED = 0, 1, 2
+WORK = 48
+"""Rows of work space for a block."""
+
+_enter_rotation, _enter_angles = _rotations.enter, _angles.enter
+_leave_rotation, _leave_angles = _rotations.leave, _angles.leave
+_enter_by_table, _leave_by_table = _surface_exits.enter, _surface_exits.leave
+_locate_rotation, _locate_angles = _rotations.locate, _angles.locate
+_move_rotation, _move_angles, _unfold = _rotations.move, _angles.move, _rotations.unfold
+
+
+@njit(**options)
+def move(kind, r, d, centre):
+    """Move coordinates r (4, BLOCK) by displacements d (BLOCK, 4), both flat."""
+    if kind == ANGLES:
+        _move_angles(r, d, centre)
+    else:
+        _move_rotation(r, d, centre)
+
+
+@njit(**options)
+def enter(kind, exits, there, there_par, back, back_par, x, p, work, r):
+    """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
+    if kind == ANGLES:
+        _enter_angles(there, there_par, back, back_par, x, p, work, r)
+    elif exits.shape[0] > 0:
+        _enter_by_table(exits, back, back_par, x, p, work, r)
+    else:
+        _enter_rotation(there, there_par, back, back_par, x, p, work, r)
+
+
+@njit(**options)
+def leave(kind, exits, there, there_par, r, work, x, p):
+    """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
+    if kind == ANGLES:
+        _leave_angles(there, there_par, r, work, x, p)
+    elif exits.shape[0] > 0:
+        _leave_by_table(exits, r, work, x, p)
+    else:
+        _leave_rotation(there, there_par, r, work, x, p)
+
+
+@njit(**options)
+def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
+    """Number of the first coefficient of a block's stencils and, in uva (3, BLOCK), the fractions of their cells.
+
+    Grid coordinates are shift + scale times the coordinates of `locate`.
+    """
+    u, v, angle = uva[0], uva[1], uva[2]
+    if kind == ANGLES:
+        _locate_angles(r, place, u, v, angle)
+        # no mirrors
+        for i in range(BLOCK):
+            work[7, i] = 0.0
+    else:
+        _locate_rotation(r, work, place, u, v, angle, kind == FOLDED)
+    for axis in range(3):
+        t, a, b = uva[axis], scale[axis], shift[axis]
+        for i in range(BLOCK):
+            t[i] = b + a * t[i]
+        cells_and_fractions(t, table.shape[axis + 1] - degree - 1, cell)
+        n = table.shape[axis + 1]
+        for i in range(BLOCK):
+            place[i] = place[i] * n + cell[i]
+
+
+@njit(**options)
+def leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d):
+    """Move r (4, BLOCK) and the Jacobi matrices, m (6, BLOCK), by one leap, their stencils being placed.
+
+    ``leap`` is (table, centre, jacobi, matrix, curvature). d (4 BLOCK, 4) keeps what is interpolated: displacements,
+    matrices, and for riding = 2 the curvatures of rays that have not detached, row 5 of m; ``odd`` says what was
+    reflected. Returns the number of these rays.
+    """
+    table, centre, jacobi, matrix, curvature = leap
+    rf, df, ef = r.reshape(-1), d[:BLOCK].reshape(-1), d[BLOCK : 2 * BLOCK].reshape(-1)
+    wu, wv, wa = w[0:6].reshape(-1), w[6:12].reshape(-1), w[12:18].reshape(-1)
+    weights(uva[0], degree, wu)
+    weights(uva[1], degree, wv)
+    weights(uva[2], degree, wa)
+    interpolate(table, degree, place, wu, wv, wa, count, df)
+    if kind == FOLDED:
+        _unfold(df, odd)
+    move(kind, rf, df, centre)
+    if riding:
+        interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
+        _carry_jacobi(ef, matrix, m.reshape(-1))
+    if riding > 1:
+        return interpolate_where(curvature, degree, place, wu, wv, wa, m[5], count, d[2 * BLOCK :].reshape(-1))
+    return 0
+
+
+@njit(**options)
+def _carry_jacobi(d, matrix, m):
+    """Multiply the Jacobi matrices m (4, BLOCK), flat, from the left by matrix (4,) + d (BLOCK, 4), flat."""
+    c11, c21, c12, c22 = matrix[0], matrix[1], matrix[2], matrix[3]
+    for i in range(BLOCK):
+        m11, m21, m12, m22 = c11 + d[4 * i], c21 + d[4 * i + 1], c12 + d[4 * i + 2], c22 + d[4 * i + 3]
+        i1, j1, i2, j2 = m[i], m[BLOCK + i], m[2 * BLOCK + i], m[3 * BLOCK + i]
+        m[i], m[BLOCK + i] = m11 * i1 + m12 * j1, m21 * i1 + m22 * j1
+        m[2 * BLOCK + i], m[3 * BLOCK + i] = m11 * i2 + m12 * j2, m21 * i2 + m22 * j2
+
+
+@njit(**options)
+def flow(kind, exits, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out):
+    """Compose the map counts[0], then counts[1], ... times on states (n, 6, 10 or 12) into out (n, m, the same).
+
+    ``leap`` is (table, centre, jacobi, matrix, curvature): table (charts, nu, nv, na, 4) holds the displacement less
+    its mean ``centre``, jacobi the Jacobi matrix less its mean ``matrix`` (4,), curvature (..., 8) that of
+    `geodesics.kernels.attenuation`, as are the ``rules``. ``there`` takes the model to the body, ``back`` the body to
+    the model; ``exits`` (6 or 0, n, n, 4) is a table of x(u, v) that replaces ``there``.
+    """
+    n, lanes = states.shape
+    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
+    # Jacobi matrix, attenuation, time of detachment
+    m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
+    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
+    place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    riding = 0 if lanes == 6 else (1 if lanes == 10 else 2)
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        for i in range(BLOCK):
+            source = start + min(i, count - 1)
+            for k in range(3):
+                x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
+            for k in range(6, lanes):
+                m[k - 6, i] = states[source, k]
+        enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
+        now = 0.0
+        for output in range(counts.shape[0]):
+            for _ in range(counts[output]):
+                place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
+                creeping = leap_block(kind, leap, riding, degree, uva, place, work[7], count, r, m, w, d)
+                if creeping > 0:
+                    extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
+                now += time
+            leave(kind, exits, there, there_par, r, work, x, p)
+            for i in range(count):
+                for k in range(3):
+                    out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
+                for k in range(6, lanes):
+                    out[start + i, output, k] = m[k - 6, i]

@@ -1,0 +1,131 @@
+"""What all compositions of maps share: angles, spline weights and stencil sums for a block of rays.
+
+Weights of the uniform B-splines of degree p at fraction t of a cell, w_j = N_p(t + p - j), in closed form:
+
+    p = 3   6 w = (1-t)^3, 4 - 6 t^2 + 3 t^3, mirror images
+    p = 5   120 w = (1-t)^5, 26 - 50 t + 20 t^2 + 20 t^3 - 20 t^4 + 5 t^5, 66 - 60 t^2 + 30 t^4 - 10 t^5, mirror images
+
+Loops run over a whole block on flat arrays, so that they vectorise; the sums are explicit vector code.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from creeping.kernels.block import BLOCK, options
+from creeping.kernels.contraction import contraction
+
+_sum_3_4, _sum_5_4 = contraction(3, 4), contraction(5, 4)
+_sum_3_8, _sum_5_8 = contraction(3, 8), contraction(5, 8)
+_TAN_PI_8 = math.tan(math.pi / 8)
+
+
+@njit(**options)
+def turns(across, along):
+    """Angle atan2(across, along) in turns, in [0, 1); libm's atan2 does not vectorise."""
+    a, b = abs(across), abs(along)
+    low, high = min(a, b), max(a, b)
+    # atan(low/high) = pi/4 + atan((low - high)/(low + high)) keeps the argument below tan(pi/8)
+    steep = low > _TAN_PI_8 * high
+    top = low - high if steep else low
+    bottom = low + high if steep else high
+    z = top / (bottom if bottom > 0.0 else 1.0)
+    s = z * z
+    r = -0.04347919839046537 + s * 0.021133752033748364
+    r = 0.0568830340363325 + s * r
+    r = -0.066402251735395 + s * r
+    r = 0.07689952488233016 + s * r
+    r = -0.09090773003240828 + s * r
+    r = 0.11111106177375227 + s * r
+    r = -0.14285714180900647 + s * r
+    r = 0.19999999998854168 + s * r
+    r = -0.33333333333328435 + s * r
+    angle = (z + z * s * r) * (0.5 / math.pi)
+    angle = angle + 0.125 if steep else angle
+    angle = 0.25 - angle if a > b else angle
+    angle = 0.5 - angle if along < 0.0 else angle
+    angle = 1.0 - angle if across < 0.0 else angle
+    return angle - 1.0 if angle >= 1.0 else angle
+
+
+@njit(**options)
+def cells_and_fractions(grid, last, cell):
+    """Split grid coordinates (BLOCK,) into cells held in 0..last and, in place, fractions.
+
+    A coordinate that is not a number gets cell 0: whatever the state, the stencil lies inside the table.
+    """
+    for i in range(BLOCK):
+        t = grid[i]
+        t = t if t > 0.0 else 0.0
+        t = t if t < last else last
+        c = math.floor(t)
+        cell[i] = np.int64(c)
+        grid[i] -= c
+
+
+@njit(**options)
+def weights(t, degree, w):
+    """Fill w (degree + 1, BLOCK), flat, with the B-spline weights at fractions t (BLOCK,)."""
+    if degree == 3:
+        for i in range(BLOCK):
+            a, b = t[i], 1.0 - t[i]
+            w[i] = b * b * b * (1 / 6)
+            w[BLOCK + i] = (4.0 - a * a * (6.0 - 3.0 * a)) * (1 / 6)
+            w[2 * BLOCK + i] = (4.0 - b * b * (6.0 - 3.0 * b)) * (1 / 6)
+            w[3 * BLOCK + i] = a * a * a * (1 / 6)
+    else:
+        for i in range(BLOCK):
+            a, b = t[i], 1.0 - t[i]
+            aa, bb = a * a, b * b
+            w[i] = bb * bb * b * (1 / 120)
+            w[BLOCK + i] = (26.0 + a * (-50.0 + a * (20.0 + a * (20.0 + a * (5.0 * a - 20.0))))) * (1 / 120)
+            w[2 * BLOCK + i] = (66.0 + aa * (-60.0 + aa * (30.0 - 10.0 * a))) * (1 / 120)
+            w[3 * BLOCK + i] = (66.0 + bb * (-60.0 + bb * (30.0 - 10.0 * b))) * (1 / 120)
+            w[4 * BLOCK + i] = (26.0 + b * (-50.0 + b * (20.0 + b * (20.0 + b * (5.0 * b - 20.0))))) * (1 / 120)
+            w[5 * BLOCK + i] = aa * aa * a * (1 / 120)
+
+
+@njit(**options)
+def interpolate(table, degree, first, wu, wv, wa, count, out):
+    """Stencil sums of the first ``count`` rays of a block: out (BLOCK, lanes), flat.
+
+    ``first`` holds the number of each stencil's first coefficient, the weights are those of `weights`.
+    """
+    lanes = table.shape[4]
+    row = table.shape[3]
+    plane = row * table.shape[2]
+    su, sv = lanes * plane, lanes * row
+    if lanes == 4 and degree == 3:
+        for i in range(count):
+            _sum_3_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+    elif lanes == 4:
+        for i in range(count):
+            _sum_5_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+    elif degree == 3:
+        for i in range(count):
+            _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+    else:
+        for i in range(count):
+            _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+
+
+@njit(**options)
+def interpolate_where(table, degree, first, wu, wv, wa, end, count, out):
+    """Eight-lane sums of those of the first ``count`` rays whose time ``end`` is infinite; see `interpolate`.
+
+    Returns their number.
+    """
+    row = table.shape[3]
+    su, sv, some = 8 * row * table.shape[2], 8 * row, 0
+    if degree == 3:
+        for i in range(count):
+            if end[i] == math.inf:
+                _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+                some += 1
+    else:
+        for i in range(count):
+            if end[i] == math.inf:
+                _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+                some += 1
+    return some

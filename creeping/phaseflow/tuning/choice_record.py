@@ -1,0 +1,71 @@
+"""Choices between flows, kept beside the cached maps.
+
+A choice rests on measured times, and a run that is repeated is to carry its rays in the same way. A file holds what
+was chosen and a digest of it; one that cannot be read, or was changed, is as good as none.
+"""
+
+import json
+import os
+from pathlib import Path
+
+from creeping._typing import Any
+from creeping.geodesics.direct_flow import DirectFlow
+from creeping.geodesics.integrator import MapError
+from creeping.geometry.surface import Surface
+from creeping.phaseflow.cache import cache_folder, cached_place
+from creeping.phaseflow.phase_map import PhaseMap
+from creeping.storage.folder import content_digest
+
+SUFFIX = ".choice.json"
+
+
+def remembered_choice(
+    body: Surface, key: dict[str, Any], horizon: float, *, stored: bool, folder: bool | str | Path
+) -> DirectFlow | str | None:
+    """The flow that was chosen before: "map", or the direct one itself with this horizon; None if there is none.
+
+    A map that is ``stored`` now and was not then reopens the choice.
+    """
+    try:
+        content = json.loads(_file(body, key, folder).read_text(encoding="utf-8"))
+        if content.pop("digest") != content_digest(content):
+            return None
+        if content["kind"] == "map":
+            return "map"
+        if stored and not content["stored"]:
+            return None
+        step, error = content["step"], content["error"]
+        measured = MapError(float(error[0]), float(error[1]), int(error[2]))
+        return DirectFlow(body, float(content["rtol"]), horizon, None if step is None else float(step), measured)
+    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):
+        return None
+
+
+def remember_choice(
+    body: Surface, key: dict[str, Any], flow: PhaseMap | DirectFlow, *, stored: bool, folder: bool | str | Path
+) -> None:
+    """Keep a choice, if there is a place for it."""
+    content: dict[str, Any] = {"kind": "map"}
+    if isinstance(flow, DirectFlow):
+        assert flow.error is not None
+        measured = [flow.error.rms, flow.error.max, flow.error.samples]
+        content = {"kind": "direct", "rtol": flow.rtol, "step": flow.step, "error": measured, "stored": stored}
+    place = _file(body, key, folder)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        part = place.with_name(f".{place.name}.{os.getpid()}")
+        part.write_text(json.dumps(content | {"digest": content_digest(content)}), encoding="utf-8")
+        part.replace(place)
+    except OSError:
+        return
+
+
+def choice_files() -> list[Path]:
+    """Files of choices in the user's cache, those of processes ended while they wrote among them."""
+    root = cache_folder()
+    return sorted([*root.glob(f"*{SUFFIX}"), *root.glob(f".*{SUFFIX}.*")]) if root.is_dir() else []
+
+
+def _file(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Path:
+    place = cached_place(body, {"choice": key}, folder)
+    return place.with_name(place.name + SUFFIX)

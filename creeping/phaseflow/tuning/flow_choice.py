@@ -1,0 +1,271 @@
+"""The choice between a phase map and direct integration, by their cost on this machine and body.
+
+Direct integration takes c_d seconds a ray, with the longest equal steps that meet the tolerance; a map takes b seconds
+to build and c_m a ray. For N rays the map is chosen if b + N c_m < N c_d, with c_d measured, b and c_m estimated before
+the build, and c_m measured after it.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from time import process_time as clock
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.errors import IntegrationError, InvalidInputError, ToleranceError
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.direct_flow import DirectFlow
+from creeping.geodesics.equations import natural_horizon
+from creeping.geodesics.integrator import MapError, pack, trace_states
+from creeping.geometry.surface import Surface, size
+from creeping.phaseflow.building import Progress, require_checked, settled, upper_bound
+from creeping.phaseflow.cache import cached_phase_map, is_cached
+from creeping.phaseflow.coordinates.base import model_of
+from creeping.phaseflow.coordinates.rotation import CompiledModel
+from creeping.phaseflow.phase_map import PhaseMap
+from creeping.phaseflow.tuning.choice_record import remember_choice, remembered_choice
+from creeping.phaseflow.tuning.request import Request
+from creeping.phaseflow.tuning.search import RAYS, Candidate, candidates, tracing_cost, tuned_map
+
+SAMPLES = 512
+"""Rays on which direct integration is measured and both are timed, fewer where F is dear."""
+BUDGET = 0.2
+"""Seconds that one measurement may take."""
+QUICK = 0.3
+"""Seconds of direct integration below which nothing is tuned."""
+WORTH = 0.85
+"""Share of direct integration that a map must be expected to take less than, and its tuning too."""
+SMALLEST = 60_000
+"""Nodes of the smallest map that is worth estimating."""
+
+
+def choose_flow(
+    body: Surface,
+    *,
+    rays: int,
+    length: float,
+    tolerance: float = 1e-6,
+    outputs: int = 1,
+    ride_along: bool = True,
+    cache: bool | str | Path = True,
+    progress: Progress | None = None,
+) -> PhaseMap | DirectFlow:
+    """Choose the flow that carries rays fastest, its preparation included.
+
+    Parameters
+    ----------
+    body : Surface
+    rays : int
+        Rays of all incidences together.
+    length : float, L (travel time for a weighted body)
+    tolerance : float
+        Rms error of (x, p) at the end of the rays, 1e-12 to 1e-1.
+    outputs : int
+        Equally spaced points wanted on each ray.
+    ride_along : bool
+        Whether the Jacobi matrix is wanted, as by fans.
+    cache : bool or path
+        As for `build_phase_map`; a map in the cache costs nothing to build. The choice is kept there too: it rests on
+        measured times, and a later run is to carry its rays in the same way; a map that has come into the cache since
+        reopens it.
+    progress : callable, optional
+        Called with a line of text before each long step, and with the reason of the choice.
+
+    Returns
+    -------
+    PhaseMap or DirectFlow
+        Its horizon is ``length/outputs`` or divides it. Always direct for bodies without kernels.
+
+    Raises
+    ------
+    InvalidInputError
+        On a number out of range.
+    ToleranceError
+        If direct integration does not reach the tolerance.
+    """
+    if not (isinstance(rays, (int, np.integer)) and rays >= 1):
+        raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
+    if not 1e-12 <= tolerance <= 1e-1:
+        raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-12 and 1e-1")
+    bounded, riding = max(float(tolerance), 1e-9), bool(ride_along)
+    request = Request(body, bounded, length, outputs, None, None, None, None, riding, "direct", None, None)
+    say = progress or (lambda _: None)
+    require_checked(body)
+    request.rays = int(rays)
+    if cache is False:
+        return _chosen(request, tolerance, False, False, False, say)
+    key = request.key() | {"tolerance": float(tolerance), "rays": int(rays)}
+    stored = _stored(request, tolerance, cache)
+    before = remembered_choice(body, key, length / outputs, stored=stored, folder=cache)
+    if isinstance(before, DirectFlow):
+        say("direct integration, as chosen before")
+        return before
+    flow = _chosen(request, tolerance, cache, stored, before is not None, say)
+    remember_choice(body, key, flow, stored=_stored(request, tolerance, cache), folder=cache)
+    return flow
+
+
+def _stored(request: Request, tolerance: float, cache: bool | str | Path) -> bool:
+    """Whether a map for the request is in the cache; one for the usual number of rays will do and is taken."""
+    if tolerance < 1e-9:
+        return False
+    rays = request.rays
+    if is_cached(request.body, request.key(), folder=cache):
+        return True
+    request.rays = RAYS
+    if is_cached(request.body, request.key(), folder=cache):
+        return True
+    request.rays = rays
+    return False
+
+
+def _chosen(
+    request: Request, tolerance: float, cache: bool | str | Path, stored: bool, before: bool, say: Progress
+) -> PhaseMap | DirectFlow:
+    """The flow that is cheaper by the clock, or the map if it is ``stored`` and was the choice ``before``."""
+    body, rays, outputs, ride_along = request.body, request.rays, request.outputs, request.ride_along
+    length = request.length
+    assert length is not None
+    cost = tracing_cost(body)
+    if stored and before:
+        say("phase map, as chosen before")
+        return cached_phase_map(body, request.key(), lambda: tuned_map(request, say), folder=cache, progress=say)
+    if rays * length * cost < QUICK and not stored:
+        say(f"direct integration: {rays} rays take about {rays * length * cost:.1g} s")
+        return _untuned_direct(body, length, outputs, tolerance)
+    direct, each = tuned_direct(body, length, outputs, tolerance, ride_along)
+    if not stored:
+        found, reason = _worth_building(request, rays * each, cost, tolerance)
+        if reason:
+            say(f"direct integration: {reason}")
+            return direct
+        request.direct = WORTH * rays * each
+    else:
+        found = None
+
+    def build() -> PhaseMap:
+        return tuned_map(request, say, found)
+
+    try:
+        flow = build() if cache is False else cached_phase_map(body, request.key(), build, folder=cache, progress=say)
+    except ToleranceError as error:
+        say(f"direct integration: {error}")
+        return direct
+    composed = _seconds_per_ray(flow, body, length, outputs, ride_along, each)
+    if composed > each:
+        say(f"direct integration: {1e6 * each:.2g} us a ray, with the map {1e6 * composed:.2g}")
+        return direct
+    say(f"phase map: {1e6 * composed:.2g} us a ray, direct integration {1e6 * each:.2g}")
+    return flow
+
+
+def _worth_building(request: Request, direct: float, cost: float, tolerance: float) -> tuple[list[Candidate], str]:
+    """Candidates for a map, and the reason to build none of them, if there is one; ``direct`` in seconds."""
+    body = request.body
+    said = f"{request.rays} rays take {direct:.2g} s"
+    if tolerance < 1e-9:
+        return [], f"no map reaches such a tolerance; {said}"
+    # what the smallest map takes, so that probing is not begun in vain
+    least = 0.3 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if request.ride_along else 1.0)
+    if not isinstance(model_of(body), CompiledModel):
+        return [], f"{body!r} has no compiled sphere map nor a doubly periodic chart"
+    if direct < least:
+        return [], said
+    try:
+        found = candidates(request, model_of(body), cost)
+    except ToleranceError as error:
+        return [], str(error)
+    assert request.length is not None
+    expected = found[0].seconds(request.rays, request.length)
+    # estimates err, and so do the gains that they promise
+    return found, f"{said}, with a map about {expected:.2g} s" if expected > WORTH * direct else ""
+
+
+def _untuned_direct(body: Surface, length: float, outputs: int, tolerance: float) -> DirectFlow:
+    """Direct flow with adapted steps, measured on a few rays: for so little work that tuning would take longer."""
+    states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(2)))
+    times = np.array([length])
+    exact = trace_states(body, states, times, rtol=float(np.clip(1e-4 * tolerance, 1e-14, 1e-10)))[:, 0]
+    rtol = float(np.clip(0.1 * tolerance, 1e-14, 1e-3))
+    while True:
+        flow = DirectFlow(body, rtol, length / outputs)
+        error = np.linalg.norm(flow.transport(states, times)[:, 0] - exact, axis=1)
+        rms = float(np.sqrt(np.mean(error**2)))
+        if rms <= 0.3 * tolerance:
+            return replace(flow, error=MapError(rms, float(error.max()), len(states)))
+        if rtol <= 1e-14:
+            raise ToleranceError(
+                f"direct integration reaches rms {rms:.1e} after {length:g}, not {tolerance:.1e}; "
+                "rounding grows along such rays: shorten them or loosen the tolerance",
+                rms=rms,
+            )
+        rtol = max(0.1 * rtol, 1e-14)
+
+
+def tuned_direct(
+    body: Surface, length: float, outputs: int, tolerance: float, ride_along: bool
+) -> tuple[DirectFlow, float]:
+    """Direct flow with the longest equal steps that meet the tolerance, and its seconds a ray.
+
+    Raises
+    ------
+    ToleranceError
+        If it does not meet the tolerance with steps as short as 1e-3 body sizes.
+    """
+    horizon = length / outputs
+    cost = tracing_cost(body)
+    count = int(np.clip(BUDGET / (cost * length), 32, SAMPLES))
+    times = np.array([length])
+    reference = float(np.clip(1e-3 * tolerance, 1e-14, 1e-9))
+    rng = np.random.default_rng(2)
+
+    def errors(number: int) -> FloatArray:
+        states = pack(*random_bundle_points(body, number, rng=rng))
+        exact = trace_states(body, states, times, rtol=reference)
+        found = trace_states(body, states, times, rtol=0.0, step=length / steps)
+        return np.asarray(np.linalg.norm(found - exact, axis=2))
+
+    steps = max(1, int(np.ceil(length / (0.3 * size(body)))))
+    reached = np.inf
+    for _ in range(12):
+        try:
+            error = settled(errors, count, 1 if 4 * cost * length * count > BUDGET else 16)[:, 0]
+            reached = upper_bound(error)
+        except IntegrationError:
+            reached = np.inf
+        if reached <= tolerance:
+            measured = MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(error))
+            flow = DirectFlow(body, float(np.clip(1e-2 * tolerance, 1e-13, 1e-8)), horizon, length / steps, measured)
+            return flow, _seconds_per_ray(flow, body, length, outputs, ride_along, cost * length)
+        # an order below the method's own while it has not set in
+        factor = (reached / (0.5 * tolerance)) ** (1 / 7.5) if np.isfinite(reached) else 2.0
+        steps = int(np.ceil(steps * np.clip(factor, 1.1, 2.0)))
+        if length / steps < 1e-3 * size(body):
+            break
+    raise ToleranceError(
+        f"direct integration with steps of {length / steps:.2g} reaches rms {reached:.1e} after {length:g}, not "
+        f"{tolerance:.1e}; rounding grows along such rays: shorten them or loosen the tolerance",
+        rms=reached,
+    )
+
+
+def _seconds_per_ray(
+    flow: PhaseMap | DirectFlow, body: Surface, length: float, outputs: int, ride_along: bool, guess: float
+) -> float:
+    """Measured time of one ray, on one thread."""
+    # whole blocks, or their unused rays would count
+    count = 64 * int(np.clip(BUDGET / (64 * guess), 1, 16))
+    states = _random_states(body, count, ride_along)
+    times = length * np.arange(1, outputs + 1) / outputs
+    flow.transport(states[:64], times[:1])
+    best = np.inf
+    for _ in range(3):
+        start = clock()
+        flow.transport(states, times)
+        best = min(best, clock() - start)
+    return max(float(best), 1e-9) / count
+
+
+def _random_states(body: Surface, count: int, ride_along: bool) -> FloatArray:
+    # what a fan carries, or a flow
+    return pack(*random_bundle_points(body, count, rng=np.random.default_rng(3)), lanes=12 if ride_along else 6)

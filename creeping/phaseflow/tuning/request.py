@@ -1,0 +1,235 @@
+"""Asking for a phase map: parameters checked against each other, the missing ones chosen, the cache consulted."""
+
+from pathlib import Path
+
+import numpy as np
+
+from creeping._typing import Any
+from creeping.errors import InvalidInputError, SurfaceError, ToleranceError
+from creeping.geodesics.equations import natural_horizon
+from creeping.geometry.surface import Surface
+from creeping.phaseflow.building import (
+    Plan,
+    Progress,
+    build_direct,
+    build_tower,
+    measured,
+    require_checked,
+)
+from creeping.phaseflow.cache import cached_phase_map
+from creeping.phaseflow.coordinates.base import model_of
+from creeping.phaseflow.grid import MARGIN, Grid, least_cells
+from creeping.phaseflow.phase_map import PhaseMap
+from creeping.phaseflow.tuning.search import RAYS, tuned_map
+
+
+def build_phase_map(
+    body: Surface,
+    *,
+    tolerance: float | None = None,
+    length: float | None = None,
+    outputs: int = 1,
+    rays: int = RAYS,
+    horizon: float | None = None,
+    grid: tuple[int, int] | tuple[int, int, int] | None = None,
+    order: int | None = None,
+    precision: str | None = None,
+    ride_along: bool = True,
+    method: str = "direct",
+    time_step: float | None = None,
+    stages: int | None = None,
+    cache: bool | str | Path = True,
+    progress: Progress | None = None,
+) -> PhaseMap:
+    """Build the phase map g_T0 of a body, or open it from the cache.
+
+    Parameters
+    ----------
+    body : Surface
+    tolerance : float, optional
+        Rms error, 1e-9 to 1e-1, of one g_T0, or with ``length`` of the final state; chooses whatever of horizon, grid,
+        order and precision is not given. 1e-6 if neither tolerance nor grid is given.
+    length : float, optional, L (travel time for a weighted body)
+        Length of the rays that shall meet the tolerance; the horizon is as long as pays.
+    outputs : int
+        Equally spaced points of a ray that are wanted, with ``length``: the horizon divides their distance.
+    rays : int
+        Rays to come, in all: what a build may cost follows from it.
+    horizon : float, optional
+        T0, L (travel time for a weighted body).
+    grid : (nodes, angles) or (nodes_u, nodes_v, angles), optional
+        Nodes per chart, margin included, and on the circle.
+    order : int, optional
+        Degree of the splines, 3 or 5.
+    precision : {"single", "double"}, optional
+        Of the stored coefficients; sums are in double. With a tolerance single where that is exact enough, else double.
+    ride_along : bool
+        Whether to carry the Jacobi matrix, which fans need.
+    method : {"direct", "tower"}
+        "tower" is Algorithm 1 and needs ``time_step``, ``stages``, ``horizon`` and ``grid``; it stores (x, p) in space,
+        as the paper does.
+    time_step : float, optional
+        tau of the burn-in.
+    stages : int, optional
+        S, the number of levels of the tower.
+    cache : bool or path
+        True: the user's cache folder; a path: that folder; False: no cache.
+    progress : callable, optional
+        Called with a line of text before each long step.
+
+    Returns
+    -------
+    PhaseMap
+        With its error measured against `trace`.
+
+    Raises
+    ------
+    InvalidInputError
+        On parameters that contradict each other.
+    ToleranceError
+        If no map within the limits reaches the tolerance; says what was reached and how to go on.
+    """
+    if tolerance is None and grid is None:
+        tolerance = 1e-6
+    request = Request(
+        body, tolerance, length, outputs, horizon, grid, order, precision, ride_along, method, time_step, stages
+    )
+    if not isinstance(rays, (int, np.integer)) or rays < 1:
+        raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
+    if not isinstance(cache, (bool, str, Path)):
+        raise InvalidInputError(f"cache = {cache!r} is neither True, False nor a folder")
+    request.rays = int(rays)
+    say = progress or (lambda _: None)
+    if cache is False:
+        return request.build(say)
+    return cached_phase_map(body, request.key(), lambda: request.build(say), folder=cache, progress=say)
+
+
+class Request:
+    """Checked parameters of one build."""
+
+    def __init__(
+        self,
+        body: Surface,
+        tolerance: float | None,
+        length: float | None,
+        outputs: int,
+        horizon: float | None,
+        grid: tuple[int, ...] | None,
+        order: int | None,
+        precision: str | None,
+        ride_along: bool,
+        method: str,
+        time_step: float | None,
+        stages: int | None,
+    ) -> None:
+        if tolerance is not None and not 1e-9 <= tolerance <= 1e-1:
+            raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-9 and 1e-1")
+        for name, value in (("horizon", horizon), ("length", length)):
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
+        if length is not None and tolerance is None:
+            raise InvalidInputError("length belongs to a tolerance: give both, or horizon and grid alone")
+        if not isinstance(outputs, (int, np.integer)) or outputs < 1 or (outputs > 1 and length is None):
+            raise InvalidInputError(f"outputs = {outputs!r}: give a whole number >= 1, and the length they divide")
+        if order not in (None, 3, 5):
+            raise InvalidInputError(f"order = {order!r}: splines of degree 3 and 5 are built")
+        if precision not in (None, "single", "double"):
+            raise InvalidInputError(f"precision = {precision!r} is neither 'single' nor 'double'")
+        if method not in ("direct", "tower"):
+            raise InvalidInputError(f"method = {method!r} is neither 'direct' nor 'tower'")
+        # plain numbers, which can be stored
+        self.body, self.tolerance = body, tolerance and float(tolerance)
+        self.length, self.horizon = length and float(length), horizon and float(horizon)
+        self.outputs = int(outputs)
+        self.order, self.precision, self.ride_along, self.method = order, precision, ride_along, method
+        self.periodic = _common_periodicity(body)
+        self.nodes = None if grid is None else _nodes(grid, order or 5, self.periodic, least_cells(body))
+        self.rays, self.direct = RAYS, np.inf
+        self.burn_in, self.base, self.stages = time_step, 0, stages or 0
+        if method == "tower":
+            if None in (horizon, grid, time_step, stages):
+                raise InvalidInputError("method='tower' needs horizon, grid, time_step and stages")
+            if precision == "single" or not ride_along:
+                raise InvalidInputError("method='tower' stores double precision with the Jacobi matrix")
+            self.burn_in, self.base, self.stages = _tower_base(horizon, time_step, stages)
+        elif time_step is not None or stages is not None:
+            raise InvalidInputError("time_step and stages belong to method='tower'")
+
+    def key(self) -> dict[str, Any]:
+        """Parameters that decide the result, for the cache."""
+        return {
+            "tolerance": self.tolerance,
+            "length": self.length,
+            "outputs": self.outputs,
+            # the magnitude only, or hardly a map would be found again
+            "rays": round(float(np.log10(self.rays))),
+            "horizon": self.horizon,
+            "nodes": self.nodes and list(self.nodes),
+            "degree": self.order,
+            "precision": self.precision,
+            "ride_along": self.ride_along,
+            "method": self.method,
+            "time_step": self.burn_in,
+            "stages": self.stages,
+        }
+
+    def build(self, say: Progress) -> PhaseMap:
+        """Build with the parameters given, choosing the missing ones."""
+        require_checked(self.body)
+        if self.nodes is None:
+            return tuned_map(self, say)
+        grid = Grid(self.nodes, self.order or 5, self.periodic)
+        if self.method == "tower":
+            assert self.burn_in is not None
+            result = build_tower(self.body, grid, self.burn_in, self.base, self.stages, say)
+        else:
+            plan = Plan(self.horizon or natural_horizon(self.body), grid, self.precision == "single", self.ride_along)
+            result = build_direct(self.body, model_of(self.body), plan, say, rtol=1e-11)
+        result = measured(result, self.length)
+        reached = result.growth.rms[-1] if self.length and result.growth else result.error.rms
+        if self.tolerance is not None and reached > self.tolerance:
+            factor = (reached / self.tolerance) ** (1 / (grid.degree + 1))
+            enough = tuple(int(np.ceil(1.1 * factor * n)) for n in self.nodes)
+            raise ToleranceError(
+                f"grid {self.nodes} with horizon {result.horizon:g} reaches rms {reached:.1e}, not "
+                f"{self.tolerance:.1e}; about {enough} should do, or leave grid out",
+                rms=reached,
+            )
+        return result
+
+
+def _common_periodicity(body: Surface) -> tuple[bool, bool]:
+    kinds = {tuple(chart.periodic) for chart in body.atlas.charts}
+    if len(kinds) != 1:
+        raise SurfaceError(f"the charts of the atlas differ in periodicity ({sorted(kinds)}); use charts of one kind")
+    first, second = kinds.pop()
+    return first, second
+
+
+def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool], cells: int) -> tuple[int, int, int]:
+    try:
+        nodes = tuple(int(n) for n in grid)
+        whole = all(n == g for n, g in zip(nodes, grid, strict=True))
+    except (TypeError, ValueError):
+        nodes, whole = (), False
+    if len(nodes) == 2:
+        nodes = (nodes[0], *nodes)
+    least = [degree + 1 if wraps else max(degree + 5, cells + 1 + 2 * MARGIN) for wraps in periodic] + [degree + 1]
+    if len(nodes) != 3 or not whole or any(n < m for n, m in zip(nodes, least, strict=True)):
+        raise InvalidInputError(
+            f"grid = {grid!r}: give two or three whole numbers of at least {least} for order {degree}"
+        )
+    return nodes
+
+
+def _tower_base(horizon: Any, time_step: Any, stages: Any) -> tuple[float, int, int]:
+    """Check that B = (T0/tau)^(1/S) is a whole number >= 2."""
+    if not (isinstance(stages, int) and stages >= 1 and np.isfinite(time_step) and 0 < time_step < horizon):
+        raise InvalidInputError(
+            f"time_step = {time_step!r} and stages = {stages!r} do not make a tower below {horizon:g}"
+        )
+    base = (horizon / time_step) ** (1 / stages)
+    if abs(base - round(base)) > 1e-9 * base or round(base) < 2:
+        raise InvalidInputError(f"(horizon/time_step)^(1/stages) = {base:.6g} is not a whole number >= 2")
+    return horizon / round(base) ** stages, round(base), stages

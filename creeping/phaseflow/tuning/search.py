@@ -1,0 +1,359 @@
+"""Choosing horizon, grid, order and precision of a map from a tolerance on the end of rays of a given length.
+
+Rows of points along one axis of the grid at a time are traced to every horizon in question. Splines through every 2nd,
+3rd, ... of them give the error of each axis against its cells, e_u, e_v, e_a. Errors of leaps are carried to the end of
+the ray by the Jacobi matrices: G(T0)^2 = sum_k |M(L) M(k T0)^-1|^2/2, geometric mean over rays. A map must reach
+
+    e_u^2 + e_v^2 + e_a^2 <= (tolerance/G)^2,   all three equal where nodes are fewest.
+
+Of all candidates the one that is cheapest for the rays to come, its build included, is built, measured at the end of
+rays, and refined until it meets the tolerance; three at most in turn.
+"""
+
+from dataclasses import dataclass, replace
+from time import process_time as clock
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.errors import ToleranceError
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.equations import natural_horizon
+from creeping.geodesics.integrator import pack, trace_states
+from creeping.geometry.surface import Surface, size
+from creeping.phaseflow.building import Plan, Progress, build_direct, curvature_reach, measured
+from creeping.phaseflow.coordinates.base import Model, model_of
+from creeping.phaseflow.grid import MARGIN, Grid, least_cells
+from creeping.phaseflow.phase_map import PhaseMap
+from creeping.phaseflow.splines import thinning_operator
+
+if TYPE_CHECKING:
+    from creeping.phaseflow.tuning.request import Request
+
+RAYS = 1_000_000
+"""Rays for which a map is tuned unless their number is known: what a build may cost follows from it."""
+MAX_NODES = 4_000_000
+"""Nodes of the largest grid that is built."""
+MAX_BYTES = 150e6
+"""Largest table that composes at a useful speed: beyond the cache every stencil is 36 reads from memory."""
+LINES = 24
+"""Rows probed along each axis."""
+CELLS = 192
+"""Cells of a probed row; it has divisors enough to try many grids."""
+STRIDES = (2, 3, 4, 6, 8, 12, 16, 24)
+NODE, DOUBLING = 6e-7, 4e-7
+"""Seconds that a node takes of a build besides tracing, and of a doubling."""
+FIXED = 0.1
+"""Seconds of a build that do not depend on its size."""
+COARSE = 1_500_000
+"""Nodes from which on a coarser map is built first, to measure how errors grow."""
+BUDGET, SHARE = (0.02, 0.4), 0.02
+"""Least and most seconds that one probe or measurement may take, as a share of direct integration of all rays."""
+SINGLE, RISKY = 4e-9, 1.2e-8
+"""Errors of one leap, in units of (x, p): float32 coefficients are tried down to the first, and given up at the first
+failure below the second; their rounding makes about 1e-8."""
+SAFE = 0.5
+"""Share of the tolerance that is aimed at."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A horizon with the grid it needs.
+
+    Attributes
+    ----------
+    plan : Plan
+    leap : float
+        Estimated seconds of composition per ray and unit of length.
+    build : float
+        Estimated seconds of the build.
+    target : float
+        Error of one leap that is aimed at.
+    """
+
+    plan: Plan
+    leap: float
+    build: float
+    target: float
+
+    def seconds(self, rays: float, length: float) -> float:
+        """Estimated time of the build and of so many rays."""
+        return self.build + rays * length * self.leap
+
+
+def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None = None) -> PhaseMap:
+    """Build the fastest map that meets the request's tolerance, of the candidates if these are known already."""
+    body, tolerance = request.body, request.tolerance
+    assert tolerance is not None
+    model = model_of(body)
+    cost = tracing_cost(body)
+    if found is None:
+        say("probing horizons and grids")
+        found = candidates(request, model, cost)
+    best: tuple[float, PhaseMap] | None = None
+    started = clock()
+    for candidate in found[:3]:
+        plan, before = candidate.plan, np.inf
+        if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
+            plan = _scaled(plan, 0.6)
+        for _ in range(6):
+            say(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
+            began = clock()
+            built = build_direct(body, model, plan, say, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
+            result = _measured(built, request, cost)
+            assert result.growth is not None
+            reached = result.growth.bound if request.length else result.error.rms
+            if best is None or reached < best[0]:
+                best = reached, result
+            if reached <= tolerance:
+                result.parameters.update(tolerance=tolerance, length=request.length)
+                return result
+            doubtful = candidate.target < RISKY * np.hypot(1, size(body)) or reached > 0.5 * before
+            if plan.single and request.precision is None and doubtful:
+                # the grid is no longer what limits it
+                plan, before = replace(plan, single=False), np.inf
+            else:
+                full = model.charts * int(np.prod(plan.grid.nodes)) > 0.9 * MAX_NODES
+                plan, before = _finer(plan, reached / (SAFE * tolerance)), reached
+                most = MAX_NODES / (model.charts * int(np.prod(plan.grid.nodes)))
+                if full:
+                    break
+                if most < 1.0:
+                    plan = _scaled(plan, 0.97 * most ** (1 / 3))
+            # what was spent is spent: it is the next map and its rays that must pay, and no map is tuned for ever
+            own = float(built.parameters["seconds"])
+            more = int(np.prod(plan.grid.nodes)) / int(np.prod(built.grid.nodes))
+            ahead = clock() - began - own + own * more + request.rays * (request.length or 0.0) * candidate.leap
+            if max(ahead, clock() - started) > request.direct:
+                raise ToleranceError(
+                    f"tuning took {clock() - started:.2g} s, and {ahead:.2g} s are ahead: direct integration is near"
+                )
+    assert best is not None
+    reached, result = best
+    what = f"rays of length {request.length:g}" if request.length else "one g_T0"
+    raise ToleranceError(
+        f"no map of at most {MAX_NODES} nodes reached rms {tolerance:.1e} after {what}: the best is {reached:.1e}"
+        f" with horizon {result.horizon:g} and grid {result.grid.nodes}"
+        + f"; give a shorter horizon or length, a tolerance of {2 * reached:.0e}, or integrate with DirectFlow",
+        rms=reached,
+    )
+
+
+def _measured(built: PhaseMap, request: "Request", cost: float) -> PhaseMap:
+    """The map with its errors; where F is dear on fewer rays, and against a reference only so much better."""
+    length = request.length or built.horizon
+    assert request.tolerance is not None
+    budget = _budget(request, cost)
+    samples = int(np.clip(budget / (cost * length), 400, 2000))
+    dear = 4 * cost * length * samples > budget
+    rtol = 1e-3 * request.tolerance if dear else 1e-12
+    return measured(built, request.length, samples=samples, rtol=rtol, most=1 if dear else 16)
+
+
+def _budget(request: "Request", cost: float) -> float:
+    """Seconds that one probe or measurement may take."""
+    return float(np.clip(SHARE * request.rays * cost * (request.length or natural_horizon(request.body)), *BUDGET))
+
+
+def tracing_cost(body: Surface) -> float:
+    """Seconds of direct integration at 1e-9 per ray and unit of length, on one thread."""
+    length = natural_horizon(body)
+    states = pack(*random_bundle_points(body, 256, rng=np.random.default_rng(0)))
+    trace_states(body, states[:64], np.array([0.01 * length]), rtol=1e-9, step=length / 4)
+    start = clock()
+    trace_states(body, states, np.array([length]), rtol=1e-9, step=length / 4)
+    return max(clock() - start, 1e-7) / (256 * length)
+
+
+def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]:
+    """Horizons with their grids, the fastest first.
+
+    Raises
+    ------
+    ToleranceError
+        If none needs fewer than MAX_NODES.
+    """
+    body, tolerance = request.body, request.tolerance
+    assert tolerance is not None
+    natural = natural_horizon(body)
+    horizons = _horizons(request, natural, cost)
+    probe = _Probe(body, model, horizons, request.periodic)
+    orders = (request.order,) if request.order else (3, 5)
+    rays = int(np.clip(_budget(request, cost) / (2 * cost * (request.length or natural)), 48, 512))
+    stretch = amplification(body, request.length or natural, rays)
+    found = []
+    fewest = (np.inf, 0.0)
+    for k, horizon in enumerate(horizons):
+        gain = growth_factor(*stretch, horizon) if request.length else 1.0
+        target = SAFE * tolerance / gain
+        single = request.precision == "single" or (
+            request.precision is None and target > SINGLE * np.hypot(1, size(body))
+        )
+        for order in orders:
+            grid = probe.grid(k, order, target)
+            nodes = model.charts * int(np.prod(grid.nodes))
+            nbytes = float(nodes * model.lanes * (4 if single else 8))
+            fewest = min(fewest, (nodes, horizon))
+            if nodes > MAX_NODES or nbytes > MAX_BYTES:
+                continue
+            doublings = _doublings(horizon, natural, cost)
+            plan = Plan(
+                horizon, grid, single, request.ride_along, doublings, least_cells(body), curvature_reach(tolerance)
+            )
+            # the curvatures are wanted at several times of each leap
+            traced = cost * horizon / 2**plan.doublings * (6.0 if request.ride_along else 1.0)
+            build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if request.ride_along else 1.0)
+            build += FIXED + 2 * _budget(request, cost)
+            leap = leap_seconds(order, nbytes)
+            if request.ride_along:
+                # lanes are four times as many, and the attenuation is summed
+                leap = 4 * leap + 40e-9
+            found.append(Candidate(plan, leap / horizon, build, target))
+    if not found:
+        raise ToleranceError(
+            f"no map of at most {MAX_NODES} nodes is expected to reach rms {tolerance:.1e}"
+            + (f" after rays of length {request.length:g}" if request.length else "")
+            + f": the best, with horizon {fewest[1]:g}, needs about {fewest[0]:.0e}; loosen the tolerance, "
+            "or integrate with DirectFlow",
+        )
+    length = request.length or natural
+    return sorted(found, key=lambda one: one.seconds(request.rays, length))
+
+
+def leap_seconds(order: int, nbytes: float) -> float:
+    """Estimated time of one leap of a ray anywhere on the body.
+
+    Measured on one core: 20 (cubic) and 40 ns in the nearest cache, more by the logarithm of the table beyond 1 MB,
+    where a stencil's cache lines come from farther away.
+    """
+    base, lines = (20.0, 0.6) if order == 3 else (40.0, 1.0)
+    return 1e-9 * (base + 27.0 * lines * float(np.log2(max(nbytes / 1e6, 1.0))))
+
+
+def _horizons(request: "Request", natural: float, cost: float) -> list[float]:
+    """Horizons to try, ascending: they divide the distance of outputs; from 0.4 times the natural one to 16 times."""
+    if request.horizon:
+        return [request.horizon]
+    if not request.length:
+        return [natural]
+    # probing a horizon traces some 14 000 rays that far
+    # over longer leaps the curvatures do not ride along
+    reach = natural * (curvature_reach(request.tolerance or 0.0) if request.ride_along else 16)
+    longest = max(natural, min(reach, 4 * _budget(request, cost) / (cost * 3 * LINES * CELLS)))
+    distance = request.length / request.outputs
+    leaps = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
+    found = [distance / m for m in leaps if 0.4 * natural <= distance / m <= longest]
+    if not found:
+        found = [distance / max(1, np.ceil(distance / longest))]
+    return sorted(found)
+
+
+def _doublings(horizon: float, natural: float, cost: float) -> int:
+    """Doublings that make the build fastest: each halves the tracing and costs two leaps and a fit at every node."""
+    d = 0
+    while cost * horizon / 2 ** (d + 1) > DOUBLING and horizon / 2 ** (d + 1) >= natural / 8:
+        d += 1
+    return d
+
+
+def amplification(body: Surface, length: float, rays: int) -> tuple[FloatArray, FloatArray]:
+    """Times t along rays, and how much an error made at t is stretched on the way to their end: (m,), (m,)."""
+    times = length * np.arange(1, 65) / 64
+    x, p = random_bundle_points(body, rays, rng=np.random.default_rng(1))
+    m = trace_states(body, pack(x, p, jacobi=True), times, rtol=1e-6, step=0.05 * size(body))[:, :, 6:]
+    # columns (m11, m21), (m12, m22); the inverse needs no division since det M = 1
+    scale = size(body)
+    a, c, b, d = m[:, -1:, 0], scale * m[:, -1:, 1], m[:, -1:, 2] / scale, m[:, -1:, 3]
+    e, g, f, h = m[:, :, 0], scale * m[:, :, 1], m[:, :, 2] / scale, m[:, :, 3]
+    square = (a * h - b * g) ** 2 + (b * e - a * f) ** 2 + (c * h - d * g) ** 2 + (d * e - c * f) ** 2
+    # the geometric mean: a few rays of a chaotic flow would swamp any other
+    return times, np.asarray(np.exp(0.5 * np.mean(np.log(0.5 * square), axis=0)))
+
+
+def growth_factor(times: FloatArray, stretch: FloatArray, horizon: float) -> float:
+    """G: what errors of the leaps add up to at the end of a ray, in units of one leap's error."""
+    count = max(1, round(times[-1] / horizon))
+    at = times[-1] * np.arange(1, count + 1) / count
+    return float(np.sqrt(np.sum(np.exp(2 * np.interp(at, times, np.log(stretch))))))
+
+
+class _Probe:
+    """Interpolation errors of rows of points along each axis, for several horizons."""
+
+    def __init__(self, body: Surface, model: Model, horizons: list[float], periodic: tuple[bool, bool]) -> None:
+        self.body, self.periodic = body, (*periodic, True)
+        # errors in the units of (x, p) from those of the coordinates
+        unit = {"ambient": 1.0, "rotation": 2.0, "octant": 2.0, "angles": 2 * np.pi}[model.name]
+        self.scale = unit * (1.0 if model.name == "ambient" else float(np.hypot(1, size(body))))
+        step = horizons[0] / max(1, np.ceil(horizons[0] / (0.5 * size(body))))
+        times = step * np.arange(1, round(horizons[-1] / step) + 1)
+        self.rows = [self._row(body, model, axis, np.array(horizons), times) for axis in range(3)]
+
+    def _row(self, body: Surface, model: Model, axis: int, horizons: FloatArray, times: FloatArray) -> FloatArray:
+        """Displacements along one axis: (horizons, lines, points, lanes)."""
+        rng = np.random.default_rng(axis)
+        count = CELLS if self.periodic[axis] else CELLS + 1
+        at = [np.repeat(rng.random(LINES), count) for _ in range(3)]
+        at[axis] = np.tile(np.arange(count) / CELLS, LINES)
+        at[2] = 2 * np.pi * at[2]
+        chart = np.repeat(rng.integers(model.charts, size=LINES), count)
+        coordinates = np.concatenate([model.at(c, *(v[chart == c] for v in at)) for c in range(model.charts)])
+        # lines of one chart are consecutive, and stay whole
+        times = np.unique(np.concatenate([times, horizons]))
+        states = trace_states(body, model.states(coordinates), times, rtol=1e-9, step=float(times[0]))
+        values = []
+        for horizon in horizons:
+            upto = int(np.searchsorted(times, horizon * (1 - 1e-12))) + 1
+            values.append(model.displacement(coordinates, states[:, :upto], times[:upto]).reshape(LINES, count, -1))
+        return np.stack(values)
+
+    def errors(self, k: int, axis: int, order: int) -> tuple[FloatArray, FloatArray]:
+        """Cells of an axis, ascending, and the rms error of splines with them."""
+        data, wraps = self.rows[axis][k], self.periodic[axis]
+        count = data.shape[1]
+        cells, errors = [], []
+        for stride in STRIDES[::-1]:
+            if CELLS // stride < order + 4:
+                continue
+            spline = np.tensordot(thinning_operator(count, stride, order, wraps), data[:, ::stride], axes=(1, 1))
+            # a chart's margin spares it the ends of the row
+            inner = slice(None) if wraps else slice(MARGIN * stride, count - MARGIN * stride)
+            difference = np.moveaxis(spline, 0, 1)[:, inner] - data[:, inner]
+            cells.append(CELLS // stride)
+            errors.append(self.scale * float(np.sqrt(np.mean(np.sum(difference**2, axis=-1)))) + 1e-300)
+        return np.array(cells), np.array(errors)
+
+    def grid(self, k: int, order: int, target: float) -> Grid:
+        """Fewest nodes whose three errors together are the target."""
+        cells = []
+        for axis in range(3):
+            n, e = self.errors(k, axis, order)
+            # the error that rows of finer cells would have, where tracing itself is no longer exact enough
+            e = np.maximum.accumulate(e[::-1])[::-1]
+            wanted = target / np.sqrt(3)
+            if wanted >= e[0]:
+                cells.append(float(n[0]) * max((e[0] / wanted) ** (1 / (order + 1)), 0.5))
+            elif wanted <= e[-1]:
+                cells.append(float(n[-1]) * (e[-1] / wanted) ** (1 / (order + 1)))
+            else:
+                cells.append(float(np.exp(np.interp(-np.log(wanted), -np.log(e), np.log(n)))))
+        return _grid(cells, order, self.periodic[:2], least_cells(self.body))
+
+
+def _grid(cells: list[float], order: int, periodic: tuple[bool, ...], least: int) -> Grid:
+    sides = [
+        max(int(np.ceil(c)) if wraps else max(int(np.ceil(c)), least) + 1 + 2 * MARGIN, order + (1 if wraps else 5))
+        for c, wraps in zip(cells, periodic, strict=False)
+    ]
+    return Grid((sides[0], sides[1], max(4 * int(np.ceil(cells[2] / 4)), 8)), order, (periodic[0], periodic[1]))
+
+
+def _finer(plan: Plan, excess: float) -> Plan:
+    """The plan with every axis refined so that its error falls by the excess, at least by a tenth of its cells."""
+    return _scaled(plan, float(np.clip(1.02 * excess ** (1 / (plan.grid.degree + 1)), 1.06, 2.0)))
+
+
+def _scaled(plan: Plan, factor: float) -> Plan:
+    grid = plan.grid
+    return replace(plan, grid=_grid([factor * c for c in grid.cells], grid.degree, grid.periodic, plan.least_cells))

@@ -1,0 +1,111 @@
+"""What the uncertainty of a body does to its creeping rays.
+
+A body known from points offers itself ``coarser`` as well (see `creeping.geometry.surface.Surface`). Rays of a fan are
+traced on both, from the same points, projected, and with the same d; they differ by about the error of the coarser
+body. Or the whole incidence is done again on it, shadow line and all (`coarser_fan`), for what follows from a fan.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.geodesics.bundle import project_bundle
+from creeping.geodesics.direct_flow import DirectFlow
+from creeping.geodesics.integrator import pack
+from creeping.geometry.surface import project
+from creeping.rays.fan import RayFan, RayStatus, launch
+from creeping.rays.spreading import spread
+from creeping.shadow.attachment import line_tangents
+from creeping.shadow.line import shadow_line
+
+RAYS = 48
+RTOL = 1e-10
+
+
+@dataclass(frozen=True)
+class BodyError:
+    """Differences at the last steps of rays on a body and on its coarser twin.
+
+    Attributes
+    ----------
+    points : float
+        Rms distance, L.
+    spreading : float
+        Rms difference of J.
+    attenuation : float
+        Rms difference of the attenuation integral, L^(1/3).
+    rays : int
+        Traced; those that are no creeping rays, or end early on either body, are left out.
+    """
+
+    points: float
+    spreading: float
+    attenuation: float
+    rays: int
+
+
+def body_error(fan: RayFan, *, rays: int = RAYS) -> BodyError | None:
+    """Estimate how far a fan is off because its body is known only approximately.
+
+    Parameters
+    ----------
+    fan : RayFan
+    rays : int
+        How many of its rays are traced again.
+
+    Returns
+    -------
+    BodyError or None
+        None for a body that is known exactly, and if no ray reaches the end.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``rays`` is not a positive whole number.
+    """
+    if isinstance(rays, bool) or not isinstance(rays, (int, np.integer)) or rays < 1:
+        raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
+    coarser: Any = getattr(fan.body, "coarser", None)
+    good = np.flatnonzero(fan.status == RayStatus.OK)
+    if coarser is None or not len(good):
+        return None
+    chosen = good[np.unique(np.linspace(0, len(good) - 1, rays).astype(int))]
+    starts = fan.points[chosen, 0]
+    ends = [_ends(body, starts, fan) for body in (fan.body, coarser)]
+    both = np.isinf(ends[0][:, 5]) & np.isinf(ends[1][:, 5])
+    if not both.any():
+        return None
+    # times of detachment are infinite here
+    off = ends[0][both, :5] - ends[1][both, :5]
+
+    def rms(values: FloatArray) -> float:
+        return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
+
+    return BodyError(rms(off[:, :3]), rms(off[:, 3:4]), rms(off[:, 4:5]), int(both.sum()))
+
+
+def coarser_fan(fan: RayFan) -> RayFan | None:
+    """The same incidence on the coarser body, None for a body that is known exactly.
+
+    As many rays and steps as the fan has, from its own shadow line, by direct integration.
+    """
+    coarser: Any = getattr(fan.body, "coarser", None)
+    if coarser is None:
+        return None
+    line = shadow_line(coarser, fan.line.direction)
+    rays, steps = max(len(fan.points), 1), len(fan.travel_time) - 1
+    flow = DirectFlow(coarser, rtol=RTOL)
+    return launch(flow, line, length=fan.length, n_rays=rays, n_steps=steps, max_gap=float("inf"))
+
+
+def _ends(body: Any, starts: FloatArray, fan: RayFan) -> FloatArray:
+    """x (3), J, attenuation and detachment at the end of rays from points near the body: (n, 6)."""
+    d = np.broadcast_to(fan.line.direction, starts.shape)
+    x, p = project_bundle(body, project(body, starts), d)
+    states = DirectFlow(body, rtol=RTOL).transport(pack(x, p, lanes=12), fan.travel_time[[0, -1]])
+    tangents = line_tangents(body, x, fan.line.direction)
+    j, _, _ = spread(body, np.concatenate([x, tangents], axis=1), p, states)
+    end = states[:, -1]
+    return np.column_stack([end[:, :3], j[:, -1], end[:, 10:]])

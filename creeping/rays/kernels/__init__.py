@@ -1,0 +1,1 @@
+"""Compiled quantities along rays, and the search for where they are shed."""

@@ -1,0 +1,273 @@
+"""Where creeping rays cross the horizon n.r = 0 of a distant observer: nodes of the integrals over the shadow line.
+
+On a ray, (n.r)' = κₙ p.r + τ b.r. A fan integral takes every crossing with p.r > 0; the shadow half of the forward
+integral takes the first one of each ray that starts with n.r < 0. Its lit half runs over the mid-horizon
+n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to both d and r, the joints.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geometry.surface import Surface, normal, size
+from creeping.rays.quantities import RayPoints
+from creeping.rays.strips import Strip, gather
+from creeping.shadow.line import ShadowLine
+
+
+@dataclass(frozen=True, eq=False)
+class HorizonRays:
+    """Nodes on creeping rays: observer row (n,), points (n,), and weight dσ⊥ (n,), L."""
+
+    observer: IntArray
+    rays: RayPoints
+    weight: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MidHorizon:
+    """Nodes on the mid-horizon.
+
+    Attributes
+    ----------
+    observer : (n,) of int
+    points, normals : (n, 3)
+    weight : (n,), L
+        Arclength across q = (d + r)/|d + r|.
+    along, across : (n,), 1/L
+        Normal curvatures along q and n x q.
+    """
+
+    observer: IntArray
+    points: FloatArray
+    normals: FloatArray
+    weight: FloatArray
+    along: FloatArray
+    across: FloatArray
+
+
+class HorizonGrid:
+    """Normals of the strips at evenly spaced σ, fine enough for a wavenumber, and coarse steps.
+
+    Parameters
+    ----------
+    strips : tuple of Strip
+    body : Surface
+    spacing : float, L
+        Largest spacing of σ.
+    """
+
+    def __init__(self, strips: tuple[Strip, ...], body: Surface, spacing: float) -> None:
+        self.strips, self.body = strips, body
+        self.parts = []
+        for strip in strips:
+            low, high = strip.span
+            count = max(len(strip.positions), int(np.ceil((high - low) / spacing)))
+            sigma = low + (high - low) * (np.arange(count) + 0.5) / count
+            s = strip.times[strip.coarse_steps]
+            pairs = np.stack(np.meshgrid(sigma, s, indexing="ij"), axis=-1).reshape(-1, 2)
+            n = normal(body, strip.at(pairs[:, 0], pairs[:, 1]).points)
+            self.parts.append((sigma, s, n.reshape(count, len(s), 3), (high - low) / count))
+
+    def crossings(self, wanted: IntArray, directions: FloatArray) -> HorizonRays:
+        """Every crossing with p.r > 0, for the wanted rows of the observers' unit directions (m, 3)."""
+        seeds = []
+        for k, (sigma, s, n, step) in enumerate(self.parts):
+            for row in wanted:
+                height = n @ directions[row]
+                ray, j = np.nonzero(height[:, :-1] * height[:, 1:] < 0)
+                share = height[ray, j] / (height[ray, j] - height[ray, j + 1])
+                seeds.append(_Seeds.of(row, k, sigma[ray], s[j] + share * (s[j + 1] - s[j]), step))
+        nodes = _polish(self.strips, self.body, _Seeds.joined(seeds), directions)
+        ahead = np.sum(nodes.rays.directions * directions[nodes.observer], axis=1) > 0
+        return HorizonRays(nodes.observer[ahead], nodes.rays[ahead], nodes.weight[ahead])
+
+
+class _Seeds(NamedTuple):
+    """Nodes before they are refined: observer, strip, σ, s, weight dσ, each (n,)."""
+
+    observer: IntArray
+    strip: IntArray
+    sigma: FloatArray
+    s: FloatArray
+    weight: FloatArray
+
+    @classmethod
+    def of(cls, row: int, strip: int, sigma: FloatArray, s: FloatArray, weight: FloatArray | float) -> "_Seeds":
+        """Nodes of one observer on one strip."""
+        count = len(sigma)
+        return cls(np.full(count, row), np.full(count, strip), sigma, s, np.broadcast_to(weight, (count,)))
+
+    @classmethod
+    def joined(cls, parts: list["_Seeds"]) -> "_Seeds":
+        """All parts as one."""
+        none = cls.of(0, 0, np.zeros(0), np.zeros(0), 0.0)
+        return cls(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
+
+
+def _polish(strips: tuple[Strip, ...], body: Surface, seeds: _Seeds, directions: FloatArray) -> HorizonRays:
+    """Newton's method along each ray on n.r."""
+    limit = 0.5 * max((strip.cell[1] for strip in strips), default=0.0)
+    r, s = directions[seeds.observer], seeds.s
+    for _ in range(3):
+        rays = gather(strips, seeds.strip, seeds.sigma, s)
+        gradient = body.gradient(rays.points)
+        g = np.linalg.norm(gradient, axis=1)
+        n = gradient / g[:, None]
+        turned = np.einsum("nij,nj->ni", body.hessian(rays.points), rays.directions) / g[:, None]
+        rate = np.sum((turned - np.sum(turned * n, axis=1, keepdims=True) * n) * r, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = np.nan_to_num(-np.sum(n * r, axis=1) / rate)
+        s = np.maximum(s + np.clip(move, -limit, limit), 0.0)
+    rays = gather(strips, seeds.strip, seeds.sigma, s)
+    return HorizonRays(seeds.observer, rays, seeds.weight * rays.width)
+
+
+def joints(strip: Strip, r: FloatArray) -> list[tuple[float, float, bool]]:
+    """Intervals (σ start, σ end, shadow) of a strip with n0.r of one sign, negative on the shadow half."""
+    low, high = strip.span
+    sigma = np.linspace(low, high, 4 * len(strip.positions) + 1)
+
+    def height(at: FloatArray) -> FloatArray:
+        return np.asarray(strip.first_normals(at) @ r)
+
+    values = height(sigma)
+    changes = np.flatnonzero(values[:-1] * values[1:] < 0)
+    left, right = sigma[changes], sigma[changes + 1]
+    negative = values[changes] < 0
+    for _ in range(45):
+        middle = 0.5 * (left + right)
+        same = (height(middle) < 0) == negative
+        left, right = np.where(same, middle, left), np.where(same, right, middle)
+    cuts = 0.5 * (left + right)
+    if not len(cuts):
+        return [(low, high, bool(values[0] < 0))]
+    if strip.closed:
+        edges = np.append(cuts, cuts[0] + strip.period)
+        after = [not negative[k] for k in range(len(cuts))]
+    else:
+        edges = np.concatenate([[low], cuts, [high]])
+        after = [bool(values[0] < 0), *(not negative[k] for k in range(len(cuts)))]
+    return [(float(a), float(b), bool(s)) for a, b, s in zip(edges[:-1], edges[1:], after, strict=True)]
+
+
+def forward_nodes(
+    strips: tuple[Strip, ...], line: ShadowLine, wanted: IntArray, directions: FloatArray, counts: IntArray
+) -> tuple[HorizonRays, MidHorizon, IntArray]:
+    """Gauss nodes of both halves of the forward integral, and the observers for which some were not found.
+
+    Parameters
+    ----------
+    wanted : (w,)
+        Rows of the observers.
+    directions : (m, 3)
+        Unit directions of all observers, none of them d itself.
+    counts : (w,)
+        Nodes on each interval between joints.
+    """
+    shadow, lit, lost = [], [_MidSeeds.empty()], []
+    for row, count in zip(wanted, counts, strict=True):
+        r = directions[row]
+        nodes, weights = np.polynomial.legendre.leggauss(int(count))
+        for k, strip in enumerate(strips):
+            for start, end, dark in joints(strip, r):
+                sigma, weight = start + (end - start) * (nodes + 1) / 2, (end - start) / 2 * weights
+                if dark:
+                    s, found = _first_crossing(strip, line.body, sigma, r)
+                    shadow.append(_Seeds.of(row, k, sigma[found], s[found], weight[found]))
+                else:
+                    x, across, found = _mid_horizon(strip, line, sigma, r)
+                    lit.append(_MidSeeds(np.full(int(found.sum()), row), x[found], (weight * across)[found]))
+                if not np.all(found):
+                    lost.append(row)
+    nodes_lit = _MidSeeds(*(np.concatenate(columns) for columns in zip(*lit, strict=True)))
+    return (
+        _polish(strips, line.body, _Seeds.joined(shadow), directions),
+        _mid_nodes(line, nodes_lit, directions),
+        np.unique(np.array(lost, dtype=np.int64)),
+    )
+
+
+class _MidSeeds(NamedTuple):
+    """Nodes of the mid-horizon: observer (n,), points (n, 3), weight (n,)."""
+
+    observer: IntArray
+    points: FloatArray
+    weight: FloatArray
+
+    @classmethod
+    def empty(cls) -> "_MidSeeds":
+        """No nodes."""
+        return cls(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
+
+
+def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """First s at which n.r rises through 0 on the rays σ (n,), to a coarse step, and whether there is one."""
+    s = strip.times[strip.coarse_steps]
+    heights = strip.coarse_normals(body) @ r
+    rises = np.asarray(heights > 0)
+    first = np.argmax(rises, axis=1)
+    found = np.asarray(rises.any(axis=1))
+    # a ray near a joint may rise within its first step: linear interpolation serves every start
+    before = np.maximum(first - 1, 0)
+    rows = np.arange(len(first))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = heights[rows, before] / (heights[rows, before] - heights[rows, first])
+    crossing = np.where(first > 0, s[before] + np.nan_to_num(share) * (s[first] - s[before]), 0.0)
+    positions = strip.positions
+    if strip.closed:
+        positions = np.concatenate([positions[-1:] - strip.period, positions, positions[:1] + strip.period])
+        crossing = np.concatenate([crossing[-1:], crossing, crossing[:1]])
+        found = np.concatenate([found[-1:], found, found[:1]])
+    at = strip.wrap(sigma)
+    whole = np.interp(at, positions, found.astype(float))
+    return np.interp(at, positions, crossing), np.asarray(whole > 0.5)
+
+
+def _mid_horizon(
+    strip: Strip, line: ShadowLine, sigma: FloatArray, r: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Points (n, 3) of the mid-horizon beside the rays σ, d(arclength across q)/dσ, and whether they were found.
+
+    Each is sought from the launch point in the plane of n0 and d: F = 0, n.q = 0, (x - x0).b0 = 0.
+    """
+    body = line.body
+    q = line.direction + r
+    q = q / np.linalg.norm(q)
+    start = strip.at(sigma, np.zeros(len(sigma)))
+    x0 = start.points
+    b0 = np.cross(start.first_normal, line.direction)
+    x = x0.copy()
+    largest = 0.2 * size(body)
+    for _ in range(25):
+        gradient = body.gradient(x)
+        bent = body.hessian(x) @ q
+        rows = np.stack([gradient, bent, b0], axis=1)
+        right = -np.stack([body.level(x), gradient @ q, np.sum((x - x0) * b0, axis=1)], axis=1)
+        move = np.einsum("nij,nj->ni", np.linalg.pinv(rows), right)
+        long = np.linalg.norm(move, axis=1, keepdims=True)
+        x = x + move * np.minimum(1.0, largest / np.maximum(long, 1e-300))
+        if np.all(long < 1e-13 * size(body)):
+            break
+    n = normal(body, x)
+    found = np.asarray((np.abs(n @ q) < 1e-9) & (n @ line.direction < 1e-9))
+    found &= np.linalg.norm(x - x0, axis=1) < size(body)
+    found &= np.abs(body.level(x)) <= 1e-9 * np.linalg.norm(body.gradient(x), axis=1) * size(body)
+    order = np.argsort(sigma)
+    slope = make_interp_spline(sigma[order], x[order], k=min(7, len(sigma) - 1))(sigma, nu=1)
+    return x, np.abs(np.sum(slope * np.cross(n, q), axis=1)), np.asarray(found)
+
+
+def _mid_nodes(line: ShadowLine, seeds: _MidSeeds, directions: FloatArray) -> MidHorizon:
+    body, x = line.body, seeds.points
+    gradient = body.gradient(x)
+    g = np.linalg.norm(gradient, axis=1)
+    n = gradient / g[:, None]
+    q = line.direction + directions[seeds.observer]
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    H = body.hessian(x)
+    along, across = (np.einsum("ni,nij,nj->n", v, H, v) / g for v in (q, np.cross(n, q)))
+    return MidHorizon(seeds.observer, x, n, seeds.weight, along, across)

@@ -1,0 +1,1 @@
+"""Compiled steps of a shadow line, from a mesh to the arcs that launch rays."""

@@ -1,0 +1,132 @@
+"""What a body is prepared with for shadow lines at sweep speed: meshes, and its singular directions.
+
+The gradient of n.d along the body is S d with S the shape operator. On n.d = 0 it vanishes only where K = 0 and d is
+the null direction a of S there: those directions are singular, and form curves on the sphere. They bound the regions
+in which the number of curves of the line is constant; to first order v = |n.d| at a critical point is the angle to
+them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.geometry.curvature import gaussian_curvature
+from creeping.geometry.surface import Surface, normal, project
+from creeping.geometry.triangulation import Triangulation, triangulate
+
+TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096))
+"""Vertices of the meshes, and nodes of a line on them."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineMeshes:
+    """Meshes from coarse to fine, and where K = 0.
+
+    Attributes
+    ----------
+    meshes : tuple
+        As `shadow.kernels.trace.trace_lines` takes them.
+    critical : (m, 2, 6)
+        (n, n x a) at both ends of the segments of K = 0.
+    coarsest : Triangulation
+    """
+
+    meshes: tuple[tuple[Any, ...], ...]
+    critical: FloatArray
+    coarsest: Triangulation
+
+    @property
+    def turns(self) -> FloatArray:
+        """Rms angle between the normals at the ends of an edge, per mesh, radians."""
+        return np.array([mesh[5] for mesh in self.meshes])
+
+
+def line_meshes(body: Surface) -> LineMeshes:
+    """Prepare a body.
+
+    Raises
+    ------
+    SurfaceError
+        If F = 0 has no closed triangulation in its bounds.
+    """
+    found = [_mesh_of(body, vertices) for vertices, _ in TIERS]
+    packed = tuple(_packed(body, mesh, nodes) for mesh, (_, nodes) in zip(found, TIERS, strict=True))
+    # the finer the mesh, the fewer small parabolic loops are missed
+    return LineMeshes(packed, singular_segments(body, found[-1]), found[0])
+
+
+def _mesh_of(body: Surface, vertices: int) -> Triangulation:
+    """Triangulation with about so many vertices."""
+    cells = int(np.sqrt(vertices / 3))
+    for _ in range(4):
+        mesh = triangulate(body.level, body.gradient, body.bounds, cells=max(cells, 8))
+        ratio = np.sqrt(vertices / len(mesh.vertices))
+        if 0.93 < ratio < 1.07:
+            break
+        cells = round(cells * float(ratio))
+    return mesh
+
+
+def _packed(body: Surface, mesh: Triangulation, nodes: int) -> tuple[Any, ...]:
+    n = normal(body, mesh.vertices)
+    ends = n[mesh.triangles]
+    turn = np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=-1)
+    return (
+        np.ascontiguousarray(mesh.vertices.T),
+        np.ascontiguousarray(n.T).ravel(),
+        mesh.triangles.astype(np.int32),
+        neighbours_of(mesh.triangles),
+        mesh.edge_length,
+        float(np.sqrt(np.mean(turn**2))),
+        nodes,
+    )
+
+
+def neighbours_of(triangles: IntArray) -> np.ndarray[Any, np.dtype[np.int32]]:
+    """Triangle across the edge from corner k to corner k + 1, for a closed oriented mesh: (m, 3) -> (m, 3)."""
+    m = len(triangles)
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
+    code = edges[:, 0] * (edges.max() + 1) + edges[:, 1]
+    reverse = edges[:, 1] * (edges.max() + 1) + edges[:, 0]
+    order = np.argsort(code)
+    across = order[np.searchsorted(code[order], reverse)] // 3
+    return np.asarray(across.reshape(m, 3), dtype=np.int32)
+
+
+def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
+    """Ends (n, n x a) of the segments in which K = 0 crosses the triangles of a mesh: (m, 2, 6)."""
+    K = gaussian_curvature(body, mesh.vertices)
+    t, k = np.nonzero((K[mesh.triangles] > 0) != (K[np.roll(mesh.triangles, -1, axis=1)] > 0))
+    first, last = mesh.triangles[t, k], mesh.triangles[t, (k + 1) % 3]
+    points = _parabolic(body, mesh.vertices[first], mesh.vertices[last], K[first] > 0)
+    n, a = normal(body, points), _null_direction(body, points)
+    # two edges of a triangle are crossed; they follow each other in t
+    n, a = n.reshape(-1, 2, 3), a.reshape(-1, 2, 3)
+    a[:, 1] *= np.where(np.sum(a[:, 0] * a[:, 1], axis=-1) < 0, -1.0, 1.0)[:, None]
+    return np.ascontiguousarray(np.concatenate([n, np.cross(n, a)], axis=-1))
+
+
+def _parabolic(body: Surface, low: FloatArray, high: FloatArray, positive: Any) -> FloatArray:
+    """Points with K = 0 between points of either sign, by bisection on the body: (m, 3) x 2 -> (m, 3)."""
+    middle = low
+    for _ in range(40):
+        middle = project(body, 0.5 * (low + high))
+        same = (gaussian_curvature(body, middle) > 0) == positive
+        low = np.where(same[:, None], middle, low)
+        high = np.where(same[:, None], high, middle)
+    return middle
+
+
+def _null_direction(body: Surface, points: FloatArray) -> FloatArray:
+    """Unit tangents with the least |kappa|: (m, 3) -> (m, 3)."""
+    g, H = body.gradient(points), body.hessian(points)
+    norm = np.linalg.norm(g, axis=-1)
+    n = g / norm[:, None]
+    e = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
+    e /= np.linalg.norm(e, axis=1, keepdims=True)
+    basis = np.stack([e, np.cross(n, e)], axis=1)
+    values, vectors = np.linalg.eigh(basis @ H @ np.swapaxes(basis, 1, 2) / norm[:, None, None])
+    least = np.argmin(np.abs(values), axis=1)
+    chosen = np.take_along_axis(vectors, least[:, None, None], axis=2)[..., 0]
+    return np.asarray(np.einsum("mk,mki->mi", chosen, basis))

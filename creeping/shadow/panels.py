@@ -1,0 +1,276 @@
+"""A smooth closed curve {F = 0, grad F.d = 0} in panels, exact at every arclength.
+
+On the panel from a to b with chord c = b - a, the curve is a graph over the chord, u in [-1, 1]:
+
+    F(x) = 0,   grad F(x).d = 0,   c.(x - (a + b)/2 - u c/2) = 0,
+    ds/du = |c|^2 / (2 T.c),       T = grad F x Hd / |.|.
+
+x and ds/du are polynomials through Gauss points of u; panels are halved until the polynomials are exact to rounding, so
+they shrink where the curve turns fast and the length needs no resampling.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from creeping._typing import BoolArray, FloatArray
+from creeping.errors import SingularIncidenceError
+from creeping.geometry.surface import Surface, size
+
+ORDER = 16
+"""Gauss points of a panel."""
+LENGTH_TOLERANCE = 1e-12
+"""Last coefficients of a panel's arclength, relative to the curve."""
+MIN_ALIGNMENT = 0.6
+"""Smallest T.c/|c| on a panel: tangents within 53 degrees of the chord."""
+_U, _WEIGHTS = legendre.leggauss(ORDER)
+# values at the Gauss points -> Legendre coefficients, exact for polynomials below the order
+_TO_COEFFICIENTS = (legendre.legvander(_U, ORDER - 1) * _WEIGHTS[:, None] * (np.arange(ORDER) + 0.5)).T
+
+
+def newton_step(
+    body: Surface, direction: FloatArray, points: FloatArray, axis: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Newton step for {F = 0, grad F.d = 0} at right angles to an axis, and the tangent: (n, 3), (n, 3).
+
+    ``direction`` is d, (3,) or one for each point.
+
+    Without an axis it is the tangent, and the step is that of least norm. Inverse rows of (grad F, Hd, axis) are cross
+    products over the determinant axis.(grad F x Hd).
+    """
+    F, gradient = body.level(points), body.gradient(points)
+    Hd = (body.hessian(points) @ direction[..., None])[..., 0]
+    G = np.sum(gradient * direction, axis=-1)
+    W = np.cross(gradient, Hd)
+    if axis is None:
+        axis = W
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        step = -(F[..., None] * np.cross(Hd, axis) + G[..., None] * np.cross(axis, gradient))
+        step /= np.sum(W * axis, axis=-1, keepdims=True)
+        tangent = W / np.linalg.norm(W, axis=-1, keepdims=True)
+    return step, tangent
+
+
+def onto_line(
+    body: Surface, direction: FloatArray, points: FloatArray, *, reach: float, iterations: int = 4
+) -> FloatArray:
+    """Points of {F = 0, grad F.d = 0} by steps of least norm, each at most ``reach``: (n, 3) -> (n, 3)."""
+    points = np.array(points, dtype=float)
+    for _ in range(iterations):
+        step, _ = newton_step(body, direction, points)
+        points += _limited(step, reach)
+    return points
+
+
+def _limited(step: FloatArray, reach: FloatArray | float) -> FloatArray:
+    norm = np.linalg.norm(step, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(step * np.minimum(1.0, reach / norm)[..., None]) if np.any(norm > reach) else step
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PanelCurve:
+    """Closed curve in panels.
+
+    Attributes
+    ----------
+    body, direction : Surface, (3,)
+    nodes : (p, 3), L
+        First points of the panels.
+    shape : (p, ORDER, 3), L
+        Legendre coefficients of x(u).
+    speed : (p, ORDER), L
+        Legendre coefficients of ds/du.
+    """
+
+    body: Surface
+    direction: FloatArray
+    nodes: FloatArray
+    shape: FloatArray
+    speed: FloatArray
+
+    @property
+    def breaks(self) -> FloatArray:
+        """Arclengths of the ends of the panels: (p + 1,), L."""
+        # the integral of P_j over [-1, 1] is 2 for j = 0 and 0 otherwise
+        return np.concatenate([[0.0], np.cumsum(2 * self.speed[:, 0])])
+
+    @property
+    def length(self) -> float:
+        """Length, L."""
+        return float(self.breaks[-1])
+
+    @property
+    def gauss_arclengths(self) -> FloatArray:
+        """Arclengths of the Gauss points, dense where the curve turns: (p ORDER,), L."""
+        integral = legendre.legint(self.speed, lbnd=-1, axis=1) @ legendre.legvander(_U, ORDER).T
+        return np.asarray((self.breaks[:-1, None] + integral).ravel())
+
+    def at(self, arclength: FloatArray) -> FloatArray:
+        """Points at any arclength, modulo the length: (m,) -> (m, 3), L."""
+        breaks = self.breaks
+        s = np.mod(np.asarray(arclength, dtype=float), breaks[-1])
+        panel = np.clip(np.searchsorted(breaks, s, side="right") - 1, 0, len(self.nodes) - 1)
+        offset = s - breaks[panel]
+        integral = legendre.legint(self.speed, lbnd=-1, axis=1)[panel]
+        speed = self.speed[panel]
+        u = offset / speed[:, 0] - 1
+        for _ in range(12):
+            V = legendre.legvander(u, ORDER)
+            step = (np.sum(V * integral, axis=1) - offset) / np.sum(V[:, :-1] * speed, axis=1)
+            u = np.clip(u - step, -1, 1)
+            if np.all(np.abs(step) < 1e-15):
+                break
+        points = np.einsum("mk,mkc->mc", legendre.legvander(u, ORDER - 1), self.shape[panel])
+        return onto_line(self.body, self.direction, points, reach=1e-6 * size(self.body), iterations=2)
+
+
+def fit_panels(body: Surface, direction: FloatArray, nodes: FloatArray, spacing: FloatArray) -> PanelCurve:
+    """Panels of the closed curve through ordered nodes.
+
+    Parameters
+    ----------
+    body, direction : Surface, (3,)
+    nodes : (k, 3), L
+        Points of the curve, running along T, up to swaps of neighbours closer than ``spacing``.
+    spacing : (k,), L
+        Size of the mesh at the nodes.
+
+    Returns
+    -------
+    PanelCurve
+
+    Raises
+    ------
+    SingularIncidenceError
+        If a panel cannot be made exact: the curve turns within rounding of a crossing.
+    """
+    nodes = _forward_nodes(body, direction, nodes, spacing)
+    _, tangents = newton_step(body, direction, nodes)
+    count = len(nodes)
+    chords = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)
+    tolerance = LENGTH_TOLERANCE * max(float(chords.sum()), 0.1 * size(body))
+    keys = _first_breaks(tangents)
+    # a panel end is its place in the ring of nodes; halving takes a node of the ring while there is one between
+    known = {float(k): (nodes[k % count], tangents[k % count]) for k in range(count + 1)}
+    todo = [(float(a), float(b)) for a, b in pairwise(keys)]
+    done: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
+    while todo:
+        a, Ta = (np.array(part) for part in zip(*(known[key] for key, _ in todo), strict=True))
+        b, Tb = (np.array(part) for part in zip(*(known[key] for _, key in todo), strict=True))
+        shape, speed, good = _fit(body, direction, a, Ta, b, Tb, tolerance)
+        done += [(todo[i][0], a[i], shape[i], speed[i]) for i in np.flatnonzero(good)]
+        bad = np.flatnonzero(~good)
+        halves = []
+        for i in bad:
+            low, high = todo[i]
+            middle = _between(low, high)
+            if middle not in known:
+                known[middle] = _middle(body, direction, a[i], Ta[i], b[i], Tb[i])
+            halves += [(low, middle), (middle, high)]
+        if len(done) + len(halves) > 20_000 or (
+            len(bad) and np.min(np.linalg.norm(b - a, axis=1)[bad]) < 1e-11 * size(body)
+        ):
+            raise SingularIncidenceError(
+                f"the shadow line cannot be followed at {len(bad)} places, first near "
+                f"{np.round(a[bad[0]], 6).tolist()}; it turns too sharply there: perturb the direction by say 1e-3",
+                points=a[bad],
+                distance=0.0,
+            )
+        todo = halves
+    done.sort(key=lambda panel: panel[0])
+    return PanelCurve(body, direction, *(np.array([panel[k] for panel in done]) for k in (1, 2, 3)))
+
+
+def _between(low: float, high: float) -> float:
+    """Middle whole number strictly between two keys, or their mean if there is none."""
+    first, last = np.floor(low) + 1, np.ceil(high) - 1
+    return float((first + last) // 2) if first <= last else (low + high) / 2
+
+
+def _forward_nodes(body: Surface, direction: FloatArray, nodes: FloatArray, spacing: FloatArray) -> FloatArray:
+    """Drop nodes that lie behind, or less than a quarter of a mesh edge before, the last one kept."""
+    _, tangents = newton_step(body, direction, nodes)
+    kept = [0]
+    for k in range(1, len(nodes)):
+        if (nodes[k] - nodes[kept[-1]]) @ tangents[kept[-1]] > 0.25 * min(spacing[k], spacing[kept[-1]]):
+            kept.append(k)
+    while len(kept) > 4 and (nodes[0] - nodes[kept[-1]]) @ tangents[kept[-1]] <= 0.25 * spacing[kept[-1]]:
+        kept.pop()
+    return nodes[kept]
+
+
+def _first_breaks(tangents: FloatArray) -> list[int]:
+    """Ring numbers, 0 to k, at which panels start: 0.6 rad of turning apart, eight panels if there are nodes."""
+    count = len(tangents)
+    cosine = np.clip(np.sum(tangents * np.roll(tangents, -1, axis=0), axis=1), -1, 1)
+    turned = np.concatenate([[0.0], np.cumsum(np.arccos(cosine))])
+    panels = int(np.clip(np.ceil(turned[-1] / 0.6), min(8, count), count))
+    keys = np.searchsorted(turned, np.linspace(0, turned[-1], panels + 1)[1:-1])
+    return [0, *np.unique(np.clip(keys, 1, count - 1)).tolist(), count]
+
+
+def _fit(
+    body: Surface,
+    direction: FloatArray,
+    a: FloatArray,
+    Ta: FloatArray,
+    b: FloatArray,
+    Tb: FloatArray,
+    tolerance: float,
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Coefficients of x and ds/du of panels from a to b, and whether they are exact."""
+    chord = b - a
+    long = np.linalg.norm(chord, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        axis = np.repeat(chord / long[:, None], ORDER, axis=0)
+        points = _hermite(a, Ta, b, Tb, _U).reshape(-1, 3)
+    reach = np.repeat(0.2 * long, ORDER)
+    good_ends = np.minimum(np.sum(Ta * chord, axis=1), np.sum(Tb * chord, axis=1)) > MIN_ALIGNMENT * long
+    step = np.zeros_like(points)
+    for _ in range(7):
+        step, _ = newton_step(body, direction, points, axis)
+        points = points + _limited(step, reach)
+    _, tangent = newton_step(body, direction, points, axis)
+    aligned = np.sum(tangent * axis, axis=1).reshape(-1, ORDER)
+    moved = np.linalg.norm(step, axis=1).reshape(-1, ORDER)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        speed = (0.5 * long[:, None] / aligned) @ _TO_COEFFICIENTS.T
+        shape = np.einsum("jk,pkc->pjc", _TO_COEFFICIENTS, points.reshape(-1, ORDER, 3))
+        tail = np.sum(np.abs(speed[:, -3:]), axis=1)
+        # the ends are known apart from the polynomial: a jump to another branch shows there
+        miss = np.maximum(
+            np.linalg.norm(shape.sum(axis=1) - b, axis=1),
+            np.linalg.norm((shape * (-1.0) ** np.arange(ORDER)[:, None]).sum(axis=1) - a, axis=1),
+        )
+        good = good_ends & np.all(aligned > MIN_ALIGNMENT, axis=1) & np.all(moved < 1e-8 * long[:, None], axis=1)
+        good &= (tail < tolerance) & (miss < 1e-7 * long)
+    return shape, speed, np.asarray(good)
+
+
+def _hermite(a: FloatArray, Ta: FloatArray, b: FloatArray, Tb: FloatArray, u: FloatArray) -> FloatArray:
+    """Cubic over the chords with the tangents of the ends: (p, 3) and (k,) -> (p, k, 3)."""
+    c = (b - a)[:, None]
+    square = np.sum(c * c, axis=-1, keepdims=True)
+    ends = []
+    for tangent in (Ta, Tb):
+        T = tangent[:, None]
+        along = np.sum(T * c, axis=-1, keepdims=True)
+        # a tangent across the chord says nothing about a graph over it
+        ends.append(np.where(along > 0.2 * np.sqrt(square), 0.5 * (square / along * T - c), 0.0))
+    v = u[:, None]
+    bump = ends[0] * (1 - v) ** 2 * (1 + v) / 4 - ends[1] * (1 + v) ** 2 * (1 - v) / 4
+    return np.asarray(0.5 * (a + b)[:, None] + 0.5 * v * c + bump)
+
+
+def _middle(
+    body: Surface, direction: FloatArray, a: FloatArray, Ta: FloatArray, b: FloatArray, Tb: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Point of the curve near the middle of the cubic from a to b, with its tangent."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        guess = _hermite(a[None], Ta[None], b[None], Tb[None], np.zeros(1))[0]
+    point = onto_line(body, direction, guess, reach=0.3 * float(np.linalg.norm(b - a)), iterations=8)
+    _, tangent = newton_step(body, direction, point)
+    return point[0], tangent[0]

@@ -1,0 +1,1 @@
+"""Files written aside and renamed, and folders of arrays with a manifest; knows nothing of what they hold."""

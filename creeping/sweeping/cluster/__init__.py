@@ -1,0 +1,1 @@
+"""Sweeps over many processes or machines."""

@@ -1,0 +1,239 @@
+"""A sweep on a Dask cluster: a sliding window of tasks, each of which writes its own chunks.
+
+Workers get the recipe of the sweep once, by a plugin that restarted workers get too; a phase map they open from the
+store, mapped from its files. They return a record; the driver marks the task. A task whose worker dies again and again
+is put aside until all others are done, and then done in this process's hands: one incidence after the other, alone.
+"""
+
+import os
+import queue
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+import dask
+import distributed
+
+from creeping._typing import Any
+from creeping.errors import CreepingError
+from creeping.sweeping.cluster.workers import THREADS, Recipe, RecipePlugin, one_incidence, whole_task
+from creeping.sweeping.plan import Arrays, Beginning, SweepPlan
+from creeping.sweeping.storage.layout import UNDONE
+from creeping.sweeping.storage.store import SweepStore
+
+AHEAD = 2
+"""Tasks in flight for each thread of the workers."""
+ANSWER = 20.0
+"""Seconds in which a scheduler must answer."""
+PATIENCE = 120.0
+"""Seconds without any worker after which the sweep is given up."""
+
+
+def fill_on(
+    client: Any, plan: SweepPlan, store: SweepStore, missing: list[int], stop: Callable[[], bool]
+) -> Iterator[int]:
+    """Compute tasks on a cluster; yields each when it is committed.
+
+    Parameters
+    ----------
+    client : distributed.Client or str
+        Client, or the address of a scheduler.
+    plan : SweepPlan
+    store : SweepStore
+    missing : list of int
+        Tasks.
+    stop : callable
+        Asked now and then: whether to start no more tasks, and to wait for those that are being computed only.
+
+    Raises
+    ------
+    CreepingError
+        If the workers cannot write, or there are none for too long, or the first incidences all fail with one and the
+        same error.
+    """
+    if isinstance(client, str):
+        with connected(client) as own:
+            yield from fill_on(own, plan, store, missing, stop)
+        return
+    recipe = Recipe(plan.digest, plan.body, plan.request, plan.make, str(store.folder))
+    name = f"creeping-{plan.digest[:16]}"
+    try:
+        client.register_plugin(RecipePlugin(recipe), name=name)
+    except (TypeError, AttributeError) as error:
+        raise CreepingError(f"{plan.body!r} cannot be sent to workers ({error}); sweep in one process") from error
+    window = _Window(client, plan, stop)
+    try:
+        dead = []
+        status, beginning = store.status(), Beginning()
+        for task, outcome in window.results(missing):
+            if isinstance(outcome, distributed.KilledWorker):
+                dead.append(task)
+                continue
+            failed, common = outcome
+            store.commit(task, failures=failed > 0)
+            yield task
+            # those that failed before may fail again
+            if status[task] == UNDONE:
+                beginning.add(store.rows(task).stop - store.rows(task).start, common)
+        for task in dead:
+            if stop():
+                return
+            found = _singly(window, plan.rows(task), stop)
+            if found is None:
+                return
+            store.write_task(task, *found)
+            store.commit(task, failures=bool(found[1]))
+            yield task
+    finally:
+        window.close()
+        with suppress(Exception):
+            client.unregister_worker_plugin(name)
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """Client of the scheduler at an address."""
+    try:
+        client = distributed.Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise CreepingError(f"no Dask scheduler answers at {address!r} ({error}); start one first") from error
+    with client:
+        yield client
+
+
+@contextmanager
+def local_client(workers: int) -> Iterator[Any]:
+    """Client of as many worker processes of this machine, of one thread each."""
+    options = {
+        # a task goes to a worker when the worker is free: fewer are lost with it, or have to be waited for
+        "distributed.scheduler.worker-saturation": 1.0,
+        # one death may be an accident
+        "distributed.scheduler.allowed-failures": 1,
+    }
+    with (
+        dask.config.set(options),
+        distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            # any free port: 8787 may be taken by a cluster of the user
+            dashboard_address=":0",
+            env=dict.fromkeys(THREADS, "1"),
+            silence_logs=50,
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+class _Window:
+    """Tasks in flight: never more than a few for each thread of the workers."""
+
+    def __init__(self, client: Any, plan: SweepPlan, stop: Callable[[], bool]) -> None:
+        self.client, self.plan, self.stop = client, plan, stop
+        self.finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.flying: dict[str, tuple[int, Any]] = {}
+        self._threads, self._asked, self._alive = 0, 0.0, time.monotonic()
+
+    def results(self, tasks: list[int]) -> Iterator[tuple[int, Any]]:
+        """Task and what `whole_task` says of it, or the `KilledWorker`, in the order of completion."""
+        waiting = iter(tasks)
+        drained = False
+        while True:
+            stopping = self.stop()
+            while not stopping and len(self.flying) < self._width():
+                task = next(waiting, None)
+                if task is None:
+                    break
+                self.submit(task, whole_task, task, self.plan.incidences[self.plan.rows(task)])
+            if stopping and not drained:
+                self._drop_what_waits()
+                drained = True
+            if not self.flying:
+                return
+            done = self.next()
+            if done is not None:
+                yield done
+
+    def submit(self, task: int, work: Callable[..., Any], *arguments: Any) -> None:
+        """Send work to the cluster."""
+        key = f"creeping-{task}-{os.urandom(6).hex()}"
+        future = self.client.submit(work, self.plan.digest, *arguments, key=key, pure=False)
+        self.flying[key] = (task, future)
+        future.add_done_callback(self.finished.put)
+
+    def next(self) -> tuple[int, Any] | None:
+        """Outcome of what is finished next; None if nothing was for a second."""
+        try:
+            future = self.finished.get(timeout=1.0)
+        except queue.Empty:
+            self._require_workers()
+            return None
+        if future.key not in self.flying:
+            return None
+        task, _ = self.flying.pop(future.key)
+        if future.status == "finished":
+            return task, future.result()
+        if future.status != "error":
+            raise CreepingError(
+                f"the cluster gave up task {task} ({future.status}); see to its scheduler; what is done is kept: resume"
+            )
+        error = future.exception()
+        if isinstance(error, distributed.KilledWorker):
+            return task, error
+        if isinstance(error, CreepingError):
+            raise error
+        raise CreepingError(
+            f"task {task} failed on its worker ({type(error).__name__}: {error}); what is done is kept: resume"
+        ) from error
+
+    def close(self) -> None:
+        """Cancel what is in flight."""
+        futures = [future for _, future in self.flying.values()]
+        self.flying.clear()
+        with suppress(Exception):
+            self.client.cancel(futures, force=True)
+
+    def _drop_what_waits(self) -> None:
+        """Cancel tasks that no worker has begun."""
+        futures = [future for _, future in self.flying.values()]
+        busy = {key for stacks in self.client.call_stack(futures).values() for key in stacks} if futures else set()
+        idle = [key for key in self.flying if key not in busy]
+        dropped = [self.flying.pop(key)[1] for key in idle]
+        self.client.cancel(dropped, force=True)
+
+    def _width(self) -> int:
+        if time.monotonic() - self._asked > 2.0:
+            self._threads, self._asked = sum(self.client.nthreads().values()), time.monotonic()
+        return AHEAD * max(1, self._threads)
+
+    def _require_workers(self) -> None:
+        if self.client.nthreads():
+            self._alive = time.monotonic()
+        elif time.monotonic() - self._alive > PATIENCE:
+            raise CreepingError(
+                f"the cluster has had no worker for {PATIENCE:.0f} s; start workers; what is done is kept: resume"
+            )
+
+
+def _singly(window: _Window, rows: slice, stop: Callable[[], bool]) -> tuple[Arrays, dict[int, str]] | None:
+    """Results of incidences, one after the other with nothing else on the cluster; None if stopped."""
+    request, incidences = window.plan.request, window.plan.incidences
+    arrays, errors = request.empty(rows.stop - rows.start), dict[int, str]()
+    for row in range(rows.start, rows.stop):
+        if stop():
+            return None
+        place = row - rows.start
+        window.submit(row, one_incidence, incidences[row : row + 1])
+        outcome = None
+        while outcome is None:
+            outcome = window.next()
+        if isinstance(outcome[1], Exception):
+            errors[place] = "its worker died each time it was tried"
+            continue
+        found, failed = outcome[1]
+        for name, values in arrays.items():
+            values[place] = found[name][0]
+        if failed:
+            errors[place] = failed[0]
+    return arrays, errors

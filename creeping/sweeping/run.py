@@ -1,0 +1,266 @@
+"""Sweeps over incident directions, in this process or on a cluster."""
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike
+from creeping.errors import CreepingError, InvalidInputError
+from creeping.field.boundary import BoundaryLike, Impedance
+from creeping.geometry.directions import unit_directions
+from creeping.geometry.surface import size
+from creeping.rays.fan import Flow
+from creeping.sweeping.plan import Arrays, Beginning, SweepPlan, bytes_of, common_error, compute, task_size
+from creeping.sweeping.request import Quantity, sweep_request
+from creeping.sweeping.results import as_dataset, require
+from creeping.sweeping.storage.layout import UNDONE
+from creeping.sweeping.storage.store import SweepStore
+
+if TYPE_CHECKING:
+    import xarray
+
+IN_MEMORY = 8_000_000_000
+"""Bytes of results beyond which a store is asked for."""
+Progress = Callable[[int, int, float], None]
+"""Called with incidences done, incidences to do, and seconds."""
+
+
+def sweep_directions(
+    flow: Flow,
+    incidences: ArrayLike,
+    *,
+    wavenumbers: ArrayLike = (),
+    quantity: Quantity = "monostatic",
+    observation: ArrayLike | None = None,
+    boundary: BoundaryLike | Sequence[BoundaryLike] | None = None,
+    length: float | None = None,
+    n_rays: int = 256,
+    n_steps: int = 1,
+    order: int = 2,
+    store: str | Path | None = None,
+    resume: bool = False,
+    client: Any = None,
+    chunk: int | None = None,
+    progress: Progress | None = None,
+) -> "xarray.Dataset":
+    """Creeping rays, or their field, for many incident directions.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+    incidences : (n, 3)
+        Where the waves travel; need not be unit.
+    wavenumbers : float or (k,), 1/L
+        Of the fields.
+    quantity : {"monostatic", "bistatic", "rays"}
+        Field in the direction the wave came from, field in the directions ``observation``, or the rays themselves.
+        Every quantity has the shadow line: curves, length, shares.
+    observation : (m, 3), optional
+        Directions of "bistatic".
+    boundary : {"soft", "hard", "pec"}, Impedance or a list of them
+        "soft" if not given.
+    length : float, optional, L (travel time for a weighted body)
+        Of the rays, 3 body sizes if not given.
+    n_rays : int
+        Rays of an incidence.
+    n_steps : int
+        Points kept of each ray of "rays".
+    order : 2 or 1
+        Of the creeping waves.
+    store : path, optional
+        Folder for the results (zarr), written task by task; the dataset is read from it when it is used. Without it
+        results are in memory.
+    resume : bool
+        Go on with a store that exists: tasks that are missing, or have incidences that failed, are computed.
+    client : distributed.Client or str, optional
+        Dask cluster, or the address of its scheduler, that shares the tasks; it needs a store that all workers see.
+    chunk : int, optional
+        Incidences of one task; a store that exists keeps its own.
+    progress : callable, optional
+        Called as ``progress(done, total, seconds)`` after each task.
+
+    Returns
+    -------
+    xarray.Dataset
+        With ``incidence_status`` of each incidence: one that is singular or fails is marked there, and is no error.
+
+    Raises
+    ------
+    CreepingError
+        On bad input, all mistakes of the request at once; if the first incidences all fail with one and the same
+        error; if the store belongs to another study, is in use, or cannot be written. What was written is kept.
+
+    Examples
+    --------
+    >>> import creeping as cr, scatterers as sc
+    >>> flow = cr.DirectFlow(sc.Sphere(), rtol=1e-6)
+    >>> ds = cr.sweep_directions(flow, [(0, 0, 1), (1, 1, 0)], quantity="rays", n_rays=4, length=1.0)
+    >>> dict(ds.sizes)
+    {'incidence': 2, 'ray': 4, 'step': 1, 'axis': 3}
+    """
+    require("xarray")
+    _refuse(flow, quantity, store, resume, client)
+    if boundary is None:
+        boundary = () if quantity == "rays" else "soft"
+    several = [boundary] if isinstance(boundary, (str, Impedance)) else list(boundary)
+    request = sweep_request(
+        quantity,
+        length=3 * size(flow.body) if length is None else length,
+        n_rays=n_rays,
+        n_steps=n_steps,
+        wavenumbers=wavenumbers,
+        boundary=several,
+        observation=observation,
+        order=order,
+    )
+    directions = unit_directions(incidences, "incidences")
+    if directions.ndim != 2:
+        raise InvalidInputError(f"incidences have shape {directions.shape}; give rows of three numbers, shape (n, 3)")
+    if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, (int, np.integer)) or chunk < 1):
+        raise InvalidInputError(f"chunk = {chunk!r} is not a whole number >= 1")
+    going_on = store is not None and resume and Path(store).exists()
+    chunk = SweepStore.open(str(store)).chunk if going_on else task_size(request, len(directions), chunk)
+    plan = SweepPlan(flow, request, directions, chunk)
+    if store is None:
+        return in_memory(plan, progress)
+    opened = open_store(plan, store, resume=resume)
+    fill(plan, opened, client=client, progress=progress)
+    return opened.dataset()
+
+
+def in_memory(plan: SweepPlan, progress: Progress | None = None) -> "xarray.Dataset":
+    """Dataset of a plan, computed in this process and kept in memory."""
+    count = len(plan.incidences)
+    if bytes_of(plan.request) * count > IN_MEMORY:
+        raise InvalidInputError(
+            f"{count} incidences give {bytes_of(plan.request) * count / 1e9:.0f} GB of results; give store=, a folder"
+        )
+    started = time.perf_counter()
+    sweeper = plan.make(plan.flow, plan.request)
+    arrays: Arrays = plan.request.empty(count)
+    errors: list[tuple[int, str]] = []
+    beginning = Beginning()
+    for task in range(plan.tasks):
+        rows = plan.rows(task)
+        found, failed = compute(sweeper, plan.incidences[rows])
+        for name, values in arrays.items():
+            values[rows] = found[name]
+        errors += [(rows.start + row, text) for row, text in failed.items()]
+        beginning.add(rows.stop - rows.start, common_error(failed, rows.stop - rows.start))
+        if progress:
+            progress(rows.stop, count, time.perf_counter() - started)
+    return as_dataset(plan, arrays, errors, time.perf_counter() - started)
+
+
+def open_store(plan: SweepPlan, folder: str | Path, *, resume: bool) -> SweepStore:
+    """Store of a plan: made, or opened if ``resume`` and it exists."""
+    if resume and Path(folder).exists():
+        store = SweepStore.open(folder)
+        store.require_same(plan)
+        return store
+    if Path(folder).exists():
+        raise InvalidInputError(
+            f"{folder} exists; give resume=True (--resume) to go on with it, or choose another store"
+        )
+    return SweepStore.create(folder, plan)
+
+
+def fill(
+    plan: SweepPlan,
+    store: SweepStore,
+    *,
+    client: Any = None,
+    progress: Progress | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    most: int | None = None,
+) -> bool:
+    """Compute the missing tasks of a store.
+
+    Parameters
+    ----------
+    plan : SweepPlan
+    store : SweepStore
+    client : distributed.Client or str, optional
+        Cluster, or the address of its scheduler; this process if not given.
+    progress : callable, optional
+        See `sweep_directions`.
+    stop : callable
+        Asked between tasks: whether to leave the rest for another time.
+    most : int, optional
+        Tasks to do at most, in this process.
+
+    Returns
+    -------
+    bool
+        Whether nothing is missing now.
+
+    Raises
+    ------
+    CreepingError
+        If the store is in use or cannot be written, or the first incidences all fail with one and the same error.
+    """
+    started = time.perf_counter()
+    with store.locked():
+        missing = store.missing()
+        done = len(plan.incidences) - sum(plan.rows(t).stop - plan.rows(t).start for t in missing)
+
+        def say(task: int) -> None:
+            nonlocal done
+            done += plan.rows(task).stop - plan.rows(task).start
+            if progress:
+                progress(done, len(plan.incidences), time.perf_counter() - started)
+
+        left = len(missing)
+        try:
+            if client is None:
+                for task in _here(plan, store, missing[:most], stop):
+                    left -= 1
+                    say(task)
+            elif missing:
+                require("distributed")
+                from creeping.sweeping.cluster.driver import fill_on
+
+                for task in fill_on(client, plan, store, missing, stop):
+                    left -= 1
+                    say(task)
+        except BaseException:
+            # the first error is the one to tell
+            with suppress(CreepingError):
+                store.finish(time.perf_counter() - started)
+            raise
+        store.finish(time.perf_counter() - started)
+    return left == 0
+
+
+def _here(plan: SweepPlan, store: SweepStore, tasks: list[int], stop: Callable[[], bool]) -> Any:
+    """Compute tasks one after the other; yields each when it is committed."""
+    sweeper = plan.make(plan.flow, plan.request) if tasks else None
+    status, beginning = store.status(), Beginning()
+    for task in tasks:
+        if stop() or sweeper is None:
+            return
+        arrays, errors = compute(sweeper, plan.incidences[plan.rows(task)])
+        store.write_task(task, arrays, errors)
+        store.commit(task, failures=bool(errors))
+        yield task
+        # those that failed before may fail again
+        if status[task] == UNDONE:
+            count = store.rows(task).stop - store.rows(task).start
+            beginning.add(count, common_error(errors, count))
+
+
+def _refuse(flow: Flow, quantity: str, store: Any, resume: bool, client: Any) -> None:
+    """Refuse options that do not go together."""
+    if quantity != "rays" and getattr(flow.body, "speed", None) is not None:
+        raise InvalidInputError(
+            f"quantity {quantity!r} is for rays of constant speed; leave out the speed, or ask for 'rays'"
+        )
+    if store is None and (resume or client is not None):
+        word = "resume" if resume else "client"
+        raise InvalidInputError(
+            f"{word} goes with store=, the folder of the results" + (", seen by all workers" * (not resume))
+        )

@@ -1,0 +1,67 @@
+"""Layout of a store on disk: its arrays, made with nothing in them, and the group that holds its study."""
+
+from pathlib import Path
+
+from creeping._typing import Any
+from creeping.storage.folder import content_digest
+from creeping.sweeping.plan import SweepPlan
+from creeping.sweeping.results import coordinates, require, sweep_attributes, variable_attributes
+
+SCHEMA = 1
+STUDY, STATUS, ERRORS = "study", "task_status", "incidence_error"
+UNDONE, DONE, WITH_FAILURES = 0, 1, 2
+ERROR_BYTES = 256
+"""Bytes kept of the message of a failed incidence, UTF-8, zeros after it."""
+COORDINATE_CHUNK = 65_536
+
+
+def write_empty(folder: Path, plan: SweepPlan) -> None:
+    """Write groups, coordinates, and arrays without chunks."""
+    zarr = require("zarr")
+    group = zarr.open_group(folder, mode="w", zarr_format=3)
+    request, count = plan.request, len(plan.incidences)
+    beside = coordinates(request, plan.incidences)
+    for name, (dims, values, words) in beside.items():
+        text = values.dtype.kind == "U"
+        where = _create(
+            group, name, values.shape, str if text else values.dtype, dims, words, first=COORDINATE_CHUNK, fill=None
+        )
+        where[:] = values.astype(object) if text else values
+    for name, variable in request.variables.items():
+        shape = (count, *(request.sizes[d] for d in variable.dims))
+        words, dims = variable_attributes(request, name), ("incidence", *variable.dims)
+        _create(group, name, shape, variable.dtype, dims, words, first=plan.chunk, fill=variable.fill)
+    words = {"description": "0 missing, 1 done, 2 done but for failed incidences; written last"}
+    _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=UNDONE)
+    words = {"description": "why an incidence failed, UTF-8, zeros after it"}
+    _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
+    # as xarray writes it: which arrays are coordinates
+    group.attrs.update(sweep_attributes(plan) | {"coordinates": " ".join(beside)})
+    content = {"schema": SCHEMA, "key": plan.key, "variables": list(request.variables)}
+    group.create_group(STUDY).attrs.update({"content": content, "blake2b": content_digest(content)})
+
+
+def _create(
+    group: Any,
+    name: str,
+    shape: tuple[int, ...],
+    dtype: Any,
+    dims: Any,
+    words: dict[str, Any],
+    *,
+    first: int,
+    fill: Any,
+) -> Any:
+    """Array with chunks that are whole but along the first axis."""
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    return group.create_array(
+        name,
+        shape=shape,
+        dtype=dtype,
+        chunks=(min(first, shape[0]), *shape[1:]),
+        dimension_names=dims,
+        attributes=words,
+        compressors=[ZstdCodec(level=1), Crc32cCodec()],
+        **({} if fill is None else {"fill_value": fill}),
+    )

@@ -1,0 +1,1 @@
+"""Study files: a sweep described in TOML."""

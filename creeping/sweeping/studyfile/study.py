@@ -1,0 +1,256 @@
+"""Study files: a sweep written down in TOML, angles in degrees, units in the names of keys.
+
+All mistakes are told at once, with the key that may have been meant. See `EXAMPLE`.
+"""
+
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from creeping._typing import Any, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.geometry.surface import Surface, size
+from creeping.storage.folder import content_digest
+from creeping.sweeping.plan import array_digest, too_large
+from creeping.sweeping.request import MOST_RAYS, MOST_STEPS, QUANTITIES, SweepRequest, sweep_request
+from creeping.sweeping.studyfile.directions import read_directions
+from creeping.sweeping.studyfile.schema import Key, nearest, read_table
+
+EXAMPLE = """\
+[study]
+name = "monostatic, twisted ellipsoid"
+body = "twisted-ellipsoid"            # as on the command line; a file is sought beside this one
+quantity = "monostatic"               # or "bistatic", "rays"
+boundary = ["soft", "hard"]
+wavenumbers_per_length = [20.0, 40.0] # 1/L; or { first = 10.0, last = 40.0, count = 31 }
+rays = 256
+length_in_body_sizes = 3.0            # or length = 6.0
+
+[incidences]
+kind = "fibonacci"
+count = 1000
+
+[flow]
+kind = "auto"                         # or "map", "direct"
+tolerance = 1e-6
+
+[run]
+output = "sweep.zarr"
+"""
+STUDY = {
+    "name": Key("text", "", blank=True),
+    "body": Key("text", "", required=True),
+    "units": Key("text"),
+    "speed": Key("text"),
+    "allow_rough": Key("flag", False),
+    "quantity": Key("text", "monostatic", choices=QUANTITIES),
+    "boundary": Key("texts"),
+    "wavenumbers_per_length": Key("wavenumbers", ()),
+    "rays": Key("count", 256, most=MOST_RAYS),
+    "steps": Key("count", most=MOST_STEPS),
+    "order": Key("count", most=2),
+    "length": Key("positive"),
+    "length_in_body_sizes": Key("positive"),
+}
+_AS_LIST = 'write [{}] and below it kind = "list" and directions = [[x, y, z], ...], or another kind'
+FLOW = {"kind": Key("text", "auto", choices=("auto", "map", "direct")), "tolerance": Key("positive", 1e-6)}
+RUN = {
+    "chunk": Key("count", most=1_000_000),
+    "workers": Key("count", most=10_000),
+    "output": Key("text"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study file, read and checked.
+
+    Attributes
+    ----------
+    name : str
+    body : str
+        As on the command line; with ``units``, ``speed`` and ``allow_rough``.
+    request : SweepRequest
+        Its ``length`` in body sizes if ``in_body_sizes``.
+    in_body_sizes : bool
+    incidences : (n, 3)
+        Unit directions.
+    flow, tolerance : str, float
+        "auto", "map" or "direct".
+    chunk, workers, output : int, int, str or None
+        What changes no result.
+    text : str
+        Of the file.
+    folder : Path
+        Of the file; paths in it are relative to it.
+    """
+
+    name: str
+    body: str
+    units: str | None
+    speed: str | None
+    allow_rough: bool
+    request: SweepRequest
+    in_body_sizes: bool
+    incidences: FloatArray
+    flow: str
+    tolerance: float
+    chunk: int | None
+    workers: int | None
+    output: str | None
+    text: str
+    folder: Path
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What led to body and flow, as text and numbers."""
+        named = ("body", "units", "speed", "allow_rough", "flow", "tolerance")
+        return {name: getattr(self, name) for name in named}
+
+    @property
+    def digest(self) -> str:
+        """Of all that changes results: not of the name, comments, or how the sweep is run."""
+        return content_digest(
+            {
+                **self.asked,
+                "request": repr(self.request),
+                "in_body_sizes": self.in_body_sizes,
+                "incidences": array_digest(self.incidences),
+            }
+        )
+
+    def request_for(self, body: Surface) -> SweepRequest:
+        """Request with the length of the rays in L."""
+        return replace(self.request, length=self.request.length * size(body)) if self.in_body_sizes else self.request
+
+
+def read_study(path: str | Path) -> Study:
+    """Read a study file.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read, or with all its mistakes, as ``mistakes`` too.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise InvalidInputError(
+            f"cannot read the study {path}: there is no such file; name another, or write one to start from with "
+            f"'creeping sweep --example > study.toml'"
+        ) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidInputError(f"cannot read the study {path}: {error}") from error
+    return parse_study(text, folder=path.parent, name=str(path))
+
+
+def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
+    """Read the text of a study file, whose paths are relative to ``folder``.
+
+    Examples
+    --------
+    >>> study = parse_study(EXAMPLE, folder=Path("."))
+    >>> study.request.quantity, len(study.incidences), study.request.boundaries
+    ('monostatic', 1000, ('soft', 'hard'))
+    """
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        # also of numbers with thousands of digits, and of brackets in brackets in brackets
+        raise InvalidInputError(f"{name} is not TOML: {error}") from error
+    if not tables:
+        raise InvalidInputError(f"{name} is empty; start from what 'creeping sweep --example' prints")
+    mistakes: list[str] = []
+    known = ("study", "incidences", "observation", "flow", "run")
+    observed: bool | None = "observation" in tables
+    main = tables.get("study", {"body": "?"})
+    if isinstance(main, dict) and "observation" in main and not observed:
+        main = {key: value for key, value in main.items() if key != "observation"}
+        mistakes.append(f"[study] observation is a table of its own: {_AS_LIST.format('observation')}")
+        observed = None
+    for key, value in tables.items():
+        if key not in known:
+            what = "unknown table" if isinstance(value, dict) else "a key outside of the tables"
+            mistakes.append(f"{key}: {what}{nearest(key, known)}")
+    mistakes += [f"the table [{key}] is missing" for key in ("study", "incidences") if key not in tables]
+    main = read_table("study", main, STUDY, mistakes)
+    flow = read_table("flow", tables.get("flow", {}), FLOW, mistakes)
+    run = read_table("run", tables.get("run", {}), RUN, mistakes)
+    if not 1e-12 <= flow["tolerance"] <= 1e-1:
+        mistakes.append(f"[flow] tolerance = {flow['tolerance']:g} is not between 1e-12 and 1e-1")
+    sets: dict[str, FloatArray | None] = {}
+    for key in known[1:3]:
+        if isinstance(tables.get(key), dict):
+            sets[key] = read_directions(key, tables[key], folder, mistakes)
+        elif key in tables:
+            mistakes.append(f"{key} is not a table: {_AS_LIST.format(key)}")
+            observed = None if key == "observation" else observed
+    if main["length"] is not None and main["length_in_body_sizes"] is not None:
+        mistakes.append("[study] length and length_in_body_sizes are both given; give one")
+    request = _request(main, observed, sets.get("observation"), mistakes)
+    if mistakes or request is None:
+        count = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
+        raise InvalidInputError(f"{name} has {count}:\n  " + "\n  ".join(mistakes), mistakes=mistakes)
+    kept = {key: main[key] for key in ("name", "body", "units", "speed", "allow_rough")}
+    incidences = sets["incidences"]
+    assert incidences is not None
+    return Study(
+        **kept,
+        request=request,
+        in_body_sizes=main["length"] is None,
+        incidences=incidences,
+        flow=flow["kind"],
+        tolerance=flow["tolerance"],
+        **run,
+        text=text,
+        folder=folder,
+    )
+
+
+def _request(
+    main: dict[str, Any], observed: bool | None, seen: FloatArray | None, mistakes: list[str]
+) -> SweepRequest | None:
+    """Request of the table [study]; its mistakes are added to the list.
+
+    ``observed`` says whether there is a table [observation], None if one is meant and a mistake is told already.
+    """
+    quantity = main["quantity"]
+    if quantity != "rays" and main["steps"] is not None:
+        mistakes.append(f'[study] steps goes with quantity "rays"; "{quantity}" chooses its own')
+    if quantity == "rays" and main["order"] is not None:
+        mistakes.append('[study] order goes with a field; quantity "rays" has none')
+    if quantity != "rays" and main["speed"] is not None:
+        mistakes.append(f'[study] speed goes with quantity "rays"; a field ("{quantity}") is for constant speed')
+    if observed is not None and (quantity == "bistatic") != observed:
+        there = (
+            'is missing: quantity "bistatic" needs it' if not observed else f'goes with "bistatic", not "{quantity}"'
+        )
+        mistakes.append(f"the table [observation] {there}")
+    boundary = main["boundary"]
+    if boundary is None:
+        boundary = () if quantity == "rays" else ("soft",)
+    try:
+        request = sweep_request(
+            quantity,
+            length=main["length"] or main["length_in_body_sizes"] or 3.0,
+            n_rays=main["rays"],
+            n_steps=main["steps"] or 1,
+            wavenumbers=main["wavenumbers_per_length"],
+            boundary=list(boundary),
+            # a mistake of its own is told already
+            observation=seen if seen is not None or quantity != "bistatic" else (0, 0, 1),
+            order=main["order"] or 2,
+        )
+    except InvalidInputError as error:
+        told = getattr(error, "mistakes", [str(error)])
+        # what follows from a mistake that is told already is none of its own
+        unsure = any(text.startswith(("[study] wavenumbers", "[study] quantity")) for text in mistakes)
+        needs = "needs wavenumbers"
+        told = [reason for reason in told if not (reason.startswith("observation") or (unsure and needs in reason))]
+        mistakes += [f"[study] {reason.replace(needs, needs + '_per_length')}" for reason in told]
+        return None
+    reason = too_large(request)
+    if reason:
+        mistakes.append(f"[study] {reason}")
+    return request

@@ -1,0 +1,1 @@
+"""Atlas of graphs over tangent planes, for bodies of any genus."""

@@ -1,0 +1,183 @@
+"""Atlas of Monge charts for a smooth closed body of any genus (`scatterers.atlas.monge.charts`).
+
+A point belongs to the chart for which max(|2u - 1|, |2v - 1|) is least, (2u - 1, 2v - 1) = (E1, E2).(x - x0)/w, among
+those listed for its voxel with n.N >= VALID and the height within bounds. The isometric frame of such a chart is the
+least rotation that takes N to n,
+
+    t_i = E_i - (E_i.n)(n + N)/(1 + n.N).
+"""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.atlas.monge.charts import Field, FloatArray, MongeChart, MongeCharts
+from scatterers.atlas.monge.cover import VALID, Cover, covered_by, probes
+from scatterers.kernels.compiled import Compiled
+from scatterers.kernels.monge_layout import CHART, FIRST, LEAN, ORIGIN, OUTSIDE, PER_SIDE, SHAPE, VOXELS
+
+# times that the cloud is completed where the atlas misses a point between
+ROUNDS = 4
+# points that determine neighbours
+FEWEST = 16
+
+
+@dataclass(frozen=True, eq=False)
+class MongeAtlas:
+    """Monge charts that cover a body.
+
+    Attributes
+    ----------
+    graphs : MongeCharts
+    parameters : (k,)
+        Charts and table of voxels, as `scatterers.kernels.monge_layout` orders them.
+    """
+
+    graphs: MongeCharts
+    parameters: FloatArray
+
+    @property
+    def margin(self) -> float:
+        """How far charts reach beyond their unit squares on every side, in half widths of these."""
+        return float(self.parameters[OUTSIDE]) - 1.0
+
+    @classmethod
+    def covering(
+        cls, level: Field, gradient: Field, hessian: Field, cloud: FloatArray, *, margin: float = 0.6
+    ) -> "MongeAtlas":
+        """Cover the body F = 0.
+
+        Parameters
+        ----------
+        level, gradient, hessian : callable
+            F and its derivatives, (..., 3) -> (...), (..., 3) and (..., 3, 3).
+        cloud : (n, 3), L
+            Points spread evenly over the whole body, such as `scatterers.spline.cloud.body_cloud` gives, a tenth of the
+            least radius of curvature apart or less.
+        margin : float
+            How far charts reach beyond their unit squares, in half widths: splines have nodes there.
+
+        Raises
+        ------
+        ValueError
+            If the cloud is no array of finite points, or charts do not cover the body: the cloud is too coarse for it,
+            or it has thin or sharp parts.
+        """
+        cloud = _checked(cloud)
+        for _ in range(ROUNDS):
+            found = covered_by(level, gradient, hessian, cloud, margin)
+            atlas = cls(found.graphs, _flat(found, margin))
+            # points of other places than those that the charts were chosen by
+            other = probes(level, gradient, cloud, seed=1)
+            missed = other[~atlas._holds(other)]
+            if not len(missed):
+                return atlas
+            cloud = np.concatenate([cloud, missed])
+        raise ValueError(
+            f"{len(missed)} of {len(other)} points of the body lie in no chart (first near "
+            f"{missed[0].round(4).tolist()}); give a denser cloud, or a body without thin or sharp parts"
+        )
+
+    def _holds(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Whether points (n, 3) are in the unit squares of their charts and, tried for each eighth, on their sheet."""
+        chart, uv = self.locate(points)
+        inside = (chart >= 0) & np.all((uv >= 0) & (uv <= 1), axis=-1)
+        some = np.flatnonzero(inside)[::8]
+        back = self.graphs[chart[some]]
+        inside[some] = np.linalg.norm(back.points(uv[some]) - points[some], axis=-1) < 1e-6 * back.half
+        return np.asarray(inside)
+
+    @cached_property
+    def charts(self) -> Sequence[MongeChart]:
+        """All charts."""
+        return tuple(MongeChart(self.graphs[k]) for k in range(len(self.graphs.half)))
+
+    def locate(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+        """Chart number (...) and chart variables (..., 2) of points (..., 3); -1 and NaN where there is none."""
+        points = np.asarray(points, dtype=float)
+        x = points.reshape(-1, 3)
+        normal = self.graphs.gradient(x)
+        p = self.parameters
+        shape, first = p[SHAPE:VOXELS].astype(np.int64), int(p[VOXELS])
+        # far from the body anything may come
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+            place = np.nan_to_num((x - p[ORIGIN:PER_SIDE]) * p[PER_SIDE]).clip(0, shape - 1).astype(np.int64)
+        entry = p[first + (place[:, 0] * shape[1] + place[:, 1]) * shape[2] + place[:, 2]].astype(np.int64)
+        count = p[entry].astype(np.int64)
+        table = p[FIRST:first].reshape(-1, CHART)
+        chart, uv, best = np.full(len(x), -1), np.full((len(x), 2), np.nan), np.full(len(x), np.inf)
+        for k in range(int(count.max(initial=0))):
+            some = np.flatnonzero(count > k)
+            number = p[entry[some] + 1 + k].astype(np.int64)
+            row = table[number]
+            q = np.einsum("nij,nj->ni", row[:, 3:12].reshape(-1, 3, 3), x[some] - row[:, :3])
+            t = q[:, :2] * row[:, 12:13]
+            score = np.max(np.abs(t), axis=-1)
+            valid = np.sum(normal[some] * row[:, 9:12], axis=-1) >= p[LEAN]
+            valid &= (q[:, 2] >= row[:, 13]) & (q[:, 2] <= row[:, 14]) & (score < best[some])
+            some = some[valid]
+            best[some], chart[some], uv[some] = score[valid], number[valid], 0.5 + 0.5 * t[valid]
+        uv = uv.clip(0.5 - 0.5 * p[OUTSIDE], 0.5 + 0.5 * p[OUTSIDE])
+        return chart.reshape(points.shape[:-1]), uv.reshape(*points.shape[:-1], 2)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """All that `restored` needs besides F."""
+        graphs = self.graphs
+        found = {"centres": graphs.centres, "axes": graphs.axes, "half": graphs.half, "bend": graphs.bend}
+        return found | {"parameters": self.parameters}
+
+    @classmethod
+    def restored(cls, level: Field, gradient: Field, arrays: Mapping[str, FloatArray]) -> "MongeAtlas":
+        """The atlas whose `arrays` these are, of the same F."""
+        parts = (np.ascontiguousarray(arrays[name], dtype=float) for name in ("centres", "axes", "half", "bend"))
+        graphs = MongeCharts(level, gradient, *parts)
+        return cls(graphs, np.ascontiguousarray(arrays["parameters"], dtype=float))
+
+    @property
+    def digest(self) -> str:
+        """Text that tells atlases apart: what is stored on the charts of one is of no use on those of another."""
+        return hashlib.blake2b(self.parameters.tobytes(), digest_size=8).hexdigest()
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled locator."""
+        from scatterers.kernels.monge import locate
+
+        return Compiled(locate, "locator", self.parameters)
+
+
+def _checked(cloud: FloatArray) -> FloatArray:
+    cloud = np.ascontiguousarray(cloud, dtype=float)
+    if cloud.ndim != 2 or cloud.shape[1] != 3 or len(cloud) < FEWEST:
+        raise ValueError(f"the cloud has shape {cloud.shape}; give (n, 3) with at least {FEWEST} points of the body")
+    if bad := int(np.sum(~np.all(np.isfinite(cloud), axis=-1))):
+        raise ValueError(f"{bad} of {len(cloud)} points of the cloud are not finite; leave them out")
+    return cloud
+
+
+def _flat(cover: Cover, margin: float) -> FloatArray:
+    """Parameters of an atlas: charts, and the table of voxels."""
+    number = len(cover.graphs.half)
+    origin, side, shape = cover.voxels
+    first = FIRST + CHART * number
+    code = (cover.listed[:, 0] * shape[1] + cover.listed[:, 1]) * shape[2] + cover.listed[:, 2]
+    pairs = np.unique(code * number + cover.listed[:, 3])
+    code, chart = pairs // number, pairs % number
+    voxel, begin, count = np.unique(code, return_index=True, return_counts=True)
+    # behind the table an empty list, then that of each voxel with its length before it
+    lists = first + int(np.prod(shape))
+    entry = lists + 1 + begin + np.arange(len(voxel))
+    table = np.full(int(np.prod(shape)), float(lists))
+    table[voxel] = entry
+    tail = np.zeros(1 + len(chart) + len(voxel))
+    tail[entry - lists] = count
+    tail[np.arange(len(chart)) + np.repeat(np.arange(len(voxel)), count) + 2] = chart
+    header = np.array([*origin, 1 / side, *shape, first, VALID, 1 + margin], dtype=float)
+    graphs = cover.graphs
+    rows = [graphs.centres, graphs.axes.reshape(-1, 9), 1 / graphs.half[:, None], cover.heights]
+    return np.concatenate([header, np.concatenate(rows, axis=1).ravel(), table, tail])

@@ -1,0 +1,136 @@
+"""Bodies given by an F in a box of space, whatever its kind: charts, parameters, compiled level.
+
+A star-shaped body, upright or along a bent spine, has the sphere map of `scatterers.sphere_map.radial` and by it six
+charts; any other body has the Monge charts of `scatterers.atlas.monge.atlas`.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.atlas.charts import CubeSphereAtlas
+from scatterers.base.body import Body
+from scatterers.kernels.compiled import Compiled
+from scatterers.kernels.spline_constants import CENTRE, HEADER
+from scatterers.sphere_map.radial import RadialMap, SpaceLevel
+from scatterers.spline.samples import Samples
+from scatterers.spline.tensor import SYMMETRIC, evaluated
+
+if TYPE_CHECKING:
+    from scatterers.atlas.monge.atlas import MongeAtlas
+
+FloatArray = NDArray[np.float64]
+CLOUDS = (25_000, 100_000)
+"""Points of the body by which charts are chosen, the more if the fewer do not do."""
+MARGIN = 0.4
+"""How far charts reach beyond their squares: fewer charts than with more, for maps of at least 15 nodes a side."""
+
+
+class LevelBody(Body):
+    """Base; a subclass calls `_place` when F is known, and gives its ``_identity``."""
+
+    _space: SpaceLevel
+    _map: RadialMap | None
+    _bounds: FloatArray
+    # places where the body is not smooth, and how far from them rays are not trusted
+    _rough: FloatArray = np.zeros((0, 3))
+    _reach: float = 0.0
+    # charts found before
+    _charts: Mapping[str, FloatArray] = MappingProxyType({})
+
+    def _place(self, space: SpaceLevel, samples: Samples, sphere_map: RadialMap | None) -> None:
+        """Take F, its samples and the sphere map, None for a body that has none."""
+        self._space, self._map = space, sphere_map
+        for made in ("compiled", "atlas", "_rough_tree"):
+            self.__dict__.pop(made, None)
+        low, high = samples.inside
+        reach = np.stack([low - 1.5 * samples.spacing, high + 1.5 * samples.spacing])
+        self._bounds = np.clip(reach, space.box[0], space.box[1])
+
+    def _identity(self) -> str:
+        """Text that changes with the shape."""
+        raise NotImplementedError
+
+    def _shape_texts(self) -> list[str]:
+        # what is stored on charts belongs to these charts
+        charts = [] if self._map is not None else [f"charts={cast('MongeAtlas', self.atlas).digest}"]
+        return [self._identity(), *charts]
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Box (2, 3) that contains the body with some slack, L."""
+        return self._bounds
+
+    @property
+    def star_shaped(self) -> bool:
+        """Whether the body has a sphere map."""
+        return self._map is not None
+
+    def level(self, points: FloatArray) -> FloatArray:
+        """F, positive outside: (..., 3) -> (...)."""
+        return evaluated(self.compiled, points)[0]
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of F: (..., 3) -> (..., 3)."""
+        return evaluated(self.compiled, points)[1]
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        return evaluated(self.compiled, points)[2][..., SYMMETRIC]
+
+    def rough(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Whether points (..., 3) lie where the body is not smooth enough for creeping rays: (...)."""
+        points = np.asarray(points, dtype=float)
+        found = np.zeros(points.shape[:-1], dtype=bool)
+        if len(self._rough):
+            finite = np.all(np.isfinite(points), axis=-1)
+            distance, _ = self._rough_tree.query(points[finite], distance_upper_bound=self._reach)
+            found[finite] = np.isfinite(distance)
+        return found
+
+    @cached_property
+    def _rough_tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self._rough)
+
+    def parameters(self, points: FloatArray) -> FloatArray:
+        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi]: (..., 3) -> (..., 2).
+
+        Of psi^-1(x) on a star-shaped body; else of x as seen from the middle of the box, where several points of the
+        body may share their angles.
+        """
+        s = self._map.inverse(points) if self._map is not None else points - self._bounds.mean(0)
+        theta = np.arctan2(np.hypot(s[..., 0], s[..., 1]), s[..., 2])
+        return np.stack([theta, np.arctan2(s[..., 1], s[..., 0])], axis=-1)
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled level evaluator."""
+        if self._map is not None:
+            return self._map.compiled_level
+        return Compiled(self._space.sources["level"], "level", self._space.flat(np.zeros(HEADER - CENTRE)))
+
+    @cached_property
+    def atlas(self) -> "CubeSphereAtlas | MongeAtlas":
+        """Six charts over the sphere map, or Monge charts."""
+        if self._map is not None:
+            return CubeSphereAtlas(self._map, self._map.compiled_locator)
+        from scatterers.atlas.monge.atlas import MongeAtlas
+        from scatterers.spline.cloud import body_cloud
+
+        if self._charts:
+            return MongeAtlas.restored(self.level, self.gradient, self._charts)
+        failure = ""
+        for count in CLOUDS:
+            cloud = body_cloud(self.level, self.gradient, self._bounds, count)
+            try:
+                return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)
+            except ValueError as error:
+                # parts may be finer than the points
+                failure = str(error)
+        raise ValueError(f"the body is too thin, or too sharply curved, in places for charts: {failure}")

@@ -1,0 +1,1 @@
+"""CAD files through gmsh, in a process of its own."""

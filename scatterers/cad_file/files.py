@@ -1,0 +1,222 @@
+"""Points and exact normals of a CAD file's faces, and where faces do not join smoothly."""
+
+import importlib.util
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.triangles.files import UNITS, TriangleMesh
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
+BEGINNINGS = {"STEP": r"\s*ISO-10303-21", "IGES": r".{72}[SFG]", "BREP": r"\s*(DBRep_DrawableShape|CASCADE Topology)"}
+LARGEST = 512_000_000
+"""Bytes of a file."""
+TIMEOUT = 600
+MILLIMETRE = 1e-3
+SHARP = 2.0
+"""Degrees between the normals of two faces at a common point that make an edge."""
+DOUBTFUL = 20.0
+"""Degrees between the normal of a face and that of the triangles: at a pole of its parameters a face has none."""
+# what a STEP file may call its length unit
+PREFIXES = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".MICRO.": "um", ".KILO.": "km"}
+IGES_UNITS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 9: "um", 10: "cm"}
+
+
+@dataclass(frozen=True, eq=False)
+class CadPoints:
+    """What a CAD file gives.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        Its vertices lie on the faces.
+    normals : (n, 3)
+        Outward; NaN where no face has one.
+    edges : tuple of str
+        Where faces do not join smoothly.
+    rough : (k, 3), m
+        Vertices there.
+    """
+
+    mesh: TriangleMesh
+    normals: FloatArray
+    edges: tuple[str, ...]
+    rough: FloatArray
+
+
+def read_cad(path: Path, units: str | None, points: int, *, say: Callable[[str], None]) -> CadPoints:
+    """Read a STEP, IGES or BREP file by gmsh.
+
+    Raises
+    ------
+    ValueError
+        If the file is of another kind, its unit is unknown or contradicted, or it is not one closed body.
+    ModuleNotFoundError
+        If gmsh is not installed.
+    """
+    from scatterers.triangles.topology import cleaned, oriented
+
+    kind = kind_of(path)
+    if importlib.util.find_spec("gmsh") is None:
+        raise ModuleNotFoundError("CAD files need gmsh: pip install 'creeping[cad]'", name="gmsh")
+    found = _meshed(path, points)
+    # a file cut short may have lost its unit: gmsh says more of it
+    scale = _scale(path, kind, units)
+    number = np.zeros(int(found["nodes"].max(initial=0)) + 1, dtype=np.int64)
+    number[found["nodes"]] = np.arange(len(found["nodes"]))
+    used, triangles = np.unique(number[found["triangles"]], return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    repairs: list[str] = []
+    before = found["points"][used]
+    vertices, triangles = cleaned(path.name, before, triangles, repairs.append, repairs.append)
+    triangles = oriented(path.name, vertices - vertices.mean(0), triangles, repairs.append)
+    # an even mesh of a clean file needs no merging; if it was done, points are found again by their place
+    place = {tuple(p): k for k, p in enumerate(vertices)}
+    row = np.full(len(number), -1, dtype=np.int64)
+    row[found["nodes"][used]] = [place.get(tuple(p), -1) for p in before]
+    mesh = TriangleMesh(vertices * scale, triangles, tuple(repairs))
+    at = row[found["at"]]
+    known = at >= 0
+    normals, edges, sharp = _joined(mesh, at[known], found["face"][known], found["normals"][known])
+    for line in repairs:
+        say(line)
+    return CadPoints(mesh, normals, edges, mesh.vertices[sharp])
+
+
+def kind_of(path: Path) -> str:
+    """STEP, IGES or BREP, by name and beginning, or ValueError; nothing else of the file is read."""
+    kind = SUFFIXES.get(path.suffix.lower())
+    if kind is None:
+        raise ValueError(f"{path.name} is none of {', '.join(SUFFIXES)}; export the body as STEP")
+    if not path.is_file():
+        raise ValueError(f"{path} is no file; give the path of a CAD file")
+    size = path.stat().st_size
+    if size == 0 or size > LARGEST:
+        raise ValueError(f"{path.name} has {size} bytes; give a CAD file of at most {LARGEST}")
+    with path.open("rb") as file:
+        start = file.read(4096).decode("latin-1")
+    if not re.match(BEGINNINGS[kind], start):
+        raise ValueError(f"{path.name} does not begin as {kind} files do; export the body again")
+    return kind
+
+
+def _scale(path: Path, kind: str, units: str | None) -> float:
+    """Metres to a unit of what gmsh gives."""
+    if units is not None and units not in UNITS:
+        raise ValueError(f'units = {units!r} is none of {", ".join(UNITS)}; give e.g. units="mm"')
+    stated = _stated(path, kind)
+    if kind == "BREP":
+        if units is None:
+            raise ValueError(f'{path.name} does not state its unit; give e.g. units="mm"')
+        # nothing is converted where nothing is stated
+        return UNITS[units]
+    if stated is None:
+        raise ValueError(
+            f"{path.name} does not state its unit of length, or one that is none of {', '.join(UNITS)}; export it again"
+        )
+    if units is not None and stated != units:
+        raise ValueError(f"{path.name} is in {stated}, not in {units}; leave units out")
+    return MILLIMETRE
+
+
+def _stated(path: Path, kind: str) -> str | None:
+    """Unit that a file states, as far as it is one of `UNITS`."""
+    text = path.read_bytes().decode("latin-1")
+    if kind == "STEP":
+        compact = re.sub(r"\s+", "", text)
+        for name, unit in (("'INCH'", "in"), ("'FOOT'", "ft")):
+            if re.search(rf"CONVERSION_BASED_UNIT\({name}", compact, re.IGNORECASE):
+                return unit
+        found = re.search(r"SI_UNIT\((\$|\.[A-Z]+\.),\.METRE\.\)", compact)
+        return PREFIXES.get(found[1]) if found else None
+    if kind == "IGES":
+        globals_ = "".join(line[:72] for line in text.splitlines() if line[72:73] == "G")
+        # strings are nH...; their commas do not separate
+        fields = re.split(r"[,;]", _without_strings(globals_))
+        with_flag = fields[13].strip() if len(fields) > 13 else ""
+        return IGES_UNITS.get(int(with_flag)) if with_flag.isdigit() else None
+    return None
+
+
+def _without_strings(text: str) -> str:
+    """Global section of an IGES file with its Hollerith strings emptied."""
+    out, k = "", 0
+    for found in re.finditer(r"(\d+)H", text):
+        if found.start() < k:
+            continue
+        out += text[k : found.start()]
+        k = found.end() + int(found[1])
+    return out + text[k:]
+
+
+def _meshed(path: Path, points: int) -> dict[str, NDArray[np.generic]]:
+    """Run the worker and read what it wrote."""
+    with tempfile.TemporaryDirectory(prefix="creeping-") as folder:
+        out = Path(folder) / "points.npz"
+        # -P: modules that happen to lie in the working folder are not imported
+        worker = Path(__file__).with_name("worker.py")
+        command = [sys.executable, "-P", str(worker), str(path.resolve()), str(points), str(out)]
+        try:
+            done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, text=True)
+        except subprocess.TimeoutExpired:
+            raise ValueError(f"{path.name}: gmsh did not mesh it within {TIMEOUT} s; simplify the body") from None
+        if done.returncode or not out.exists():
+            lines = [line for line in (done.stderr or "").splitlines() if line.strip()]
+            if "libGL" in done.stderr or "cannot open shared object" in done.stderr:
+                raise ValueError(
+                    f"gmsh does not start: {lines[-1].strip()}; on Debian: apt install libglu1-mesa libxcursor1 "
+                    "libxft2 libxinerama1 libxrender1 libxfixes3"
+                )
+            reason = lines[-1].strip() if lines else f"it ended with code {done.returncode}"
+            raise ValueError(f"{path.name}: gmsh cannot read or mesh it ({reason}); repair the body or export it anew")
+        with np.load(out, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+
+
+def _joined(
+    mesh: TriangleMesh, at: IntArray, face: IntArray, normals: FloatArray
+) -> tuple[FloatArray, tuple[str, ...], IntArray]:
+    """Outward normal of each vertex, the edges, and the vertices on them."""
+    from scatterers.triangles.jets import angle_weighted_normals
+
+    rough_normals = angle_weighted_normals(mesh.vertices, mesh.triangles)
+    length = np.linalg.norm(normals, axis=1)
+    with np.errstate(invalid="ignore"):
+        normals = normals / length[:, None]
+    # a face's orientation is that of its parameters
+    for tag in np.unique(face):
+        mine = face == tag
+        if np.nanmedian(np.sum(normals[mine] * rough_normals[at[mine]], axis=1)) < 0:
+            normals[mine] *= -1
+    doubtful = ~(np.sum(normals * rough_normals[at], axis=1) > np.cos(np.radians(DOUBTFUL)))
+    n = len(mesh.vertices)
+    # at an edge all faces disagree with the triangles, and rightly
+    trusted = np.bincount(at[~doubtful], minlength=n)
+    alone = np.bincount(at, minlength=n) < 2
+    normals[doubtful & (alone | (trusted > 0))[at]] = np.nan
+    total = np.zeros((n, 3))
+    finite = np.all(np.isfinite(normals), axis=1)
+    np.add.at(total, at[finite], normals[finite])
+    with np.errstate(invalid="ignore"):
+        mean = total / np.linalg.norm(total, axis=1, keepdims=True)
+    away = np.degrees(np.arccos(np.clip(np.sum(normals * mean[at], axis=1), -1, 1)))
+    sharp = np.unique(at[finite & (2 * away > SHARP)])
+    edges: dict[tuple[int, ...], list[float]] = {}
+    for vertex in sharp:
+        mine = at == vertex
+        edges.setdefault(tuple(sorted(face[mine].tolist())), []).append(2 * float(np.nanmax(away[mine])))
+    lines = [
+        f"edge between faces {' and '.join(map(str, faces))}: {max(angles):.0f} deg at {len(angles)} points"
+        for faces, angles in sorted(edges.items(), key=lambda item: -len(item[1]))
+        if len(faces) == 2
+    ]
+    return mean, tuple(lines), sharp

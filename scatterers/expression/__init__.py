@@ -1,0 +1,1 @@
+"""Bodies given by an expression: parsing, search of the body, singular points."""

@@ -1,0 +1,210 @@
+"""Safe expressions in x, y, z: parsed by a whitelist, differentiated by sympy, compiled by numba.
+
+The text is walked as a syntax tree and each allowed node is rebuilt as a sympy object, so nothing of the
+text is ever executed; only code that sympy prints from that tree is. where(a < b, c, d) is c where a < b, else d;
+its derivatives are those of the pieces, so pieces must join smoothly.
+"""
+
+import ast
+import math
+import operator
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
+MAX_LENGTH = 2000
+MAX_POWER = 64
+MAX_DEPTH = 120
+LARGEST = 1e12
+_BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_COMPARED: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
+
+
+class Differentiated(NamedTuple):
+    """Functions made from one expression.
+
+    Attributes
+    ----------
+    value, gradient, hessian : callable
+        numpy functions of x, y, z that return 1, 3 and 6 (xx, yy, zz, yz, xz, xy) arrays.
+    block : callable
+        Plain Python of the block evaluator; see `scatterers.kernels.compiled.Compiled`.
+    first : callable
+        Plain Python of (x, y, z, parameters) to the value and the three slopes; parameters are not used.
+    """
+
+    value: Callable[..., Any]
+    gradient: Callable[..., Any]
+    hessian: Callable[..., Any]
+    block: Callable[..., None]
+    first: Callable[..., tuple[float, float, float, float]]
+
+
+def parse(text: str) -> Any:
+    """Turn the text into a sympy expression of x, y, z.
+
+    Raises
+    ------
+    ValueError
+        If the text is none, empty, too long, not an expression, or contains anything that is not on the whitelist.
+    """
+    import sympy
+
+    if not isinstance(text, str):
+        raise ValueError(f"expression {shown(text)} is not text; write one in x, y, z such as '1 + x'")
+    if not text.strip():
+        raise ValueError("the expression is empty; write one in x, y, z such as '1 + x'")
+    if len(text) > MAX_LENGTH:
+        raise ValueError(f"the expression has {len(text)} characters, more than {MAX_LENGTH}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ValueError(f"expression {shown(text)} is not valid: {error}") from None
+    names = {name: sympy.Symbol(name, real=True) for name in "xyz"} | {"pi": sympy.pi}
+
+    def refuse(what: str) -> ValueError:
+        allowed = f"numbers, x, y, z, pi, + - * / **, {', '.join(FUNCTIONS)} and where(x < 0, a, b)"
+        return ValueError(f"expression {shown(text)} contains {what}; allowed are {allowed}")
+
+    def require_moderate(value: Any) -> None:
+        # functions of larger numbers, and towers of powers, would take sympy for ever
+        if value.has(sympy.I, sympy.zoo, sympy.nan, sympy.oo, -sympy.oo):
+            raise refuse("a value that is not real and finite")
+        if value.is_number and not abs(value.evalf(15)) <= LARGEST:
+            raise refuse(f"a number beyond {LARGEST:g}")
+
+    def build(node: ast.expr, depth: int) -> Any:
+        if depth > MAX_DEPTH:
+            raise refuse(f"more than {MAX_DEPTH} nested operations")
+        match node:
+            case ast.Constant(value=bool()):
+                raise refuse(repr(node.value))
+            case ast.Constant(value=int() | float() as number):
+                if abs(number) > LARGEST:
+                    raise refuse(f"the number {shown(number)}, beyond {LARGEST:g}")
+                return sympy.Integer(number) if isinstance(number, int) else sympy.Float(number)
+            case ast.Name(id=name) if name in names:
+                return names[name]
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return -build(operand, depth + 1)
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return build(operand, depth + 1)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+                a, b = build(left, depth + 1), build(right, depth + 1)
+                if isinstance(op, ast.Pow):
+                    require_moderate(a)
+                    require_moderate(b)
+                    if not (b.is_number and abs(float(b)) <= MAX_POWER):
+                        raise refuse(f"a power that is not a number within +-{MAX_POWER}")
+                    # before it is computed
+                    if a.is_number and abs(float(b)) * abs(math.log(abs(float(a)) or 1.0)) > math.log(LARGEST):
+                        raise refuse(f"a number beyond {LARGEST:g}")
+                result = _BINARY[type(op)](a, b)
+                if result.has(sympy.zoo, sympy.nan, sympy.oo, -sympy.oo):
+                    raise refuse("a division by zero")
+                return result
+            case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
+                given = build(argument, depth + 1)
+                require_moderate(given)
+                return getattr(sympy, name)(given)
+            case ast.Call(
+                func=ast.Name(id="where"),
+                args=[ast.Compare(left=left, ops=[op], comparators=[right]), yes, no],
+                keywords=[],
+            ) if type(op) in _COMPARED:
+                low, high = build(left, depth + 1), build(right, depth + 1)
+                require_moderate(low)
+                require_moderate(high)
+                condition = _COMPARED[type(op)](low, high)
+                one, other = build(yes, depth + 1), build(no, depth + 1)
+                return sympy.Piecewise((one, condition), (other, True))
+        raise refuse(f"{ast.unparse(node)[:40]!r}")
+
+    expression = build(tree.body, 0)
+    if expression.has(sympy.I, sympy.zoo, sympy.nan, sympy.oo):
+        raise refuse("a value that is not real and finite")
+    return expression
+
+
+def shown(what: Any) -> str:
+    """Text as error messages quote it."""
+    full = repr(what)
+    return full if len(full) <= 80 else f"{full[:60]}... ({len(full)} characters)"
+
+
+def differentiate(text: str) -> Differentiated:
+    """Parse the text and make numpy functions and a block evaluator of its value, gradient and Hessian.
+
+    Raises
+    ------
+    ValueError
+        As `parse`, and if there is an absolute value in it, the root of a square, which has no second derivative.
+    """
+    # what is no text may not be hashable either
+    return _differentiated(text) if isinstance(text, str) else parse(text)
+
+
+def _shared(parts: Any) -> Any:
+    """Repeated subexpressions with their names, and the parts in terms of them.
+
+    Not `sympy.cse`: it rewrites sums and products first, and in 1.14 it took a sum of exponents for a product.
+    """
+    import sympy
+    from sympy.simplify.cse_main import tree_cse
+
+    return tree_cse(parts, sympy.numbered_symbols("t"))
+
+
+@lru_cache(maxsize=64)
+def _differentiated(text: str) -> Differentiated:
+    import sympy
+    from sympy.printing.pycode import PythonCodePrinter
+
+    expression = parse(text)
+    x, y, z = (sympy.Symbol(name, real=True) for name in "xyz")
+    gradient = [expression.diff(v) for v in (x, y, z)]
+    pairs = [(x, x), (y, y), (z, z), (y, z), (x, z), (x, y)]
+    hessian = [expression.diff(a, b) for a, b in pairs]
+    if any(part.has(sympy.DiracDelta, sympy.Derivative) for part in hessian):
+        corner = next((f"|{a.args[0]}|" for a in expression.atoms(sympy.Abs)), "a corner")
+        raise ValueError(
+            f"expression {shown(text)} contains {corner}, which is not smooth where it vanishes; write it without "
+            "roots of squares, or with where(x < 0, a, b)"
+        )
+
+    shared, reduced = _shared([expression, *gradient, *hessian])
+    printer = PythonCodePrinter({"fully_qualified_modules": True, "standard": "python3"})
+    targets = ["values[i]", *(f"gradients[{k}, i]" for k in range(3)), *(f"hessians[{k}, i]" for k in range(6))]
+    lines = [
+        "def block(points, values, gradients, hessians, parameters):",
+        "    for i in range(points.shape[1]):",
+        "        x, y, z = points[0, i], points[1, i], points[2, i]",
+        *(f"        {symbol} = {printer.doprint(part)}" for symbol, part in shared),
+        *(f"        {target} = {printer.doprint(part)}" for target, part in zip(targets, reduced, strict=True)),
+    ]
+    slopes, of_slopes = _shared([expression, *gradient])
+    lines += [
+        "def first(x, y, z, parameters):",
+        *(f"    {symbol} = {printer.doprint(part)}" for symbol, part in slopes),
+        f"    return {', '.join(f'1.0 * ({printer.doprint(part)})' for part in of_slopes)}",
+    ]
+    space: dict[str, Any] = {"math": math}
+    exec(compile("\n".join(lines), "<expression>", "exec"), space)  # printed by sympy, see the module's head
+
+    def numeric(parts: list[Any]) -> Callable[..., Any]:
+        function: Callable[..., Any] = sympy.lambdify((x, y, z), parts, "numpy", cse=_shared)
+        return function
+
+    return Differentiated(numeric([expression]), numeric(gradient), numeric(hessian), space["block"], space["first"])

@@ -1,0 +1,80 @@
+"""Block evaluators of the bodies, compiled to functions that kernels call by address.
+
+A *level evaluator* fills, for a block of n points, F, grad F and the six Hessian entries
+(xx, yy, zz, yz, xz, xy); a *locator* is given the points with grad F there, and fills chart number, chart
+variables and the isometric frame (rows e1x, e1y, e1z, e2x, e2y, e2z). Of a sphere map x = psi(s), a *forward*
+function fills x and the nine entries of d psi/ds by rows (xx, xy, xz, yx, ...), an *inverse* function fills s,
+of unit length.
+Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.
+numba is imported at the first use, for a quick start: plain Python that several of them call is marked by `helper`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.kernels.cache import discard_stale
+
+Kind = Literal["level", "locator", "forward", "inverse"]
+discard_stale(Path(__file__).parents[1])
+
+F = TypeVar("F", bound=Callable[..., Any])
+# products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+_helpers: list[Callable[..., Any]] = []
+
+
+def helper(function: F) -> F:
+    """Let compiled functions call this plain Python; numba is told at the first compilation."""
+    _helpers.append(function)
+    return function
+
+
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """A block function, compiled when first asked for, and the parameters to call it with.
+
+    Attributes
+    ----------
+    source : callable
+        Plain Python of the function, with the arguments
+        ``(points (3, n), values (n,), gradients (3, n), hessians (6, n), parameters)`` for a level or a speed,
+        ``(points (3, n), gradients (3, n), chart (n,), uv (2, n), frame (6, n), parameters)`` for a locator,
+        ``(s (3, n), points (3, n), derivatives (9, n), parameters)`` for a forward sphere map,
+        ``(points (3, n), s (3, n), parameters)`` for its inverse.
+    kind : {"level", "locator", "forward", "inverse"}
+    parameters : (k,) float64
+    """
+
+    source: Callable[..., None]
+    kind: Kind
+    parameters: NDArray[np.float64]
+
+    @property
+    def function(self) -> Any:
+        """The compiled function, a numba CFunc."""
+        return _compile(self.source, self.kind)
+
+
+@cache
+def _compile(source: Callable[..., None], kind: str) -> Any:
+    from numba import cfunc, types
+    from numba.extending import register_jitable
+
+    while _helpers:
+        register_jitable(**OPTIONS)(_helpers.pop())
+    row, rows = types.float64[::1], types.float64[:, ::1]
+    signature = {
+        "level": types.void(rows, row, rows, rows, row),
+        "locator": types.void(rows, rows, types.int64[::1], rows, rows, row),
+        "forward": types.void(rows, rows, rows, row),
+        "inverse": types.void(rows, rows, row),
+    }[kind]
+    # code made from an expression has no file that numba could cache beside
+    in_file = not source.__code__.co_filename.startswith("<")
+    return cfunc(signature, cache=in_file, **OPTIONS)(source)

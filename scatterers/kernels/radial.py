@@ -1,0 +1,188 @@
+"""Compiled twins of `scatterers.sphere_map.radial.RadialMap`; importing this module imports numba.
+
+Parameters are those of the spline, `scatterers.kernels.spline_constants` says where.
+"""
+
+import math
+
+from numba import njit
+
+from scatterers.kernels.compiled import OPTIONS
+from scatterers.kernels.frames import cube_tangents, fill_frame
+from scatterers.kernels.spline_constants import (
+    AXIS,
+    BOX,
+    CENTRE,
+    DEGREE,
+    HALF_AXES,
+    ITERATIONS,
+    MIDDLE,
+    PER_HALF,
+    REACH,
+    SHIFTS,
+    SMALL,
+)
+from scatterers.kernels.tensor import value_and_gradient
+
+
+@njit(**OPTIONS)
+def _exit(y, parameters):  # type: ignore[no-untyped-def]
+    """Largest r for which c + r y is in the box of the sheared grid."""
+    largest = math.inf
+    for axis in range(3):
+        if y[axis] > 0.0:
+            largest = min(largest, parameters[BOX + 3 + axis] / y[axis])
+        elif y[axis] < 0.0:
+            largest = min(largest, parameters[BOX + axis] / y[axis])
+    return largest
+
+
+@njit(**OPTIONS)
+def _beyond(x, parameters):  # type: ignore[no-untyped-def]
+    """Whether a point is beyond the grid."""
+    for axis in range(3):
+        g = (x[axis] - parameters[3 + axis]) * parameters[6 + axis]
+        if g < 0.0 or g > parameters[axis] - 5.0:
+            return True
+    return False
+
+
+@njit(**OPTIONS)
+def _polynomial(t, start, parameters):  # type: ignore[no-untyped-def]
+    """Value and derivative of a polynomial whose coefficients begin at start."""
+    value, slope = parameters[start + DEGREE], 0.0
+    for m in range(DEGREE - 1, -1, -1):
+        slope = slope * t + value
+        value = value * t + parameters[start + m]
+    return value, slope
+
+
+@njit(**OPTIONS)
+def _spine(w, parameters):  # type: ignore[no-untyped-def]
+    """Shift T(w) - w and its derivative along the spine's axis, which an x in the place of w has too."""
+    per_half = parameters[PER_HALF]
+    if per_half == 0.0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    t = (w[int(parameters[AXIS])] - parameters[MIDDLE]) * per_half
+    if abs(t) > REACH:
+        t, per_half = math.copysign(REACH, t), 0.0
+    x, dx = _polynomial(t, SHIFTS, parameters)
+    y, dy = _polynomial(t, SHIFTS + DEGREE + 1, parameters)
+    z, dz = _polynomial(t, SHIFTS + 2 * DEGREE + 2, parameters)
+    return (x, y, z), (per_half * dx, per_half * dy, per_half * dz)
+
+
+@njit(**OPTIONS)
+def _pulled(g, slope, parameters):  # type: ignore[no-untyped-def]
+    """DT^T g."""
+    axis, along = int(parameters[AXIS]), slope[0] * g[0] + slope[1] * g[1] + slope[2] * g[2]
+    x = g[0] + along if axis == 0 else g[0]
+    y = g[1] + along if axis == 1 else g[1]
+    return x, y, g[2] + along if axis == 2 else g[2]
+
+
+@njit(**OPTIONS)
+def _pushed(v, slope, parameters):  # type: ignore[no-untyped-def]
+    """DT v."""
+    along = v[int(parameters[AXIS])]
+    return v[0] + slope[0] * along, v[1] + slope[1] * along, v[2] + slope[2] * along
+
+
+@njit(**OPTIONS)
+def _at(r, y, parameters):  # type: ignore[no-untyped-def]
+    """x = T(c + r y), the slope of the spine there, F and DT^T grad F."""
+    w = (parameters[CENTRE] + r * y[0], parameters[CENTRE + 1] + r * y[1], parameters[CENTRE + 2] + r * y[2])
+    shift, slope = _spine(w, parameters)
+    x = (w[0] + shift[0], w[1] + shift[1], w[2] + shift[2])
+    value, gx, gy, gz = value_and_gradient(x[0], x[1], x[2], parameters)
+    return x, slope, value, _pulled((gx, gy, gz), slope, parameters)
+
+
+@njit(**OPTIONS)
+def _radius(y, parameters):  # type: ignore[no-untyped-def]
+    """Root r of F(T(c + r y)), NaN if none is found."""
+    low, high = 0.0, _exit(y, parameters)
+    r = 1.0 if high > 1.0 else 0.5 * high
+    for _ in range(ITERATIONS):
+        x, _, value, g = _at(r, y, parameters)
+        if _beyond(x, parameters):
+            value = math.inf
+        if value > 0.0:
+            high = min(high, r)
+        else:
+            low = max(low, r)
+        step = -value / (g[0] * y[0] + g[1] * y[1] + g[2] * y[2])
+        if abs(step) <= SMALL * r:
+            return r + step
+        inside = r + step > low and r + step < high
+        r = r + step if inside else 0.5 * (low + high)
+    return math.nan
+
+
+def forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def]
+    """Points and derivatives of psi for a block; the compiled twin of forward and derivative."""
+    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    for i in range(s.shape[1]):
+        y = (a * s[0, i], b * s[1, i], c * s[2, i])
+        r = _radius(y, parameters)
+        # the gradient anew: at the last iterate it is off by a Newton step
+        x, slope, _, g = _at(r, y, parameters)
+        scale = r / (g[0] * y[0] + g[1] * y[1] + g[2] * y[2])
+        gx, gy, gz = scale * a * g[0], scale * b * g[1], scale * c * g[2]
+        points[0, i], points[1, i], points[2, i] = x
+        column = _pushed((r * a - y[0] * gx, -y[1] * gx, -y[2] * gx), slope, parameters)
+        derivatives[0, i], derivatives[3, i], derivatives[6, i] = column
+        column = _pushed((-y[0] * gy, r * b - y[1] * gy, -y[2] * gy), slope, parameters)
+        derivatives[1, i], derivatives[4, i], derivatives[7, i] = column
+        column = _pushed((-y[0] * gz, -y[1] * gz, r * c - y[2] * gz), slope, parameters)
+        derivatives[2, i], derivatives[5, i], derivatives[8, i] = column
+
+
+def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
+    """psi^-1 of a block; the compiled twin of inverse.
+
+    The shift is not taken from `_spine` so that the loops are vectorised; each touches few rows for the same reason.
+    """
+    a, b, c = 1 / parameters[HALF_AXES], 1 / parameters[HALF_AXES + 1], 1 / parameters[HALF_AXES + 2]
+    spine, middle, per_half = int(parameters[AXIS]), parameters[MIDDLE], parameters[PER_HALF]
+    n = points.shape[1]
+    for axis in range(3):
+        centre, start = parameters[CENTRE + axis], SHIFTS + axis * (DEGREE + 1)
+        if per_half == 0.0 or axis == spine:
+            for i in range(n):
+                s[axis, i] = points[axis, i] - centre
+            continue
+        c0, c1, c2, c3 = parameters[start], parameters[start + 1], parameters[start + 2], parameters[start + 3]
+        c4, c5, c6 = parameters[start + 4], parameters[start + 5], parameters[start + 6]
+        for i in range(n):
+            t = (points[spine, i] - middle) * per_half
+            t = -REACH if t < -REACH else t
+            t = REACH if t > REACH else t
+            shift = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))))
+            s[axis, i] = points[axis, i] - shift - centre
+    for i in range(n):
+        x, y, z = a * s[0, i], b * s[1, i], c * s[2, i]
+        scale = 1.0 / math.sqrt(x * x + y * y + z * z)
+        s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z
+
+
+def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
+    """Chart, chart variables and isometric frame of points on the body; the compiled twin of locate and polar_frame.
+
+    The frame does not see the factor r of d psi/ds, nor the length of y, so w - c serves for y.
+    """
+    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        shift, slope = _spine((x, y, z), parameters)
+        gx, gy, gz = _pulled((gradients[0, i], gradients[1, i], gradients[2, i]), slope, parameters)
+        x -= shift[0] + parameters[CENTRE]
+        y -= shift[1] + parameters[CENTRE + 1]
+        z -= shift[2] + parameters[CENTRE + 2]
+        chart[i], uv[0, i], uv[1, i], tx, ty, tz, wx, wy, wz = cube_tangents(x / a, y / b, z / c)
+        tx, ty, tz, wx, wy, wz = a * tx, b * ty, c * tz, a * wx, b * wy, c * wz
+        scale = 1.0 / (gx * x + gy * y + gz * z)
+        t, w = scale * (gx * tx + gy * ty + gz * tz), scale * (gx * wx + gy * wy + gz * wz)
+        tx, ty, tz = _pushed((tx - t * x, ty - t * y, tz - t * z), slope, parameters)
+        wx, wy, wz = _pushed((wx - w * x, wy - w * y, wz - w * z), slope, parameters)
+        fill_frame(frame, i, tx, ty, tz, wx, wy, wz)

@@ -1,0 +1,1 @@
+"""Maps from the unit sphere to star-shaped bodies."""

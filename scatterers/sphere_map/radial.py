@@ -1,0 +1,244 @@
+"""Sphere map of a body that is star-shaped once its spine is upright: x = psi(s) = T(c + r(s) A s).
+
+A = diag(half axes), r > 0 the root of F(T(c + r A s)) = 0, and T a shear along the spine, in cyclic axes whose third is
+the body's longest,
+
+    T(w) = w + (X(w_3), Y(w_3), 0),   T^-1(x) = x - (X(x_3), Y(x_3), 0);
+
+an upright body has T = 1. With y = A s and g = DT^T grad F(x): d psi/ds = r DT (A - y (A g)^T/(g.y)), and
+psi^-1(x) = A^-1 (w - c)/|A^-1 (w - c)|, w = T^-1(x). Every ray meets the body once where g.(w - c) > 0 on all of it.
+The root is found by Newton steps from r = 1, halved into the bracket when they leave it; beyond the grid counts as
+outside the body. `scatterers.kernels.radial` is the compiled twin.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.polynomial import polynomial
+from numpy.typing import NDArray
+
+from scatterers.kernels.compiled import Compiled
+from scatterers.kernels.spline_constants import DEGREE, ITERATIONS, REACH, SMALL
+from scatterers.spline.tensor import evaluated
+
+FloatArray = NDArray[np.float64]
+# centroids this near to a parallel of the axis, in half widths, make no spine
+UPRIGHT = 0.01
+
+
+class SpaceLevel(Protocol):
+    """F in a box of space, as a sphere map needs it."""
+
+    @property
+    def box(self) -> FloatArray:
+        """Box (2, 3) in which F is known, L."""
+        ...
+
+    def flat(self, of_map: FloatArray) -> FloatArray:
+        """Parameters of the compiled functions, those of a map among them."""
+        ...
+
+    @property
+    def sources(self) -> Mapping[str, Callable[..., None]]:
+        """Plain Python of its "level" and of the "forward" sphere map over it; see `kernels.compiled`."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Spine:
+    """Shift across one axis as polynomials of the place along it, constant from `REACH` times their range on.
+
+    Attributes
+    ----------
+    axis : int
+        The axis along which the spine runs.
+    middle, half : float
+        The range middle +- half of that coordinate, L.
+    shifts : (DEGREE + 1, 3)
+        Coefficients of the powers of (x_axis - middle)/half for the shifts along x, y and z, L; zero along the axis.
+    """
+
+    axis: int
+    middle: float
+    half: float
+    shifts: FloatArray
+
+    @property
+    def upright(self) -> bool:
+        """Whether there is no shift."""
+        return not np.any(self.shifts)
+
+    def shift(self, points: FloatArray) -> FloatArray:
+        """T(w) - w = x - T^-1(x): (..., 3) -> (..., 3)."""
+        t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
+        return np.moveaxis(np.asarray(polynomial.polyval(t.clip(-REACH, REACH), self.shifts)), 0, -1)
+
+    def slope(self, points: FloatArray) -> FloatArray:
+        """Derivative of the shift along the axis: (..., 3) -> (..., 3)."""
+        t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
+        found = polynomial.polyval(t.clip(-REACH, REACH), polynomial.polyder(self.shifts)) / self.half
+        return np.moveaxis(np.where(np.abs(t) > REACH, 0.0, found), 0, -1)
+
+    def pulled(self, points: FloatArray, gradient: FloatArray) -> FloatArray:
+        """DT^T grad F at points w or x: (..., 3) -> (..., 3)."""
+        out = gradient.copy()
+        out[..., self.axis] += np.sum(self.slope(points) * gradient, axis=-1)
+        return out
+
+    @classmethod
+    def through(cls, inside: NDArray[np.bool_], origin: FloatArray, spacing: FloatArray) -> "Spine":
+        """Least-squares spine of the slices of the nodes inside a body, weighted by their areas.
+
+        A shift within `UPRIGHT` of a constant, by the weighted mean square, is left out.
+        """
+        where = np.argwhere(inside)
+        low, high = where.min(0), where.max(0)
+        axis = int(np.argmax((high - low + 1) * spacing))
+        middle, half = 0.5 * (low + high) * spacing + origin, 0.5 * (high - low + 1) * spacing
+        area = np.bincount(where[:, axis], minlength=inside.shape[axis])
+        slices = np.flatnonzero(area)
+        area = area[slices]
+        t = (origin[axis] + slices * spacing[axis] - middle[axis]) / half[axis]
+        root, shifts = np.sqrt(area), np.zeros((DEGREE + 1, 3))
+        # few slices determine few coefficients
+        degree = min(DEGREE, len(slices) // 2)
+        for across in (axis - 1, axis - 2):
+            centroid = np.bincount(where[:, axis], where[:, across])[slices] / area * spacing[across] + origin[across]
+            off = centroid - np.average(centroid, weights=area)
+            if np.sqrt(np.average(off**2, weights=area)) > UPRIGHT * half[across]:
+                shifts[: degree + 1, across] = polynomial.polyfit(t, centroid, degree, w=root)
+        return cls(axis, float(middle[axis]), float(half[axis]), shifts)
+
+    @classmethod
+    def none(cls) -> "Spine":
+        """No shift."""
+        return cls(2, 0.0, 1.0, np.zeros((DEGREE + 1, 3)))
+
+
+@dataclass(frozen=True, eq=False)
+class RadialMap:
+    """The map over an F known in a box; satisfies `scatterers.atlas.charts.SphereMap`.
+
+    Attributes
+    ----------
+    space : SpaceLevel
+    centre, half_axes : (3,), L
+        Of the body with upright spine.
+    spine : Spine
+    iterative : bool
+        That psi is a search for a root: users who evaluate it often had better tabulate it.
+    """
+
+    space: SpaceLevel
+    centre: FloatArray
+    half_axes: FloatArray
+    spine: Spine
+    iterative = True
+
+    @cached_property
+    def box(self) -> FloatArray:
+        """Box (2, 3) about the centre that contains the sheared grid, L."""
+        ends = np.repeat(np.linspace(-REACH, REACH, 129)[:, None], 3, axis=1) * self.spine.half + self.spine.middle
+        shift = self.spine.shift(ends)
+        return np.asarray(self.space.box - self.centre - np.stack([shift.max(0), shift.min(0)]))
+
+    def radius(self, s: FloatArray) -> FloatArray:
+        """Root r of the rays along unit vectors: (..., 3) -> (...); NaN where none is found."""
+        y = self.half_axes * np.asarray(s, dtype=float).reshape(-1, 3)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            high = np.min(np.where(y > 0, self.box[1] / y, np.where(y < 0, self.box[0] / y, np.inf)), axis=-1)
+        low, r = np.zeros(len(y)), np.where(high > 1, 1.0, 0.5 * high)
+        found = np.full(len(y), np.nan)
+        active = np.flatnonzero(np.isfinite(high))
+        for _ in range(ITERATIONS):
+            if not len(active):
+                break
+            at, along = r[active], y[active]
+            value, slope = self._along(at, along)
+            high[active] = np.where(value > 0, np.minimum(high[active], at), high[active])
+            low[active] = np.where(value > 0, low[active], np.maximum(low[active], at))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = -value / slope
+            small = np.abs(step) <= SMALL * at
+            inside = (at + step > low[active]) & (at + step < high[active])
+            r[active] = np.where(small | inside, at + step, 0.5 * (low[active] + high[active]))
+            found[active[small]] = r[active[small]]
+            active = active[~small]
+        return found.reshape(np.shape(s)[:-1])
+
+    def _along(self, r: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """F, infinite beyond the grid, and its derivative by r at T(c + r y)."""
+        w = self.centre + r[:, None] * y
+        x = w + self.spine.shift(w)
+        value, gradient, _ = evaluated(self.compiled_level, x)
+        if not self.spine.upright:
+            box = self.space.box
+            value = np.where(np.any((x < box[0]) | (x > box[1]), axis=-1), np.inf, value)
+        return value, np.sum(self.spine.pulled(w, gradient) * y, axis=-1)
+
+    def facing(self, points: FloatArray) -> FloatArray:
+        """g.(w - c) at points of the body, positive where rays leave it: (..., 3) -> (...)."""
+        _, gradient, _ = evaluated(self.compiled_level, points)
+        y = points - self.spine.shift(points) - self.centre
+        return np.asarray(np.sum(self.spine.pulled(points, gradient) * y, axis=-1))
+
+    def forward(self, s: FloatArray) -> FloatArray:
+        """psi(s): (..., 3) -> (..., 3)."""
+        w = self.centre + self.radius(s)[..., None] * self.half_axes * s
+        return np.asarray(w + self.spine.shift(w))
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Derivative of psi: (..., 3) -> (..., 3, 3)."""
+        r, y = self.radius(s), self.half_axes * s
+        w = self.centre + r[..., None] * y
+        _, gradient, _ = evaluated(self.compiled_level, w + self.spine.shift(w))
+        g = self.spine.pulled(w, gradient)
+        slope = g * self.half_axes / np.sum(g * y, axis=-1, keepdims=True)
+        inner = r[..., None, None] * (np.diag(self.half_axes) - y[..., :, None] * slope[..., None, :])
+        return np.asarray(inner + self.spine.slope(w)[..., :, None] * inner[..., None, self.spine.axis, :])
+
+    def inverse(self, points: FloatArray) -> FloatArray:
+        """psi^-1(x), of unit length: (..., 3) -> (..., 3)."""
+        points = np.asarray(points, dtype=float)
+        s = (points - self.spine.shift(points) - self.centre) / self.half_axes
+        return np.asarray(s / np.linalg.norm(s, axis=-1, keepdims=True))
+
+    @cached_property
+    def parameters(self) -> FloatArray:
+        """Parameters that all compiled functions share."""
+        return self.space.flat(self.header)
+
+    @cached_property
+    def header(self) -> FloatArray:
+        """Parameters of the map, as `scatterers.kernels.spline_constants` orders them."""
+        spine = self.spine
+        along = [spine.axis, spine.middle, 0.0 if spine.upright else 1 / spine.half]
+        parts = [self.centre, self.half_axes, np.array(along, dtype=float), spine.shifts.T.ravel(), self.box.ravel()]
+        return np.concatenate(parts)
+
+    @cached_property
+    def compiled_level(self) -> Compiled:
+        """Compiled F, grad F and Hessian."""
+        return Compiled(self.space.sources["level"], "level", self.parameters)
+
+    @cached_property
+    def compiled_forward(self) -> Compiled:
+        """Compiled psi and its derivative."""
+        return Compiled(self.space.sources["forward"], "forward", self.parameters)
+
+    @cached_property
+    def compiled_inverse(self) -> Compiled:
+        """Compiled psi^-1."""
+        from scatterers.kernels.radial import inverse
+
+        return Compiled(inverse, "inverse", self.parameters)
+
+    @cached_property
+    def compiled_locator(self) -> Compiled:
+        """Compiled locator of the six charts over psi."""
+        from scatterers.kernels.radial import locate
+
+        return Compiled(locate, "locator", self.parameters)

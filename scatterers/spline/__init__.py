@@ -1,0 +1,1 @@
+"""Quintic tensor-product splines F(x), and their fit to points and normals."""

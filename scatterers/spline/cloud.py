@@ -1,0 +1,98 @@
+"""Points of a body F = 0, about evenly spread: where F changes sign along the edges of a cubic grid, put on the body.
+
+An edge from node a to node b with F of both signs gives x = a + F(a)/(F(a) - F(b)) (b - a); then Newton steps
+x <- x - F grad F/|grad F|^2, none longer than a cell. Edges that meet near one node give points close together, of
+which one a voxel of half a cell is kept. Their number goes with 1/spacing^2: a first grid tells which one to take.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.spline.samples import edge_crossings
+
+FloatArray = NDArray[np.float64]
+Field = Callable[[FloatArray], FloatArray]
+# cells of the first grid, along the side of a cube of the box's volume
+COARSE = 24
+# nodes of the largest grid
+MOST = 30_000_000
+NEWTON = 30
+# a Newton step this small, in units of the longest, squares to rounding
+SMALL = 1e-7
+
+
+def body_cloud(level: Field, gradient: Field, box: FloatArray, count: int) -> FloatArray:
+    """About ``count`` points (n, 3) of a body inside its box (2, 3), more if it is thin.
+
+    Parameters
+    ----------
+    level, gradient : callable
+        F and its gradient, (..., 3) -> (...) and (..., 3).
+    box : (2, 3), L
+    count : int
+
+    Raises
+    ------
+    ValueError
+        If F has no sign change in the box, is not smooth on the body, or so many points ask for too large a grid.
+    """
+    box = np.asarray(box, dtype=float)
+    side = box[1] - box[0]
+    # a thin body passes between the nodes of a coarser grid
+    longest = 0.4 * float(side.min())
+    spacing = min(float(np.prod(side)) ** (1 / 3) / COARSE, longest)
+    for _ in range(4):
+        if np.prod(side / spacing + 4) > MOST:
+            raise ValueError(
+                f"{count} points ask for a grid of more than {MOST} nodes; ask for fewer, or a smaller box"
+            )
+        # the shift keeps nodes off planes of symmetry, where F is often exactly 0
+        origin = box[0] - (1 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing
+        axes = [origin[k] + spacing * np.arange(int(side[k] / spacing) + 4) for k in range(3)]
+        # plane by plane, so that large grids do not fill the memory
+        planes = [level(np.stack(np.broadcast_arrays(x, axes[1][:, None], axes[2]), axis=-1)) for x in axes[0]]
+        points = sign_changes(np.stack(planes), origin, np.full(3, spacing))
+        if not len(points):
+            raise ValueError("F has no sign change in its box: no body; check the box and F")
+        if 0.9 * count < len(points) < 1.1 * count:
+            break
+        # not straight to a much finer grid: a coarse one may have missed parts
+        spacing = min(spacing * np.clip(np.sqrt(len(points) / count), 0.2, 5.0), longest)
+    return onto(level, gradient, points, spacing)
+
+
+def sign_changes(values: FloatArray, origin: FloatArray, spacing: FloatArray) -> FloatArray:
+    """Points (n, 3) where F changes sign on a grid of samples (n0, n1, n2), one in each voxel of half a cell."""
+    index = edge_crossings(values)
+    voxel = np.floor(2 * index).astype(np.int64)
+    shape = 2 * np.array(values.shape, dtype=np.int64)
+    _, first = np.unique((voxel[:, 0] * shape[1] + voxel[:, 1]) * shape[2] + voxel[:, 2], return_index=True)
+    return np.asarray(origin + index[first] * spacing)
+
+
+def onto(level: Field, gradient: Field, points: FloatArray, reach: float) -> FloatArray:
+    """Points (n, 3) brought onto F = 0 by Newton steps of at most ``reach`` each.
+
+    Raises
+    ------
+    ValueError
+        If one finds no zero of F.
+    """
+    points = points.copy()
+    active = np.arange(len(points))
+    for _ in range(NEWTON):
+        x = points[active]
+        slope = gradient(x)
+        norm = np.linalg.norm(slope, axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = level(x) / norm
+            points[active] = x - (np.clip(distance, -reach, reach) / norm)[:, None] * slope
+        active = active[~(np.abs(distance) < SMALL * reach)]
+        if not len(active):
+            return points
+    raise ValueError(
+        f"{len(active)} of {len(points)} points found no zero of F (first near {points[active[0]].round(4).tolist()}); "
+        "F must be smooth with grad F != 0 on the body"
+    )

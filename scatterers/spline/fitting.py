@@ -1,0 +1,361 @@
+"""Smooth F from points and normals of a body: least squares of a quintic tensor-product B-spline.
+
+In cells of the grid, f = F/h with spacing h, the coefficients c minimise
+
+    sum_v f(v)^2 + w |grad f(v) - n|^2 + OFFSET_WEIGHT (f(v + n) - 1)^2 + OFFSET_WEIGHT (f(v - n) + 1)^2
+    + smoothing sum |fourth differences of c along each axis|^2,
+
+w the weight of the normals, v and n in cells: F is near the signed distance within a cell of the body, which holds
+what the points alone leave free; where it is thinner than that, the distance stands for 1. Only coefficients that a
+sample sees are unknown; the others keep the distance that the solver starts from. The normal equations are solved by
+conjugate gradients, preconditioned by S D^-1 S: S = B^-1 takes coefficients to the cardinal basis (B samples the
+B-splines at the nodes), in which the equations are nearly diagonal, D is the density of the samples about each node,
+raised by a floor. Steps are few if they start from a good distance: those left to the end change what the samples
+hardly see.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.kernels.spline_constants import OVERREAD
+from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated, weights
+
+FloatArray = NDArray[np.float64]
+OFFSET_WEIGHT = 0.01
+"""Of the samples at one cell's distance from the body."""
+THIN = 0.2
+"""Cells by which the distance of such a sample may differ from one before the body counts as thin there."""
+OFFSET_STRIDE = 3
+"""Every so many points have such samples."""
+SMOOTHING = 1e-8
+FLOOR = 0.03
+"""Of the density, in units of the largest: what the equations leave nearly free must not dominate the steps."""
+PADDING = 5.0
+"""Cells between the body and the faces of the grid."""
+NEAR = 7.0
+"""Cells from the points within which a given distance is asked for: beyond, no sample sees what is there."""
+QUASI = np.array([13, -112, 438, -112, 13]) / 240
+MAX_NODES = 8_000_000
+ITERATIONS = 480
+CHECKED = 60
+"""Iterations from one look at the curvature to the next."""
+LOST = 2.5
+"""How much worse than the best the curvatures of the F that is taken may be: points and normals gain by every step."""
+WATCHED = 2000
+"""Points at which it is looked at."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A spline with what its fit tells.
+
+    Attributes
+    ----------
+    spline : TensorSpline
+    spacing : float
+        Of the grid, L.
+    iterations : int
+    change : float
+        Rms change of the principal curvatures over the last `CHECKED` iterations, 1/L.
+    misfit : float
+        Rms of F/|grad F| at the points, L.
+    turn : float
+        Rms angle between grad F and the normals at the points, radians.
+    """
+
+    spline: TensorSpline
+    spacing: float
+    iterations: int
+    change: float
+    misfit: float
+    turn: float
+
+
+def fit(
+    points: FloatArray,
+    normals: FloatArray,
+    spacing: float,
+    *,
+    distance: Callable[[FloatArray], FloatArray] | None = None,
+    trusted: NDArray[np.bool_] | None = None,
+    mean_curvature: FloatArray | None = None,
+    smoothing: float = SMOOTHING,
+    normal_weight: float = 1.0,
+    accuracy: float = 5e-5,
+    say: Callable[[str], None] = lambda _: None,
+) -> Fitted:
+    """Fit F to points (n, 3) of a closed body, L, and outward unit normals (n, 3) there.
+
+    Parameters
+    ----------
+    spacing : float
+        h, L; about 1.6 to 2 distances between neighbouring points.
+    distance : callable, optional
+        Signed distance from the body to start from, (m, 3) -> (m,); NaN where it is not known.
+    trusted : (n,) bool, optional
+        Points that are fitted, by default all; at the others F stays near the distance that it starts from.
+    mean_curvature : (n,), 1/L, optional
+        Mean curvature at the points by another route, NaN where it is not known. Steps towards the points first add
+        ripples and only then remove them: the last F is taken that agrees with it nearly as well as the best one.
+    smoothing : float
+        Weight of the fourth differences; noisy points need more.
+    normal_weight : float
+        Weight of grad f = n; less where points are noisy, and normals that come of them more so.
+    accuracy : float
+        Change of the curvatures over `CHECKED` iterations, relative to their rms, at which the solver stops.
+    say : callable
+        Told what is being done.
+
+    Raises
+    ------
+    ValueError
+        If the grid would have more than `MAX_NODES` nodes.
+    """
+    equations = _Equations(points, normals, spacing, smoothing, normal_weight, trusted)
+    c = equations.start(distance)
+    watch = _Watch(equations, mean_curvature)
+    r = equations.residual(c, targets=True)
+    z = equations.preconditioned(r)
+    p, rz = z.copy(), float(np.vdot(r, z))
+    before, change, done = watch.curvatures(c), np.inf, 0
+    best, kept = watch.off(before), c.copy()
+    while done < ITERATIONS and rz > 0:
+        q = equations.residual(p, targets=False)
+        step = -rz / float(np.vdot(p, q))
+        c += step * p
+        r += step * q
+        z = equations.preconditioned(r)
+        last, rz = rz, float(np.vdot(r, z))
+        p = z + (rz / last) * p
+        done += 1
+        if done % CHECKED:
+            continue
+        now = watch.curvatures(c)
+        change = float(np.sqrt(np.mean((now - before) ** 2)))
+        scale = float(np.sqrt(np.mean(now**2)))
+        say(f"fitting: {done} iterations, curvatures changing by {change / scale:.1e}")
+        before, off = now, watch.off(now)
+        best = min(best, off)
+        if off <= LOST * best:
+            kept = c.copy()
+        elif done > CHECKED:
+            break
+        if change <= accuracy * scale:
+            break
+    return equations.result(kept if watch.guided else c, done, change / spacing)
+
+
+def spacing_of(points: FloatArray, nodes: float) -> float:
+    """Spacing at which the grid about points (n, 3) has so many nodes, L."""
+    side = np.ptp(points, axis=0)
+    low, high = 0.0, float(side.max())
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        fewer = np.prod(side / middle + 2 * PADDING + 5) < nodes
+        low, high = (low, middle) if fewer else (middle, high)
+    return high
+
+
+class _Equations:
+    """Samples and operators of one fit, in cells; coefficients are flat with `OVERREAD` numbers behind."""
+
+    def __init__(
+        self,
+        points: FloatArray,
+        normals: FloatArray,
+        spacing: float,
+        smoothing: float,
+        normal_weight: float,
+        trusted: NDArray[np.bool_] | None = None,
+    ) -> None:
+        from scipy.spatial import cKDTree
+
+        low, high = points.min(0) - PADDING * spacing, points.max(0) + PADDING * spacing
+        nodes = np.ceil((high - low) / spacing).astype(np.int64) + 1
+        self.shape = tuple(int(n) + 4 for n in nodes)
+        if np.prod(np.array(self.shape, dtype=float)) > MAX_NODES:
+            raise ValueError(
+                f"a grid of {' x '.join(map(str, nodes))} nodes with spacing {spacing:.3g} has more than {MAX_NODES}; "
+                "give a coarser mesh or a larger spacing"
+            )
+        self.points, self.normals, self.spacing, self.smoothing = points, normals, spacing, smoothing
+        self.low, self.normal_weight = low, normal_weight
+        self.tree = cKDTree(points)
+        # in the order of the cells, so that neighbouring samples find their coefficients in the cache
+        self.fitted = slice(None) if trusted is None else trusted
+        points, normals = points[self.fitted], normals[self.fitted]
+        places = (points - low) / spacing
+        order = np.lexsort(places.astype(np.int64).T[::-1])
+        places, self.sorted_normals = places[order], np.ascontiguousarray(normals[order])
+        some = slice(None, None, OFFSET_STRIDE)
+        self.samples = [places, *(np.ascontiguousarray((places + k * self.sorted_normals)[some]) for k in (1, -1))]
+        self.targets = [np.zeros(len(places)), *(self._offset_targets(k) for k in (1, -1))]
+        self.unknown = self._seen()
+        one = np.array([1, 26, 66, 26, 1]) / 120
+        sampling = [sum(np.diag(np.full(n - abs(k), one[k + 2]), k) for k in range(-2, 3)) for n in self.shape]
+        self.cardinal = [np.linalg.inv(matrix) for matrix in sampling]
+        density = self._density()
+        # 70 is the square sum of a fourth difference's weights
+        self.divisor = density + FLOOR * density.max() + 210 * smoothing
+
+    def _plane_distance(self, where: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance (m,) to the tangent plane at the nearest point, far from it to the point; and to the point, L."""
+        off, nearest = self.tree.query(where)
+        plane = np.sum((where - self.points[nearest]) * self.normals[nearest], axis=1)
+        return np.where(np.abs(plane) > 0.5 * off, plane, np.copysign(off, plane)), off
+
+    def _offset_targets(self, k: int) -> FloatArray:
+        """f at the samples a cell outside (k = 1) or inside (k = -1) the body: k, or less where it is thin."""
+        distance = self._plane_distance(self.low + self.spacing * self.samples[k])[0] / self.spacing
+        return np.where(np.abs(distance - k) < THIN, float(k), distance)
+
+    def start(self, distance: Callable[[FloatArray], FloatArray] | None) -> FloatArray:
+        """Coefficients of the distance near the body, where it is given, and else of that to the nearest tangent plane.
+
+        Far from a plane's point, of the distance to that point. Coefficients follow from values at the nodes by the
+        quasi-interpolant QUASI, which reproduces quintics and reaches two nodes only: kinks far off stay there.
+        """
+        from scipy.ndimage import convolve1d
+
+        axes = [self.low[k] + self.spacing * (np.arange(self.shape[k]) - 2.0) for k in range(3)]
+        where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        values, off = self._plane_distance(where)
+        if distance is not None:
+            near = np.flatnonzero(off < NEAR * self.spacing)
+            found = distance(where[near])
+            # a foot that is farther off than the nearest point is none
+            good = np.abs(found) <= off[near] * (1 + 1e-9)
+            values[near[good]] = found[good]
+        c = values.reshape(self.shape) / self.spacing
+        for axis in range(3):
+            c = convolve1d(c, QUASI, axis=axis, mode="nearest")
+        return np.concatenate([c.ravel(), np.zeros(OVERREAD)])
+
+    def residual(self, c: FloatArray, *, targets: bool) -> FloatArray:
+        """A^T W (b - A c) less the smoothing's gradient, b = 0 unless targets; zero where c is not unknown."""
+        from scatterers.kernels.normal_equations import accumulate
+
+        out = np.zeros_like(c)
+        shape = np.array(self.shape, dtype=np.int64)
+        flat = np.zeros_like(self.sorted_normals)
+        for k, (places, values) in enumerate(zip(self.samples, self.targets, strict=True)):
+            weight = np.array([OFFSET_WEIGHT, 0.0] if k else [1.0, self.normal_weight])
+            slopes = self.sorted_normals if targets and not k else flat
+            accumulate(places, values if targets else np.zeros(len(places)), slopes, weight, shape, c, out)
+        grid, total = c[:-OVERREAD].reshape(self.shape), out[:-OVERREAD].reshape(self.shape)
+        for axis in range(3):
+            fourth = np.moveaxis(self.smoothing * np.diff(grid, 4, axis=axis), axis, 0)
+            along = np.moveaxis(total, axis, 0)
+            for k, weight_of in enumerate((1, -4, 6, -4, 1)):
+                along[k : k + len(fourth)] -= weight_of * fourth
+        total *= self.unknown
+        out[-OVERREAD:] = 0.0
+        return out
+
+    def preconditioned(self, r: FloatArray) -> FloatArray:
+        """S D^-1 S r on the unknown coefficients."""
+        z = self._cardinal(self._cardinal(r[:-OVERREAD].reshape(self.shape)) / self.divisor) * self.unknown
+        return np.concatenate([z.ravel(), np.zeros(OVERREAD)])
+
+    def _cardinal(self, values: FloatArray) -> FloatArray:
+        for axis in range(3):
+            values = np.moveaxis(np.tensordot(self.cardinal[axis], values, axes=(1, axis)), 0, axis)
+        return values
+
+    def _seen(self) -> NDArray[np.bool_]:
+        """Coefficients that some sample sees."""
+        from scipy.ndimage import binary_dilation
+
+        seen = np.zeros(self.shape, dtype=bool)
+        for places in self.samples:
+            seen[tuple(places.astype(np.int64).T)] = True
+        # a sample of cell k sees coefficients k..k + 5
+        return np.asarray(binary_dilation(seen, np.ones((6, 6, 6)), origin=-1 * np.ones(3, dtype=int)))
+
+    def _density(self) -> FloatArray:
+        """Weights of the samples about each node, by hats three cells wide."""
+        size = int(np.prod(self.shape))
+        strides = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
+        total = np.zeros(size)
+        for weight, places in zip(
+            (1 + 3 * self.normal_weight, OFFSET_WEIGHT, OFFSET_WEIGHT), self.samples, strict=True
+        ):
+            nearest = np.rint(places).astype(np.int64)
+            for shift in np.ndindex(3, 3, 3):
+                node = nearest + np.array(shift) - 1
+                hat = weight * np.prod(1 - np.abs(places - node) / 1.5, axis=1)
+                total += np.bincount((node + 2) @ strides, np.maximum(hat, 0.0), minlength=size)
+        return total.reshape(self.shape)
+
+    def spline(self, c: FloatArray) -> TensorSpline:
+        values = np.ascontiguousarray(c[:-OVERREAD].reshape(self.shape)) * self.spacing
+        return TensorSpline(values, self.low, np.full(3, self.spacing))
+
+    def result(self, c: FloatArray, iterations: int, change: float) -> Fitted:
+        """The spline, and what is left at the points."""
+        spline = self.spline(c)
+        value, gradient, _ = evaluated(spline.compiled, self.points[self.fitted])
+        slope = np.linalg.norm(gradient, axis=1)
+        turn = np.linalg.norm(gradient / slope[:, None] - self.normals[self.fitted], axis=1)
+        misfit = float(np.sqrt(np.mean((value / slope) ** 2)))
+        return Fitted(spline, self.spacing, iterations, change, misfit, float(np.sqrt(np.mean(turn**2))))
+
+
+def tangents(normals: FloatArray) -> FloatArray:
+    """Two orthonormal tangents at unit normals: (n, 3) -> (2, n, 3)."""
+    e = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    e /= np.linalg.norm(e, axis=1, keepdims=True)
+    return np.stack([e, np.cross(normals, e)])
+
+
+class _Watch:
+    """Curvatures at some of the points, by which the progress of a fit is judged."""
+
+    def __init__(self, equations: _Equations, mean_curvature: FloatArray | None) -> None:
+        self.equations = equations
+        at, n = equations.points[equations.fitted], equations.normals[equations.fitted]
+        self.guided = mean_curvature is not None
+        guide = np.zeros(len(at)) if mean_curvature is None else mean_curvature[equations.fitted]
+        known = np.flatnonzero(np.isfinite(guide))
+        known = known[:: max(1, len(known) // WATCHED)]
+        self.at, n, self.guide = at[known], n[known], guide[known] * equations.spacing
+        self.tangents = tangents(n)
+
+    def curvatures(self, c: FloatArray) -> FloatArray:
+        """Curvature along two orthogonal tangents, in 1/cells: (2, n)."""
+        _, gradient, hessian = evaluated(self.equations.spline(c).compiled, self.at)
+        bent = np.einsum("kni,nij,knj->kn", self.tangents, hessian[:, SYMMETRIC], self.tangents)
+        return np.asarray(self.equations.spacing * bent / np.linalg.norm(gradient, axis=1))
+
+    def off(self, curvatures: FloatArray) -> float:
+        """Rms difference from the mean curvature that was given; 0 without one."""
+        if not self.guided:
+            return 0.0
+        return float(np.sqrt(np.mean((curvatures.mean(axis=0) - self.guide) ** 2)))
+
+
+def accumulate_numpy(
+    places: FloatArray,
+    values: FloatArray,
+    slopes: FloatArray,
+    weight: FloatArray,
+    shape: NDArray[np.int64],
+    c: FloatArray,
+    out: FloatArray,
+) -> float:
+    """Numpy twin of `scatterers.kernels.normal_equations.accumulate`."""
+    cell = places.astype(np.int64)
+    w = weights(places - cell, 1)
+    value, slope = w[..., 0], w[..., 1]
+    steps = np.arange(6)
+    i, j, k = (cell[:, axis, None] + steps for axis in range(3))
+    index = (i[:, :, None, None] * shape[1] + j[:, None, :, None]) * shape[2] + k[:, None, None, :]
+    triples = [(value, value, value), (slope, value, value), (value, slope, value), (value, value, slope)]
+    rows = np.stack([np.einsum("na,nb,nc->nabc", a[:, 0], b[:, 1], d[:, 2]) for a, b, d in triples], axis=1)
+    left = np.column_stack([values, slopes]) - np.einsum("nqabc,nabc->nq", rows, c[index])
+    scale = np.array([weight[0], *3 * [weight[1]]])
+    np.add.at(out, index, np.einsum("nq,nqabc->nabc", scale * left, rows))
+    return float(np.sum(scale * left**2))

@@ -1,0 +1,160 @@
+"""Quintic tensor-product B-spline on a uniform Cartesian grid: F, grad F and the Hessian of F.
+
+With g = (x - origin)/spacing, cell k = floor(g) and fraction t = g - k, axis by axis,
+
+    F(x) = sum_abc w_a(t_1) w_b(t_2) w_c(t_3) C[k_1 + a, k_2 + b, k_3 + c],   a, b, c = 0..5,
+
+n nodes carrying n + 4 coefficients. Ends are not-a-knot, so quintics are reproduced and F converges as h^6. Beyond
+the grid the outermost cell's polynomial goes on for one cell; from there on t is held. A NaN stays one.
+`scatterers.kernels.tensor` is the compiled twin.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.kernels.compiled import Compiled
+from scatterers.kernels.spline_constants import BEYOND, CENTRE, HEADER, OVERREAD, POWERS
+
+FloatArray = NDArray[np.float64]
+# where xx, yy, zz, yz, xz, xy stand in a matrix
+SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+
+
+@cache
+def interpolation_operator(n: int) -> FloatArray:
+    """Matrix (n + 4, n) from node values to the uniform coefficients of the not-a-knot quintic.
+
+    The fifth derivative is continuous at the two outermost inner nodes of either end: sixth differences of the
+    coefficients vanish there.
+    """
+    conditions = np.zeros((n + 4, n + 4))
+    for node in range(n):
+        conditions[node, node : node + 5] = np.array([1, 26, 66, 26, 1]) / 120
+    for row, knot in enumerate((1, 2, n - 3, n - 2), n):
+        conditions[row, knot - 1 : knot + 6] = np.array([1, -6, 15, -20, 15, -6, 1]) / 64
+    return np.asarray(np.linalg.solve(conditions, np.eye(n + 4, n)))
+
+
+def coefficients(samples: FloatArray) -> FloatArray:
+    """Node values (n0, n1, n2) to coefficients (n0 + 4, n1 + 4, n2 + 4)."""
+    for axis in range(3):
+        operator = interpolation_operator(samples.shape[axis])
+        samples = np.moveaxis(np.tensordot(operator, samples, axes=(1, axis)), 0, axis)
+    return np.ascontiguousarray(samples)
+
+
+def weights(t: FloatArray, order: int) -> FloatArray:
+    """Weights of the six B-splines and their derivatives up to the order: (...) -> (..., 6, order + 1)."""
+    columns, powers = [], POWERS
+    for _ in range(order + 1):
+        total = np.zeros((*np.shape(t), 6))
+        for row in powers[::-1]:
+            total = total * t[..., None] + row
+        columns.append(total)
+        powers = powers[1:] * np.arange(1, len(powers))[:, None]
+    return np.stack(columns, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class TensorSpline:
+    """The spline through samples of F on a grid.
+
+    Attributes
+    ----------
+    coefficients : (n0 + 4, n1 + 4, n2 + 4)
+    origin, spacing : (3,), L
+    """
+
+    coefficients: FloatArray
+    origin: FloatArray
+    spacing: FloatArray
+
+    @property
+    def box(self) -> FloatArray:
+        """Grid's box (2, 3), L."""
+        cells = np.array(self.coefficients.shape) - 5
+        return np.stack([self.origin, self.origin + cells * self.spacing])
+
+    def at_nodes(self) -> FloatArray:
+        """F at the nodes: (n0, n1, n2)."""
+        values = self.coefficients
+        for axis in range(3):
+            nodes = values.shape[axis] - 4
+            shifted = [w * np.take(values, range(k, k + nodes), axis) for k, w in enumerate((1, 26, 66, 26, 1))]
+            values = np.sum(shifted, axis=0) / 120
+        return values
+
+    def _derivatives(self, points: FloatArray, order: int) -> FloatArray:
+        """All mixed derivatives with up to ``order`` along each axis: (..., 3) -> (..., order + 1, thrice)."""
+        points = np.asarray(points, dtype=float)
+        flat = ((points.reshape(-1, 3)) - self.origin) / self.spacing
+        inside = np.clip(np.nan_to_num(flat, nan=0.0), 0, np.array(self.coefficients.shape) - 6)
+        cell = inside.astype(np.int64)
+        w = weights(np.clip(flat - cell, -BEYOND, 1 + BEYOND), order)
+        w = w / self.spacing[:, None, None] ** np.arange(order + 1)
+        out = np.empty((len(flat), *3 * (order + 1,)))
+        steps = np.arange(6)
+        # the stencils of a batch are gathered at once, so batches stay small
+        for start in range(0, len(flat), 1024):
+            part = slice(start, start + 1024)
+            i, j, k = (cell[part, axis, None] + steps for axis in range(3))
+            stencil = self.coefficients[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
+            rows = stencil.reshape(len(i), 36, 6) @ w[part, 2]
+            planes = np.swapaxes(w[part, 1], 1, 2)[:, None] @ rows.reshape(len(i), 6, 6, -1)
+            out[part] = np.einsum("nia,nibc->nabc", w[part, 0], planes)
+        return out.reshape(*points.shape[:-1], *out.shape[1:])
+
+    def value(self, points: FloatArray) -> FloatArray:
+        """F: (..., 3) -> (...)."""
+        return self._derivatives(points, 0)[..., 0, 0, 0]
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of F: (..., 3) -> (..., 3)."""
+        return self.value_and_gradient(points)[1]
+
+    def value_and_gradient(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """F (...) and its gradient (..., 3)."""
+        d = self._derivatives(points, 1)
+        return d[..., 0, 0, 0], np.stack([d[..., 1, 0, 0], d[..., 0, 1, 0], d[..., 0, 0, 1]], axis=-1)
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        d = self._derivatives(points, 2)
+        xx, yy, zz = d[..., 2, 0, 0], d[..., 0, 2, 0], d[..., 0, 0, 2]
+        yz, xz, xy = d[..., 0, 1, 1], d[..., 1, 0, 1], d[..., 1, 1, 0]
+        rows = [np.stack(row, axis=-1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
+        return np.stack(rows, axis=-2)
+
+    def flat(self, of_map: FloatArray) -> FloatArray:
+        """Parameters of the compiled functions: the header, which ends with those of a map, and the coefficients."""
+        header = [np.array(self.coefficients.shape, dtype=float), self.origin, 1 / self.spacing, of_map]
+        return np.concatenate([*header, self.coefficients.ravel(), np.zeros(OVERREAD)])
+
+    @property
+    def sources(self) -> dict[str, Callable[..., None]]:
+        """Plain Python of the compiled functions; see `scatterers.sphere_map.radial.SpaceLevel`."""
+        from scatterers.kernels.radial import forward
+        from scatterers.kernels.tensor import evaluate
+
+        return {"level": evaluate, "forward": forward}
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled evaluator."""
+        return Compiled(self.sources["level"], "level", self.flat(np.zeros(HEADER - CENTRE)))
+
+
+def evaluated(compiled: Compiled, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """F (...), its gradient (..., 3) and Hessian entries (..., 6), xx, yy, zz, yz, xz, xy, of a compiled spline."""
+    from scatterers.kernels.tensor import call
+
+    points = np.asarray(points, dtype=float)
+    columns = np.ascontiguousarray(points.reshape(-1, 3).T)
+    n, shape = columns.shape[1], points.shape[:-1]
+    values, gradients, hessians = np.empty(n), np.empty((3, n)), np.empty((6, n))
+    call(compiled.function, columns, values, gradients, hessians, compiled.parameters)
+    return values.reshape(shape), gradients.T.reshape(*shape, 3), hessians.T.reshape(*shape, 6)

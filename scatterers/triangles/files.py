@@ -1,0 +1,363 @@
+"""Triangle meshes from files and objects, checked and in metres: what happens before a surface is fitted.
+
+Nothing of a file is executed and nothing beside it is opened: only the loaders of six formats are called, on bytes
+read here, without a resolver of names; trimesh's own repairs are left out, as they drop what is wrong without a word.
+"""
+
+import io
+import logging
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.triangles.crossings import crossings
+from scatterers.triangles.threemf import read_3mf
+from scatterers.triangles.topology import cleaned, oriented
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048, "km": 1e3}
+"""Metres per unit."""
+SPELLED = {
+    "meter": "m", "metre": "m", "millimeter": "mm", "millimetre": "mm", "centimeter": "cm", "centimetre": "cm",
+    "micron": "um", "micrometer": "um", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft", "kilometer": "km",
+}  # fmt: skip
+SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf")
+MOST_BYTES = 512 * 2**20
+MOST_TRIANGLES = 4_000_000
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Sizes of a body that are believed, m."""
+FAR = 100.0
+"""Sizes from the origin beyond which a body is brought back: there differences of coordinates lose digits."""
+COARSEST_ROUNDING = 1e-3
+"""Rounding of the coordinates, in mean edges, from which on curvatures are those of the rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Closed, oriented triangle mesh of one body.
+
+    Attributes
+    ----------
+    vertices : (n, 3), m
+    triangles : (m, 3)
+        Vertex numbers, counter-clockwise seen from outside.
+    repairs : tuple of str
+        What was changed, one sentence each.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    repairs: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{v:.4g}" for v in np.ptp(self.vertices, axis=0))
+        return f"TriangleMesh({len(self.vertices)} vertices, {len(self.triangles)} triangles, {size} m)"
+
+
+class _Raw(NamedTuple):
+    """What a source holds, in its own unit."""
+
+    name: str
+    vertices: FloatArray
+    triangles: IntArray
+    stated: str | None
+    indexed: bool
+
+
+def read_mesh(source: Any, units: str | None = None, *, say: Callable[[str], None]) -> TriangleMesh:
+    """Read, check and repair the mesh of one body.
+
+    Parameters
+    ----------
+    source : path, or object with ``vertices`` and ``faces``
+        STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh.
+    units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
+        Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
+    say : callable
+        Is told each repair in a sentence.
+
+    Returns
+    -------
+    TriangleMesh
+
+    Raises
+    ------
+    ValueError
+        If the source cannot be read, its unit is unknown, or it is not one closed body without self-intersections.
+    """
+    if units is not None and units not in UNITS:
+        raise ValueError(f'units = {units!r} is none of {", ".join(UNITS)}; give e.g. units="mm"')
+    in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
+    raw = _from_object(source) if in_memory else _from_file(source)
+    _check_numbers(raw)
+    scale = UNITS[_unit(raw, units, "m" if in_memory else None)]
+    repairs: list[str] = []
+
+    def note(message: str) -> None:
+        repairs.append(message)
+        say(message)
+
+    vertices, triangles = cleaned(raw.name, raw.vertices, raw.triangles, note if raw.indexed else _silent, note)
+    _check_size(raw.name, vertices, scale)
+    # digits are lost to the offset in any sum of products of coordinates, so it goes first
+    offset = 0.5 * (vertices.min(0) + vertices.max(0))
+    local = vertices - offset
+    triangles = oriented(raw.name, local, triangles, note)
+    _check_rounding(raw.name, vertices, triangles)
+    _check_crossings(raw.name, local, triangles, offset * scale, scale)
+    if np.linalg.norm(offset) > FAR * np.linalg.norm(np.ptp(vertices, axis=0)):
+        note(
+            f"{raw.name} lies {np.linalg.norm(offset) * scale:.6g} m from the origin; "
+            f"moved by {_where(-offset * scale)}"
+        )
+        vertices = local
+    return TriangleMesh(vertices * scale, triangles, tuple(repairs))
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+def _where(point: FloatArray) -> str:
+    return "(" + ", ".join(f"{v:.5g}" for v in point) + ") m"
+
+
+def _from_object(source: Any) -> _Raw:
+    name = "the mesh"
+    try:
+        vertices, faces = np.array(source.vertices, dtype=float), np.asarray(source.faces)
+        triangles = faces.astype(np.int64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"the vertices or faces of the mesh are not numbers ({error})") from None
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ValueError(f"the vertices of the mesh have shape {vertices.shape}; give (n, 3)")
+    if triangles.size and (triangles.ndim != 2 or triangles.shape[1] != 3):
+        raise ValueError(f"the faces of the mesh have shape {triangles.shape}; give triangles (m, 3)")
+    if not np.array_equal(triangles, faces):
+        raise ValueError("the faces of the mesh are not whole numbers; give vertex numbers")
+    return _Raw(name, vertices, triangles.reshape(-1, 3), getattr(source, "units", None), True)
+
+
+def _from_file(source: Any) -> _Raw:
+    path, data = mesh_bytes(source)
+    name, suffix = path.name, path.suffix.lower()
+    _check_whole(name, suffix, data)
+    try:
+        vertices, triangles, stated = _loaded(data, suffix)
+    except Exception as error:  # the loaders raise whatever their parsing runs into
+        text = str(error) or type(error).__name__
+        raise ValueError(f"{name} cannot be read as {suffix[1:].upper()}: {text}; export it again") from None
+    return _Raw(name, vertices, triangles, stated, suffix != ".stl")
+
+
+def mesh_bytes(source: Any) -> tuple[Path, bytes]:
+    """Path of a mesh file and what it holds, read only if it is a file of a known kind and size.
+
+    Raises
+    ------
+    ValueError
+        If it is not.
+    """
+    try:
+        path = Path(source)
+    except TypeError:
+        raise ValueError(
+            f"a {type(source).__name__} is no mesh; give a path or an object with vertices and faces"
+        ) from None
+    name, suffix = path.name, path.suffix.lower()
+    if path.is_dir():
+        raise ValueError(f"{path} is a directory; give the path of a mesh file")
+    if not path.is_file():
+        raise ValueError(f"{path} is no file on this machine; give the path of a mesh file (addresses are not fetched)")
+    if suffix not in SUFFIXES:
+        raise ValueError(f"{name} is of a kind that is not read; give one of {', '.join(SUFFIXES)}")
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise ValueError(f"{name} has {size / 2**20:.0f} MB, more than {MOST_BYTES / 2**20:.0f}; thin it out")
+        data = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{name} cannot be opened: {error.strerror}") from None
+    if not data:
+        raise ValueError(f"{name} is empty; export it again")
+    return path, data
+
+
+@contextmanager
+def _quiet(name: str) -> Iterator[None]:
+    """No messages of a logger: what matters here is raised."""
+    logger = logging.getLogger(name)
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+class _Nothing:
+    """Resolver of names in a file, to which there are no other files."""
+
+    def get(self, name: str) -> bytes:
+        raise ValueError(f"it refers to {name!r}, which is not opened; export it as one file")
+
+    __getitem__ = get
+
+
+def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None]:
+    """Vertices and triangles of everything in the file, and the unit it states."""
+    if suffix == ".3mf":
+        return read_3mf(data, MOST_BYTES, MOST_TRIANGLES)
+    import trimesh
+
+    with warnings.catch_warnings(), _quiet("trimesh"):
+        # older numpy only warns where it stops reading a text in the middle
+        warnings.filterwarnings("error", category=DeprecationWarning, message=".*could not be read to its end")
+        scene = trimesh.load(
+            io.BytesIO(data),
+            file_type=suffix[1:],
+            force="scene",
+            process=False,
+            skip_materials=True,
+            resolver=_Nothing(),
+        )
+    vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+    stated = {getattr(geometry, "units", None) for geometry in scene.geometry.values()}
+    placed = 0
+    for node in scene.graph.nodes_geometry:
+        matrix, key = scene.graph[node]
+        # each placement repeats its triangles
+        placed += len(getattr(scene.geometry[key], "faces", ()))
+        if placed > MOST_TRIANGLES:
+            raise ValueError(f"its meshes, each where it is placed, have more than {MOST_TRIANGLES} triangles")
+        if len(getattr(scene.geometry[key], "faces", ())):
+            points = np.array(scene.geometry[key].vertices, dtype=float)
+            corners = np.array(scene.geometry[key].faces, dtype=np.int64)
+            if corners.min() < 0 or corners.max() >= len(points):
+                raise ValueError(f"a triangle refers to vertex {corners.max()} of {len(points)}")
+            if not np.array_equal(matrix, np.eye(4)):
+                points = points @ matrix[:3, :3].T + matrix[:3, 3]
+                # a placement that mirrors turns the triangles inside out
+                corners = corners if np.linalg.det(matrix[:3, :3]) > 0 else corners[:, ::-1]
+            vertices.append(points)
+            triangles.append(corners + count)
+            count += len(points)
+    unit = stated.pop() if len(stated) == 1 and suffix == ".glb" else None
+    return np.concatenate(vertices), np.concatenate(triangles), unit or ("m" if suffix == ".glb" else None)
+
+
+def _check_whole(name: str, suffix: str, data: bytes) -> None:
+    """Raise ValueError if the file is shorter than it says, which the loaders do not all see."""
+    cut = f"{name} is cut short or no {suffix[1:].upper()}"
+    if suffix == ".stl":
+        count = int.from_bytes(data[80:84], "little")
+        if len(data) >= 84 and len(data) == 84 + 50 * count:
+            return
+        if b"\0" in data[:84] or not data.lstrip().lower().startswith(b"solid"):
+            raise ValueError(f"{cut}: {count} triangles take {84 + 50 * count} bytes, it has {len(data)}")
+        text = data.lower()
+        if b"endsolid" not in text or len(re.findall(rb"\bfacet\b", text)) != text.count(b"endfacet"):
+            begun, ended = len(re.findall(rb"\bfacet\b", text)), text.count(b"endfacet")
+            raise ValueError(f"{cut}: {begun} facets are begun, {ended} ended, and 'endsolid' has to follow")
+    elif suffix == ".glb":
+        length = int.from_bytes(data[8:12], "little")
+        if data[:4] != b"glTF" or length != len(data):
+            raise ValueError(f"{cut}: its header states {length} bytes, it has {len(data)}")
+    elif suffix == ".ply":
+        head, _, body = data.partition(b"end_header")
+        rows = sum(int(n) for n in re.findall(rb"^\s*element\s+\w+\s+(\d+)", head, re.MULTILINE))
+        if not body:
+            raise ValueError(f"{cut}: its header has no end")
+        if b"ascii" in head and (found := len([line for line in body.splitlines() if line.strip()])) < rows:
+            raise ValueError(f"{cut}: its header states {rows} rows, it has {found}")
+    elif suffix == ".off":
+        lines = [line for line in (raw.partition(b"#")[0].split() for raw in data.splitlines()) if line]
+        numbers = [word for line in lines[:2] for word in line if word.isdigit()]
+        held = len(lines) - (1 if lines and len(lines[0]) > 1 else 2)
+        if len(numbers) >= 2 and held < int(numbers[0]) + int(numbers[1]):
+            raise ValueError(f"{cut}: its header states {int(numbers[0]) + int(numbers[1])} rows, it has {held}")
+
+
+def _check_numbers(raw: _Raw) -> None:
+    name, vertices, triangles = raw.name, raw.vertices, raw.triangles
+    if not len(triangles):
+        raise ValueError(f"{name} holds no triangles ({len(vertices)} vertices); export the surface as a mesh")
+    if len(triangles) > MOST_TRIANGLES:
+        raise ValueError(f"{name} has {len(triangles)} triangles, more than {MOST_TRIANGLES}; thin it out")
+    outside = (triangles < 0) | (triangles >= len(vertices))
+    if bad := int(np.sum(outside.any(axis=1))):
+        worst = int(triangles[outside][0])
+        raise ValueError(
+            f"{bad} of {len(triangles)} triangles of {name} refer to vertices that do not exist "
+            f"(vertex {worst} of {len(vertices)}); export it again"
+        )
+    finite = np.all(np.isfinite(vertices), axis=1)
+    if bad := int(np.sum(~finite)):
+        raise ValueError(
+            f"{bad} of {len(vertices)} vertices of {name} are not finite (the first is vertex "
+            f"{int(np.argmin(finite))}); repair or export it again"
+        )
+
+
+def _unit(raw: _Raw, given: str | None, otherwise: str | None) -> str:
+    stated = None
+    if raw.stated is not None:
+        word = str(raw.stated).strip().lower()
+        stated = word if word in UNITS else SPELLED.get(word.removesuffix("s"), SPELLED.get(word))
+        if stated is None:
+            raise ValueError(f"{raw.name} states the unit {raw.stated!r}, none of {', '.join(UNITS)}; convert it")
+    if stated is not None and given is not None and stated != given:
+        raise ValueError(
+            f"{raw.name} states its unit, {stated}, but units = {given!r}; leave units out, or convert the file"
+        )
+    unit = given or stated or otherwise
+    if unit is None:
+        used = raw.vertices[np.unique(raw.triangles)]
+        size = np.ptp(used, axis=0)
+        extents = " x ".join(f"{v:.5g}" for v in size)
+        raise ValueError(
+            f"{raw.name} does not state its unit; it extends over {extents} of it, {size.max() * 1e-3:.5g} m if "
+            f'millimetres; give the unit, e.g. units="mm", or one of {", ".join(UNITS)}'
+        )
+    return unit
+
+
+def _check_size(name: str, vertices: FloatArray, scale: float) -> None:
+    size = float(np.ptp(vertices, axis=0).max()) * scale
+    if not SMALLEST <= size <= LARGEST:
+        raise ValueError(
+            f"{name} is {size:.3g} m large; give the right units, or a body from {SMALLEST:g} to {LARGEST:g} m"
+        )
+
+
+def _check_rounding(name: str, vertices: FloatArray, triangles: IntArray) -> None:
+    with np.errstate(over="ignore"):
+        single = vertices.astype(np.float32)
+    if not np.array_equal(single, vertices):
+        return
+    quantum = float(np.spacing(np.abs(single).max()))
+    edge = float(np.mean(np.linalg.norm(vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)], axis=-1)))
+    if quantum > COARSEST_ROUNDING * edge:
+        raise ValueError(
+            f"the numbers of {name} are rounded to {quantum:.2g}, {quantum / edge:.2g} of its mean edge, as it lies "
+            "far from the origin in single precision; move it to the origin before it is exported"
+        )
+
+
+def _check_crossings(name: str, local: FloatArray, triangles: IntArray, offset: FloatArray, scale: float) -> None:
+    count, pairs = crossings(local, triangles)
+    if count:
+        first = local[triangles[pairs[0, 0]]].mean(axis=0) * scale + offset
+        spread = local[triangles[pairs.ravel()]].mean(axis=1)
+        raise ValueError(
+            f"{name} crosses itself: {count} pairs of its {len(triangles)} triangles, the first near {_where(first)}, "
+            f"within {np.ptp(spread, axis=0).max() * scale:.3g} m of each other; repair it, e.g. by a union"
+        )

@@ -1,0 +1,164 @@
+"""Osculating jets: normals and curvatures at the vertices of a mesh, without any use of its triangles' shapes.
+
+In a frame (e1, e2, n) at a vertex the surface is w = h(u, v) = sum c_ab u^a v^b, 1 <= a + b <= d, fitted by weighted
+least squares to the nearest vertices of the same sheet [Cazals and Pouget, Estimating differential quantities using
+polynomial fitting of osculating jets, CAGD 22 (2005) 121-146]; the jet of degree d errs by O(e^d) in the normal and
+O(e^(d-1)) in the curvatures. With W^2 = 1 + h_u^2 + h_v^2, and signs such that a convex body has kappa > 0,
+
+    n = (-h_u, -h_v, 1) / W,    K = (h_uu h_vv - h_uv^2) / W^4,
+    H = -((1 + h_v^2) h_uu - 2 h_u h_v h_uv + (1 + h_u^2) h_vv) / (2 W^3),    kappa = H +- sqrt(H^2 - K).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+NEIGHBOURS = 56
+"""Twice the terms of degree 6: enough to show in the residual what the jet misses."""
+AT_MOST = 112
+"""Neighbours where the usual ones leave terms open, as on long triangles."""
+FEWEST = 36
+"""Neighbours below which a jet of degree 6 is not fitted."""
+SAME_SHEET = 0.3
+"""Cosine between the normals of a vertex and its neighbours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Jets:
+    """Jets of degree 6 at n vertices, and what lower degrees say.
+
+    Attributes
+    ----------
+    fitted : (n,) bool
+        False where fewer than 36 vertices of the same sheet are near: there the normal is that of the triangles,
+        the curvatures and coefficients are 0, the tilt is 1 and the residuals are the mean edge.
+    normals : (n, 3)
+        Outward unit normals.
+    principal : (n, 2), 1/L
+        Principal curvatures, the larger first; positive where the body is convex.
+    principal4 : (n, 2), 1/L
+        The same by degree 4.
+    residuals : (n, 3), L
+        Weighted rms distance of the neighbours from the jets of degree 2, 4 and 6.
+    tilt : (n,)
+        Distance of the unit normals of degree 4 and 6.
+    frames : (n, 3, 3)
+        Rows e1, e2, n of the jets.
+    radii : (n,), L
+        Distance of the farthest neighbour, the unit of u, v, w in ``coefficients``.
+    coefficients : (n, 27)
+        Of u, v, uu, uv, vv, uuu, ...: by degree, powers of u falling.
+    """
+
+    fitted: NDArray[np.bool_]
+    normals: FloatArray
+    principal: FloatArray
+    principal4: FloatArray
+    residuals: FloatArray
+    tilt: FloatArray
+    frames: FloatArray
+    radii: FloatArray
+    coefficients: FloatArray
+
+    def __repr__(self) -> str:
+        return (
+            f"Jets({len(self.normals)} vertices, tilt up to {self.tilt.max():.2g}, {np.sum(~self.fitted)} not fitted)"
+        )
+
+    @property
+    def gaussian(self) -> FloatArray:
+        """Gaussian curvature K (n,), 1/L^2."""
+        return self.principal[:, 0] * self.principal[:, 1]
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean curvature H (n,), 1/L."""
+        return 0.5 * (self.principal[:, 0] + self.principal[:, 1])
+
+
+def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
+    """Fit jets at all vertices.
+
+    Parameters
+    ----------
+    vertices : (n, 3), L
+    triangles : (m, 3)
+        Counter-clockwise seen from outside; they give first normals, and the mean edge, only.
+    """
+    from scatterers.kernels.jets import TERMS, fit
+
+    vertices = np.ascontiguousarray(vertices, dtype=float)
+    guess = angle_weighted_normals(vertices, triangles)
+    near, counts = _neighbours(vertices, guess)
+    n = len(vertices)
+    frames, radii, coefficients = np.empty((n, 3, 3)), np.empty(n), np.zeros((n, TERMS))
+    residuals, lower = np.empty((n, 3)), np.zeros((n, 5))
+    corners = vertices[triangles]
+    edge = float(np.mean(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)))
+    radii[:], residuals[:] = edge, edge
+    fit(vertices, guess, near, counts, NEIGHBOURS, frames, radii, coefficients, residuals, lower)
+    normals, principal = _curvatures(frames, radii, coefficients)
+    normals4, principal4 = _curvatures(frames, radii, lower)
+    fitted = counts > 0
+    tilt = np.where(fitted, np.linalg.norm(normals4 - normals, axis=1), 1.0)
+    return Jets(fitted, normals, principal, principal4, residuals, tilt, frames, radii, coefficients)
+
+
+def angle_weighted_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
+    """Outward unit normals (n, 3): face normals weighted by the angles at the vertex."""
+    corners = vertices[triangles]
+    ahead = np.roll(corners, -1, axis=1) - corners
+    length = np.linalg.norm(ahead, axis=-1)
+    normal = np.cross(ahead[:, 0], -ahead[:, 2])
+    area = np.linalg.norm(normal, axis=-1, keepdims=True)
+    # triangles without area have no say
+    normal = np.divide(normal, area, out=np.zeros_like(normal), where=area > 0)
+    cosine = -np.sum(ahead * np.roll(ahead, 1, axis=1), axis=-1) / np.maximum(
+        length * np.roll(length, 1, axis=1), 1e-300
+    )
+    angle = np.arccos(np.clip(cosine, -1, 1))
+    total = np.stack(
+        [np.bincount(triangles.ravel(), (angle * normal[:, k, None]).ravel(), len(vertices)) for k in range(3)], axis=1
+    )
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(size > 0, total / np.where(size > 0, size, 1.0), [0.0, 0.0, 1.0])
+
+
+def _neighbours(vertices: FloatArray, normals: FloatArray) -> tuple[IntArray, IntArray]:
+    """Nearest vertices (n, 112) whose normals agree, nearest first, and how many (n,); 0 if too few."""
+    from scipy.spatial import cKDTree
+
+    tree, n = cKDTree(vertices), len(vertices)
+    near, counts = np.zeros((n, AT_MOST), np.int64), np.zeros(n, np.int64)
+    waiting, asked = np.arange(n), AT_MOST + 8
+    for _ in range(3):
+        asked = min(asked, n)
+        found = tree.query(vertices[waiting], asked)[1].reshape(len(waiting), asked)
+        cosine = np.einsum("ijk,ik->ij", normals[found], normals[waiting])
+        good = (cosine > SAME_SHEET) & (found != waiting[:, None])
+        # stable: the good ones first, in order of distance
+        order = np.argsort(~good, axis=1, kind="stable")[:, :AT_MOST]
+        near[waiting, : order.shape[1]] = np.take_along_axis(found, order, axis=1)
+        counts[waiting] = np.minimum(good.sum(axis=1), AT_MOST)
+        waiting = waiting[counts[waiting] < NEIGHBOURS]
+        if not len(waiting) or asked == n:
+            break
+        # three times the radius; what is still short then lies on a thin or tiny part
+        asked *= 3
+    counts[counts < FEWEST] = 0
+    return near, counts
+
+
+def _curvatures(frames: FloatArray, radii: FloatArray, coefficients: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Normals (n, 3) and principal curvatures (n, 2) at the origin of the jets."""
+    u, v, uu, uv, vv = coefficients[:, :5].T
+    uu, uv, vv = 2 * uu / radii, uv / radii, 2 * vv / radii
+    square = 1 + u**2 + v**2
+    direction = np.stack([-u, -v, np.ones_like(u)], axis=1) / np.sqrt(square)[:, None]
+    gaussian = (uu * vv - uv**2) / square**2
+    mean = -((1 + v**2) * uu - 2 * u * v * uv + (1 + u**2) * vv) / (2 * square**1.5)
+    root = np.sqrt(np.maximum(mean**2 - gaussian, 0))
+    return np.einsum("ij,ijk->ik", direction, frames), np.stack([mean + root, mean - root], axis=1)

@@ -1,0 +1,282 @@
+"""Whether a mesh is smooth enough for a smooth surface: figures of its triangles and jets, and a verdict.
+
+With e the mean edge, kappa the larger principal curvature, n_d, kappa_d and res_d normal, curvature and rms residual
+of the jet of degree d, a vertex is *bad* if max(|n_4 - n_6|, e |kappa_4 - kappa_6|/3) > 0.03, or if n_6 is more than
+0.5 off the normals of its triangles, as at a tip, whose jet follows one side of it; and
+
+    smooth           none of the following;
+    sharp            edges of more than 40 degrees, and thrice the median, that follow each other;
+    noisy            res_6/res_2 > 0.15 in the median: neither degree describes the vertices;
+    curvature jumps  res_6/res_4 stays near 1/2 along curves. On a smooth surface it falls like (kappa e)^2; where kappa
+                     jumps by D, both residuals are D e^2 times a number. Or kappa_4 and kappa_6 differ there by more
+                     than a quarter of kappa. Such a surface is C1 only, and hardly a vertex of it is bad;
+    too coarse       bad vertices otherwise, kappa e above 0.3, or edges of twice the radius of the jets at their ends
+                     and more: in between nothing is known.
+
+Noise of s edges leaves res_4 = 0.95 s e and res_6 = 0.81 s e, a smooth surface res_6 < 4 (kappa e)^2 res_4, which
+tells them apart. The thresholds are measured on ellipsoid, torus, twisted and bumpy bodies
+of 2000 to 40000 vertices, even and as slivers, with noise of 0.001 to 0.05 e, and on bodies with edges and rims.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.triangles.jets import Jets, angle_weighted_normals
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
+BAD = 0.03
+ASTRAY = 0.5
+"""|n_6 - n| of a jet that does not follow its triangles; on slivers of smooth bodies it is below 0.2."""
+FEW = 100
+"""Vertices below which no jet of degree 6 means anything."""
+RESOLVED = 0.3
+"""kappa e that a uniform grid resolves."""
+SHARP = 40.0
+SLIVER = 0.05
+"""Area, relative to the median, below which the normal of a triangle is not asked."""
+NOISE_RATIO, NOISE = 0.15, 5e-4
+RESIDUAL_PER_NOISE = 0.95, 0.81
+"""Residuals of degree 4 and 6 on noise: sqrt(1 - terms/neighbours), a little more by the weights."""
+JUMP_DECAY, JUMP_RESIDUAL = 0.33, 1e-4
+FEWEST_RIMS, JUMPS_ALONG = 6, 0.5
+"""Vertices that make a rim; jumps, in roots of the number of vertices, that make a curve over the body."""
+
+
+class Mesh(Protocol):
+    """What `assess` asks of a mesh."""
+
+    @property
+    def vertices(self) -> FloatArray:
+        """Vertices (n, 3), m."""
+        ...
+
+    @property
+    def triangles(self) -> IntArray:
+        """Vertex numbers (m, 3)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class MeshQuality:
+    """Figures of a mesh; lengths in m, angles in degrees, percentiles over vertices or edges.
+
+    Attributes
+    ----------
+    vertices, triangles : int
+    edge_mean, edge_min, edge_max : float
+    size : (3,)
+        Sides of the box.
+    dihedral : (3,)
+        Angle between neighbouring triangles: median, 99 %, largest.
+    curvature : float
+        99 % of the larger principal curvature times the mean edge.
+    residual : float
+        99 % of res_6 / e.
+    residual_ratio : (2,)
+        res_6 / res_2: median, 99 %.
+    tilt : (2,)
+        |n_4 - n_6|: 99 %, largest.
+    bad_share : float
+        Share of vertices whose badness exceeds 0.03.
+    noise : float
+        Estimate of the noise of the vertices, in edges; 0 where the surface itself leaves all of the residuals.
+    jumps : int
+        Vertices at which the curvature jumps.
+    badness : (n,)
+        max(|n_4 - n_6|, e |kappa_4 - kappa_6| / 3) at the vertices, and |n_6 - n| where that exceeds 0.5, to be drawn
+        on the mesh.
+    verdict : {"smooth", "noisy", "sharp", "curvature jumps", "too coarse"}
+    reasons : str
+        What the verdict rests on and what helps.
+    """
+
+    vertices: int
+    triangles: int
+    edge_mean: float
+    edge_min: float
+    edge_max: float
+    size: FloatArray
+    dihedral: FloatArray
+    curvature: float
+    residual: float
+    residual_ratio: FloatArray
+    tilt: FloatArray
+    bad_share: float
+    noise: float
+    jumps: int
+    badness: FloatArray
+    verdict: Verdict
+    reasons: str
+
+    def __repr__(self) -> str:
+        return f"MeshQuality({self.verdict}: {self.vertices} vertices, {self.bad_share:.2%} bad)\n{self.reasons}"
+
+    @property
+    def bad(self) -> NDArray[np.bool_]:
+        """Which vertices are bad (n,)."""
+        return self.badness > BAD
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers and texts, all but ``badness``."""
+        found = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "badness"}
+        return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in found.items()}
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any], badness: FloatArray) -> "MeshQuality":
+        """The figures again, with the ``badness`` that is kept apart."""
+        values: dict[str, Any] = {
+            name: np.array(v, dtype=float) if isinstance(v, list) else v for name, v in content.items()
+        }
+        return cls(**values, badness=badness)
+
+    def summary(self, wavenumber: float | None = None) -> str:
+        """Table of the figures, in wavelengths, too, for a wavenumber in 1/m.
+
+        Raises
+        ------
+        ValueError
+            If the wavenumber is not a positive finite number.
+        """
+        if wavenumber is not None and not 0 < wavenumber < np.inf:
+            raise ValueError(f"wavenumber = {wavenumber!r} is not positive and finite; give 2 pi over the wavelength")
+        d, r, t = self.dihedral, self.residual_ratio, self.tilt
+        rows = [
+            ("verdict", self.verdict),
+            ("vertices, triangles", f"{self.vertices}, {self.triangles}"),
+            ("size", _metres(self.size)),
+            ("edge mean, min, max", f"{self.edge_mean:.4g}, {self.edge_min:.4g}, {self.edge_max:.4g} m"),
+            ("dihedral 50 %, 99 %, max", f"{d[0]:.3g}, {d[1]:.3g}, {d[2]:.3g} degrees"),
+            ("curvature x edge 99 %", f"{self.curvature:.3g}"),
+            ("res6 / edge 99 %", f"{self.residual:.2g}"),
+            ("res6 / res2 50 %, 99 %", f"{r[0]:.2g}, {r[1]:.2g}"),
+            ("|n4 - n6| 99 %, max", f"{t[0]:.2g}, {t[1]:.2g}"),
+            ("bad vertices", f"{self.bad_share:.3%}"),
+            ("curvature jumps at", f"{self.jumps} vertices"),
+            ("noise of the vertices", f"{self.noise:.2g} edges"),
+        ]
+        if wavenumber is not None:
+            waves = self.size * wavenumber / (2 * np.pi)
+            rows.insert(3, ("", " x ".join(f"{v:.4g}" for v in waves) + " wavelengths"))
+            rows.insert(5, ("", f"{self.edge_mean * wavenumber / (2 * np.pi):.3g} wavelengths on average"))
+        return "\n".join([f"{name:26s} {value}" for name, value in rows] + [self.reasons])
+
+
+def _metres(size: FloatArray) -> str:
+    return " x ".join(f"{v:.4g}" for v in size) + " m"
+
+
+def assess(mesh: Mesh, jets: Jets) -> MeshQuality:
+    """Judge a closed, oriented mesh by its jets."""
+    vertices, triangles = mesh.vertices, mesh.triangles
+    corners = vertices[triangles]
+    length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1)
+    edge = float(length.mean())
+    ends, angles = _dihedrals(vertices, triangles)
+    curvature = np.abs(jets.principal).max(axis=1)
+    doubt = np.abs(jets.principal4 - jets.principal).max(axis=1)
+    astray = np.linalg.norm(jets.normals - angle_weighted_normals(vertices, triangles), axis=1)
+    badness = np.maximum(np.maximum(jets.tilt, edge * doubt / 3), np.where(astray > ASTRAY, astray, 0.0))
+    # below this a residual is rounding of the vertices
+    floor = 1e-12 * edge
+    second, fourth, sixth = np.maximum(jets.residuals, floor).T
+    ratio = sixth / second
+    resolved = float(np.percentile(curvature, 99)) * edge
+    noise = _noise(fourth, sixth, curvature * edge) / edge
+    jump = (sixth > JUMP_DECAY * fourth) & (sixth > max(JUMP_RESIDUAL * edge, 5 * float(np.median(sixth))))
+    strong = float(np.percentile(curvature, 90))
+    # noise of s e changes kappa_4 - kappa_6 by up to 8 s/e where the jet is well determined
+    jump |= doubt > (0.25 + 100 * resolved**4) * strong + 12 * float(np.median(sixth)) / edge**2
+    quality: dict[str, Any] = {
+        "vertices": len(vertices),
+        "triangles": len(triangles),
+        "edge_mean": edge,
+        "edge_min": float(length.min()),
+        "edge_max": float(length.max()),
+        "size": np.ptp(vertices, axis=0),
+        "dihedral": np.append(np.percentile(angles, [50, 99]), angles.max()),
+        "curvature": resolved,
+        "residual": float(np.percentile(sixth, 99)) / edge,
+        "residual_ratio": np.percentile(ratio, [50, 99]),
+        "tilt": np.append(np.percentile(jets.tilt, 99), jets.tilt.max()),
+        "bad_share": float(np.mean(badness > BAD)),
+        "noise": noise,
+        "jumps": int(jump.sum()),
+        "badness": badness,
+    }
+    # of both ends of the edge that follows each corner
+    far = np.minimum(jets.radii[triangles], jets.radii[np.roll(triangles, -1, axis=1)])
+    faults = {"rims": _rims(ends, angles, len(vertices)), "unseen": int(np.sum(length > 2 * far)) // 2}
+    verdict, reasons = _verdict(quality, jets, **faults)
+    return MeshQuality(**quality, verdict=verdict, reasons=reasons)
+
+
+def _verdict(quality: dict[str, Any], jets: Jets, *, rims: int, unseen: int) -> tuple[Verdict, str]:
+    """Verdict and what it rests on, from the grossest fault to none."""
+    count, badness, jumps = quality["vertices"], quality["badness"], quality["jumps"]
+    curvature, noise = quality["curvature"], quality["noise"]
+    bad = int(np.sum(badness > BAD))
+    worst = f"worst {badness.max():.2g} at vertex {int(badness.argmax())}"
+    if rims >= FEWEST_RIMS:
+        return "sharp", (
+            f"{rims} of {count} vertices lie on edges of more than {SHARP:.0f} degrees (largest "
+            f"{quality['dihedral'][2]:.0f}); round the edges off over several triangles, or give another body"
+        )
+    if count < FEW or np.mean(~jets.fitted) > 0.5:
+        return "too coarse", f"{count} vertices are too few for a smooth surface; give some thousands"
+    if quality["residual_ratio"][0] > NOISE_RATIO and noise > NOISE and curvature < 1:
+        return "noisy", (
+            f"the vertices scatter by about {noise:.2g} of an edge, {noise * quality['edge_mean']:.2g} m, "
+            f"which makes curvatures uncertain by some {100 * min(1.0, noise / max(curvature, 1e-3)):.2g} %; smooth "
+            "the mesh, or export it with more digits"
+        )
+    if JUMPS_ALONG * np.sqrt(count) <= jumps < 0.2 * count and curvature < RESOLVED:
+        return "curvature jumps", (
+            f"the curvature jumps at {jumps} of {count} vertices, as where a cylinder meets a sphere; rays across them "
+            "are of low order: blend the faces with continuous curvature"
+        )
+    if unseen:
+        return "too coarse", (
+            f"{unseen} edges are much longer than the neighbourhoods of their ends (longest "
+            f"{quality['edge_max']:.3g} m, mean {quality['edge_mean']:.3g} m); mesh the body evenly"
+        )
+    if bad or curvature >= RESOLVED:
+        return "too coarse", (
+            f"{bad} of {count} vertices are bad ({worst}, allowed {BAD}), curvature times edge is {curvature:.2g}, "
+            f"allowed {RESOLVED}; halve the edges, at least where it curves most"
+        )
+    return "smooth", f"no vertex is bad ({worst}, allowed {BAD}) and curvature times edge is {curvature:.2g}"
+
+
+def _noise(fourth: FloatArray, sixth: FloatArray, turn: FloatArray) -> float:
+    """Noise of the vertices, as a length: what remains of res_6 when that of a smooth surface is taken off."""
+    decay = np.minimum(4 * turn**2, 0.5) ** 2
+    on4, on6 = RESIDUAL_PER_NOISE
+    return float(np.median(np.sqrt(np.maximum(sixth**2 - decay * fourth**2, 0) / (on6**2 - decay * on4**2))))
+
+
+def _rims(ends: IntArray, angles: FloatArray, count: int) -> int:
+    """Vertices at which at least two sharp edges meet, or 0 if most sharp edges stand alone, as those of slivers do."""
+    sharp = (angles > SHARP) & (angles > 3 * np.median(angles))
+    # where most edges are sharp, as on a cube, the median says nothing
+    sharp |= angles > 60
+    meeting = np.bincount(ends[sharp].ravel(), minlength=count)
+    chained = int(np.sum(meeting >= 2))
+    return chained if 2 * chained > np.sum(meeting > 0) else 0
+
+
+def _dihedrals(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
+    """Edges (k, 2) and the angles between their triangles (k,), degrees; small ones are left out."""
+    corners = vertices[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    first, last = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    order = np.lexsort((np.maximum(first, last), np.minimum(first, last))).reshape(-1, 2)
+    left, right = normal[order[:, 0] // 3], normal[order[:, 1] // 3]
+    angle = np.arctan2(np.linalg.norm(np.cross(left, right), axis=1), np.sum(left * right, axis=1))
+    area = np.minimum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))
+    solid = area > SLIVER * np.median(np.linalg.norm(normal, axis=1))
+    return np.stack([first, last], axis=1)[order[solid, 0]], np.degrees(angle[solid])

@@ -1,0 +1,181 @@
+"""Bodies from files and expressions on the command line: outputs, exit codes, messages."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+import creeping as cr
+import scatterers as sc
+from creeping.commands import main as cli
+
+
+def creeping(*arguments, capsys=None):
+    """Run in this process and return (exit code, stdout, stderr)."""
+    with pytest.raises(SystemExit) as caught:
+        cli.main([str(argument) for argument in arguments])
+    out = capsys.readouterr()
+    return caught.value.code, out.out, out.err
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    """A mesh of the unit sphere, in millimetres, that does not say so."""
+    path = tmp_path_factory.mktemp("meshes") / "ball.stl"
+    mesh = trimesh.creation.icosphere(3)
+    mesh.apply_scale(1000)
+    mesh.export(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def cube(tmp_path_factory):
+    path = tmp_path_factory.mktemp("meshes") / "cube.off"
+    trimesh.creation.box().subdivide().subdivide().subdivide().export(path)
+    return path
+
+
+SHORT = ["--direction", 0.1, 0.2, 1, "--flow", "direct", "--rays", 16, "--backend", "matplotlib"]
+
+
+def test_run_with_an_expression(tmp_path, capsys):
+    body = "x**2 + y**2 + 4*z**2 - 1"
+    code, out, err = creeping("run", body, *SHORT, "--length", 0.5, "-o", tmp_path, capsys=capsys)
+    assert code == 0
+    assert "examining the expression" in err
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["body"] == body and out.startswith(body)
+    # the same oblate spheroid by name
+    line = cr.shadow_line(sc.Ellipsoid(1.0, 1.0, 0.5), (0.1, 0.2, 1.0))
+    assert summary["shadow_line"][0]["length"] == pytest.approx(line.curves[0].length, rel=1e-8)
+    assert not {"fit", "verdict", "error_of_body"} & set(summary)
+
+
+def test_run_with_a_mesh(ball, tmp_path, capsys):
+    options = [*SHORT, "--length", 1, "--units", "mm", "-o", tmp_path]
+    code, out, err = creeping("run", ball, *options, capsys=capsys)
+    assert code == 0
+    assert "reading the mesh" in err and "fitting" in err
+    assert "body: a fit to 1922 points" in out and "because of it: points" in out
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["verdict"] == "smooth" and summary["ray_status"]["ROUGH"] == 0
+    assert summary["fit"]["points"] == 642 + 1280
+    assert summary["fit"]["normal_curvature"] == pytest.approx(1, rel=1e-3)
+    # that corners of an STL file's triangles are joined is no repair
+    assert summary["repairs"] == []
+    # a sphere of one metre: its shadow line is a great circle
+    assert summary["shadow_line"][0]["length"] == pytest.approx(2 * np.pi, abs=1e-5)
+    off = summary["error_of_body"]
+    assert 0 < off["points"] < 1e-4 and 0 < off["spreading"] < 1e-3 and 0 < off["attenuation"] < 1e-3
+    assert 1 <= off["rays"] <= summary["rays"]
+    # once more, the fit from the cache
+    code, _, err = creeping("run", ball, *options, capsys=capsys)
+    assert code == 0 and "fitting" not in err
+
+
+def test_run_with_a_mesh_and_a_wavenumber(ball, tmp_path, capsys):
+    field = ["--length", 3.2, "--wavenumber", 10, "--observe", "grid:90", "-o", tmp_path]
+    code, out, _ = creeping("run", ball, *SHORT, "--units", "mm", *field, capsys=capsys)
+    assert code == 0
+    assert "error of the field because of the body: rms" in out
+    entry = json.loads((tmp_path / "summary.json").read_text())["field"]
+    assert 0 < entry["uncertain_by"]["rms"] <= entry["uncertain_by"]["max"] < 1e-2 * entry["largest"]
+
+
+def test_fitted_bodies_in_the_cache(ball, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))
+    assert "0 maps, 0 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
+    body = sc.Mesh(ball, "mm")
+    assert "0 maps, 1 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
+    (row,) = json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])
+    assert f"({row['fit']})" in body.fingerprint and row["MB"] > 0
+    assert creeping("cache", "verify", capsys=capsys)[:2] == (0, f"ok       {row['fit']}\n")
+    file = tmp_path / "fits" / f"{row['fit']}.npz"
+    file.write_bytes(file.read_bytes()[:-1])
+    code, out, _ = creeping("cache", "verify", capsys=capsys)
+    assert code == 3 and "DAMAGED" in out
+    assert "removed 0 maps, 1 fitted bodies" in creeping("cache", "clear", capsys=capsys)[1]
+    assert not file.exists()
+
+
+def test_check_of_a_mesh(ball, tmp_path, capsys):
+    options = ["--units", "mm", "--wavenumber", 4 * np.pi]
+    code, out, _ = creeping("check", ball, *options, "-o", tmp_path / "new", capsys=capsys)
+    assert code == 0
+    assert "size                       2 x 2 x 2 m" in out
+    assert "4 x 4 x 4 wavelengths" in out
+    assert "fit: 1922 points" in out and "genus 0" in out
+    assert (tmp_path / "new" / "quality.png").read_bytes().startswith(b"\x89PNG")
+    code, out, _ = creeping("check", ball, *options, "--json", capsys=capsys)
+    answer = json.loads(out)
+    assert code == 0 and answer["ok"] is True
+    assert answer["quality"]["verdict"] == "smooth" and answer["fit"]["points"] == 1922 and answer["genus"] == 0
+    assert "picture" not in answer
+
+
+def test_check_of_a_cube_gives_its_quality(cube, tmp_path, capsys):
+    code, out, err = creeping("check", cube, "--units", "m", "-o", tmp_path, capsys=capsys)
+    assert code == 3
+    assert "verdict                    sharp" in out and "dihedral 50 %, 99 %, max" in out
+    assert "refused: " in out and "round the edges off" in out
+    assert "Traceback" not in err
+    assert (tmp_path / "quality.png").stat().st_size > 5000
+    code, out, _ = creeping("check", cube, "--units", "m", "--json", capsys=capsys)
+    answer = json.loads(out)
+    assert code == 3 and answer["ok"] is False
+    assert answer["quality"]["verdict"] == "sharp" and "not smooth enough" in answer["refused"]
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_body_without_charts_is_refused(command, tmp_path, capsys, monkeypatch):
+    """Found by a cone with --allow-rough, November 2026: a traceback."""
+
+    def none(*_, **__):
+        raise ValueError("no charts for 68 of 25260 points of the body; give one without sharp parts")
+
+    monkeypatch.setattr("scatterers.atlas.monge.atlas.MongeAtlas.covering", none)
+    torus = "(x**2 + y**2 + z**2 + 0.75)**2 - 4*(x**2 + y**2)"
+    options = ["--direction", 1, 0, 0.5, "-o", tmp_path] if command == "run" else []
+    code, _, err = creeping(command, torus, *options, capsys=capsys)
+    assert code == 3
+    assert "no charts for 68 of 25260 points" in err and "Traceback" not in err
+
+
+def test_check_names_a_folder_that_cannot_be(ball, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    code, _, err = creeping("check", ball, "--units", "mm", "-o", tmp_path / "file", capsys=capsys)
+    assert code == 3
+    assert "cannot make the folder" in err
+
+
+@pytest.mark.parametrize(
+    "body, more, match",
+    [
+        ("ball", [], "does not state its unit"),
+        ("ball", ["--units", "yard"], "units = 'yard' is none of m, mm"),
+        ("cube", ["--units", "m"], "not smooth enough (sharp)"),
+        ("none.stl", ["--units", "m"], "none.stl is no file on this machine"),
+        ("none.step", [], "none.step is no file"),
+        ("none.xyz", [], "unknown body 'none.xyz'"),
+        ("cuboid", [], "unknown body 'cuboid'; give one of sphere"),
+        ("torus", ["--units", "mm"], "--units belongs to a file; 'torus' is none"),
+        ("torus", ["--allow-rough"], "--allow-rough belongs to a file or an expression"),
+        ("x**2 + y**2 + z**2 - 1", ["--units", "mm"], "--units belongs to a file"),
+        ("x**2 + y**2 - 1", [], "x**2 + y**2 - 1: "),
+        ("x**2 + y**2 + z**2 - w", [], "w"),
+        ("__import__('os').system('touch hey') + x", [], ""),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_bad_bodies_are_exit_code_3(command, body, more, match, capsys, tmp_path, monkeypatch, request):
+    if command == "check" and body == "cube":
+        pytest.skip("check tells more of it")
+    monkeypatch.chdir(tmp_path)
+    source = request.getfixturevalue(body) if body in ("ball", "cube") else body
+    options = ["--direction", 1, 0, 0, "-o", "x"] if command == "run" else []
+    code, _, err = creeping(command, source, *more, *options, capsys=capsys)
+    assert code == 3
+    assert match in err
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []

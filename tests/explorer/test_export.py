@@ -1,0 +1,86 @@
+"""The page that needs no server."""
+
+import re
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.commands import main as cli
+from creeping.errors import CreepingError, SingularIncidenceError
+from creeping.explorer.request import Wish
+
+pytest.importorskip("viser")
+BODY = sc.Ellipsoid(1.2, 0.8, 0.6)
+WISH = Wish(theta=50.0, phi=40.0, rays=48, length=1.5, spacing=0.25, wavenumber=30.0, boundary="soft")
+
+
+def written(path, body=BODY, wish=WISH):
+    from creeping.explorer.export import export_page
+
+    return export_page(path, cr.DirectFlow(body, rtol=1e-9), wish)
+
+
+def test_the_page_opens_from_its_file(tmp_path, browser):
+    from creeping.explorer.preview import moving_frame, step_of
+
+    path = tmp_path / "page.html"
+    written(path)
+    browser.open(path.as_uri())
+    frame = moving_frame(cr.DirectFlow(BODY, rtol=1e-9), WISH, step_of(BODY))
+    held = browser.segments(len(frame.ray_segments))
+    np.testing.assert_allclose(held, frame.ray_segments, rtol=0, atol=1e-6)
+    assert browser.driver.find_element("id", "plane").rect["height"] > 50
+    assert "length 6.0202046 L" in browser.driver.find_element("id", "creeping").text
+    assert browser.errors() == []
+    outside = [u for u in browser.requests() if not u.startswith(("file:", "data:", "blob:", "chrome:"))]
+    assert outside == []
+
+
+def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path):
+    found = written(tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text()
+    assert f"length {found.line.length:.8g} L" in page and "Ellipsoid(a=1.2, b=0.8, c=0.6" in page
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=[\"']?https?:", page)
+
+
+def test_a_hostile_name_is_text(tmp_path):
+    class Named(sc.Ellipsoid):
+        def __repr__(self):
+            return "<script>alert(1)</script>"
+
+    written(tmp_path / "page.html", Named(1.2, 0.8, 0.6))
+    assert "<script>alert(1)" not in (tmp_path / "page.html").read_text()
+
+
+def test_trouble_writes_nothing(tmp_path):
+    with pytest.raises(SingularIncidenceError):
+        written(tmp_path / "page.html", sc.Torus(), WISH.changed(theta=90.0, phi=0.0))
+    with pytest.raises(CreepingError):
+        written(tmp_path / "no" / "such" / "folder" / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_writes_it(tmp_path, capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["explore", "sphere", "--rays", "32", "--export", str(tmp_path / "page.html")])
+    assert caught.value.code == 0
+    assert "rays, rms" in capsys.readouterr().out and (tmp_path / "page.html").stat().st_size > 1e6
+
+
+@pytest.mark.parametrize(
+    "arguments, code",
+    [
+        (["--rays", "8"], 3),
+        (["--direction", "0", "0", "0"], 3),
+        (["--port", "0"], 3),
+        (["--boundary", "pec"], 2),
+        (["--length", "nan"], 3),
+        (["--wavenumber", "0"], 3),
+    ],
+)
+def test_the_command_refuses(arguments, code, tmp_path, capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["explore", "sphere", *arguments, "--export", str(tmp_path / "page.html")])
+    assert caught.value.code == code and list(tmp_path.iterdir()) == []

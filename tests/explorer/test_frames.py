@@ -1,0 +1,136 @@
+"""What is drawn of a frame: numbers of the fan, no NaN, statuses in their places."""
+
+import re
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.explorer.colours import ENDED, FIELD_COLOURS, RANGE, field_colours
+from creeping.explorer.preview import moving_frame, outline, segments, step_of, steps_of
+from creeping.explorer.refined import cut_directions, settled
+from creeping.explorer.request import Wish
+from creeping.explorer.svg import cut_svg, plane_svg
+from creeping.explorer.text import colour_bar, moving_text, settled_text
+from creeping.geometry.surface import normal
+from creeping.geometry.triangulation import triangulate
+
+WISH = Wish(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
+
+
+def found_of(body, wish=WISH):
+    flow = cr.DirectFlow(body, rtol=1e-8)
+    frame = moving_frame(flow, wish, step_of(body))
+    mesh = triangulate(body.level, body.gradient, body.bounds, cells=24)
+    return frame, mesh, settled(flow, frame, mesh.vertices)
+
+
+@pytest.fixture(scope="module")
+def twisted():
+    return found_of(sc.TwistedEllipsoid())
+
+
+def test_a_frame_has_no_nan(twisted):
+    frame, _, _ = twisted
+    curves, levels = frame.level_segments
+    for values in (frame.ray_segments, frame.launch_segments, curves):
+        assert values.dtype == np.float32 and values.shape[1:] == (2, 3) and np.all(np.isfinite(values))
+    assert len(frame.ray_segments) == 64 * (frame.fan.points.shape[1] - 1)
+    assert set(np.round(levels, 9)) <= set(np.round(WISH.levels, 9)) and len(levels)
+    assert frame.fan.length == pytest.approx(2.0, abs=step_of(frame.fan.body) / 2)
+
+
+def test_levels_are_those_of_the_field(twisted):
+    frame, _, found = twisted
+    assert frame.levels.shape == frame.fan.spreading.shape
+    # |u| = 1.4 at the shadow line of a hard body: g(0) = 1.399
+    np.testing.assert_allclose(frame.levels[:, 0], 20 * np.log10(1.399), atol=0.01)
+    assert found.body_levels[np.isfinite(found.body_levels)].max() < 20 * np.log10(2) + 3
+
+
+def test_the_outline_lies_near_the_shadow_line(twisted):
+    frame, mesh, found = twisted
+    normals = normal(frame.fan.body, mesh.vertices)
+    drawn = outline(mesh, normals, WISH.direction)
+    assert drawn.shape[1:] == (2, 3) and np.all(np.isfinite(drawn))
+    length = float(np.sum(np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1)))
+    assert length == pytest.approx(found.line.length, rel=0.02)
+    n = normal(frame.fan.body, drawn.reshape(-1, 3).astype(float))
+    assert np.max(np.abs(n @ WISH.direction)) < 0.05
+
+
+def test_a_newer_wish_ends_the_work():
+    body = sc.Sphere()
+    frame = moving_frame(cr.DirectFlow(body), WISH, step_of(body))
+    asked = []
+
+    def stale():
+        asked.append(0)
+        return len(asked) == 2
+
+    assert settled(cr.DirectFlow(body), frame, np.zeros((0, 3)), stale) is None
+    assert len(asked) == 2
+
+
+def test_the_cut_of_a_sphere_is_near_the_partial_waves():
+    from studies.reference import sphere
+
+    # along z: theta of the cut is the angle from the forward direction
+    _, _, found = found_of(sc.Sphere(), WISH.changed(theta=0.0, length=6.5, rays=128))
+    exact = sphere.far_field(30.0, 1.0, np.cos(np.radians(found.cut_angles)), "hard")
+    assert np.max(np.abs(found.far.total - exact)) < 0.02 * np.max(np.abs(exact))
+    np.testing.assert_allclose(cut_directions(np.array([90.0, -90.0]), 90.0), [[0, 1, 0], [0, -1, 0]], atol=1e-12)
+
+
+def test_the_error_told_is_that_of_the_rays_drawn(twisted):
+    frame, _, found = twisted
+    assert frame.fan.error.samples == 0 and found.drawn.error.samples == 16
+    assert np.array_equal(found.drawn.points, frame.fan.points)
+    ends, _ = cr.trace(frame.fan.body, frame.fan.points[:, 0], frame.fan.directions[:, 0], frame.fan.length, rtol=1e-12)
+    every = np.linalg.norm(frame.fan.points[:, -1] - ends, axis=1)
+    assert found.drawn.error.rms < 20 * np.sqrt(np.mean(every**2)) and found.drawn.error.max < 20 * every.max()
+    assert "rays drawn: 64 rays" in settled_text(found) and f"rms {found.drawn.error.rms:.1e}" in settled_text(found)
+
+
+def test_long_rays_get_longer_steps():
+    body = sc.Sphere()
+    flow, step = cr.DirectFlow(body), step_of(body)
+    frame = moving_frame(flow, WISH.changed(length=400 * step, spacing=0.0), step)
+    assert frame.fan.length == pytest.approx(400 * step, abs=1.5 * step) and len(frame.fan.travel_time) <= 193
+    assert steps_of(0.1 * step, step) == (2, step)
+
+
+def test_pictures_are_svg_of_finite_numbers(twisted):
+    _, _, found = twisted
+    for text in (plane_svg(found), cut_svg(found), colour_bar(RANGE, "hard")):
+        assert text.startswith("<svg") and text.endswith("</svg>") and "nan" not in text and "inf" not in text
+        assert not re.search(r"(src|href)=", text)
+
+
+def test_a_weighted_body_has_rays_and_no_field():
+    frame, _, found = found_of(sc.Sphere(speed="1 + 0.3*x"))
+    assert frame.levels is None and found.body_levels is None and found.far is None and cut_svg(found) == ""
+    assert "no field" in settled_text(found) and "dB" not in moving_text(frame, 0.01, RANGE)
+    assert plane_svg(found).count("<path") > 3
+
+
+def test_a_torus_is_drawn_all_the_way_round():
+    _, _, found = found_of(sc.Torus(), WISH.changed(theta=70.0))
+    assert "psi (degrees)" in plane_svg(found)
+    assert "occluded" in settled_text(found)
+
+
+def test_colours_of_levels():
+    low, high = RANGE
+    colours = field_colours(np.array([-np.inf, np.nan, low - 20, low, high, np.inf]))
+    assert colours[:2].tolist() == [list(ENDED)] * 2
+    assert colours[2].tolist() == colours[3].tolist() == FIELD_COLOURS.table[0].tolist()
+    assert colours[4].tolist() == colours[5].tolist() == FIELD_COLOURS.table[255].tolist()
+
+
+def test_closed_lines_return():
+    square = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]]], dtype=float)
+    assert segments(square).shape == (2, 2, 3)
+    closed = segments(square, closed=True)
+    np.testing.assert_array_equal(closed[-1], [[1, 1, 0], [0, 0, 0]])

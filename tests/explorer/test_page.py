@@ -1,0 +1,196 @@
+"""The page in a real browser: it loads, a slider moves the rays, nothing leaves the machine."""
+
+import time
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.explorer.request import Wish
+from creeping.rays.preview import quick_fan
+
+pytest.importorskip("viser")
+BODY = sc.TwistedEllipsoid()
+WISH = Wish(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
+
+
+@pytest.fixture
+def page():
+    from creeping.explorer.page import Explorer
+
+    made = Explorer(cr.DirectFlow(BODY, rtol=1e-9), WISH, port=8123)
+    yield made
+    made.close()
+
+
+def rays_of(page, **values):
+    """Segments of the rays by the engine, for the wish with other values."""
+    wish = WISH.changed(**values)
+    count = round(wish.length / page.step)
+    fan = quick_fan(page.flow, wish.direction, length=count * page.step, n_rays=wish.rays, n_steps=count)
+    return np.stack([fan.points[:, :-1], fan.points[:, 1:]], axis=2).reshape(-1, 2, 3)
+
+
+def settled(page, seconds=60.0):
+    until = time.monotonic() + seconds
+    while not page.plane.content:
+        assert time.monotonic() < until, page.status.content
+        time.sleep(0.1)
+
+
+def test_rays_on_the_page_are_those_of_the_engine(page, browser):
+    browser.open(page.address)
+    first = rays_of(page)
+    held = browser.segments(len(first))
+    np.testing.assert_allclose(held, first, rtol=0, atol=1e-6)
+    settled(page)
+    # a key on the slider of theta, as a hand would press it
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    slider = browser.driver.find_elements(By.CSS_SELECTOR, "[role=slider]")[0]
+    slider.send_keys(Keys.ARROW_RIGHT * 5)
+    until = time.monotonic() + 30
+    while page.wish.theta == WISH.theta:
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    time.sleep(1.0)
+    assert 50.0 < page.wish.theta < 50.6
+    held = browser.segments(len(first))
+    np.testing.assert_allclose(held, rays_of(page, theta=page.wish.theta), rtol=0, atol=1e-6)
+    assert np.max(np.abs(held - first)) > 1e-3
+    assert browser.errors() == []
+    outside = [
+        u for u in browser.requests() if not u.startswith((page.address, "data:", "blob:", "ws://127.0.0.1", "chrome:"))
+    ]
+    assert outside == []
+
+
+def test_the_arrow_turns_the_sliders_and_the_program_turns_nothing(page):
+    class Event:
+        client, target = object(), page.stage.incidence
+
+    # a quarter turn about x takes +z to -y
+    page.stage.incidence.wxyz = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+    page._dragged(Event)
+    assert (page.wish.theta, page.wish.phi) == pytest.approx((90.0, -90.0))
+    assert (page.sliders["theta"].value, page.sliders["phi"].value) == pytest.approx((90.0, -90.0))
+    Event.client = None
+    page.stage.incidence.wxyz = (1.0, 0.0, 0.0, 0.0)
+    page._dragged(Event)
+    assert page.wish.theta == pytest.approx(90.0)
+
+
+def test_what_cannot_be_shown_is_told_and_the_page_lives_on(page):
+    page.ask(length=float("nan"))
+    assert "length" in page.status.content and page.wish == WISH
+    settled(page)
+    page.ask(theta=80.0)
+    until = time.monotonic() + 30
+    while "theta 80.0" not in page.status.content:
+        assert time.monotonic() < until, page.status.content
+        time.sleep(0.05)
+
+
+def test_a_singular_incidence_is_named():
+    from creeping.explorer.page import Explorer
+
+    made = Explorer(cr.DirectFlow(sc.Torus()), WISH.changed(theta=90.0, phi=0.0), port=8140)
+    try:
+        until = time.monotonic() + 60
+        while "crosses itself" not in made.status.content:
+            assert time.monotonic() < until, made.status.content
+            time.sleep(0.05)
+    finally:
+        made.close()
+
+
+@pytest.mark.parametrize(
+    "origin, let_in",
+    [
+        ("http://127.0.0.1:8123", True),
+        (None, True),
+        ("http://a.example", False),
+        ("null", False),
+        ("file://", False),
+        ("http://[::1", False),
+        ("http://127.0.0.1.a.example", False),
+    ],
+)
+def test_another_site_is_turned_away(page, origin, let_in):
+    import viser
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    address = page.address.replace("http", "ws")
+    protocol = [f"viser-v{viser.__version__}"]
+    with connect(address, origin=origin, subprotocols=protocol, max_size=None) as socket:
+        until, closed = time.monotonic() + 3, False
+        while time.monotonic() < until and not closed:
+            try:
+                socket.recv(timeout=0.5)
+            except TimeoutError:
+                pass
+            except ConnectionClosed:
+                closed = True
+    assert closed is not let_in
+
+
+def test_nothing_is_shared_with_the_world(page, monkeypatch):
+    import viser._tunnel
+
+    asked = []
+    monkeypatch.setattr(viser._tunnel.ViserTunnel, "__init__", lambda *a, **k: asked.append(a))
+    assert page.server.get_host() == "127.0.0.1"
+    assert page.server.request_share_url() is None and asked == []
+
+
+def test_a_settled_result_is_not_drawn_over_a_newer_frame(page, monkeypatch):
+    from creeping.explorer import page as module
+
+    settled(page)
+    began, real = [], module.settled_text
+
+    def late(found):
+        # a newer wish is drawn after the work was found good, and before it is drawn
+        began.append(found.wish.theta)
+        if found.wish.theta == 60.0:
+            page.ask(theta=70.0)
+            until = time.monotonic() + 30
+            while "theta 70.0" not in page.status.content and time.monotonic() < until:
+                time.sleep(0.01)
+        return real(found)
+
+    monkeypatch.setattr(module, "settled_text", late)
+    drawn = []
+    monkeypatch.setattr(page.stage, "settle", lambda found, paint: drawn.append(found.wish.theta))
+    page.ask(theta=60.0)
+    until = time.monotonic() + 90
+    while 70.0 not in drawn:
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    assert began[0] == 60.0 and 60.0 not in drawn
+
+
+def test_iso_phase_curves_can_be_turned_off_and_a_refusal_resets_the_slider(page):
+    slider = page.sliders["spacing"]
+    assert slider.min == 0.0
+
+    class Event:
+        client, target = object(), slider
+
+    slider.value = 1e-4
+    page._slid("spacing", Event)
+    assert "curves" in page.status.content and slider.value == page.wish.spacing == WISH.spacing
+    slider.value = 0.0
+    page._slid("spacing", Event)
+    assert page.wish.spacing == 0.0
+
+
+def test_nothing_works_on_after_the_end():
+    from creeping.explorer.page import Explorer
+
+    made = Explorer(cr.DirectFlow(BODY, rtol=1e-6), WISH, port=8150)
+    made.close()
+    assert not any(worker.is_alive() for worker in made._workers)

@@ -1,0 +1,125 @@
+"""Results as polylines for pyvista: points and arrays are theirs, and those of a file."""
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import creeping as cr
+from creeping.files.polylines import CELL_ARRAYS, POINT_ARRAYS
+from creeping.plotting import polydata, write_vtp
+
+
+@pytest.fixture(scope="module")
+def pyvista():
+    return pytest.importorskip("pyvista", exc_type=ImportError)
+
+
+def test_polydata_of_a_fan_is_the_fan(pyvista, twisted_fan):
+    mesh = twisted_fan.to_polydata()
+    assert isinstance(mesh, pyvista.PolyData)
+    shape = twisted_fan.points.shape[:2]
+    assert (mesh.n_lines, mesh.n_points) == (shape[0], shape[0] * shape[1])
+    np.testing.assert_array_equal(mesh.points.reshape(twisted_fan.points.shape), twisted_fan.points)
+    for name in ("eikonal", "spreading", "spreading_rate", "curvature", "attenuation", "caustic_index"):
+        np.testing.assert_array_equal(mesh.point_data[name].reshape(shape), getattr(twisted_fan, name))
+    np.testing.assert_array_equal(mesh.point_data["travel_time"].reshape(shape)[-1], twisted_fan.travel_time)
+    np.testing.assert_array_equal(mesh.cell_data["ray"], np.arange(shape[0]))
+    for name in ("status", "curve_index"):
+        np.testing.assert_array_equal(mesh.cell_data[name], getattr(twisted_fan, name))
+    # cells are the rays, in order
+    np.testing.assert_array_equal(mesh.get_cell(3).point_ids, np.arange(3 * shape[1], 4 * shape[1]))
+
+
+def test_detached_rays_keep_their_points(pyvista, twisted_fan):
+    mesh = twisted_fan.to_polydata()
+    ray = int(np.flatnonzero(twisted_fan.status == cr.RayStatus.DETACHED)[0])
+    cell = mesh.get_cell(ray)
+    np.testing.assert_array_equal(cell.points, twisted_fan.points[ray])
+    assert np.all(np.isfinite(cell.points))
+    status = mesh.point_data["ray_status"][cell.point_ids]
+    gone = twisted_fan.travel_time > twisted_fan.detachment[ray]
+    assert 0 < gone.sum() < len(gone)
+    np.testing.assert_array_equal(status, np.where(gone, cr.RayStatus.DETACHED, cr.RayStatus.OK))
+
+
+def test_nan_stays_where_it_was(pyvista, twisted_fan):
+    spreading = twisted_fan.spreading.copy()
+    spreading[2] = np.nan
+    mesh = replace(twisted_fan, spreading=spreading).to_polydata()
+    assert mesh.n_points == twisted_fan.points[..., 0].size
+    np.testing.assert_array_equal(mesh.point_data["spreading"].reshape(spreading.shape), spreading)
+
+
+def test_polydata_is_a_copy(pyvista, twisted_fan):
+    before = twisted_fan.points.copy(), twisted_fan.spreading.copy()
+    mesh = twisted_fan.to_polydata()
+    mesh.points[:] = 0
+    mesh.point_data["spreading"][:] = 0
+    np.testing.assert_array_equal(twisted_fan.points, before[0])
+    np.testing.assert_array_equal(twisted_fan.spreading, before[1])
+
+
+def test_polydata_of_line_and_curves(pyvista, twisted_fan, twisted_curves):
+    line = twisted_fan.line
+    mesh = line.to_polydata()
+    np.testing.assert_array_equal(mesh.points, np.concatenate([curve.points for curve in line.curves]))
+    names = np.array(["attached", "occluded", "concave"])
+    np.testing.assert_array_equal(
+        names[mesh.point_data["line_status"]], np.concatenate([curve.status for curve in line.curves])
+    )
+    one = line.curves[0].to_polydata()
+    np.testing.assert_array_equal(one.points, line.curves[0].points)
+    curve = twisted_curves[0].to_polydata()
+    np.testing.assert_array_equal(curve.points, twisted_curves[0].points)
+    assert np.all(curve.point_data["travel_time"] == 0.5)
+    np.testing.assert_array_equal(curve.cell_data["level"], [0.5])
+    joined = polydata(line, twisted_fan, twisted_curves)
+    assert joined.n_lines == len(line.curves) + len(twisted_fan.points) + len(twisted_curves)
+    np.testing.assert_array_equal(np.unique(joined.cell_data["kind"]), [0, 1, 2])
+
+
+def test_file_and_polydata_have_one_list_of_names(pyvista, tmp_path, twisted_fan, twisted_curves):
+    path = tmp_path / "all.vtp"
+    write_vtp(path, twisted_fan.line, twisted_fan, twisted_curves)
+    piece = ET.parse(path).getroot().find("PolyData/Piece")
+    names = [[array.get("Name") for array in piece.find(part)] for part in ("PointData", "CellData")]
+    assert names == [list(POINT_ARRAYS), list(CELL_ARRAYS)]
+    mesh, read = polydata(twisted_fan.line, twisted_fan, twisted_curves), pyvista.read(path)
+    assert sorted(mesh.point_data.keys()) == sorted(names[0])
+    assert sorted(mesh.cell_data.keys()) == sorted(names[1])
+    for name in names[0]:
+        assert mesh.point_data[name].dtype == read.point_data[name].dtype
+        np.testing.assert_array_equal(mesh.point_data[name], read.point_data[name])
+    for name in names[1]:
+        np.testing.assert_array_equal(mesh.cell_data[name], read.cell_data[name])
+    np.testing.assert_array_equal(mesh.points, read.points)
+    np.testing.assert_array_equal(mesh.lines, read.lines)
+
+
+def test_polydata_loads_nothing_that_draws():
+    code = """
+import sys, pathlib
+from types import SimpleNamespace as S
+import numpy as np
+from creeping.plotting import polydata
+curve = S(points=np.eye(3), arclength=np.arange(3.0), status=np.array(["attached"] * 3))
+mesh = polydata(S(body=None, direction=None, curves=[curve]))
+assert mesh.n_lines == 1, mesh
+drawing = [name for name in sys.modules if "vtkRendering" in name or name.startswith("pyvista.plotting")]
+assert not drawing, drawing
+maps = pathlib.Path("/proc/self/maps")
+loaded = maps.read_text() if maps.exists() else ""
+assert not [name for name in ("libX11", "libEGL", "libGL.", "libOpenGL", "libGLX") if name in loaded]
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_polydata_of_nothing(pyvista, dark_fan):
+    assert dark_fan.line.to_polydata().n_lines == len(dark_fan.line.curves)
+    mesh = dark_fan.to_polydata()
+    assert (mesh.n_points, mesh.n_lines) == (0, 0)
+    assert polydata().n_points == 0

@@ -1,0 +1,121 @@
+"""Files are read back, by VTK's own reader where there is one."""
+
+import csv
+import errno
+import os
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from creeping.errors import CreepingError, InvalidInputError
+from creeping.plotting import write_csv, write_text, write_vtp
+
+
+def table(path):
+    with open(path, encoding="ascii") as stream:
+        lines = list(stream)
+    notes = [line for line in lines if line.startswith("#")]
+    rows = list(csv.DictReader(lines[len(notes) :]))
+    assert len(notes) == len(rows[0])
+    return rows
+
+
+def test_vtp_reads_back(tmp_path, sphere_line, sphere_fan, sphere_curves):
+    pyvista = pytest.importorskip("pyvista", exc_type=ImportError)
+    path = tmp_path / "all.vtp"
+    write_vtp(path, sphere_line, sphere_fan, sphere_curves)
+    mesh = pyvista.read(path)
+    rays, steps = sphere_fan.eikonal.shape
+    assert mesh.n_lines == 1 + rays + 3
+    assert mesh.n_points == 96 + rays * steps + 3 * 96
+    on_rays = slice(96, 96 + rays * steps)
+    np.testing.assert_array_equal(mesh.points[on_rays].reshape(rays, steps, 3), sphere_fan.points)
+    for name in ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index"):
+        np.testing.assert_array_equal(mesh.point_data[name][on_rays].reshape(rays, steps), getattr(sphere_fan, name))
+    np.testing.assert_array_equal(
+        mesh.point_data["travel_time"][on_rays].reshape(rays, steps)[4], sphere_fan.travel_time
+    )
+    assert np.all(np.isnan(mesh.point_data["eikonal"][:96]))
+    assert np.all(mesh.point_data["caustic_index"][:96] == -1)
+    assert np.bincount(mesh.point_data["line_status"][:96]).tolist() == [60, 20, 16]
+    np.testing.assert_array_equal(mesh.cell_data["kind"], [0] + [1] * rays + [2] * 3)
+    np.testing.assert_array_equal(mesh.cell_data["status"][1 : 1 + rays], sphere_fan.status)
+    np.testing.assert_array_equal(mesh.cell_data["level"][-3:], [0.3, 0.6, 0.9])
+    # a closed curve comes back to its first point
+    first = mesh.get_cell(0).point_ids
+    assert len(first) == 97
+    assert first[0] == first[-1]
+
+
+@pytest.mark.parametrize("part", ["line", "fan", "curves", "nothing"])
+def test_vtp_of_one_part_is_well_formed(tmp_path, sphere_line, sphere_fan, sphere_curves, part):
+    given = {"line": {"line": sphere_line}, "fan": {"fan": sphere_fan}, "curves": {"curves": sphere_curves}}
+    path = tmp_path / "part.vtp"
+    write_vtp(path, **given.get(part, {}))
+    piece = ET.parse(path).getroot().find("PolyData/Piece")
+    assert int(piece.get("NumberOfLines")) == {"line": 1, "fan": 30, "curves": 3, "nothing": 0}[part]
+
+
+def test_csv_of_a_fan_keeps_every_bit(tmp_path, sphere_fan):
+    path = tmp_path / "fan.csv"
+    write_csv(path, fan=sphere_fan)
+    rows = table(path)
+    expected = "ray step t x y z px py pz eikonal J dJ kappa_n caustic_index status"
+    assert list(rows[0]) == expected.split()
+    rays, steps = sphere_fan.eikonal.shape
+    assert len(rows) == rays * steps
+    read = np.array([[float(row[name]) for name in "xyz"] for row in rows]).reshape(rays, steps, 3)
+    np.testing.assert_array_equal(read, sphere_fan.points)
+    spreading = np.array([float(row["J"]) for row in rows]).reshape(rays, steps)
+    np.testing.assert_array_equal(spreading, sphere_fan.spreading)
+    assert [int(row["status"]) for row in rows[::steps]] == sphere_fan.status.tolist()
+
+
+def test_csv_of_line_and_curves(tmp_path, sphere_line, sphere_curves):
+    write_csv(tmp_path / "line.csv", line=sphere_line)
+    rows = table(tmp_path / "line.csv")
+    assert [row["status"] for row in rows] == sphere_line.curves[0].status.tolist()
+    assert [float(row["s"]) for row in rows] == sphere_line.curves[0].arclength.tolist()
+    open_curve = replace(sphere_curves[0], closed=False)
+    write_csv(tmp_path / "curves.csv", curves=[*sphere_curves, open_curve])
+    rows = table(tmp_path / "curves.csv")
+    assert len(rows) == 4 * 96
+    assert {row["closed"] for row in rows} == {"0", "1"}
+
+
+def test_csv_wants_exactly_one(tmp_path, sphere_line, sphere_fan):
+    with pytest.raises(InvalidInputError, match="got nothing; give exactly one"):
+        write_csv(tmp_path / "x.csv")
+    with pytest.raises(InvalidInputError, match="got line and fan"):
+        write_csv(tmp_path / "x.csv", line=sphere_line, fan=sphere_fan)
+    assert not list(tmp_path.iterdir())
+
+
+def test_text_is_replaced_whole(tmp_path):
+    path = tmp_path / "summary.json"
+    for text in ("long old text\n", "κ\n"):
+        write_text(path, text)
+        assert path.read_bytes() == text.encode()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_missing_folder_is_named(tmp_path, sphere_line):
+    with pytest.raises(CreepingError, match=r"missing.*create the folder first"):
+        write_vtp(tmp_path / "missing" / "line.vtp", sphere_line)
+
+
+def test_full_disk_leaves_the_old_file(tmp_path, sphere_line, monkeypatch):
+    path = tmp_path / "line.csv"
+    path.write_text("old")
+
+    def full(*_args):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("creeping.files.tables._write_table", full)
+    with pytest.raises(CreepingError, match="free some space") as caught:
+        write_csv(path, line=sphere_line)
+    assert caught.value.path == path
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,0 +1,105 @@
+"""The tracer: compiled against numpy, against scipy, and its answers to bad input."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from tolerances import JACOBI_DIFFERENCE, TRACE, TWIN
+
+import creeping as cr
+import scatterers as sc
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.equations import speed_values, vector_field
+from creeping.geodesics.integrator import dormand_prince_8, pack, trace_numpy, trace_states
+from creeping.geometry.surface import normal
+
+
+def test_compiled_equals_numpy(body, rng):
+    # 3 rays: one block, so both paths share one step
+    states = pack(*random_bundle_points(body, 3, rng=rng), jacobi=True)
+    times = np.array([0.0, 0.3, 0.3, 1.1])
+    twin = trace_numpy(body, states, times, dormand_prince_8(), rtol=1e-12, step=0.05)
+    np.testing.assert_allclose(trace_states(body, states, times, rtol=1e-12, step=0.05), twin, atol=TWIN)
+
+
+def test_against_scipy(body, rng):
+    x, p = random_bundle_points(body, 2, rng=rng)
+    ends = cr.trace(body, x, p, 2.0, rtol=1e-12)
+    for k in range(2):
+
+        def field(_, y):
+            return np.concatenate(vector_field(body, y[:3], y[3:]))
+
+        reference = solve_ivp(field, (0, 2), np.r_[x[k], p[k]], method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+        np.testing.assert_allclose(np.r_[ends[0][k], ends[1][k]], reference, atol=TRACE)
+
+
+def test_jacobi_lane_is_the_derivative_in_the_angle(body, rng):
+    x, p = random_bundle_points(body, 20, rng=rng)
+    across, h = np.cross(normal(body, x), p), 1e-5
+    end = trace_states(body, pack(x, p, jacobi=True), np.array([1.0]), rtol=1e-13)[:, 0]
+    turned = [cr.trace(body, x, np.cos(a) * p + np.sin(a) * across, 1.0, rtol=1e-13)[0] for a in (h, -h)]
+    b = np.cross(normal(body, end[:, :3]), end[:, 3:6])
+    difference = np.sum(b * (turned[0] - turned[1]), axis=-1) / (2 * h)
+    np.testing.assert_allclose(speed_values(body, end[:, :3]) * end[:, 8], difference, atol=JACOBI_DIFFERENCE)
+
+
+def test_jacobi_matrix_has_determinant_one(body, rng):
+    states = pack(*random_bundle_points(body, 20, rng=rng), jacobi=True)
+    m = trace_states(body, states, np.array([1.0, 3.0]), rtol=1e-12)[..., 6:]
+    np.testing.assert_allclose(m[..., 0] * m[..., 3] - m[..., 1] * m[..., 2], 1, atol=1e-9)
+
+
+def test_shapes_follow_points_and_times():
+    points = np.zeros((2, 5, 3))
+    points[..., 0] = 1.0
+    assert cr.trace(sc.Sphere(), points, [0, 1, 0], 0.5)[0].shape == (2, 5, 3)
+    assert cr.trace(sc.Sphere(), points, [0, 1, 0], [0.0, 0.5])[1].shape == (2, 5, 2, 3)
+    assert cr.trace(sc.Sphere(), [1, 0, 0], [0, 1, 0], 0.5)[0].shape == (3,)
+    assert cr.trace(sc.Sphere(), np.zeros((0, 3)), np.zeros((0, 3)), 0.5)[0].shape == (0, 3)
+
+
+def test_step_far_too_large_is_an_error_not_a_nan():
+    body = sc.TwistedEllipsoid()
+    states = pack(*random_bundle_points(body, 40, rng=np.random.default_rng(0)))
+    with pytest.raises(cr.CreepingError, match="shorten the step"):
+        trace_states(body, states, np.array([1e6]), rtol=0.0, step=1e5)
+
+
+@pytest.mark.parametrize(
+    "points, directions, times, match",
+    [
+        ([2.0, 0, 0], [0, 1, 0], 1.0, "off the body"),
+        ([1.0, 0, np.nan], [0, 1, 0], 1.0, "points are not finite"),
+        ([1.0, 0, 0], [0, np.inf, 0], 1.0, "directions are not finite"),
+        ([1.0, 0, 0], [0, 0, 0], 1.0, "zero"),
+        ([1.0, 0, 0], [1, 0, 0], 1.0, "normal to the body"),
+        ([1.0, 0], [0, 1], 1.0, "x, y, z"),
+        ([1.0, 0, 0], [0, 1, 0], -1.0, ">= 0"),
+        ([1.0, 0, 0], [0, 1, 0], [1.0, 0.5], "ascend"),
+        ([1.0, 0, 0], [0, 1, 0], np.nan, "finite"),
+        ([1.0, 0, 0], [0, 1, 0], [], "finite"),
+        ("point", [0, 1, 0], 1.0, "not arrays"),
+    ],
+)
+def test_bad_input_is_named(points, directions, times, match):
+    with pytest.raises(cr.CreepingError, match=match):
+        cr.trace(sc.Sphere(), points, directions, times)
+
+
+@pytest.mark.parametrize("rtol", [0.0, 1.0, -1e-6, float("nan")])
+def test_bad_tolerance_is_named(rtol):
+    with pytest.raises(cr.CreepingError, match="rtol"):
+        cr.trace(sc.Sphere(), [1, 0, 0], [0, 1, 0], 1.0, rtol=rtol)
+
+
+def test_random_points_are_uniform_by_area():
+    x, p = random_bundle_points(sc.Torus(), 20_000, rng=np.random.default_rng(1))
+    # the outer half of the torus has (pi/2 + r/R)/pi of its area
+    outer = np.mean(np.hypot(x[:, 0], x[:, 1]) > 1)
+    assert outer == pytest.approx((np.pi / 2 + 0.5) / np.pi, abs=0.015)
+    np.testing.assert_allclose(np.linalg.norm(p, axis=1), 1, atol=1e-14)
+
+
+def test_times_that_differ_by_rounding():
+    x, _ = cr.trace(sc.Sphere(), (1, 0, 0), (0, 1, 0), [0.3, 0.1 * 3])
+    np.testing.assert_allclose(x[0], x[1], atol=1e-15)

@@ -1,0 +1,169 @@
+"""Stored maps: a round trip, and no damage that goes unnoticed."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.geometry.surface import fingerprint
+from creeping.storage.folder import MANIFEST
+
+BODY = sc.Ellipsoid(1.0, 0.8, 0.6)
+OPTIONS = {"horizon": 0.25, "grid": (10, 12), "order": 3}
+
+
+@pytest.fixture(scope="module")
+def original():
+    return cr.build_phase_map(BODY, cache=False, **OPTIONS)
+
+
+@pytest.fixture
+def folder(original, tmp_path):
+    return original.save(tmp_path / "map")
+
+
+def test_round_trip(original, folder):
+    loaded = cr.load_phase_map(folder, BODY)
+    assert loaded.grid == original.grid
+    assert loaded.error == original.error
+    assert loaded.parameters == original.parameters
+    x, p = [0, 0, 0.6], [1.0, 1.0, 0]
+    for a, b in zip(loaded.flow(x, p, 1.3), original.flow(x, p, 1.3), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert sorted(f.name for f in folder.iterdir()) == ["curvature-0.npy", "jacobi-0.npy", MANIFEST, "state-0.npy"]
+    assert not list(folder.parent.glob(".map-*"))
+
+
+def flip(path, position):
+    data = bytearray(path.read_bytes())
+    data[position] ^= 1
+    path.write_bytes(bytes(data))
+
+
+def edit(folder, change, *, sign=True):
+    from creeping.storage.folder import content_digest
+
+    document = json.loads((folder / MANIFEST).read_text())
+    change(document["content"])
+    if sign:
+        document["blake2b"] = content_digest(document["content"])
+    (folder / MANIFEST).write_text(json.dumps(document))
+
+
+DAMAGES = {
+    "flipped bit of an array": lambda f: flip(f / "state-0.npy", 5000),
+    "flipped bit of a header": lambda f: flip(f / "state-0.npy", 20),
+    "flipped bit of the manifest": lambda f: flip(f / MANIFEST, 60),
+    "truncated array": lambda f: (f / "state-0.npy").write_bytes((f / "state-0.npy").read_bytes()[:-8]),
+    "missing array": lambda f: (f / "jacobi-0.npy").unlink(),
+    "missing manifest": lambda f: (f / MANIFEST).unlink(),
+    "empty manifest": lambda f: (f / MANIFEST).write_text(""),
+    "manifest of another kind": lambda f: (f / MANIFEST).write_text("[1, 2]"),
+    "manifest too deep": lambda f: (f / MANIFEST).write_text("[" * 100_000),
+    "huge manifest": lambda f: (f / MANIFEST).write_text(" " * 2_000_000),
+    "unsigned edit": lambda f: edit(f, lambda c: c.update(degree=5), sign=False),
+    "signed shape of another grid": lambda f: edit(f, lambda c: c.update(nodes=[11, 10, 12])),
+    "signed unknown degree": lambda f: edit(f, lambda c: c.update(degree=4)),
+    "signed missing key": lambda f: edit(f, lambda c: c.pop("times")),
+    "schema of the future": lambda f: edit(f, lambda c: c.update(schema=99)),
+    "shape bomb": lambda f: edit(f, lambda c: c["files"]["state-0.npy"].update(shape=[2**40, 2**40, 1, 1, 8])),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damage_is_a_clear_error(damage, folder):
+    DAMAGES[damage](folder)
+    with pytest.raises(cr.CreepingError, match="rebuild"):
+        cr.load_phase_map(folder, BODY)
+
+
+def test_pickle_is_never_opened(folder):
+    np.save(folder / "state-0.npy", np.array([print], dtype=object), allow_pickle=True)
+    with pytest.raises(cr.CreepingError, match="rebuild"):
+        cr.load_phase_map(folder, BODY)
+
+
+def test_map_of_another_body_is_refused(folder):
+    with pytest.raises(cr.CreepingError, match="is a map of"):
+        cr.load_phase_map(folder, sc.Ellipsoid(1.0, 0.8, 0.61))
+
+
+def test_save_does_not_overwrite(original, folder):
+    with pytest.raises(cr.CreepingError, match="exists"):
+        original.save(folder)
+
+
+def test_save_into_a_file_is_a_clear_error(original, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(cr.CreepingError, match="cannot write"):
+        original.save(tmp_path / "file" / "map")
+
+
+def test_cache_hit_rebuild_and_miss(tmp_path):
+    said = []
+    options = {**OPTIONS, "cache": tmp_path, "progress": said.append}
+    first = cr.build_phase_map(BODY, **options)
+    assert any("tracing" in line for line in said)
+    said.clear()
+    again = cr.build_phase_map(BODY, **options)
+    assert said == []
+    np.testing.assert_array_equal(again.leaps[0].state, first.leaps[0].state)
+    (stored,) = [p for p in tmp_path.iterdir() if p.is_dir()]
+    flip(stored / "state-0.npy", 4000)
+    repaired = cr.build_phase_map(BODY, **options)
+    assert any("rebuilding" in line for line in said)
+    np.testing.assert_array_equal(repaired.leaps[0].state, first.leaps[0].state)
+    cr.build_phase_map(BODY, **{**options, "order": 5})
+    assert len([p for p in tmp_path.iterdir() if p.is_dir()]) == 2
+
+
+def test_cache_that_cannot_be_written_is_said_and_done_without(tmp_path):
+    (tmp_path / "file").write_text("")
+    said = []
+    flow = cr.build_phase_map(BODY, cache=tmp_path / "file", progress=said.append, **OPTIONS)
+    assert flow.error.rms < 1
+    assert any("without" in line for line in said)
+
+
+def test_full_disk_leaves_nothing_behind(original, tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "save", full)
+    with pytest.raises(cr.CreepingError, match="No space left"):
+        original.save(tmp_path / "map")
+    assert [p.name for p in tmp_path.iterdir() if p.name != "map.lock"] == []
+
+
+def test_fingerprint_of_a_body_that_has_none():
+    def plain(semi_axis):
+        inner = sc.Ellipsoid(semi_axis, 0.8, 0.6)
+        names = ("level", "gradient", "hessian", "atlas", "bounds", "parameters")
+        return type("Plain", (), {name: getattr(inner, name) for name in names})()
+
+    assert fingerprint(plain(1.0)) == fingerprint(plain(1.0))
+    assert fingerprint(plain(1.0)) != fingerprint(plain(1.0001))
+
+
+def test_copied_folder_is_a_map(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    assert cr.load_phase_map(tmp_path / "copy", BODY).horizon == 0.25
+
+
+def test_second_process_waits_and_opens_the_same_map(tmp_path):
+    code = (
+        "import creeping as cr, scatterers as sc\n"
+        "def say(text): print(text, flush=True)\n"
+        "options = dict(horizon=0.25, grid=(10, 12), order=3, progress=say)\n"
+        f"cr.build_phase_map(sc.Ellipsoid(1.0, 0.8, 0.6), cache={str(tmp_path)!r}, **options)"
+    )
+    both = [subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate(timeout=120)[0] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert sorted("tracing" in text for text in said) == [False, True]
+    assert len([p for p in tmp_path.iterdir() if p.is_dir()]) == 1

@@ -1,0 +1,88 @@
+"""Grids and the margins of charts: nodes beyond the unit square must lie within the chart."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.phaseflow.building import Plan
+from creeping.phaseflow.grid import MARGIN, Grid, least_cells
+from creeping.phaseflow.tuning.search import _scaled
+
+SPHERE = sc.Sphere()
+
+
+class Reaching:
+    """The unit sphere; its charts say that they reach so many half widths beyond their unit squares."""
+
+    class Atlas:
+        charts = SPHERE.atlas.charts
+        locate = staticmethod(SPHERE.atlas.locate)
+
+        def __init__(self, margin):
+            self.margin = margin
+
+    def __init__(self, margin):
+        for name in ("level", "gradient", "hessian", "bounds", "parameters"):
+            setattr(self, name, getattr(SPHERE, name))
+        self.atlas = self.Atlas(margin)
+
+
+def grid_of(nodes, degree=5):
+    return Grid((nodes, nodes, 16), degree, (False, False))
+
+
+@pytest.mark.parametrize("margin", [0.2, 0.25, 0.4, 0.6, 0.7, 1.0, 3.9, 4.0, 10.0])
+def test_least_cells_keep_the_nodes_within_the_charts(margin):
+    cells = least_cells(Reaching(margin))
+
+    def reach(n):
+        # in half widths: u runs over two of them
+        u, v, _ = grid_of(n + 1 + 2 * MARGIN).axes()
+        assert u[0] == v[0] == pytest.approx(1 - u[-1])
+        return -2 * u[0]
+
+    assert reach(cells) <= margin * (1 + 1e-9)
+    assert cells == 1 or reach(cells - 1) > margin
+
+
+def test_charts_without_a_margin_take_any_grid():
+    assert least_cells(SPHERE) == 1
+    assert least_cells(sc.Torus()) == 1
+
+
+@pytest.mark.parametrize("order", [3, 5])
+def test_grid_too_small_for_the_margin_is_refused(order):
+    body = Reaching(0.6)
+    least = least_cells(body) + 1 + 2 * MARGIN
+    assert least == 12 > order + 5
+    for grid in ((least - 1, 8), (least - 1, least, 8), (least, least - 1, 8)):
+        with pytest.raises(cr.CreepingError, match=rf"at least \[12, 12, {order + 1}\] for order {order}"):
+            cr.build_phase_map(body, horizon=0.1, grid=grid, order=order, cache=False)
+        # the same grid does where charts reach everywhere
+        built = cr.build_phase_map(SPHERE, horizon=0.1, grid=grid, order=order, cache=False)
+        assert built.error.rms < 1e-2
+    assert cr.build_phase_map(body, horizon=0.1, grid=(least, 8), order=order, cache=False).error.rms < 1e-2
+
+
+def test_grid_too_small_for_monge_charts_is_refused():
+    body = sc.Gridded.sampled(sc.Torus(), 24)
+    with pytest.raises(cr.CreepingError, match=r"at least \[15, 15, 6\]"):
+        cr.build_phase_map(body, horizon=0.1, grid=(14, 16), cache=False)
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.5, 0.9, 1.0, 1.7])
+def test_thinned_and_refined_grids_keep_the_margin(factor):
+    plan = Plan(0.5, grid_of(20), least_cells=12)
+    grid = _scaled(plan, factor).grid
+    assert np.all(grid.cells[:2] >= 12)
+    assert _scaled(Plan(0.5, grid_of(20)), 0.5).grid.cells[0] < 12
+
+
+def test_tuned_maps_keep_the_margin():
+    # a loose tolerance alone would ask for fewer cells
+    body, plain = Reaching(0.25), cr.build_phase_map(SPHERE, tolerance=1e-2, cache=False)
+    built = cr.build_phase_map(body, tolerance=1e-2, cache=False)
+    least = least_cells(body)
+    assert built.grid.cells[0] >= least == 16 > plain.grid.cells[0]
+    assert built.error.rms <= 1e-2

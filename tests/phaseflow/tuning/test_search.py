@@ -1,0 +1,227 @@
+"""Tuned maps keep their promise at the end of rays; the choice between map and direct integration."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.integrator import pack, trace_states
+from creeping.kernels.threads import thread_count
+from creeping.phaseflow.building import Plan, build_direct, measured
+from creeping.phaseflow.coordinates import rotation as compiled_models
+from creeping.phaseflow.coordinates.base import model_of
+from creeping.phaseflow.grid import Grid
+
+
+def rms_at_end(flow, body, length, rng, rays=1000):
+    states = pack(*random_bundle_points(body, rays, rng=rng))
+    times = np.array([length])
+    exact = trace_states(body, states, times, rtol=1e-13)
+    return float(np.sqrt(np.mean(np.sum((flow.transport(states, times) - exact) ** 2, axis=2))))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-6, 1e-7])
+def test_tolerance_is_met_after_the_whole_length(body, tolerance, rng):
+    flow = cr.build_phase_map(body, tolerance=tolerance, length=4.0, ride_along=False, cache=False)
+    assert flow.growth.lengths[-1] == 4.0
+    assert flow.growth.rms[-1] <= tolerance
+    assert (4.0 / flow.horizon) % 1 == pytest.approx(0, abs=1e-9)
+    assert rms_at_end(flow, body, 4.0, rng) <= tolerance
+
+
+def test_horizon_divides_the_distance_of_outputs():
+    flow = cr.build_phase_map(sc.Torus(), tolerance=1e-5, length=3.0, outputs=10, cache=False)
+    assert (0.3 / flow.horizon) % 1 == pytest.approx(0, abs=1e-9)
+
+
+def test_chaos_is_said(rng):
+    body = sc.TwistedEllipsoid()
+    flow = cr.build_phase_map(body, tolerance=1e-5, length=8.0, ride_along=False, cache=False)
+    growth = flow.growth
+    assert growth.rms_after(8.0) == pytest.approx(growth.rms[-1])
+    assert growth.rms_after(0.5 * growth.lengths[0]) == growth.rms[0]
+    assert growth.rms_after(16.0) > 5 * growth.rms_after(8.0)
+    trusted = growth.trusted_length(1e-5)
+    assert 7.9 <= trusted < 16.0
+    assert rms_at_end(flow, body, trusted, rng, 400) < 5e-5
+    assert growth.trusted_length(1e-12) == 0.0
+
+
+def test_no_jacobi_matrix_without_ride_along(rng):
+    body = sc.Sphere()
+    flow = cr.build_phase_map(body, tolerance=1e-4, length=2.0, ride_along=False, cache=False)
+    assert not flow.rides
+    with pytest.raises(cr.CreepingError, match="ride_along=True"):
+        flow.transport(pack(*random_bundle_points(body, 3, rng=rng), jacobi=True), np.array([2.0]))
+
+
+def test_doubling_agrees_with_tracing(body, rng):
+    model, grid = model_of(body), Grid((24, 24, 32), 5, tuple(body.atlas.charts[0].periodic))
+    maps = [
+        measured(build_direct(body, model, Plan(0.4, grid, doublings=d), lambda _: None, rtol=1e-11)) for d in (0, 2)
+    ]
+    assert maps[1].error.rms < 3 * maps[0].error.rms + 1e-10
+    states = pack(*random_bundle_points(body, 50, rng=rng), lanes=12)
+    one, other = (flow.transport(states, np.array([0.4]))[:, 0] for flow in maps)
+    bound = 20 * (maps[0].error.max + maps[1].error.max)
+    assert np.abs(one[:, :10] - other[:, :10]).max() < bound
+    alive = np.isinf(one[:, 11]) & np.isinf(other[:, 11])
+    assert np.abs(one[alive, 10] - other[alive, 10]).max() < bound
+
+
+@pytest.mark.parametrize("lanes", [6, 10, 12])
+@pytest.mark.parametrize("body", [sc.TwistedEllipsoid(), sc.Torus(), sc.Ellipsoid(1.0, 0.8, 0.6)], ids=repr)
+def test_order_of_composition_changes_nothing(body, lanes, rng, monkeypatch):
+    flow = cr.build_phase_map(body, horizon=0.25, grid=(20, 32))
+    states = pack(*random_bundle_points(body, 1000, rng=rng), lanes=lanes)
+    times = np.array([0.25, 1.0])
+    plain = flow.transport(states, times)
+    monkeypatch.setattr(compiled_models, "ORDERED", 100)
+    monkeypatch.setattr(compiled_models, "NEAR", 0)
+    monkeypatch.setattr(compiled_models, "SHARE", 300)
+    # two kernels: they may fuse multiplications and additions differently
+    np.testing.assert_allclose(flow.transport(states, times), plain, rtol=1e-9, atol=1e-12)
+
+
+def test_threads_change_nothing(rng, monkeypatch):
+    body = sc.Ellipsoid(1.2, 0.8, 0.8)
+    flow = cr.build_phase_map(body, horizon=0.5, grid=(16, 24))
+    states = pack(*random_bundle_points(body, 10_000, rng=rng), lanes=12)
+    found = []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("CREEPING_THREADS", threads)
+        assert thread_count() == int(threads)
+        found.append((flow.transport(states, np.array([1.0])), trace_states(body, states[:, :6], np.array([1.0]))))
+    np.testing.assert_array_equal(found[0][0], found[1][0])
+    np.testing.assert_array_equal(found[0][1], found[1][1])
+    monkeypatch.setenv("CREEPING_THREADS", "many")
+    with pytest.raises(cr.CreepingError, match="CREEPING_THREADS"):
+        thread_count()
+
+
+def test_state_that_is_not_a_number_reads_inside_the_table():
+    flow = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(12, 16))
+    states = np.full((70, 6), np.nan)
+    assert np.all(np.isnan(flow.leap(states, 3)))
+
+
+def test_few_rays_are_integrated_directly():
+    said = []
+    flow = cr.choose_flow(sc.Sphere(), rays=10, length=2.0, progress=said.append, cache=False)
+    assert isinstance(flow, cr.DirectFlow)
+    assert flow.error.rms <= 1e-6
+    assert "direct integration" in said[-1]
+
+
+def test_many_rays_are_mapped(rng):
+    body, said = sc.Ellipsoid(1.2, 0.8, 0.8), []
+    flow = cr.choose_flow(
+        body, rays=10**8, length=8.0, tolerance=1e-6, ride_along=False, progress=said.append, cache=False
+    )
+    assert isinstance(flow, cr.PhaseMap)
+    assert "phase map" in said[-1]
+    assert rms_at_end(flow, body, 8.0, rng) <= 1e-6
+
+
+def test_tolerance_below_any_map_is_integrated_directly(rng):
+    body = sc.Ellipsoid(1.2, 0.8, 0.8)
+    flow = cr.choose_flow(body, rays=10**9, length=2.0, tolerance=1e-11, cache=False)
+    assert isinstance(flow, cr.DirectFlow)
+    assert rms_at_end(flow, body, 2.0, rng, 200) <= 1e-11
+
+
+def test_stored_map_is_used_again(tmp_path):
+    body = sc.Ellipsoid(1.2, 0.8, 0.8)
+    options = {"length": 4.0, "tolerance": 1e-5, "cache": tmp_path}
+    cr.build_phase_map(body, **options)
+    said = []
+    cr.choose_flow(body, rays=10**7, progress=said.append, **options)
+    assert not any("tracing" in text for text in said)
+
+
+@pytest.mark.parametrize("rays", [10, 10**7])
+def test_a_choice_is_made_once(rays, tmp_path, monkeypatch):
+    body, said = sc.Ellipsoid(1.2, 0.8, 0.8), []
+    options = {"rays": rays, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
+    first = cr.choose_flow(body, **options)
+    # a machine on which the other flow would be the faster
+    monkeypatch.setattr("creeping.phaseflow.tuning.flow_choice.tracing_cost", lambda body: 1.0 if rays == 10 else 1e-12)
+    again = cr.choose_flow(body, progress=said.append, **options)
+    assert type(again) is type(first) and "as chosen before" in said[-1]
+    if rays == 10:
+        assert again == first
+    else:
+        assert np.array_equal(again.leaps[-1].state, first.leaps[-1].state)
+
+
+def test_a_damaged_choice_is_made_again(tmp_path):
+    options = {"rays": 10, "length": 2.0, "cache": tmp_path}
+    first = cr.choose_flow(sc.Sphere(), **options)
+    (kept,) = tmp_path.glob("*.json")
+    whole = kept.read_text()
+    changed = (whole.replace('"rtol": ', '"rtol": 1'), whole.replace('"step": null', '"step": 0.9'))
+    for text in ("", "[]", "3", '{"kind": "direct", "rtol": "x"}', *changed):
+        assert text != whole
+        kept.write_text(text)
+        said = []
+        assert cr.choose_flow(sc.Sphere(), progress=said.append, **options) == first
+        assert "as chosen before" not in said[-1]
+
+
+def test_a_map_that_has_come_since_reopens_the_choice(tmp_path):
+    body = sc.Sphere()
+    options = {"rays": 20_000, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
+    assert isinstance(cr.choose_flow(body, **options), cr.DirectFlow)
+    cr.build_phase_map(body, length=4.0, tolerance=1e-4, cache=tmp_path)
+    said = []
+    cr.choose_flow(body, progress=said.append, **options)
+    assert "as chosen before" not in said[-1]
+    again = []
+    cr.choose_flow(body, progress=again.append, **options)
+    assert "as chosen before" in again[-1]
+
+
+def test_numbers_of_numpy_make_the_same_choice(tmp_path):
+    options = {"length": 2.0, "cache": tmp_path}
+    first = cr.choose_flow(sc.Sphere(), rays=10, tolerance=1e-5, **options)
+    assert (
+        cr.choose_flow(sc.Sphere(), rays=np.int64(10), tolerance=np.float64(1e-5), ride_along=np.True_, **options)
+        == first
+    )
+    assert len(list(tmp_path.glob("*.json"))) == 1
+
+
+@pytest.mark.parametrize(
+    "options, match",
+    [
+        ({"rays": 0}, "rays"),
+        ({"rays": 2.5}, "rays"),
+        ({"length": -1.0}, "length"),
+        ({"length": float("nan")}, "length"),
+        ({"tolerance": 1e-15}, "tolerance"),
+        ({"outputs": 0}, "outputs"),
+    ],
+)
+def test_bad_numbers_are_named(options, match):
+    with pytest.raises(cr.CreepingError, match=match):
+        cr.choose_flow(sc.Sphere(), **({"rays": 10, "length": 2.0, "cache": False} | options))
+
+
+@pytest.mark.parametrize("options", [{"length": 2.0, "grid": (12, 16), "horizon": 0.5}, {"outputs": 4}])
+def test_length_and_outputs_belong_together(options):
+    with pytest.raises(cr.CreepingError, match="length"):
+        cr.build_phase_map(sc.Sphere(), cache=False, **options)
+
+
+@pytest.mark.parametrize("options", [{"rtol": 0.0}, {"rtol": float("nan")}, {"step": 0.0}, {"horizon": -1.0}])
+def test_direct_flow_refuses_what_it_cannot_do(options):
+    with pytest.raises(cr.CreepingError, match=next(iter(options))):
+        cr.DirectFlow(sc.Sphere(), **options)
+
+
+def test_numbers_of_numpy_name_the_same_map(tmp_path):
+    options = {"tolerance": np.float64(1e-4), "outputs": np.int64(2), "cache": tmp_path}
+    cr.build_phase_map(sc.Sphere(), length=np.int64(2), **options)
+    cr.build_phase_map(sc.Sphere(), length=2.0, **options)
+    assert len(list(tmp_path.glob("*/manifest.json"))) == 1

@@ -1,0 +1,124 @@
+"""Crossings of an observer's horizon, the joints, and the nodes of the forward integral."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.geometry.surface import normal
+from creeping.rays.observer_contour import HorizonGrid, forward_nodes, joints
+from creeping.rays.strips import strips_of
+
+D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
+RADIUS = 2.0
+SPHERE, TRIAXIAL = sc.Sphere(RADIUS), sc.Ellipsoid(1.0, 0.8, 0.6)
+E = np.cross(D, [1.0, 0, 0]) / np.linalg.norm(np.cross(D, [1.0, 0, 0]))
+
+
+@pytest.fixture(scope="module")
+def fans():
+    def made(body, length):
+        line = cr.shadow_line(body, D)
+        return cr.launch(cr.DirectFlow(body, rtol=1e-11), line, length=length, n_rays=80, max_gap=np.inf)
+
+    return {"sphere": made(SPHERE, 8.0), "triaxial": made(TRIAXIAL, 2.0)}
+
+
+def directions_at(*angles):
+    return np.array([np.cos(a) * D + np.sin(a) * E for a in angles])
+
+
+def test_crossings_of_the_sphere_in_closed_form(fans):
+    theta = np.array([0.5, 1.2, 2.5])
+    r = directions_at(*theta)
+    strips = strips_of(fans["sphere"])
+    grid = HorizonGrid(strips, SPHERE, 0.05)
+    nodes = grid.crossings(np.arange(3), r)
+    for k in range(3):
+        mine = nodes.observer == k
+        # x = a (cos(s/a) u + sin(s/a) d), n.r = 0: tan(s/a) = -tan θ cos α; each ray has one with p.r > 0 in 2πa
+        x0 = nodes.rays.first_normal[mine]
+        t = nodes.rays.time[mine] / RADIUS
+        height = np.cos(t) * (x0 @ r[k]) + np.sin(t) * (D @ r[k])
+        np.testing.assert_allclose(height, 0, atol=1e-8)
+        assert np.all(-np.sin(t) * (x0 @ r[k]) + np.cos(t) * (D @ r[k]) > 0)
+        # rays 4 in units of a are shorter than 2π: the root lies within them or not
+        sigma, _, _, step = grid.parts[0]
+        first = strips[0].first_normals(sigma)
+        root = np.mod(-np.arctan2(first @ r[k], D @ r[k]), 2 * np.pi)
+        assert np.sum(mine) == np.sum(root < 8.0 / RADIUS)
+        np.testing.assert_allclose(nodes.weight[mine], step, rtol=1e-6)
+
+
+def test_only_wanted_observers_are_served(fans):
+    r = directions_at(0.5, 1.2, 2.5)
+    nodes = HorizonGrid(strips_of(fans["sphere"]), SPHERE, 0.1).crossings(np.array([2]), r)
+    assert set(nodes.observer) == {2}
+    none = HorizonGrid(strips_of(fans["sphere"]), SPHERE, 0.1).crossings(np.zeros(0, dtype=int), r)
+    assert len(none.observer) == 0
+
+
+def test_crossings_of_the_ellipsoid_lie_on_the_horizon(fans):
+    r = directions_at(0.4, 1.0, 1.9, 3.0)
+    nodes = HorizonGrid(strips_of(fans["triaxial"]), TRIAXIAL, 0.05).crossings(np.arange(4), r)
+    n = normal(TRIAXIAL, nodes.rays.points)
+    np.testing.assert_allclose(np.sum(n * r[nodes.observer], axis=1), 0, atol=1e-7)
+    assert np.all(np.sum(nodes.rays.directions * r[nodes.observer], axis=1) > 0)
+    assert np.all(nodes.weight > 0)
+
+
+def test_joints_of_the_sphere_are_across_both_directions(fans):
+    (strip,) = strips_of(fans["sphere"])
+    for theta in (0.01, 0.7, 2.0):
+        r = directions_at(theta)[0]
+        parts = joints(strip, r)
+        assert [dark for *_, dark in parts] in ([True, False], [False, True])
+        across = np.cross(D, r) / np.linalg.norm(np.cross(D, r))
+        for start, end, dark in parts:
+            # half a great circle each
+            assert end - start == pytest.approx(np.pi * RADIUS, rel=1e-6)
+            ends = strip.first_normals(np.array([start, end]))
+            np.testing.assert_allclose(np.abs(ends @ across), 1, atol=1e-8)
+            middle = strip.first_normals(np.array([(start + end) / 2]))[0]
+            assert (middle @ r < 0) == dark
+
+
+@pytest.mark.parametrize("theta", [0.02, 0.3, 1.0])
+def test_forward_nodes_of_the_sphere(fans, theta):
+    fan = fans["sphere"]
+    r = directions_at(theta)
+    shadow, lit, lost = forward_nodes(strips_of(fan), fan.line, np.array([0]), r, np.array([40]))
+    assert not len(lost)
+    # both halves are half great circles, of arclength πa across the wave
+    assert shadow.weight.sum() == pytest.approx(np.pi * RADIUS, rel=1e-6)
+    assert lit.weight.sum() == pytest.approx(np.pi * RADIUS, rel=1e-4)
+    np.testing.assert_allclose(normal(SPHERE, shadow.rays.points) @ r[0], 0, atol=1e-8)
+    assert np.all(shadow.rays.time <= np.pi * RADIUS / 2)
+    np.testing.assert_allclose(lit.normals @ (D + r[0]), 0, atol=1e-8)
+    assert np.all(lit.normals @ D < 1e-9)
+    for value in (lit.along, lit.across):
+        np.testing.assert_allclose(value, 1 / RADIUS, rtol=1e-9)
+
+
+def test_forward_nodes_of_the_ellipsoid(fans):
+    fan = fans["triaxial"]
+    r = directions_at(0.1, 0.25, 0.5)
+    shadow, lit, lost = forward_nodes(strips_of(fan), fan.line, np.array([0, 2]), r, np.array([30, 60]))
+    assert not len(lost)
+    assert set(shadow.observer) == set(lit.observer) == {0, 2}
+    n = normal(TRIAXIAL, shadow.rays.points)
+    np.testing.assert_allclose(np.sum(n * r[shadow.observer], axis=1), 0, atol=1e-7)
+    assert np.all(np.sum(shadow.rays.first_normal * r[shadow.observer], axis=1) < 0)
+    np.testing.assert_allclose(np.sum(lit.normals * (D + r[lit.observer]), axis=1), 0, atol=1e-8)
+    assert np.max(np.abs(TRIAXIAL.level(lit.points))) < 1e-8
+    # both halves project on the same chord, from joint to joint across the plane of d and r; Green's theorem on an
+    # affine circle: the sum of widths across q is that of the shadow line of the direction q
+    for k in (0, 2):
+        q = (D + r[k]) / np.linalg.norm(D + r[k])
+        line = cr.shadow_line(TRIAXIAL, q)
+        curve = line.curves[0]
+        s = np.linspace(0, curve.length, 4001)[:-1]
+        x = curve.at(s)
+        step = np.roll(x, -1, axis=0) - x
+        width = np.sum(np.abs(np.sum(step * np.cross(normal(TRIAXIAL, x), q), axis=1))) / 2
+        assert lit.weight[lit.observer == k].sum() == pytest.approx(width, rel=1e-3)

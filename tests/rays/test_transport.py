@@ -1,0 +1,141 @@
+"""Fans of many incidences at once: against `launch`, in whatever company, and bodies that need care."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import creeping as cr
+import scatterers as sc
+from creeping.rays.fan import RayStatus
+from creeping.shadow.status import FAILED, NO_RAY, OK, SINGULAR
+from creeping.sweeping.request import sweep_request
+from creeping.sweeping.sweepers.compiled import CompiledSweeper
+from creeping.sweeping.sweepers.plain import PlainSweeper
+from creeping.sweeping.sweepers.selection import sweeper_of
+
+BODIES = {
+    "triaxial": sc.Ellipsoid(1.2, 0.8, 0.6),
+    "torus": sc.Torus(),
+    "twisted": sc.TwistedEllipsoid(),
+    "weighted": sc.Ellipsoid(1.2, 0.8, 0.6, speed="1 + 0.3*x"),
+}
+
+
+def directions(n, rng):
+    d = rng.normal(size=(n, 3))
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_agrees_with_launch(name, rng):
+    body = BODIES[name]
+    flow = cr.DirectFlow(body, rtol=1e-10)
+    request = sweep_request("rays", length=2.0, n_rays=48, n_steps=3)
+    d = directions(4, rng)
+    found, plain = CompiledSweeper(flow, request)(d), PlainSweeper(flow, request)(d)
+    assert set(found) == set(plain) == set(request.variables)
+    for name, variable in request.variables.items():
+        assert found[name].dtype == plain[name].dtype == np.dtype(variable.dtype)
+        assert found[name].shape == plain[name].shape
+    for row in range(len(d)):
+        # curves start anywhere, so rays are matched by where an exact one starts next to them
+        line = cr.shadow_line(body, d[row])
+        fan = cr.launch(flow, line, length=2.0, n_rays=4000, n_steps=3, max_gap=np.inf)
+        x0 = fan.points[:, 0]
+        near = cKDTree(fan.points[:, 1]).query(found["points"][row, :, 0])[1]
+        gap = np.linalg.norm(x0[near] - x0[(near + 1) % len(x0)], axis=1).max()
+        same = found["ray_status"][row] == fan.status[near]
+        assert np.mean(same) > 0.95
+        for key, values in (("spreading", fan.spreading), ("attenuation", fan.attenuation)):
+            err = np.abs(found[key][row] - values[near][:, 1:])[same]
+            slope = np.abs(np.diff(values, axis=0)).max() / gap
+            assert np.max(err) < 1e-6 + 2 * slope * gap
+    assert np.all(found["incidence_status"] == OK)
+
+
+def test_rays_of_the_torus_start_where_theirs_do(rng):
+    body = BODIES["torus"]
+    flow = cr.DirectFlow(body, rtol=1e-10)
+    found = CompiledSweeper(flow, sweep_request("rays", length=1.5, n_rays=64, n_steps=2))(directions(3, rng))
+    points, tangents = found["points"][:, :, 1], found["directions"][:, :, 1]
+    assert np.max(np.abs(body.level(points))) < 1e-12
+    np.testing.assert_allclose(np.linalg.norm(tangents, axis=-1), 1, atol=1e-12)
+    # Clairaut: the distance from the axis times the cosine to the parallels is conserved
+    turn = np.cross([0, 0, 1], points)
+    start = np.einsum("nrci,nrci->nrc", *[np.cross([0, 0, 1], found["points"]), found["directions"]])
+    np.testing.assert_allclose(start[..., 0], np.sum(turn * tangents, axis=-1), atol=1e-9)
+
+
+def test_a_sphere_is_exact(rng):
+    d = directions(5, rng)
+    request = sweep_request("rays", length=3.0, n_rays=70, n_steps=4)
+    found = CompiledSweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-11), request)(d)
+    times = request.travel_times
+    np.testing.assert_allclose(found["spreading"], np.broadcast_to(np.cos(times), (5, 70, 4)), atol=1e-8)
+    np.testing.assert_allclose(found["attenuation"], np.broadcast_to(times, (5, 70, 4)), atol=1e-8)
+    np.testing.assert_allclose(found["line_length"], 2 * np.pi, rtol=1e-12)
+    np.testing.assert_allclose(found["launch_phase"], 0, atol=1e-12)
+    x0 = found["points"][:, :, 0] - np.sin(times[0]) * d[:, None]
+    expected = np.cos(times[3]) / np.cos(times[0]) * x0 + np.sin(times[3]) * d[:, None]
+    np.testing.assert_allclose(found["points"][:, :, 3], expected, atol=1e-8)
+    assert np.all(found["ray_status"] == RayStatus.OK) and np.all(np.isinf(found["detachment"]))
+
+
+@pytest.mark.parametrize("quantity", ["rays", "monostatic"])
+def test_an_incidence_does_not_depend_on_its_company(quantity, rng):
+    body = BODIES["twisted"]
+    fields = {} if quantity == "rays" else {"wavenumbers": [20.0, 33.0], "boundary": ["soft", "pec"]}
+    # 70 rays do not fill their blocks
+    request = sweep_request(quantity, length=3.0, n_rays=70, **fields)
+    d = directions(9, rng)
+    for flow in (cr.DirectFlow(body, rtol=1e-7), cr.build_phase_map(body, tolerance=1e-4, length=3.0, outputs=12)):
+        sweeper = sweeper_of(flow, request)
+        assert isinstance(sweeper, CompiledSweeper)
+        whole, part = sweeper(d), sweeper(d[4:6])
+        for name in whole:
+            if quantity == "rays":
+                np.testing.assert_array_equal(whole[name][4:6], part[name], err_msg=name)
+            else:
+                # single rays are traced in blocks with those of others
+                scale = np.nanmax(np.abs(part[name])) or 1.0
+                np.testing.assert_allclose(whole[name][4:6], part[name], rtol=0, atol=1e-6 * scale, err_msg=name)
+        for name, values in sweeper(d).items():
+            np.testing.assert_array_equal(values, whole[name], err_msg=name)
+
+
+def test_a_map_carries_what_direct_integration_does(rng):
+    body = BODIES["twisted"]
+    flow = cr.build_phase_map(body, tolerance=3e-5, length=4.0, outputs=1, rays=10**8)
+    request = sweep_request("rays", length=4.0, n_rays=128)
+    d = directions(6, rng)
+    found, exact = (CompiledSweeper(f, request)(d) for f in (flow, cr.DirectFlow(body, rtol=1e-11)))
+    gap = np.linalg.norm(found["points"] - exact["points"], axis=-1)
+    assert np.sqrt(np.mean(gap**2)) < 3e-5
+    same = np.isinf(found["detachment"]) == np.isinf(exact["detachment"])
+    assert np.mean(same) > 0.99
+    assert np.sqrt(np.mean((found["attenuation"] - exact["attenuation"])[same] ** 2)) < 5e-5
+    relative = np.abs(found["spreading"] / exact["spreading"] - 1)
+    assert np.median(relative) < 1e-4
+
+
+def test_singular_incidences_give_nothing():
+    body = BODIES["torus"]
+    found = CompiledSweeper(cr.DirectFlow(body), sweep_request("rays", length=1.0, n_rays=16))(np.eye(3))
+    assert found["incidence_status"].tolist() == [SINGULAR, SINGULAR, OK]
+    assert np.all(found["ray_status"][:2] == NO_RAY) and np.all(np.isnan(found["points"][:2]))
+    assert np.all(np.isfinite(found["points"][2]))
+    field = sweep_request("monostatic", length=4.0, n_rays=64, wavenumbers=[20.0], boundary="soft")
+    found = CompiledSweeper(cr.DirectFlow(body), field)(np.eye(3)[:2])
+    assert np.all(np.isnan(found["creeping"]))
+    assert FAILED not in found["incidence_status"]
+
+
+def test_rough_ground_ends_rays():
+    body = sc.Implicit("x**2 + y**2 + 1.2*z**2 - 1")
+    rough = type("Rough", (), {"rough": staticmethod(lambda x: x[..., 2] > 0.8)})
+    body.rough = rough.rough  # type: ignore[attr-defined]
+    request = sweep_request("rays", length=2.5, n_rays=64, n_steps=8)
+    found = CompiledSweeper(cr.DirectFlow(body), request)(np.array([[1.0, 0, 0]]))
+    assert RayStatus.ROUGH in found["ray_status"]
+    ended = found["ray_status"][0] == RayStatus.ROUGH
+    assert np.all(found["detachment"][0][ended] < 2.5)

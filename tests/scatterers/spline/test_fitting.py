@@ -1,0 +1,253 @@
+"""Least-squares splines of points and normals: the kernel, the equations, order of convergence, and the report."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import scatterers as sc
+from scatterers.kernels.normal_equations import accumulate
+from scatterers.kernels.spline_constants import OVERREAD
+from scatterers.spline import fitting as _fitting
+from scatterers.spline.fitting import _Equations, accumulate_numpy, fit
+from scatterers.spline.tensor import TensorSpline, coefficients, evaluated
+
+SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+ORDER = 1.0
+"""Fitted slopes against 6 and 4: the errors of least squares on a shifted grid scatter by half between two counts."""
+COUNTS = (1000, 2000, 4000)
+TRIAXIAL = sc.Ellipsoid(1.0, 0.8, 0.6)
+
+
+def fibonacci(n):
+    """Evenly spread points of the unit sphere."""
+    k = np.arange(n) + 0.5
+    z, phi = 1 - 2 * k / n, np.pi * (1 + np.sqrt(5)) * k
+    return np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], axis=-1)
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def cloud(body, n):
+    points = body.forward(fibonacci(n))
+    return points, unit(body.gradient(points))
+
+
+def spacing(body, n):
+    """Two distances between neighbours, of n points on a sphere of the same volume."""
+    return 2 * np.sqrt(4 * np.pi / n) * np.prod(body.bounds[1]) ** (1 / 3)
+
+
+@cache
+def fitted(body, n):
+    return fit(*cloud(body, n), spacing(body, n))
+
+
+@cache
+def errors(body, n):
+    """Rms errors of position, normal and normal curvature at points that were not fitted."""
+    rng = np.random.default_rng(7)
+    at = body.forward(unit(rng.normal(size=(2000, 3))))
+    value, gradient, hessian = evaluated(fitted(body, n).spline.compiled, at)
+    slope = np.linalg.norm(gradient, axis=-1)
+    exact = body.gradient(at)
+    e = unit(np.cross(exact, rng.normal(size=at.shape)))
+    curvature = np.einsum("ni,nij,nj->n", e, body.hessian(at), e) / np.linalg.norm(exact, axis=-1)
+    n_fit = gradient / slope[:, None]
+    e = unit(e - np.sum(e * n_fit, axis=-1, keepdims=True) * n_fit)
+    bent = np.einsum("ni,nij,nj->n", e, hessian[:, SYMMETRIC], e) / slope
+    off = [value / slope, np.linalg.norm(n_fit - unit(exact), axis=-1), bent - curvature]
+    return [float(np.sqrt(np.mean(part**2))) for part in off]
+
+
+@pytest.fixture
+def system(rng):
+    shape = np.array([9, 11, 10])
+    places = rng.uniform(0, shape - 5, (60, 3))
+    # on cell faces, too
+    places[:20] = np.floor(places[:20])
+    size = int(np.prod(shape))
+    return places, shape, np.concatenate([rng.normal(size=size), np.zeros(OVERREAD)])
+
+
+def test_kernel_equals_numpy(system, rng):
+    places, shape, c = system
+    values, slopes, weight = rng.normal(size=60), rng.normal(size=(60, 3)), np.array([0.7, 2.0])
+    fast, plain = rng.normal(size=c.shape), np.zeros_like(c)
+    fast[-OVERREAD:] = 0
+    plain[:] = fast
+    left = accumulate(places, values, slopes, weight, shape, c, fast)
+    assert left == pytest.approx(accumulate_numpy(places, values, slopes, weight, shape, c, plain), rel=1e-13)
+    np.testing.assert_allclose(fast, plain, atol=1e-13)
+    # what vectors load beyond the last row stays as it was
+    np.testing.assert_array_equal(fast[-OVERREAD:], 0)
+
+
+def test_rows_are_value_and_slopes_of_the_spline(system):
+    places, shape, c = system
+    spline = TensorSpline(c[:-OVERREAD].reshape(shape), np.zeros(3), np.ones(3))
+    value, gradient = spline.value_and_gradient(places)
+    for weight in ([1.0, 0.0], [0.0, 1.0], [0.3, 0.2]):
+        # the targets that the spline meets leave nothing
+        out = np.zeros_like(c)
+        left = accumulate(places, value, gradient, np.array(weight), shape, c, out)
+        assert left < 1e-24
+        np.testing.assert_allclose(out, 0, atol=1e-12)
+
+
+def test_scatter_is_the_adjoint_of_the_spline(system, rng):
+    places, shape, c = system
+    values, slopes, nothing = rng.normal(size=60), rng.normal(size=(60, 3)), np.zeros_like(c)
+    adjoint = np.zeros_like(c)
+    accumulate(places, values, slopes, np.ones(2), shape, nothing, adjoint)
+    spline = TensorSpline(c[:-OVERREAD].reshape(shape), np.zeros(3), np.ones(3))
+    value, gradient = spline.value_and_gradient(places)
+    assert np.vdot(c, adjoint) == pytest.approx(np.vdot(values, value) + np.vdot(slopes, gradient), rel=1e-12)
+
+
+@pytest.fixture(scope="module")
+def equations():
+    return _Equations(*cloud(TRIAXIAL, 300), 0.35, 1e-3, 0.7)
+
+
+@pytest.mark.parametrize("which", ["equations", "preconditioner"])
+def test_operators_are_symmetric_and_positive(equations, rng, which):
+    size = int(np.prod(equations.shape))
+
+    def free():
+        return np.concatenate([rng.normal(size=size) * equations.unknown.ravel(), np.zeros(OVERREAD)])
+
+    def operate(c):
+        return equations.preconditioned(c) if which == "preconditioner" else -equations.residual(c, targets=False)
+
+    vectors = [free() for _ in range(4)]
+    images = [operate(v) for v in vectors]
+    products = np.array([[np.vdot(v, w) for w in images] for v in vectors])
+    np.testing.assert_allclose(products, products.T, atol=1e-12 * np.abs(products).max())
+    assert np.all(np.linalg.eigvalsh(products) > 0)
+    for image in images:
+        assert np.all(image[:-OVERREAD].reshape(equations.shape)[~equations.unknown] == 0)
+        np.testing.assert_array_equal(image[-OVERREAD:], 0)
+
+
+def test_residual_is_the_slope_of_what_is_minimised(equations, rng):
+    shape = np.array(equations.shape)
+
+    def objective(c):
+        total, spline = 0.0, TensorSpline(c[:-OVERREAD].reshape(shape), np.zeros(3), np.ones(3))
+        for sign, places in zip((0, 1, -1), equations.samples, strict=True):
+            value, gradient = spline.value_and_gradient(places)
+            total += (1.0 if sign == 0 else _fitting.OFFSET_WEIGHT) * np.sum((value - sign) ** 2)
+            if sign == 0:
+                total += equations.normal_weight * np.sum((gradient - equations.sorted_normals) ** 2)
+        grid = c[:-OVERREAD].reshape(shape)
+        return total + equations.smoothing * sum(np.sum(np.diff(grid, 4, axis=k) ** 2) for k in range(3))
+
+    c = equations.start(None)
+    away = np.concatenate([rng.normal(size=int(np.prod(shape))) * equations.unknown.ravel(), np.zeros(OVERREAD)])
+    slope = (objective(c + away) - objective(c - away)) / 2
+    assert slope == pytest.approx(-2 * np.vdot(away, equations.residual(c, targets=True)), rel=1e-9)
+
+
+def test_start_is_near_the_distance(equations):
+    c = equations.start(None)[:-OVERREAD].reshape(equations.shape)
+    found = TensorSpline(c, np.zeros(3), np.ones(3)).at_nodes()
+    where = equations.low + equations.spacing * np.moveaxis(np.indices(found.shape), 0, -1)
+    distance = TRIAXIAL.level(where) / np.linalg.norm(TRIAXIAL.gradient(where) + 1e-300, axis=-1) / equations.spacing
+    # the level of an ellipsoid tells the distance near it only
+    near = np.abs(distance) < 1
+    assert np.mean((found > 0) == (distance > 0)) > 0.995
+    np.testing.assert_allclose(found[near], distance[near], atol=0.5)
+    assert np.median(np.abs(found[near] - distance[near])) < 0.1
+
+
+@pytest.mark.slow
+def test_orders_of_convergence():
+    # h goes with the distance of the points
+    steps = np.log([spacing(TRIAXIAL, n) for n in COUNTS])
+    position, normal, curvature = (
+        np.polyfit(steps, np.log(e), 1)[0] for e in zip(*(errors(TRIAXIAL, n) for n in COUNTS), strict=True)
+    )
+    assert abs(position - 6) < ORDER
+    assert abs(normal - 5) < ORDER
+    assert abs(curvature - 4) < ORDER
+
+
+@pytest.mark.parametrize(
+    "body, reached", [(sc.Sphere(), (1e-6, 2e-5, 3e-4)), (sc.Ellipsoid(1.2, 0.8, 0.8), (3e-6, 7e-5, 1e-3))]
+)
+def test_errors_of_a_thousand_points(body, reached):
+    assert np.all(np.array(errors(body, 1000)) < reached)
+
+
+def test_fit_tells_what_it_reached():
+    found = fitted(TRIAXIAL, 2000)
+    position, normal, curvature = errors(TRIAXIAL, 2000)
+    # at the points fitted, errors are about as large as between them
+    assert found.misfit == pytest.approx(position, rel=0.5)
+    assert found.turn == pytest.approx(normal, rel=0.5)
+    assert found.change < curvature
+    assert found.spacing == spacing(TRIAXIAL, 2000)
+    assert 0 < found.iterations <= _fitting.ITERATIONS
+    points, _ = cloud(TRIAXIAL, 2000)
+    box = found.spline.box
+    assert np.all(box[0] < points.min(0) - 4 * found.spacing) and np.all(box[1] > points.max(0) + 4 * found.spacing)
+
+
+def test_value_grows_as_the_distance_near_the_body():
+    found, (points, normals) = fitted(TRIAXIAL, 2000), cloud(TRIAXIAL, 2000)
+    _, gradient, _ = evaluated(found.spline.compiled, points)
+    np.testing.assert_allclose(np.linalg.norm(gradient, axis=-1), 1, atol=2e-3)
+    for side in (0.5, -0.5):
+        value, _, _ = evaluated(found.spline.compiled, points + side * found.spacing * normals)
+        np.testing.assert_allclose(value, side * found.spacing, rtol=0.05)
+
+
+def test_scale_and_place_change_nothing(rng):
+    points, normals = cloud(TRIAXIAL, 500)
+    h = spacing(TRIAXIAL, 500)
+    plain, moved = fit(points, normals, h), fit(1e-3 * points + 7, normals, 1e-3 * h)
+    at = TRIAXIAL.forward(unit(rng.normal(size=(100, 3))))
+    # which third of the points is offset hangs on rounding
+    np.testing.assert_allclose(moved.spline.value(1e-3 * at + 7), 1e-3 * plain.spline.value(at), atol=5e-8)
+    assert moved.change == pytest.approx(1e3 * plain.change, rel=0.5)
+
+
+def test_smoothing_quiets_noise(rng):
+    points, normals = cloud(TRIAXIAL, 1000)
+    noisy, h = points + 1e-3 * rng.normal(size=points.shape), spacing(TRIAXIAL, 1000)
+    at = TRIAXIAL.forward(unit(rng.normal(size=(500, 3))))
+    rough, smooth = (
+        np.linalg.norm(evaluated(fit(noisy, normals, h, smoothing=s).spline.compiled, at)[2], axis=-1)
+        for s in (1e-8, 1.0)
+    )
+    assert np.std(smooth) < np.std(rough)
+
+
+def test_progress_is_told():
+    told = []
+    fit(*cloud(sc.Sphere(), 300), 0.4, say=told.append)
+    assert told and all("curvatures changing by" in line for line in told)
+
+
+def test_too_many_nodes_are_refused():
+    points, normals = cloud(sc.Sphere(), 100)
+    with pytest.raises(
+        ValueError, match=r"2\d\d x 2\d\d x 2\d\d nodes .* more than 8000000; give a coarser mesh or a larger"
+    ):
+        fit(points, normals, 0.01)
+
+
+def test_values_at_the_nodes_are_those_of_the_spline(rng):
+    samples = rng.normal(size=(8, 10, 9))
+    spline = TensorSpline(coefficients(samples), np.array([1.0, -2.0, 0.5]), np.array([0.1, 0.2, 0.3]))
+    np.testing.assert_allclose(spline.at_nodes(), samples, atol=1e-12)
+    nodes = np.moveaxis(np.indices(samples.shape), 0, -1) * spline.spacing + spline.origin
+    np.testing.assert_allclose(spline.at_nodes(), spline.value(nodes), atol=1e-12)
+    fit_spline = fitted(sc.Sphere(), 1000).spline
+    values = fit_spline.at_nodes()
+    assert values.shape == tuple(n - 4 for n in fit_spline.coefficients.shape)
+    nodes = np.moveaxis(np.indices(values.shape), 0, -1) * fit_spline.spacing + fit_spline.origin
+    np.testing.assert_allclose(values, fit_spline.value(nodes), atol=1e-13)

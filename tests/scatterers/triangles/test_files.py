@@ -1,0 +1,390 @@
+"""Meshes from files: what is read, what is repaired with a word, and every kind of bad file, named."""
+
+import io
+import json
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+import trimesh
+
+import scatterers as sc
+from scatterers.triangles.crossings import crossings
+from scatterers.triangles.files import TriangleMesh, read_mesh
+
+BALL = trimesh.creation.icosphere(2)
+VERTICES, FACES = np.array(BALL.vertices), np.array(BALL.faces)
+
+
+def mesh(vertices=VERTICES, faces=FACES):
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+def read(source, units=None):
+    said = []
+    found = read_mesh(source, units, say=said.append)
+    assert found.repairs == tuple(said)
+    return found
+
+
+def volume(found):
+    a, b, c = np.moveaxis(found.vertices[found.triangles], 1, 0)
+    return np.sum(a * np.cross(b, c)) / 6
+
+
+MODEL = """<?xml version="1.0"?><model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
+<resources><object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>
+<object id="2"><components><component objectid="1" transform="1 0 0 0 1 0 0 0 -1 5 6 7"/></components></object>
+</resources><build><item objectid="2"/></build></model>"""
+
+
+def packed(path, unit="millimeter", text=None, part="3D/3dmodel.model"):
+    vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in VERTICES.tolist())
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES.tolist())
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(part, text or MODEL.format(unit=unit, vertices=vertices, triangles=triangles))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "ply", "off", "glb"])
+def test_formats(tmp_path, kind):
+    path = tmp_path / f"ball.{kind[:3]}"
+    mesh().export(path, file_type=kind)
+    found = read(path, None if kind == "glb" else "m")
+    assert isinstance(found, TriangleMesh) and found.repairs == ()
+    assert (len(found.vertices), len(found.triangles)) == (162, 320)
+    assert volume(found) == pytest.approx(BALL.volume, rel=1e-6)
+    if kind != "glb":
+        assert np.ptp(read(str(path), "mm").vertices, axis=0) == pytest.approx(np.full(3, 2e-3))
+
+
+def test_3mf_states_its_unit_and_places_its_parts(tmp_path):
+    found = read(packed(tmp_path / "ball.3mf"))
+    # mirrored by its component, but facing outwards
+    assert found.repairs == () and volume(found) == pytest.approx(BALL.volume * 1e-9)
+    np.testing.assert_allclose(found.vertices.mean(0), [5e-3, 6e-3, 7e-3], atol=1e-9)
+    assert np.ptp(read(packed(tmp_path / "b.3mf", "inch"), "in").vertices[:, 0]) == pytest.approx(0.0508)
+
+
+def test_objects_in_memory():
+    found = read(mesh())
+    np.testing.assert_array_equal(found.vertices, VERTICES)
+    np.testing.assert_array_equal(found.triangles, FACES)
+    assert read(mesh(), "mm").vertices.max() == pytest.approx(1e-3)
+    stated = mesh()
+    stated.units = "millimeters"
+    assert read(stated).vertices.max() == pytest.approx(1e-3)
+
+
+def scene(path, *shifts):
+    parts = trimesh.Scene()
+    for k, shift in enumerate(shifts):
+        parts.add_geometry(mesh(VERTICES + np.array(shift)), node_name=f"part {k}")
+    parts.export(path)
+    return path
+
+
+def test_a_part_is_placed_where_the_scene_says(tmp_path):
+    parts = trimesh.Scene()
+    parts.add_geometry(mesh(), transform=trimesh.transformations.translation_matrix([3, 0, 0]))
+    parts.export(tmp_path / "a.glb")
+    assert read(tmp_path / "a.glb").vertices.mean(0) == pytest.approx([3, 0, 0], abs=1e-6)
+
+
+def test_materials_are_not_opened_and_do_not_cut_a_body(tmp_path):
+    lines = ["mtllib /etc/passwd", *(f"v {x} {y} {z}" for x, y, z in VERTICES)]
+    for k, (a, b, c) in enumerate(FACES + 1):
+        lines += [f"usemtl m{k // 160}"] * (k % 160 == 0) + [f"f {a} {b} {c}"]
+    path = tmp_path / "two.obj"
+    path.write_text("\n".join(lines))
+    assert len(read(path, "m").vertices) == 162
+
+
+def doubled():
+    return mesh(np.concatenate([VERTICES, VERTICES]), np.concatenate([FACES[:100], FACES[100:] + 162]))
+
+
+def rounded():
+    # each triangle with corners of its own, off by some 1e-8
+    rng = np.random.default_rng(1)
+    points = VERTICES[FACES].reshape(-1, 3)
+    return mesh(points + 1e-8 * rng.normal(size=points.shape), np.arange(960).reshape(-1, 3))
+
+
+def some_turned():
+    faces = FACES.copy()
+    faces[10:30] = faces[10:30, ::-1]
+    return mesh(faces=faces)
+
+
+REPAIRS = {
+    "doubled": (doubled, r"of \d+ vertices of the mesh were doubles"),
+    "rounded": (rounded, "differed from others by rounding"),
+    "degenerate": (lambda: mesh(faces=np.concatenate([FACES, [[1, 1, 2]]])), "1 of 321 triangles .* degenerate"),
+    "repeated": (lambda: mesh(faces=np.concatenate([FACES, FACES[:4, [1, 2, 0]]])), "4 of 324 triangles .* doubles"),
+    "unused": (lambda: mesh(np.concatenate([VERTICES, [[9, 9, 9]]])), None),
+    "some turned": (some_turned, "20 of 320 triangles .* turned"),
+    "inside out": (lambda: mesh(faces=FACES[:, ::-1]), "all 320 triangles .* inwards"),
+    "far away": (
+        lambda: mesh(VERTICES + np.array([0, 1e4, 0])),
+        r"10000 m from the origin; moved by \(-?0, -10000, -?0\) m",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REPAIRS)
+def test_repairs_are_told(name):
+    make, message = REPAIRS[name]
+    found = read(make())
+    assert (len(found.vertices), len(found.triangles)) == (162, 320)
+    assert volume(found) == pytest.approx(BALL.volume, rel=1e-6)
+    if message is None:
+        assert found.repairs == ()
+    else:
+        assert len(found.repairs) == 1
+        with pytest.raises(ValueError, match=message):
+            raise ValueError(found.repairs[0])
+    if name == "far away":
+        assert np.abs(found.vertices).max() <= 1 + 1e-9
+
+
+def written(name, data):
+    def write(folder):
+        path = folder / name
+        path.write_bytes(data if isinstance(data, bytes) else data.encode())
+        return path
+
+    return write
+
+
+def exported(kind):
+    return mesh().export(file_type=kind)
+
+
+STL, ASCII, PLY, OFF, GLB = (exported(kind) for kind in ("stl", "stl_ascii", "ply", "off", "glb"))
+TEXT_PLY = mesh().export(file_type="ply", encoding="ascii")
+NAN_STL = STL[:96] + struct.pack("<f", float("nan")) + STL[100:]
+XML = '<!DOCTYPE model [<!ENTITY a "aa">]><model><build/></model>'
+
+
+def bomb(folder):
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", b" " * 2**20)
+    raw = bytearray(buffer.getvalue())
+    # the directory claims 3 GB
+    at = raw.rfind(b"PK\x01\x02") + 24
+    raw[at : at + 4] = struct.pack("<I", 3 * 10**9)
+    return written("bomb.3mf", bytes(raw))(folder)
+
+
+def referring(path):
+    content = json.dumps({"asset": {"version": "2.0"}, "buffers": [{"uri": "/etc/passwd", "byteLength": 9}]}).encode()
+    content += b" " * (-len(content) % 4)
+    path.write_bytes(b"glTF" + struct.pack("<4I", 2, 20 + len(content), len(content), 0x4E4F534A) + content)
+    with path.open("ab") as file:
+        file.write(struct.pack("<2I", 0, 0x4E4942))
+    data = bytearray(path.read_bytes())
+    data[8:12] = struct.pack("<I", len(data))
+    path.write_bytes(data)
+    return path
+
+
+BAD_FILES = {
+    "missing": (lambda f: f / "none.stl", "no file on this machine"),
+    "address": (lambda f: "https://example.org/a.stl", "addresses are not fetched"),
+    "directory": (lambda f: f, "is a directory"),
+    "pickle": (written("a.pkl", b"cos\nsystem\n"), "a.pkl is of a kind that is not read"),
+    "zip": (written("a.zip", b"PK"), "a.zip is of a kind"),
+    "number": (lambda f: 7, "a int is no mesh"),
+    "empty": (written("a.stl", b""), "a.stl is empty"),
+    "cut binary": (written("a.stl", STL[:-60]), "a.stl is cut short .* 320 triangles take 16084 bytes, it has 16024"),
+    "cut text": (written("a.stl", ASCII[: len(ASCII) // 2]), "a.stl is cut short .* 'endsolid'"),
+    "garbage": (written("a.stl", bytes(range(256)) * 9), "a.stl is cut short or no STL"),
+    "garbage in text": (written("a.stl", ASCII.replace("vertex 0", "vertex what", 1)), "a.stl"),
+    "no triangles": (written("a.stl", STL[:80] + bytes(4)), "a.stl holds no triangles"),
+    "cut ply": (written("a.ply", PLY[:-60]), "a.ply cannot be read as PLY"),
+    "cut header": (written("a.ply", PLY[:60]), "a.ply is cut short .* header has no end"),
+    "cut text ply": (written("a.ply", TEXT_PLY[: len(TEXT_PLY) * 3 // 4]), "a.ply is cut short .* 482 rows"),
+    "cut off": (written("a.off", OFF[: len(OFF) * 3 // 4]), "a.off is cut short .* 482 rows"),
+    "cut glb": (written("a.glb", GLB[:-100]), "a.glb is cut short"),
+    "no glb": (written("a.glb", b"{}" * 50), "a.glb is cut short or no GLB"),
+    "cut obj": (written("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 9\n"), "a.obj"),
+    "outside buffer": (lambda f: referring(f / "a.glb"), "refers to '/etc/passwd', which is not opened"),
+    "points": (written("a.obj", "v 0 0 0\nv 1 0 0\n"), "a.obj holds no triangles"),
+    "no archive": (written("a.3mf", b"nothing"), "a.3mf cannot be read as 3MF: it is not a whole ZIP"),
+    "no model": (lambda f: packed(f / "a.3mf", part="other"), "no part 3D/3dmodel.model"),
+    "entities": (lambda f: packed(f / "a.3mf", text=XML), "document type"),
+    "broken xml": (lambda f: packed(f / "a.3mf", text="<model><build>"), "broken XML"),
+    "bomb": (bomb, "unpacks to 3000000000 bytes"),
+    "not finite": (written("a.stl", NAN_STL), "1 of 960 vertices of a.stl are not finite .the first is vertex 0"),
+    "two bodies": (lambda f: scene(f / "a.glb", (0, 0, 0), (3, 0, 0)), "a.glb holds 2 separate surfaces"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_bad_files_are_named(tmp_path, name):
+    make, message = BAD_FILES[name]
+    source = make(tmp_path)
+    with pytest.raises(ValueError, match=message):
+        read(source, None if str(source).endswith((".glb", ".3mf")) else "m")
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off"])
+def test_unit_has_to_be_given(tmp_path, kind):
+    mesh(VERTICES * [1, 2, 3]).export(tmp_path / f"a.{kind}")
+    with pytest.raises(ValueError, match=r'extends over 2 x 4 x 6 of it, .* e\.g\. units="mm"'):
+        read(tmp_path / f"a.{kind}")
+
+
+def test_unit_has_to_be_known_and_agree(tmp_path):
+    with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
+        read(mesh(), "yard")
+    path = packed(tmp_path / "a.3mf")
+    with pytest.raises(ValueError, match="states its unit, mm, but units = 'm'"):
+        read(path, "m")
+    with pytest.raises(ValueError, match="states the unit 'furlong'"):
+        read(packed(tmp_path / "b.3mf", "furlong"))
+
+
+def placed(*parts):
+    return mesh(
+        np.concatenate([v for v, _ in parts]), np.concatenate([f + k * len(VERTICES) for k, (_, f) in enumerate(parts)])
+    )
+
+
+def pinched():
+    # opposite vertices become one
+    faces = FACES.copy()
+    faces[faces == int(np.argmin(VERTICES[:, 2]))] = int(np.argmax(VERTICES[:, 2]))
+    return mesh(faces=faces)
+
+
+def handled():
+    """A torus bent through itself: the tube is thicker than the hole."""
+    return trimesh.creation.torus(1.0, 1.3, 24, 24)
+
+
+def klein():
+    u, v = np.meshgrid(np.arange(24), np.arange(12), indexing="ij")
+    a, b = u * np.pi / 12, v * np.pi / 6
+    r = 2 + np.cos(a / 2) * np.sin(b) - np.sin(a / 2) * np.sin(2 * b)
+    z = np.sin(a / 2) * np.sin(b) + np.cos(a / 2) * np.sin(2 * b)
+    points = np.stack([r * np.cos(a), r * np.sin(a), z], axis=-1).reshape(-1, 3)
+
+    def number(i, j):
+        return (i % 24) * 12 + np.where(i >= 24, -j, j) % 12
+
+    u, v = u.ravel(), v.ravel()
+    quads = number(u, v), number(u + 1, v), number(u + 1, v + 1), number(u, v + 1)
+    return mesh(points, np.concatenate([np.stack(quads)[[0, 1, 2]].T, np.stack(quads)[[0, 2, 3]].T]))
+
+
+def folded():
+    points = VERTICES.copy()
+    points[5] *= -1.5
+    return mesh(points)
+
+
+class Bare:
+    """What is asked of an object, without trimesh's own checks."""
+
+    def __init__(self, vertices, faces):
+        self.vertices, self.faces = vertices, faces
+
+
+SPOILT = VERTICES.copy()
+SPOILT[7, 1] = np.inf
+SHEET = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0]])
+BAD_MESHES = {
+    "open": (lambda: mesh(faces=FACES[1:]), "3 of 480 edges of the mesh are open, the first near .* close them"),
+    "three at an edge": (lambda: mesh(faces=np.concatenate([FACES, [[0, 1, 2]]])), "of the mesh"),
+    "cavity": (lambda: placed((VERTICES, FACES), (VERTICES / 2, FACES)), "2 separate surfaces .1 of them within"),
+    "two": (lambda: placed((VERTICES, FACES), (VERTICES + 5, FACES)), "2 separate surfaces, of 320, 320 triangles"),
+    "pinched": (pinched, "1 vertices of the mesh join sheets"),
+    "torus through itself": (handled, "crosses itself: .* pairs"),
+    "klein": (klein, "one side only"),
+    "folded": (folded, "the mesh crosses itself"),
+    "flat": (lambda: Bare(SHEET, [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]]), "encloses no volume"),
+    "a point": (lambda: Bare(VERTICES * 0, FACES), "all 320 triangles of the mesh are degenerate"),
+    "tiny": (lambda: Bare(VERTICES * 1e-30, FACES), "2e-30 m large"),
+    "huge": (lambda: Bare(VERTICES * 1e30, FACES), "2e.30 m large"),
+    "infinite": (lambda: Bare(SPOILT, FACES), "1 of 162 vertices of the mesh are not finite .* vertex 7"),
+    "index": (lambda: Bare(VERTICES, FACES + 1), "refer to vertices that do not exist .vertex 162 of 162"),
+    "negative": (lambda: Bare(VERTICES, FACES - 1), "vertex -1 of 162"),
+    "quads": (lambda: Bare(VERTICES, FACES[:, [0, 1, 2, 2]]), "faces of the mesh have shape .320, 4."),
+    "halves": (lambda: Bare(VERTICES, FACES + 0.5), "not whole numbers"),
+    "words": (lambda: Bare([["a"] * 3], FACES), "not numbers"),
+    "no faces": (lambda: Bare(VERTICES, []), "holds no triangles"),
+    "rounded far away": (
+        lambda: Bare((VERTICES + 1e5).astype(np.float32), FACES),
+        "rounded to 0.0078, .* of its mean edge",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD_MESHES)
+def test_bad_meshes_are_named(name):
+    make, message = BAD_MESHES[name]
+    with pytest.raises(ValueError, match=message):
+        read(make())
+
+
+def test_too_large_a_file_is_not_read(tmp_path, monkeypatch):
+    monkeypatch.setattr("scatterers.triangles.files.MOST_BYTES", 1000)
+    mesh().export(tmp_path / "a.stl")
+    with pytest.raises(ValueError, match=r"a\.stl has 0 MB, more than"):
+        read(tmp_path / "a.stl", "m")
+    monkeypatch.setattr("scatterers.triangles.files.MOST_TRIANGLES", 10)
+    with pytest.raises(ValueError, match="320 triangles, more than 10"):
+        read(mesh())
+
+
+def crossing_pairs(vertices, triangles):
+    """Pairs of triangles without common vertices that cross: each edge is intersected with each plane."""
+    found = set()
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    for i, corners in enumerate(triangles):
+        for p, q in zip(vertices[corners], vertices[np.roll(corners, 1)], strict=True):
+            # an edge of the triangle itself has no point of its own in it
+            others = np.delete(np.arange(len(triangles)), i)
+            matrix = np.stack([b - a, c - a, np.broadcast_to(p - q, a.shape)], axis=-1)
+            s, t, u = np.linalg.solve(matrix[others], (p - a)[others, :, None])[..., 0].T
+            inside = (s > 0) & (t > 0) & (s + t < 1) & (u > 0) & (u < 1)
+            found |= {(min(i, j), max(i, j)) for j in others[inside].tolist()}
+    return found
+
+
+def test_crossings_are_those_of_brute_force():
+    rng = np.random.default_rng(3)
+    vertices = rng.uniform(size=(180, 3)) * 0.6 + np.repeat(rng.uniform(size=(60, 3)), 3, axis=0)
+    triangles = np.arange(180).reshape(-1, 3)
+    expected = crossing_pairs(vertices, triangles)
+    count, pairs = crossings(vertices, triangles)
+    assert len(expected) > 20 and count == len(expected)
+    assert {(min(p), max(p)) for p in pairs.tolist()} == expected
+
+
+def test_crossings_of_neighbours():
+    # two triangles with one common vertex, and two folded onto each other at an edge
+    points = np.array([[0, 0, 0], [2, -1, 0], [2, 1, 0], [1, 0, -1], [1, 0.1, 1], [2.0, 0.5, 0]], dtype=float)
+    assert crossings(points, np.array([[0, 1, 2], [0, 3, 4]]))[0] == 1
+    assert crossings(points, np.array([[0, 1, 2], [0, 1, 5]]))[0] == 1
+    assert crossings(points, np.array([[0, 1, 2], [0, 1, 4]]))[0] == 0
+
+
+def test_objects_placed_many_times_are_counted_before_they_are_made(tmp_path, monkeypatch):
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in np.eye(3))
+    triangles = '<triangle v1="0" v2="1" v3="2"/>' * 100
+    items = '<item objectid="1"/>' * 50
+    model = (
+        '<model unit="meter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>'
+        f"</resources><build>{items}</build></model>"
+    )
+    with zipfile.ZipFile(tmp_path / "bomb.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    monkeypatch.setattr("scatterers.triangles.files.MOST_TRIANGLES", 4000)
+    with pytest.raises(ValueError, match="each where it is placed, have more than 4000 triangles"):
+        sc.examined_mesh(tmp_path / "bomb.3mf")

@@ -1,0 +1,167 @@
+"""Compiled shadow lines: against the panels of `shadow_line`, closed forms, and themselves on the finest mesh."""
+
+import numpy as np
+import pytest
+from tolerances import FRACTION, LINE_LENGTH
+
+import creeping as cr
+import scatterers as sc
+from creeping.shadow.many import prepared, shadow_lines
+from creeping.shadow.meshes import line_meshes, neighbours_of
+from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
+
+BODIES = {
+    "triaxial": sc.Ellipsoid(1.2, 0.8, 0.6),
+    "torus": sc.Torus(),
+    "twisted": sc.TwistedEllipsoid(),
+    "peanut": sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
+    "bumpy": sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
+}
+STATUSES = ("attached", "occluded", "concave")
+
+
+def unit(*direction):
+    d = np.array(direction, dtype=float)
+    return d / np.linalg.norm(d)
+
+
+def directions(n, rng):
+    d = rng.normal(size=(n, 3))
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_agrees_with_panels(name, rng):
+    body = BODIES[name]
+    d = directions(12, rng)
+    lines = shadow_lines(body, d, 64)
+    for row in np.flatnonzero(lines.status == OK):
+        line = cr.shadow_line(body, d[row])
+        assert lines.curves[row] == len(line.curves)
+        assert lines.length[row] == pytest.approx(line.length, rel=3 * LINE_LENGTH)
+        for status in STATUSES:
+            assert getattr(lines, status)[row] == pytest.approx(line.fractions[status], abs=FRACTION)
+        if np.isfinite(lines.singular_distance[row]):
+            assert lines.singular_distance[row] == pytest.approx(line.singular_distance, abs=2e-3)
+    assert np.mean(lines.status == OK) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("name", "direction", "length", "shares"),
+    [
+        ("torus", (1, 1, 1), 8.9274357171 + 4.6171835804, None),
+        ("twisted", (1, 1, 1), 5.1675274372, (1, 0, 0)),
+        ("twisted", (1, 0, 0), 5.1661620318, (1, 0, 0)),
+        ("bumpy", (1, 1, 1), 6.5103415915, (1, 0, 0)),
+        ("peanut", (1, 0.5, 0.2), 6.3744816923, (0.78261705, 0.05494849, 0.16243446)),
+    ],
+)
+def test_published_lines(name, direction, length, shares):
+    lines = shadow_lines(BODIES[name], unit(*direction)[None], 32)
+    assert lines.status[0] == OK
+    assert lines.length[0] == pytest.approx(length, rel=LINE_LENGTH)
+    if shares:
+        assert [getattr(lines, s)[0] for s in STATUSES] == pytest.approx(shares, abs=FRACTION)
+
+
+def test_rays_start_on_the_attached_line(rng):
+    body = BODIES["torus"]
+    lines = shadow_lines(body, directions(20, rng), 96)
+    there = lines.curve_index != NO_RAY
+    assert there.all()
+    x = lines.launch_points
+    normals = body.gradient(x)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    assert np.max(np.abs(body.level(x))) < 1e-9
+    assert np.max(np.abs(np.einsum("nri,ni->nr", normals, lines.directions))) < 1e-9
+    kappa = np.einsum("nri,nrij,nj->nr", lines.directions[:, None] + 0 * x, body.hessian(x), lines.directions)
+    assert np.all(kappa > 0)
+    np.testing.assert_allclose(np.einsum("nri,ni->nr", x, lines.directions), lines.launch_phase, atol=1e-14)
+    # every arc's rays stand for its length
+    attached = lines.attached * lines.length
+    np.testing.assert_allclose(np.sum(lines.spacing, axis=1), attached, rtol=1e-12)
+    assert np.all(lines.curve_index[:, 0] == 0)
+
+
+def test_neighbouring_rays_are_a_spacing_apart(rng):
+    lines = shadow_lines(BODIES["twisted"], directions(10, rng), 256)
+    gap = np.linalg.norm(np.diff(lines.launch_points, axis=1), axis=2)
+    same = np.diff(lines.arc_index, axis=1) == 0
+    # chords are shorter than arcs, by 20 degrees of turning at most here
+    assert np.all(np.abs(gap / lines.spacing[:, 1:] - 1)[same] < 1e-2)
+
+
+def test_singular_incidences_are_refused_and_those_near_reported():
+    body = BODIES["torus"]
+    near = [unit(1, 0, v) for v in (1e-8, 1e-5, 1e-3, 0.3)]
+    lines = shadow_lines(body, np.array(near), 32)
+    assert lines.status[0] == SINGULAR
+    assert np.isnan(lines.length[0]) and np.all(lines.curve_index[0] == NO_RAY)
+    assert lines.status[1] in (SINGULAR, NEAR_SINGULAR, FOLLOWED)
+    assert lines.status[3] == OK
+    np.testing.assert_allclose(lines.singular_distance[2:], [1e-3, unit(1, 0, 0.3)[2]], rtol=1e-3)
+
+
+def test_what_the_meshes_do_not_resolve_is_followed():
+    # found 2026-11-21: a loop of length 0.2 next to a singular direction of the bumpy sphere
+    body = BODIES["bumpy"]
+    i = np.array([760])
+    z, turn = 1 - (2 * i + 1) / 1000, i * np.pi * (3 - np.sqrt(5))
+    d = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+    lines, line = shadow_lines(body, d, 128), cr.shadow_line(body, d[0])
+    assert lines.status[0] in (FOLLOWED, NEAR_SINGULAR)
+    assert lines.curves[0] == len(line.curves) == 2
+    assert lines.length[0] == pytest.approx(line.length, rel=1e-6)
+    assert np.sum(lines.spacing[0]) == pytest.approx(line.length * line.fractions["attached"], rel=1e-6)
+
+
+def test_an_incidence_does_not_depend_on_its_company(rng):
+    body = BODIES["peanut"]
+    d = directions(40, rng)
+    whole, one = shadow_lines(body, d, 64), shadow_lines(body, d[17:18], 64)
+    np.testing.assert_array_equal(whole.launch_points[17], one.launch_points[0])
+    assert whole.length[17] == one.length[0]
+
+
+def test_singular_directions_of_the_torus():
+    # K = 0 on its top and bottom circles, where the null direction is along them: all d across the axis
+    segments = prepared(BODIES["torus"]).critical
+    n, b = segments[..., :3].reshape(-1, 3), segments[..., 3:].reshape(-1, 3)
+    assert np.max(np.abs(np.abs(n[:, 2]) - 1)) < 1e-12
+    assert np.max(np.abs(b[:, 2])) < 1e-6
+    assert len(prepared(BODIES["triaxial"]).critical) == 0
+
+
+def test_meshes_are_closed_and_turn_less_and_less():
+    meshes = line_meshes(BODIES["twisted"])
+    assert np.all(np.diff(meshes.turns) < 0)
+    for vertices, _, triangles, neighbours, *_ in meshes.meshes:
+        assert vertices.shape[1] - len(triangles) // 2 == 2
+        t = np.arange(len(triangles))
+        for edge in range(3):
+            across = neighbours[:, edge]
+            assert np.all(np.any(neighbours[across] == t[:, None], axis=1))
+    np.testing.assert_array_equal(
+        neighbours_of(np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])),
+        [[2, 3, 1], [0, 3, 2], [1, 3, 0], [2, 1, 0]],
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BODIES)
+def test_thousand_directions_against_the_finest_mesh(name, monkeypatch):
+    body = BODIES[name]
+    d = cr.fibonacci_directions(1000)
+    found = shadow_lines(body, d, 32)
+    from creeping.shadow import many as module
+
+    lines = prepared(body)
+    finest = type(lines)((lines.meshes[2],) * 3, lines.critical, lines.coarsest)
+    monkeypatch.setitem(module._PREPARED, id(body), finest)
+    exact = shadow_lines(body, d, 32)
+    sure = (found.status == OK) & (exact.status == OK)
+    assert np.mean(sure) > 0.98
+    np.testing.assert_array_equal(found.curves[sure], exact.curves[sure])
+    assert np.max(np.abs(found.length / exact.length - 1)[sure]) < 3e-8
+    for status in STATUSES:
+        assert np.max(np.abs(getattr(found, status) - getattr(exact, status))[sure]) < 1e-6

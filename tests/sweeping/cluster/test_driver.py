@@ -1,0 +1,125 @@
+"""Sweeps on a cluster: the same bytes however many workers, however they die, with few tasks in flight."""
+
+import os
+import signal
+from dataclasses import replace
+
+import fake_sweeps as fake
+import numpy as np
+import pytest
+
+from creeping.errors import CreepingError
+from creeping.geometry.directions import fibonacci_directions
+from creeping.shadow.status import FAILED
+from creeping.sweeping.cluster.driver import driver as cluster
+from creeping.sweeping.run import fill, sweep_directions
+from creeping.sweeping.storage.store import SweepStore
+
+
+@pytest.fixture(scope="module")
+def two():
+    """Two workers that find poison at incidences 13, which kills them, and 21, which raises."""
+    z = fibonacci_directions(40)[:, 2]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FAKE_DIES", str(z[13]))
+        patch.setenv("FAKE_RAISES", str(z[21]))
+        patch.setenv("FAKE_SECONDS", "0.003")
+        with cluster.local_client(2) as client:
+            yield client
+
+
+def test_one_and_two_workers_and_none_give_the_same_bytes(two, tmp_path):
+    # d_z of other numbers of incidences is no poison
+    plan = fake.plan(41, 3)
+    stores = {name: SweepStore.create(tmp_path / f"{name}.zarr", plan) for name in ("none", "one", "two")}
+    fill(plan, stores["none"])
+    in_flight = []
+    fill(plan, stores["two"], client=two, progress=lambda *_: in_flight.append(len(two.futures)))
+    # and by the address, as of a scheduler elsewhere
+    with cluster.local_client(1) as client:
+        fill(plan, stores["one"], client=client.scheduler.address)
+    first = fake.bytes_of(stores["none"].folder)
+    assert len(first) > 14 * len(plan.request.variables)
+    assert first == fake.bytes_of(stores["one"].folder) == fake.bytes_of(stores["two"].folder)
+    assert set(two.run(os.getenv, "CREEPING_THREADS").values()) == {"1"}
+    assert len(in_flight) == 14 and max(in_flight) <= 2 * cluster.AHEAD + 1
+
+
+def test_poison_costs_its_incidence_alone(two, tmp_path, monkeypatch):
+    plan = fake.plan(40, 4)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    assert fill(plan, store, client=two)
+    ds = store.dataset()
+    assert np.flatnonzero(ds.incidence_status == FAILED).tolist() == [13, 21]
+    good = np.delete(np.arange(40), [13, 21])
+    assert np.array_equal(ds.creeping.values[good], fake.creeping_of(40)[good])
+    assert store.failures() == [
+        (13, "its worker died each time it was tried"),
+        (21, "ArithmeticError: a poisonous incidence"),
+    ]
+    # resumed, those two tasks are tried again, here where that does no harm
+    monkeypatch.delenv("FAKE_DIES")
+    monkeypatch.delenv("FAKE_RAISES")
+    assert store.missing() == [3, 5]
+    assert fill(plan, store)
+    assert np.array_equal(store.dataset().creeping, fake.creeping_of(40))
+
+
+def test_a_killed_worker_loses_nothing(two, tmp_path):
+    plan = fake.plan(60, 3)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    victims = list(two.run(os.getpid).values())
+
+    def progress(done, *_):
+        if done >= 15 and victims:
+            os.kill(victims.pop(), signal.SIGKILL)
+            victims.clear()
+
+    assert fill(plan, store, client=two, progress=progress) and not victims
+    assert store.failures() == [] and np.array_equal(store.dataset().creeping, fake.creeping_of(60))
+
+
+def test_stopping_keeps_what_is_done(two, tmp_path):
+    plan = fake.plan(300, 3)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    done = []
+    assert not fill(plan, store, client=two, progress=lambda *a: done.append(a[0]), stop=lambda: len(done) >= 5)
+    # tasks that had begun are finished, those that had not are dropped
+    assert 5 <= len(done) <= 5 + 2 * cluster.AHEAD
+    assert 100 - len(store.missing()) == len(done) and store.dataset().attrs["incidences_ok"] == done[-1]
+    assert two.futures == {} or all(f.status == "cancelled" for f in two.futures.values())
+
+
+def test_a_worker_that_cannot_write_ends_the_sweep_with_the_reason(two, tmp_path):
+    plan = fake.plan(12, 3)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    # a file where the folder of chunks should be
+    (store.folder / "curves" / "c").touch()
+    with pytest.raises(CreepingError, match=r"cannot write to .*s\.zarr.*resume"):
+        fill(plan, store, client=two)
+    (store.folder / "curves" / "c").unlink()
+    assert fill(plan, store, client=two)
+
+
+def test_a_sweep_whose_first_task_fails_as_one_ends(two, tmp_path):
+    plan = replace(fake.plan(40, 4), incidences=np.tile(fibonacci_directions(40)[21], (40, 1)))
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    with pytest.raises(CreepingError, match="the first 4 incidences failed, all with ArithmeticError: a poisonous"):
+        fill(plan, store, client=two)
+    assert store.dataset().attrs["incidences_failed"] == 4
+
+
+def test_a_client_is_an_option_of_the_public_function(two, tmp_path):
+    asked = {"quantity": "rays", "n_rays": 4, "length": 1.0, "chunk": 2}
+    here = sweep_directions(fake.FLOW, fibonacci_directions(6), **asked)
+    there = sweep_directions(fake.FLOW, fibonacci_directions(6), **asked, store=tmp_path / "s.zarr", client=two)
+    for name in here.data_vars:
+        assert here[name].values.tobytes() == there[name].values.tobytes(), name
+
+
+def test_no_scheduler_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "ANSWER", 0.5)
+    plan = fake.plan(4, 4)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    with pytest.raises(CreepingError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
+        fill(plan, store, client="tcp://127.0.0.1:9")

@@ -1,0 +1,277 @@
+"""Stores of sweeps: what is marked is whole, what is damaged is found, and what belongs elsewhere is refused."""
+
+import errno
+from dataclasses import replace
+
+import fake_sweeps as fake
+import numpy as np
+import pytest
+import xarray
+from filelock import FileLock
+
+import creeping as cr
+import scatterers as sc
+from creeping.errors import CreepingError, InvalidInputError
+from creeping.shadow.status import FAILED
+from creeping.sweeping.plan import SweepPlan
+from creeping.sweeping.request import sweep_request
+from creeping.sweeping.results import as_dataset
+from creeping.sweeping.run import fill, in_memory, open_store
+from creeping.sweeping.storage.store import SweepStore
+
+
+def filled(folder, **options):
+    plan = fake.plan(18, 4, **options)
+    store = SweepStore.create(folder, plan)
+    fill(plan, store)
+    return plan, store
+
+
+def test_a_store_holds_what_memory_holds(tmp_path):
+    plan, store = filled(tmp_path / "s.zarr")
+    ds, memory = store.dataset(), in_memory(plan)
+    assert ds.creeping.chunks[0] == (4, 4, 4, 4, 2)
+    assert ds.attrs["incidences_ok"] == 18 and ds.attrs["incidences_missing"] == 0
+    timed = {"seconds", "study"}
+    assert {k: v for k, v in ds.attrs.items() if k not in timed} == {
+        k: v for k, v in memory.attrs.items() if k not in timed
+    }
+    xarray.testing.assert_identical(ds.load().drop_attrs(), memory.drop_attrs())
+    assert np.array_equal(ds.creeping.values, fake.creeping_of(18))
+    # also without this package
+    with xarray.open_zarr(store.folder, consolidated=False) as plain:
+        assert plain.creeping.dims == ("incidence", "boundary", "wavenumber") and "theta" in plain.coords
+
+
+@pytest.mark.parametrize("quantity", ["rays", "bistatic"])
+def test_coordinates_are_those_of_memory(tmp_path, quantity):
+    seen = {"observation": cr.fibonacci_directions(5), "wavenumbers": 3.0, "boundary": ["hard", "pec"]}
+    request = sweep_request(quantity, length=1.0, n_steps=3, **(seen if quantity == "bistatic" else {}))
+    plan = SweepPlan(fake.FLOW, request, cr.fibonacci_directions(7), 4)
+    stored = SweepStore.create(tmp_path / "s.zarr", plan).dataset()
+    empty = as_dataset(plan, request.empty(7), [], 0.0)
+    assert list(stored.data_vars) == list(empty.data_vars) and set(stored.coords) == set(empty.coords)
+    for name, values in empty.variables.items():
+        assert stored[name].dims == values.dims and stored[name].attrs == values.attrs
+        assert name in empty.data_vars or np.array_equal(stored[name].values, values.values)
+
+
+def test_the_same_plan_gives_the_same_bytes(tmp_path):
+    filled(tmp_path / "a.zarr"), filled(tmp_path / "b.zarr")
+    first = fake.bytes_of(tmp_path / "a.zarr")
+    assert len(first) > 50 and first == fake.bytes_of(tmp_path / "b.zarr")
+
+
+def test_the_flow_is_kept(tmp_path):
+    request = sweep_request("rays", length=1.0, n_rays=4)
+    built = cr.build_phase_map(sc.Torus(), horizon=0.25, grid=(16, 24), order=3, cache=False)
+    for name, flow in (("map", built), ("direct", cr.DirectFlow(sc.Torus(), 1e-7, 0.5, 0.01))):
+        plan = SweepPlan(flow, request, cr.fibonacci_directions(2), 1)
+        store = SweepStore.create(tmp_path / name, plan)
+        again = store.flow(sc.Torus())
+        assert SweepPlan(again, request, plan.incidences, 1).key == plan.key
+        x, p = np.array([1.5, 0, 0]), np.array([0, 0.6, 0.8])
+        assert np.array_equal(again.apply(x, p), flow.apply(x, p))
+        with pytest.raises(CreepingError, match="map of torus|Torus" if name == "map" else "another study.*body"):
+            other = store.flow(sc.Torus(R=1.5))
+            store.require_same(SweepPlan(other, request, plan.incidences, 1))
+
+
+def test_resuming_does_what_is_missing_and_nothing_else(tmp_path, monkeypatch):
+    plan = fake.plan(18, 4)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    assert not fill(plan, store, most=2) and store.missing() == [2, 3, 4]
+    partial = store.dataset()
+    assert partial.attrs["incidences_missing"] == 10 and np.isnan(partial.creeping[8:]).all()
+    # where nothing is given nothing is resolved
+    assert partial.unresolved[8:].all() and not partial.unresolved[:8].any()
+    diary = tmp_path / "diary"
+    diary.mkdir()
+    monkeypatch.setenv("FAKE_DIARY", str(diary))
+    seen = []
+    assert fill(plan, open_store(plan, store.folder, resume=True), progress=lambda *a: seen.append(a[:2]))
+    assert len(list(diary.iterdir())) == 3 and seen == [(12, 18), (16, 18), (18, 18)]
+    assert fill(plan, store) and len(list(diary.iterdir())) == 3
+    filled(tmp_path / "whole.zarr")
+    assert fake.bytes_of(store.folder) == fake.bytes_of(tmp_path / "whole.zarr")
+
+
+def test_another_study_is_refused_with_what_differs(tmp_path):
+    _, store = filled(tmp_path / "s.zarr")
+    with pytest.raises(InvalidInputError, match="exists; give resume=True"):
+        open_store(fake.plan(18, 4), store.folder, resume=False)
+    other = fake.plan(17, 5, asked={"tolerance": 1e-3})
+    with pytest.raises(InvalidInputError, match="another study") as caught:
+        open_store(other, store.folder, resume=True)
+    names = [text.split()[0] for text in caught.value.differing]
+    assert names == ["asked.tolerance", "chunk", "incidences.count", "incidences.digest"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(CreepingError, match="holds no sweep"):
+        SweepStore.open(tmp_path / "empty")
+
+
+def test_two_drivers_do_not_fill_one_store(tmp_path):
+    plan, store = filled(tmp_path / "s.zarr")
+    with FileLock(store.folder / "study" / ".lock"), pytest.raises(CreepingError, match="another process is filling"):
+        fill(plan, store)
+    with FileLock(store.folder / "study" / ".lock"):
+        assert store.verify() == []
+        with pytest.raises(CreepingError, match="another process is filling"):
+            store.verify(repair=True)
+    # who holds it may ask again, and holds it until the end
+    with store.locked():
+        fill(plan, store)
+        with pytest.raises(CreepingError, match="another process is filling"):
+            fill(plan, SweepStore.open(store.folder))
+    assert fill(plan, SweepStore.open(store.folder))
+
+
+def test_a_flow_of_no_known_kind_is_told(tmp_path):
+    _, store = filled(tmp_path / "s.zarr")
+    store.key["flow"]["kind"] = "spline"
+    with pytest.raises(CreepingError, match="flow of kind 'spline', which is neither"):
+        store.flow(sc.Sphere())
+    del store.key["flow"]["kind"]
+    with pytest.raises(CreepingError, match="lacks 'kind' of its flow"):
+        store.flow(sc.Sphere())
+
+
+class Broken(fake.FakeSweeper):
+    """Raises what a mistake of the program raises."""
+
+    def __call__(self, incidences):
+        return incidences.no_such_thing
+
+
+@pytest.mark.parametrize("where", ["memory", "store"])
+def test_mistakes_of_the_program_are_no_data(tmp_path, where):
+    plan = replace(fake.plan(18, 4), make=Broken)
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        in_memory(plan) if where == "memory" else fill(plan, SweepStore.create(tmp_path / "s.zarr", plan))
+
+
+@pytest.mark.parametrize("chunk", [1, 4])
+def test_a_sweep_whose_first_task_fails_as_one_ends(tmp_path, monkeypatch, chunk):
+    bad = cr.fibonacci_directions(18)[:4, 2]
+    monkeypatch.setenv("FAKE_RAISES", " ".join(map(str, bad)))
+    plan = fake.plan(18, chunk)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    words = f"the first {max(chunk, 2)} incidences failed, all with ArithmeticError: a poison.* nothing would come"
+    with pytest.raises(CreepingError, match=words):
+        fill(plan, store)
+    with pytest.raises(CreepingError, match=words):
+        in_memory(plan)
+    assert store.dataset().attrs["incidences_failed"] == max(chunk, 2)
+    if chunk == 4:
+        # what has failed before does not keep the rest from being tried
+        assert fill(plan, store) and store.missing() == [0]
+        assert fill(plan, store) and store.missing() == [0]
+
+
+def test_one_incidence_is_too_few_to_end_a_sweep(monkeypatch):
+    monkeypatch.setenv("FAKE_RAISES", str(cr.fibonacci_directions(18)[0, 2]))
+    assert in_memory(fake.plan(18, 1)).attrs["incidences_failed"] == 1
+
+
+def test_a_full_disk_is_one_clear_error_and_loses_nothing(tmp_path, monkeypatch):
+    plan = fake.plan(18, 4)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    writes = []
+
+    def put(path, value, exclusive=False):
+        writes.append(path)
+        if len(writes) > 40:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return real(path, value, exclusive)
+
+    from zarr.storage import _local
+
+    real = _local._put
+    monkeypatch.setattr(_local, "_put", put)
+    with pytest.raises(CreepingError, match=r"No space left on device .*MB are free.*resume"):
+        fill(plan, store)
+    monkeypatch.undo()
+    kept = 5 - len(store.missing())
+    assert kept == 40 // (len(store.variables) + 1)
+    assert np.array_equal(store.dataset().creeping[: 4 * kept], fake.creeping_of(18)[: 4 * kept])
+    assert fill(plan, store)
+    filled(tmp_path / "whole.zarr")
+    assert fake.bytes_of(store.folder) == fake.bytes_of(tmp_path / "whole.zarr")
+
+
+def test_a_folder_that_cannot_be_made_leaves_nothing(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(CreepingError, match="cannot make the store"):
+        SweepStore.create(tmp_path / "file" / "s.zarr", fake.plan())
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("harm", ["bit", "cut", "gone"])
+def test_damage_is_found_named_and_repaired(tmp_path, harm):
+    plan, store = filled(tmp_path / "s.zarr")
+    whole = fake.bytes_of(store.folder)
+    # the last task is shorter than the others
+    for task in (1, 4):
+        victim = store.folder / f"creeping/c/{task}/0/0"
+        raw = bytearray(victim.read_bytes())
+        raw[len(raw) // 2] ^= 4
+        victim.unlink() if harm == "gone" else victim.write_bytes(raw if harm == "bit" else raw[:7])
+    found = store.verify()
+    assert [task for task, _ in found] == [1, 4] and "creeping" in found[0][1]
+    if harm != "gone":
+        assert "incidences 4 to 7" in found[0][1]
+        with pytest.raises((ValueError, RuntimeError)):
+            store.dataset().creeping.load()
+    assert len(store.verify(repair=True)) == 2 and store.missing() == [1, 4]
+    assert fill(plan, store) and store.verify() == []
+    assert fake.bytes_of(store.folder) == whole
+
+
+def test_a_damaged_status_tells_which_task(tmp_path):
+    _, store = filled(tmp_path / "s.zarr")
+    victim = store.folder / "incidence_status/c/2"
+    victim.write_bytes(victim.read_bytes()[:-1] + b"?")
+    with pytest.raises(CreepingError, match=r"incidence_status of task 2 .incidences 8 to 11.*--verify") as caught:
+        store.finish(0.0)
+    assert caught.value.task == 2
+
+
+def test_a_damaged_study_is_not_trusted(tmp_path):
+    _, store = filled(tmp_path / "s.zarr")
+    file = store.folder / "study/zarr.json"
+    file.write_text(file.read_text().replace('"chunk": 4', '"chunk": 5'))
+    with pytest.raises(CreepingError, match="damaged"):
+        SweepStore.open(store.folder)
+
+
+def test_poison_costs_one_incidence_and_is_tried_again(tmp_path, monkeypatch):
+    bad = cr.fibonacci_directions(18)[[5, 17], 2]
+    monkeypatch.setenv("FAKE_RAISES", " ".join(map(str, bad)))
+    plan, store = filled(tmp_path / "s.zarr")
+    ds = store.dataset()
+    assert np.flatnonzero(ds.incidence_status == FAILED).tolist() == [5, 17]
+    assert np.flatnonzero(np.isnan(ds.creeping[:, 0, 0])).tolist() == [5, 17]
+    assert store.failures() == [
+        (5, "ArithmeticError: a poisonous incidence"),
+        (17, "ArithmeticError: a poisonous incidence"),
+    ]
+    assert ds.attrs["incidences_failed"] == 2 and "incidence 17: Arith" in ds.attrs["errors"]
+    memory = in_memory(plan)
+    xarray.testing.assert_equal(memory, ds.load())
+    assert memory.attrs["errors"] == ds.attrs["errors"]
+    assert store.missing() == [1, 4]
+    monkeypatch.undo()
+    assert fill(plan, store) and store.failures() == []
+    ds = store.dataset()
+    assert "errors" not in ds.attrs and np.array_equal(ds.creeping, fake.creeping_of(18))
+
+
+def test_a_long_message_is_cut_and_a_wrong_shape_is_told(tmp_path):
+    plan = fake.plan(4, 4)
+    store = SweepStore.create(tmp_path / "s.zarr", plan)
+    arrays = plan.request.empty(4)
+    store.write_task(0, arrays, {2: 300 * "ä"})
+    store.commit(0, failures=True)
+    assert dict(store.failures())[2].rstrip("\ufffd") == 128 * "ä"
+    with pytest.raises(CreepingError, match=r"curves of shape \(3,\), not \(4,\)"):
+        store.write_task(0, arrays | {"curves": arrays["curves"][:3]}, {})

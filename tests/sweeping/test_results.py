@@ -1,0 +1,135 @@
+"""Datasets of sweeps: what stands in them, that files keep it, and that bad input is refused with what is wrong."""
+
+import fake_sweeps as fake
+import numpy as np
+import pytest
+import xarray
+
+import creeping as cr
+import scatterers as sc
+from creeping.errors import CreepingError, InvalidInputError
+from creeping.sweeping import results as dataset
+from creeping.sweeping.plan import SweepPlan
+from creeping.sweeping.request import sweep_request
+from creeping.sweeping.run import in_memory
+
+REQUESTS = {
+    "rays": sweep_request("rays", length=2.0, n_rays=5, n_steps=4),
+    "monostatic": sweep_request("monostatic", length=2.0, wavenumbers=[5, 9], boundary=["soft", "hard", "pec"]),
+    "bistatic": sweep_request(
+        "bistatic", length=2.0, wavenumbers=7, boundary="impedance:0.5+0.2j", observation=[(0, 0, 2), (1, 0, 0)]
+    ),
+}
+
+
+def blank(quantity):
+    """Dataset without results, but with all that stands around them."""
+    directions = cr.fibonacci_directions(6)
+    plan = SweepPlan(fake.FLOW, REQUESTS[quantity], directions, 6, text="[study]\n")
+    return dataset.as_dataset(plan, plan.request.empty(6), [(3, "overflow"), (5, "")], 1.5)
+
+
+@pytest.mark.parametrize("quantity", REQUESTS)
+def test_variables_have_the_dimensions_units_and_words_of_the_request(quantity):
+    ds = blank(quantity)
+    assert list(ds.data_vars) == list(REQUESTS[quantity].variables)
+    for name, variable in REQUESTS[quantity].variables.items():
+        assert ds[name].dims == ("incidence", *variable.dims) and ds[name].dtype == variable.dtype
+        assert ds[name].attrs["units"] and ds[name].attrs["description"]
+    assert ds.attrs["incidences_failed"] == 6 and ds.attrs["incidences_ok"] == 0
+    assert ds.attrs["errors"] == "incidence 3: overflow\nincidence 5: "
+    assert ds.attrs["body"] == "Sphere(radius=1.0, speed=None)" and ds.attrs["flow_rtol"] == 1e-6
+    assert ds.attrs["study"] == "[study]\n" and ds.attrs["creeping_version"] == cr.__version__
+
+
+def test_coordinates():
+    ds = blank("rays")
+    sine = np.sin(ds.theta)
+    assert ds.direction.values.T == pytest.approx(
+        np.stack([sine * np.cos(ds.phi), sine * np.sin(ds.phi), np.cos(ds.theta)])
+    )
+    assert ds.travel_time.values == pytest.approx([0.5, 1.0, 1.5, 2.0])
+    ds = blank("monostatic")
+    assert ds.creeping.sel(wavenumber=9, boundary="hard").shape == (6,)
+    assert ds.creeping_pec.dims == ("incidence", "wavenumber", "scattered", "incident")
+    assert blank("bistatic").observation.values.tolist() == [[0, 0, 1], [1, 0, 0]]
+
+
+@pytest.mark.parametrize("quantity", REQUESTS)
+def test_files_keep_everything(quantity, tmp_path):
+    ds = blank(quantity)
+    # strings of fixed length are no part of zarr's format 3
+    texts = {name: c.astype(object) for name, c in ds.coords.items() if c.dtype.kind == "U"}
+    ds.assign_coords(texts).to_zarr(tmp_path / "ds.zarr", consolidated=False)
+    with xarray.open_zarr(tmp_path / "ds.zarr", consolidated=False) as back:
+        xarray.testing.assert_equal(back.load(), ds)
+        assert back.attrs == ds.attrs
+    real = dataset.without_complex(ds)
+    real.to_netcdf(tmp_path / "ds.nc", engine="h5netcdf")
+    with xarray.open_dataset(tmp_path / "ds.nc", engine="h5netcdf") as back:
+        xarray.testing.assert_equal(back.load(), real)
+        assert {name: np.asarray(v).tolist() for name, v in back.attrs.items()} == ds.attrs
+        assert back.line_length.attrs["units"] == "L"
+
+
+def test_parts_of_complex_numbers_make_the_whole():
+    ds = in_memory(fake.plan(10))
+    real = dataset.without_complex(ds)
+    assert not [name for name, values in real.data_vars.items() if values.dtype.kind == "c"]
+    assert np.array_equal(real.creeping_real + 1j * real.creeping_imag, ds.creeping)
+
+
+@pytest.mark.slow
+def test_a_sphere_answers_alike_in_all_directions():
+    flow = cr.DirectFlow(sc.Sphere(), rtol=1e-8)
+    asked = {"wavenumbers": 10.0, "n_rays": 16, "length": 4.0}
+    seen = []
+    ds = cr.sweep_directions(
+        flow, [(0, 0, 2), (1, 1, 1), (1, -2, 3)], chunk=2, progress=lambda *a: seen.append(a[:2]), **asked
+    )
+    assert seen == [(2, 3), (3, 3)]
+    assert ds.line_length.values == pytest.approx(2 * np.pi, abs=1e-9)
+    f = ds.creeping.sel(boundary="soft", wavenumber=10.0).values
+    assert abs(f[0]) > 1e-6 and f == pytest.approx(f[0], rel=1e-4)
+    one = cr.launch(flow, cr.shadow_line(flow.body, (1, 1, 1)), length=4.0, n_rays=16)
+    far = cr.far_field(one, -np.ones(3), wavenumber=10.0, boundary="soft")
+    assert ds.reflected.values.ravel()[1] == pytest.approx(complex(far.reflected[0]), rel=1e-9)
+
+
+def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
+    def gone(name):
+        raise ModuleNotFoundError(name=name)
+
+    monkeypatch.setattr(dataset, "import_module", gone)
+    with pytest.raises(CreepingError, match=r"need xarray: pip install 'creeping\[sweep\]'"):
+        cr.sweep_directions(fake.FLOW, [(0, 0, 1)], quantity="rays")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"incidences": [(0, 0, 1), (0, 0, 0)]}, "1 of 2 incidences is zero .rows 1"),
+        ({"incidences": [(0, np.nan, 1)]}, "1 of 1 incidences is not finite"),
+        ({"incidences": (0, 0, 1)}, r"shape \(3,\); give rows"),
+        ({"incidences": [(0, 1)]}, r"shape \(1, 2\)"),
+        ({"n_rays": 0, "length": -1.0, "wavenumbers": 3}, "length = -1.0 .*; n_rays = 0 .*; wavenumbers belong"),
+        ({"quantity": "monostatic"}, "needs wavenumbers"),
+        ({"quantity": "monostatic", "wavenumbers": 1.0, "boundary": "sfot"}, "sfot"),
+        ({"quantity": "bistatic", "wavenumbers": 1.0}, "observation"),
+        ({"chunk": 0}, "chunk = 0"),
+        ({"resume": True}, "resume goes with store="),
+        ({"client": "tcp://nowhere:1"}, "client goes with store=.*seen by all workers"),
+        ({"incidences": np.ones((3_000_000, 3)), "n_rays": 60_000}, "GB of results; give store="),
+        ({"n_rays": 65_536, "n_steps": 4096}, "one incidence gives 19.3 GB of results.*fewer rays or steps"),
+        ({"n_rays": 65_536, "n_steps": 4096, "store": "never.zarr"}, "one incidence gives 19.3 GB of results"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_is_computed(options, words):
+    with pytest.raises(InvalidInputError, match=words):
+        cr.sweep_directions(fake.FLOW, **({"incidences": [(0, 0, 1)], "quantity": "rays"} | options))
+
+
+def test_a_field_on_a_weighted_body_is_refused():
+    flow = cr.DirectFlow(sc.Sphere(speed="1 + x"))
+    with pytest.raises(InvalidInputError, match="constant speed"):
+        cr.sweep_directions(flow, [(0, 0, 1)], wavenumbers=1.0)
