@@ -12,7 +12,8 @@ from creeping._typing import FloatArray, IntArray
 from creeping.explorer.request import Wish
 from creeping.field.decibels import decibels
 from creeping.field.on_rays import ray_magnitude
-from creeping.geodesics.equations import natural_horizon, speed_of
+from creeping.geodesics.equations import natural_horizon
+from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import Triangulation
 from creeping.rays.fan import Flow, RayFan

@@ -12,8 +12,8 @@ from creeping._typing import FloatArray
 from creeping.explorer.preview import MovingFrame
 from creeping.explorer.request import Wish
 from creeping.field.far import FarField, far_field
-from creeping.geodesics.equations import speed_of
 from creeping.geometry.directions import directions_from_angles
+from creeping.geometry.speed import speed_of
 from creeping.plotting.field_pictures import surface_levels
 from creeping.rays.fan import Flow, RayFan, launch
 from creeping.rays.preview import measured

@@ -15,7 +15,7 @@ from creeping.field.creeping_modes import fock_scale
 from creeping.field.far import checked
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary
-from creeping.geodesics.equations import speed_of
+from creeping.geometry.speed import speed_of
 from creeping.rays.fan import RayFan, RayStatus
 
 

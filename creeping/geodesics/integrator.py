@@ -1,7 +1,6 @@
 """Direct integration of the geodesic flow by the order-8 Runge-Kutta pair of Dormand and Prince [HNW93, sec. II.10].
 
-The compiled path advances blocks of rays with one step for the block; the numpy path, its twin, advances all rays
-together and serves bodies without a compiled level. Both put each accepted step back on T1Q.
+Blocks of rays advance with one step for the block, and each accepted step is put back on T1Q.
 """
 
 from dataclasses import dataclass
@@ -10,11 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, FloatArray, IntArray
+from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import IntegrationError, InvalidInputError
-from creeping.geodesics.bundle import bundle_points, project_bundle
-from creeping.geodesics.equations import metric_curvature, speed_of, speed_values, vector_field
-from creeping.geometry.curvature import normal_curvature
+from creeping.geodesics.bundle import bundle_points
+from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads
 
@@ -174,22 +172,17 @@ def trace_states(
     method = tableau or dormand_prince_8()
     if step is None:
         step = 0.05 * size(body)
-    compiled = compiled_parts(body)
-    if compiled is None:
-        out = trace_numpy(body, states, times, method, rtol=rtol, step=step)
-    else:
-        from creeping.geodesics.kernels.integrator import integrate
+    from creeping.geodesics.kernels.integrator import integrate
 
-        out = np.empty((len(states), len(times), states.shape[1]))
-        states = np.ascontiguousarray(states, dtype=float)
-        scale = _scale(body, states.shape[1])
-        ends = np.asarray(times, dtype=float)
-        tableau_parts = method.packed()
+    out = np.empty((len(states), len(times), states.shape[1]))
+    states = np.ascontiguousarray(states, dtype=float)
+    scale = error_scale(body, states.shape[1])
+    ends = np.asarray(times, dtype=float)
+    tableau_parts = method.packed()
+    with evaluators(body) as parts:
 
         def run(part: slice) -> None:
-            integrate(
-                *compiled, states[part], ends, *tableau_parts, scale, float(rtol), float(step), MAX_STEPS, out[part]
-            )
+            integrate(*parts, states[part], ends, *tableau_parts, scale, float(rtol), float(step), MAX_STEPS, out[part])
 
         in_threads(run, len(states))
     failed = np.flatnonzero(~np.all(np.isfinite(out), axis=(1, 2)))
@@ -207,92 +200,10 @@ def trace_states(
     return out
 
 
-def compiled_parts(body: Surface) -> tuple[Any, FloatArray, Any, FloatArray, bool] | None:
-    """Level and speed functions with their parameters for the kernels, or None if one of them is not compiled."""
-    level = getattr(body, "compiled", None)
-    speed = speed_of(body)
-    if level is None or (speed is not None and getattr(speed, "compiled", None) is None):
-        return None
-    weight = level if speed is None else speed.compiled
-    return level.function, level.parameters, weight.function, weight.parameters, speed is not None
-
-
-def _scale(body: Surface, lanes: int) -> FloatArray:
+def error_scale(body: Surface, lanes: int) -> FloatArray:
     """Magnitude below which a lane's error counts absolutely: lengths for x and M12, 1 for the others.
 
     The attenuation does not steer the steps: where kappa_n passes 0 it has kinks, at which 64 rays would wait in turn.
     """
     length = size(body)
     return np.array([length] * 3 + [1.0] * 3 + [1.0, 1 / length, length, 1.0, np.inf][: lanes - 6])
-
-
-def derivative_numpy(body: Surface, states: FloatArray) -> FloatArray:
-    """Time derivative of states (n, 6, 10 or 11); the numpy twin of the compiled right-hand side."""
-    k = np.empty_like(states)
-    k[:, :3], k[:, 3:6] = vector_field(body, states[:, :3], states[:, 3:6])
-    if states.shape[1] > 6:
-        curvature = metric_curvature(body, states[:, :3])
-        k[:, 6], k[:, 8] = states[:, 7], states[:, 9]
-        k[:, 7], k[:, 9] = -curvature * states[:, 6], -curvature * states[:, 8]
-    if states.shape[1] > 10:
-        kappa = normal_curvature(body, states[:, :3], states[:, 3:6])
-        k[:, 10] = speed_values(body, states[:, :3]) * np.maximum(kappa, 0.0) ** (2 / 3)
-    return k
-
-
-def trace_numpy(
-    body: Surface, states: FloatArray, times: FloatArray, method: Tableau, *, rtol: float, step: float
-) -> FloatArray:
-    """Trace all states with one common step; the numpy twin of the compiled tracer, same arguments as trace_states."""
-    y = np.array(states, dtype=float)
-    out = np.full((len(y), len(times), y.shape[1]), np.nan)
-    scale = _scale(body, y.shape[1])
-    now, h = 0.0, step
-    for m, end in enumerate(times):
-        left = float(end) - now
-        equal = max(1, int(np.ceil(left / step - 1e-9))) if rtol == 0 else 1
-        used = 0
-        while left > 0:
-            trial = left / (equal - used) if rtol == 0 else min(h, left)
-            with np.errstate(all="ignore"):
-                new, error = _step_numpy(body, y, trial, method, rtol, scale)
-            used += 1
-            if (
-                used > MAX_STEPS
-                or (trial < 1e-12 * step and trial < left)
-                or (rtol == 0 and not np.all(np.isfinite(new)))
-            ):
-                return out
-            if rtol > 0 and not error < 1:
-                h = trial * (max(0.2, 0.9 * error**-0.125) if np.isfinite(error) else 0.2)
-                continue
-            new[:, :3], new[:, 3:6] = project_bundle(body, new[:, :3], new[:, 3:6])
-            left = 0.0 if trial >= left else left - trial
-            y = new
-            if rtol > 0:
-                grow = min(5.0, 0.9 * max(error, 1e-8) ** -0.125)
-                h = max(h, trial * grow) if trial < h else trial * grow
-        now = float(end)
-        out[:, m] = y
-    return out
-
-
-def _step_numpy(
-    body: Surface, y: FloatArray, h: float, method: Tableau, rtol: float, scale: FloatArray
-) -> tuple[FloatArray, float]:
-    """One step, and its largest error in units of the tolerance."""
-    stages = len(method.b)
-    k = np.empty((stages + 1, *y.shape))
-    k[0] = derivative_numpy(body, y)
-    for s in range(1, stages):
-        k[s] = derivative_numpy(body, y + h * np.tensordot(method.a[s, :s], k[:s], 1))
-    new = y + h * np.tensordot(method.b, k[:stages], 1)
-    if rtol == 0:
-        return new, 0.0
-    k[stages] = derivative_numpy(body, new)
-    tolerance = rtol * np.maximum(scale, np.maximum(np.abs(y), np.abs(new)))
-    sum3 = np.sum((np.tensordot(method.e3, k, 1) / tolerance) ** 2, axis=1)
-    sum5 = np.sum((np.tensordot(method.e5, k, 1) / tolerance) ** 2, axis=1)
-    denominator = np.sqrt((sum5 + 0.01 * sum3) * y.shape[1])
-    error = np.divide(h * sum5, denominator, out=np.zeros_like(sum5), where=denominator != 0)
-    return new, float(np.max(error))

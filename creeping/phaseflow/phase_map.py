@@ -228,10 +228,6 @@ class PhaseMap(Drawn):
             raise InvalidInputError("this map carries no curvatures over a leap; use transport, which traces for them")
         return self.model.flow(self.grid, level, states, counts)
 
-    def leap_numpy(self, states: FloatArray, level: Leap | None = None) -> FloatArray:
-        """Apply one map once; the numpy twin of the compiled composition."""
-        return self.model.leap_numpy(self.grid, level or self.leaps[-1], states)
-
     def save(self, folder: str | Path) -> Path:
         """Store the map in a new folder of .npy files with a manifest; `load_phase_map` opens it.
 

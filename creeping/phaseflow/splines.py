@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import FloatArray
 
 
 @cache
@@ -79,19 +79,3 @@ def prefilter(values: FloatArray, degree: int, periodic: tuple[bool, bool]) -> F
         operator = interpolation_operator(values.shape[axis], degree, wraps)
         values = np.moveaxis(np.tensordot(operator, values, axes=(1, axis)), 0, axis)
     return np.ascontiguousarray(values)
-
-
-def evaluate(table: FloatArray, chart: IntArray, grid: FloatArray, degree: int) -> FloatArray:
-    """Evaluate at charts (n,) and grid coordinates (n, 3): (n, lanes). The numpy twin of the compiled contraction."""
-    cells = np.array([table.shape[1] - degree, table.shape[2] - degree, table.shape[3] - degree])
-    cell = np.clip(np.floor(grid).astype(np.int64), 0, cells - 1)
-    w = uniform_weights(grid - cell, degree)
-    steps = np.arange(degree + 1)
-    out = np.empty((len(grid), table.shape[-1]))
-    # the stencils of a batch are gathered at once, so batches stay small
-    for start in range(0, len(grid), 2048):
-        part = slice(start, start + 2048)
-        iu, iv, ia = (cell[part, k, None] + steps for k in range(3))
-        stencil = table[chart[part, None, None, None], iu[:, :, None, None], iv[:, None, :, None], ia[:, None, None, :]]
-        out[part] = np.einsum("ni,nj,nk,nijkl->nl", w[part, 0], w[part, 1], w[part, 2], stencil, optimize=True)
-    return out

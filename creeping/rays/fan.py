@@ -18,9 +18,9 @@ import numpy as np
 from creeping._presenting import DrawnOnBody, brief
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geodesics.equations import speed_values
 from creeping.geodesics.integrator import MapError, pack, trace_states
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
+from creeping.geometry.speed import speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
 from creeping.rays.spreading import spread, zeros_passed
 from creeping.shadow.attachment import (

@@ -12,7 +12,8 @@ import numpy as np
 from creeping._presenting import DrawnOnBody
 from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geodesics.equations import speed_of, speed_values, vector_field
+from creeping.geodesics.equations import vector_field
+from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import project
 from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan

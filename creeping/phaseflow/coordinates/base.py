@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geodesics.integrator import compiled_parts
+from creeping.geometry.evaluators import is_compiled
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.coordinates.ambient import AmbientModel
 from creeping.phaseflow.coordinates.rotation import AngleModel, OctantModel, RotationModel
@@ -56,10 +56,6 @@ class Model(Protocol):
         """Compose counts[0], then counts[1], ... maps on states (n, 6, 10 or 12): (n, m, the same)."""
         ...
 
-    def leap_numpy(self, grid: Grid, leap: Leap, states: FloatArray) -> FloatArray:
-        """One map on states (n, 6, 10 or 12), by numpy alone."""
-        ...
-
 
 def nodes_of(model: Model, grid: Grid) -> FloatArray:
     """Coordinates of the nodes of all charts: (charts nu nv na, k)."""
@@ -69,7 +65,7 @@ def nodes_of(model: Model, grid: Grid) -> FloatArray:
 
 def model_of(body: Surface, name: str | None = None) -> Model:
     """Model of a body: the one named, or the fastest it allows."""
-    if name != "ambient" and compiled_parts(body) is not None:
+    if name != "ambient" and is_compiled(body):
         atlas: Any = body.atlas
         if hasattr(getattr(atlas, "sphere_map", None), "compiled_forward"):
             folds = name == "octant" or (name is None and has_mirrors(body))

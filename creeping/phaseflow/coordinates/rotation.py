@@ -10,13 +10,11 @@ import numpy as np
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import halves, kernel_rules
-from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads
-from creeping.phaseflow.coordinates.ambient import carry_riding
 from creeping.phaseflow.coordinates.quaternions import quaternion_product, quaternions
 from creeping.phaseflow.grid import Grid, Leap
-from creeping.phaseflow.splines import evaluate, interpolation_operator
+from creeping.phaseflow.splines import interpolation_operator
 
 REACH = float(np.sqrt(2) - 1)
 """Stereographic coordinate of a chart's edge; see `phaseflow.kernels.rotation`."""
@@ -125,23 +123,6 @@ class CompiledModel:
         in_threads(run, len(nodes))
         return out, matrices, curvatures @ halves().T
 
-    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
-        raise NotImplementedError
-
-    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
-        raise NotImplementedError
-
-    def leap_numpy(self, grid: Grid, leap: Leap, states: FloatArray) -> FloatArray:
-        """See `Model`."""
-        inner, chart, located = self._locate_numpy(states)
-        scale, shift = self.placement(grid)
-        place = shift + scale * located
-        d = evaluate(leap.state, chart, place, grid.degree) + leap.centre
-        out = np.empty_like(states)
-        out[:, :3], out[:, 3:6] = self._move_numpy(inner, d)
-        carry_riding(grid, leap, chart, place, states, out)
-        return out
-
 
 class RotationModel(CompiledModel):
     """Rotations [s, q, s x q]; six stereographic charts."""
@@ -175,36 +156,6 @@ class RotationModel(CompiledModel):
         first = quaternions(own[None, :, 0], own[None, :, 1])
         return quaternion_product(quaternion_product(first, quaternions(s, q)), spin)
 
-    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
-        source: Any = getattr(self.body.atlas, "sphere_map", None)
-        s = source.inverse(states[:, :3])
-        s = s / np.linalg.norm(s, axis=1, keepdims=True)
-        basis = _across(s)
-        frame = polar_frame(source.derivative(s) @ basis)
-        q = np.einsum("nik,nk->ni", basis, np.einsum("nik,ni->nk", frame, states[:, 3:6]))
-        q /= np.linalg.norm(q, axis=1, keepdims=True)
-        axis = np.argmax(np.abs(s), axis=1)
-        order = (axis[:, None] + np.arange(3)) % 3
-        s_abc, q_abc = np.take_along_axis(s, order, 1), np.take_along_axis(q, order, 1)
-        sign = np.where(s_abc[:, 0] < 0, -1.0, 1.0)
-        s_abc[:, :2] *= sign[:, None]
-        q_abc[:, :2] *= sign[:, None]
-        uv = s_abc[:, 1:] / (1 + s_abc[:, :1])
-        along = q_abc[:, 1:] - uv * q_abc[:, :1]
-        angle = np.arctan2(along[:, 1], along[:, 0]) / (2 * np.pi) % 1.0
-        located = np.concatenate([uv / REACH, angle[:, None]], axis=1)
-        return quaternions(s, q), 2 * axis + (sign < 0), located
-
-    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
-        source: Any = getattr(self.body.atlas, "sphere_map", None)
-        r = quaternion_product(inner, d)
-        r /= np.linalg.norm(r, axis=1, keepdims=True)
-        w, x, y, z = r.T
-        s = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
-        q = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1)
-        basis = np.stack([q, np.cross(s, q)], axis=-1)
-        return source.forward(s), polar_frame(source.derivative(s) @ basis)[..., 0]
-
 
 class OctantModel(RotationModel):
     """Rotations on a body with the three coordinate planes as mirrors: the table covers s >= 0 only.
@@ -229,20 +180,6 @@ class OctantModel(RotationModel):
         """See `Model`; u and v in [0, 1] are those in [1/2, 1] of the whole chart."""
         return super().at(2 * chart, 0.5 + 0.5 * np.asarray(u), 0.5 + 0.5 * np.asarray(v), angle)
 
-    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
-        source: Any = self.body.atlas
-        s = source.sphere_map.inverse(states[:, :3])
-        mirrors = np.where(s < 0, -1.0, 1.0)
-        _, chart, located = super()._locate_numpy(states[:, :6] * np.tile(mirrors, 2))
-        inner, _, _ = super()._locate_numpy(states)
-        return (inner, np.prod(mirrors, axis=1)), chart // 2, located
-
-    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
-        rotation, parity = inner
-        own = d.copy()
-        own[:, 1:3] *= parity[:, None]
-        return super()._move_numpy(rotation, own)
-
 
 class AngleModel(CompiledModel):
     """(u, v, angle) in turns on one doubly periodic chart."""
@@ -258,21 +195,6 @@ class AngleModel(CompiledModel):
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
         """See `Model`."""
         return np.stack([u, v, angle / (2 * np.pi), np.zeros_like(u)], axis=1)
-
-    def _locate_numpy(self, states: FloatArray) -> tuple[Any, IntArray, FloatArray]:
-        chart, uv = self.body.atlas.locate(states[:, :3])
-        frame = polar_frame(self.body.atlas.charts[0].tangents(uv))
-        along = np.einsum("nik,ni->nk", frame, states[:, 3:6])
-        angle = np.arctan2(along[:, 1], along[:, 0]) / (2 * np.pi) % 1.0
-        located = np.concatenate([uv, angle[:, None]], axis=1)
-        return located, chart, located
-
-    def _move_numpy(self, inner: Any, d: FloatArray) -> tuple[FloatArray, FloatArray]:
-        chart = self.body.atlas.charts[0]
-        moved = inner + d[:, :3]
-        frame = polar_frame(chart.tangents(moved[:, :2]))
-        angle = 2 * np.pi * moved[:, 2:]
-        return chart.point(moved[:, :2]), np.cos(angle) * frame[..., 0] + np.sin(angle) * frame[..., 1]
 
 
 def _tables(leap: Leap) -> tuple[Any, ...]:
@@ -306,11 +228,3 @@ def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
         if float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) < EXIT_ERROR:
             return np.ascontiguousarray(values)
     return found
-
-
-def _across(s: FloatArray) -> FloatArray:
-    """Orthonormal basis of the planes across unit vectors: (n, 3) -> (n, 3, 2)."""
-    other = np.eye(3)[np.argmin(np.abs(s), axis=1)]
-    first = np.cross(other, s)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(s, first)], axis=-1)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.geodesics.equations import speed_of
 from creeping.geodesics.integrator import pack
+from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import Flow, RayStatus, rough_from
 from creeping.rays.single import SingleRayTracer

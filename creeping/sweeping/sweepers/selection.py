@@ -5,8 +5,9 @@ from typing import Protocol
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.geodesics.equations import natural_horizon, speed_of
+from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import compiled_parts
+from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import Flow
 from creeping.sweeping.request import SweepRequest

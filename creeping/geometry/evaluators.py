@@ -1,0 +1,148 @@
+"""F and the speed of any body as kernels take them: its compiled functions, or its numpy methods called back.
+
+    level      x (3, n) -> F, grad F, Hessian (xx, yy, zz, yz, xz, xy)
+    speed      x (3, n) -> c, grad c, Hessian of c, in the same order
+    locator    x, grad F (3, n) -> chart, (u, v), isometric frame of the chart (rows e1, e2)
+
+A body with numpy methods only goes through the same kernels as a compiled one, a hundred times slower.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+from weakref import finalize, ref
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.geometry.frames import polar_frame
+from creeping.geometry.speed import speed_hessian, speed_of
+from creeping.geometry.surface import Surface
+
+
+class Evaluators(NamedTuple):
+    """Arguments of the kernels: level and speed, each with its parameters, and whether the body is weighted.
+
+    Without a speed the level stands in its place and is not called for it.
+    """
+
+    level: Any
+    level_parameters: FloatArray
+    speed: Any
+    speed_parameters: FloatArray
+    weighted: bool
+
+
+_CALLBACKS: dict[tuple[int, str], Any] = {}
+"""By identity: bodies may be equal to others, or not be hashable."""
+
+
+@contextmanager
+def evaluators(body: Surface) -> Iterator[Evaluators]:
+    """Evaluators of a body for the kernels called inside; what its methods raise there is raised at the end."""
+    speed = speed_of(body)
+    level = _kept(body, "level", lambda: _level(body), body)
+    weight = level if speed is None else _kept(body, "speed", lambda: _speed(body), speed)
+    yield Evaluators(level.function, level.parameters, weight.function, weight.parameters, speed is not None)
+    _raise_failures(level, weight)
+
+
+@contextmanager
+def locator(body: Surface) -> Iterator[tuple[Any, FloatArray]]:
+    """Locator of a body's atlas for the kernels called inside, with its parameters."""
+    found = _kept(body, "locator", lambda: _locator(body), body.atlas)
+    yield found.function, found.parameters
+    _raise_failures(found)
+
+
+def is_compiled(body: Surface) -> bool:
+    """Whether kernels evaluate the body without calling back."""
+    speed = speed_of(body)
+    parts = (body,) if speed is None else (body, speed)
+    return all(getattr(part, "compiled", None) is not None for part in parts)
+
+
+def _kept(body: Surface, role: str, make: Callable[[], Any], source: Any) -> Any:
+    """The compiled function that the source offers, or the callback of this body, made once."""
+    compiled = getattr(source, "compiled", None)
+    if compiled is not None:
+        return compiled
+    key = id(body), role
+    if key not in _CALLBACKS:
+        _CALLBACKS[key] = make()
+        try:
+            finalize(body, _CALLBACKS.pop, key, None)
+        except TypeError:
+            # without weak references the identity may come again: nothing is kept
+            return _CALLBACKS.pop(key)
+    return _CALLBACKS[key]
+
+
+def _raise_failures(*functions: Any) -> None:
+    for function in functions:
+        if hasattr(function, "raise_failure"):
+            function.raise_failure()
+
+
+def _entries(hessian: FloatArray) -> FloatArray:
+    """The six entries of symmetric matrices: (n, 3, 3) -> (6, n)."""
+    return np.stack([hessian[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))])
+
+
+def _level(body: Surface) -> Any:
+    from creeping.kernels.callback import level_callback
+
+    known: Any = _reference(body)
+
+    def level(
+        points: FloatArray, values: FloatArray, gradients: FloatArray, hessians: FloatArray, _: FloatArray
+    ) -> None:
+        one, x = known(), np.ascontiguousarray(points.T)
+        values[:] = one.level(x)
+        gradients[:] = np.asarray(one.gradient(x)).T
+        hessians[:] = _entries(np.asarray(one.hessian(x)))
+
+    return level_callback(level)
+
+
+def _speed(body: Surface) -> Any:
+    from creeping.kernels.callback import level_callback
+
+    known: Any = _reference(body)
+
+    def speed(
+        points: FloatArray, values: FloatArray, gradients: FloatArray, hessians: FloatArray, _: FloatArray
+    ) -> None:
+        one, x = known(), np.ascontiguousarray(points.T)
+        values[:] = one.speed.value(x)
+        gradients[:] = np.asarray(one.speed.gradient(x)).T
+        hessians[:] = _entries(speed_hessian(one, x))
+
+    return level_callback(speed)
+
+
+def _locator(body: Surface) -> Any:
+    from creeping.kernels.callback import locator_callback
+
+    known: Any = _reference(body)
+
+    def locate(
+        points: FloatArray, gradients: FloatArray, chart: IntArray, uv: FloatArray, frame: FloatArray, _: FloatArray
+    ) -> None:
+        atlas = known().atlas
+        chart[:], found = atlas.locate(np.ascontiguousarray(points.T))
+        uv[:] = found.T
+        for number in np.unique(chart):
+            mine = chart == number
+            axes = polar_frame(atlas.charts[number].tangents(found[mine]))
+            frame[:3, mine], frame[3:, mine] = axes[..., 0].T, axes[..., 1].T
+
+    return locator_callback(locate)
+
+
+def _reference(body: Surface) -> Callable[[], Any]:
+    """A weak reference, so that a callback kept by the body's identity does not keep the body; itself where not."""
+    try:
+        return ref(body)
+    except TypeError:
+        return lambda: body

@@ -1,0 +1,94 @@
+"""Python functions as block evaluators: kernels call them by address, as they call compiled ones.
+
+numba passes an array to a C function field by field, (meminfo, parent, nitems, itemsize, data, shape..., strides...);
+a callback reads the fields and works on views of the kernel's own memory. It takes the interpreter's lock for each
+block of points. What a function raises cannot pass through a kernel: it is noted, the results are NaN, and
+`raise_failure` raises it afterwards.
+"""
+
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numba import types
+
+from creeping._typing import Any, FloatArray
+
+_ROW, _ROWS, _WHOLE = types.float64[::1], types.float64[:, ::1], types.int64[::1]
+_LEVEL = types.void(_ROWS, _ROW, _ROWS, _ROWS, _ROW)
+_LOCATOR = types.void(_ROWS, _ROWS, _WHOLE, _ROWS, _ROWS, _ROW)
+
+
+class BlockCallback(types.WrapperAddressProtocol):
+    """A Python function that kernels take in the place of a compiled one.
+
+    Parameters
+    ----------
+    function : callable
+        Fills the arrays it is given, but for those that hold the points, and the last, its parameters.
+    signature
+        numba signature of the compiled function it stands for.
+    inputs : sequence of int
+        Numbers of the arguments that are not filled.
+    """
+
+    def __init__(self, function: Callable[..., None], signature: Any, inputs: Sequence[int]) -> None:
+        self._function, self._signature, self._inputs = function, signature, frozenset(inputs)
+        self._arrays = [(a.ndim, ctypes.c_int64 if a.dtype == types.int64 else ctypes.c_double) for a in signature.args]
+        fields = sum(5 + 2 * ndim for ndim, _ in self._arrays)
+        # kept: the address is valid as long as this object lives
+        self._entry = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * fields)(self._call)
+        self._failure: BaseException | None = None
+
+    @property
+    def function(self) -> "BlockCallback":
+        """What is handed to a kernel."""
+        return self
+
+    @property
+    def parameters(self) -> FloatArray:
+        """None are needed: (1,)."""
+        return np.zeros(1)
+
+    def signature(self) -> Any:
+        """Signature, for numba."""
+        return self._signature
+
+    def __wrapper_address__(self) -> int:
+        """Address, for numba."""
+        return int(ctypes.cast(self._entry, ctypes.c_void_p).value or 0)
+
+    def _views(self, fields: Sequence[int]) -> Iterator[np.ndarray[Any, Any]]:
+        at = 0
+        for ndim, kind in self._arrays:
+            shape = fields[at + 5 : at + 5 + ndim]
+            count = int(np.prod(shape))
+            data = (kind * count).from_address(fields[at + 4])
+            yield np.frombuffer(data, dtype=np.dtype(kind)).reshape(shape)
+            at += 5 + 2 * ndim
+
+    def _call(self, *fields: int) -> None:
+        arrays = list(self._views(fields))
+        try:
+            self._function(*arrays)
+        except BaseException as error:  # an interrupt must not get lost either
+            self._failure = self._failure or error
+            for number, array in enumerate(arrays[:-1]):
+                if number not in self._inputs:
+                    array[...] = np.nan if array.dtype.kind == "f" else 0
+
+    def raise_failure(self) -> None:
+        """Raise what the function has raised since the last call of this."""
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+
+def level_callback(function: Callable[..., None]) -> BlockCallback:
+    """Callback for a level: ``function(points (3, n), F (n,), gradients (3, n), Hessians (6, n), _)``."""
+    return BlockCallback(function, _LEVEL, (0,))
+
+
+def locator_callback(function: Callable[..., None]) -> BlockCallback:
+    """Callback for a locator: ``function(points (3, n), gradients (3, n), chart (n,), uv (2, n), frame (6, n), _)``."""
+    return BlockCallback(function, _LOCATOR, (0, 1))

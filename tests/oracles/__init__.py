@@ -1,0 +1,1 @@
+"""The engine's kernels in plain numpy, by which they are tested."""

@@ -1,0 +1,81 @@
+"""The tracer in plain numpy: all rays together, with one common step."""
+
+import numpy as np
+
+from creeping.geodesics.bundle import project_bundle
+from creeping.geodesics.equations import metric_curvature, vector_field
+from creeping.geodesics.integrator import MAX_STEPS, Tableau, error_scale
+from creeping.geometry.curvature import normal_curvature
+from creeping.geometry.speed import speed_values
+
+
+def derivative(body, states):
+    """Time derivative of states (n, 6, 10 or 11)."""
+    k = np.empty_like(states)
+    k[:, :3], k[:, 3:6] = vector_field(body, states[:, :3], states[:, 3:6])
+    if states.shape[1] > 6:
+        curvature = metric_curvature(body, states[:, :3])
+        k[:, 6], k[:, 8] = states[:, 7], states[:, 9]
+        k[:, 7], k[:, 9] = -curvature * states[:, 6], -curvature * states[:, 8]
+    if states.shape[1] > 10:
+        kappa = normal_curvature(body, states[:, :3], states[:, 3:6])
+        k[:, 10] = speed_values(body, states[:, :3]) * np.maximum(kappa, 0.0) ** (2 / 3)
+    return k
+
+
+def trace(
+    body, states, times, method, *, rtol, step
+):
+    """Trace all states with one common step; arguments as for `trace_states`."""
+    y = np.array(states, dtype=float)
+    out = np.full((len(y), len(times), y.shape[1]), np.nan)
+    scale = error_scale(body, y.shape[1])
+    now, h = 0.0, step
+    for m, end in enumerate(times):
+        left = float(end) - now
+        equal = max(1, int(np.ceil(left / step - 1e-9))) if rtol == 0 else 1
+        used = 0
+        while left > 0:
+            trial = left / (equal - used) if rtol == 0 else min(h, left)
+            with np.errstate(all="ignore"):
+                new, error = _step(body, y, trial, method, rtol, scale)
+            used += 1
+            if (
+                used > MAX_STEPS
+                or (trial < 1e-12 * step and trial < left)
+                or (rtol == 0 and not np.all(np.isfinite(new)))
+            ):
+                return out
+            if rtol > 0 and not error < 1:
+                h = trial * (max(0.2, 0.9 * error**-0.125) if np.isfinite(error) else 0.2)
+                continue
+            new[:, :3], new[:, 3:6] = project_bundle(body, new[:, :3], new[:, 3:6])
+            left = 0.0 if trial >= left else left - trial
+            y = new
+            if rtol > 0:
+                grow = min(5.0, 0.9 * max(error, 1e-8) ** -0.125)
+                h = max(h, trial * grow) if trial < h else trial * grow
+        now = float(end)
+        out[:, m] = y
+    return out
+
+
+def _step(
+    body, y, h, method, rtol, scale
+):
+    """One step, and its largest error in units of the tolerance."""
+    stages = len(method.b)
+    k = np.empty((stages + 1, *y.shape))
+    k[0] = derivative(body, y)
+    for s in range(1, stages):
+        k[s] = derivative(body, y + h * np.tensordot(method.a[s, :s], k[:s], 1))
+    new = y + h * np.tensordot(method.b, k[:stages], 1)
+    if rtol == 0:
+        return new, 0.0
+    k[stages] = derivative(body, new)
+    tolerance = rtol * np.maximum(scale, np.maximum(np.abs(y), np.abs(new)))
+    sum3 = np.sum((np.tensordot(method.e3, k, 1) / tolerance) ** 2, axis=1)
+    sum5 = np.sum((np.tensordot(method.e5, k, 1) / tolerance) ** 2, axis=1)
+    denominator = np.sqrt((sum5 + 0.01 * sum3) * y.shape[1])
+    error = np.divide(h * sum5, denominator, out=np.zeros_like(sum5), where=denominator != 0)
+    return new, float(np.max(error))
