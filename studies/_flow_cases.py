@@ -16,7 +16,8 @@ import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal
 from creeping.phaseflow.tuning.flow_choice import tuned_direct
 from creeping.phaseflow.tuning.request import Request

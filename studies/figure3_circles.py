@@ -16,7 +16,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.geodesics.integrator import pack
+from creeping.geodesics.states import pack
 from creeping.plotting._strokes import LevelColours, Stroke, closed
 from creeping.plotting._view import View
 from studies._curves import add_level_bar, circle_strokes, directions_at, draw_curves, equal_times, ray_stroke, turn

@@ -22,7 +22,7 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import FloatArray, IntArray
 from creeping.geodesics.bundle import project_bundle, random_bundle_points
-from creeping.geodesics.integrator import pack
+from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal, project
 from studies._meshes import on_body, scattered, slivers
 

@@ -15,7 +15,7 @@ import numpy as np
 
 import creeping as cr
 from creeping._typing import Any, FloatArray
-from creeping.geodesics.integrator import pack
+from creeping.geodesics.states import pack
 from creeping.geometry.directions import fibonacci_directions
 from creeping.phaseflow.tuning.flow_choice import tuned_direct
 from creeping.shadow.many import shadow_lines

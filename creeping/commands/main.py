@@ -119,7 +119,7 @@ def run(
         say("flow")
         carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, say)
         say("creeping rays")
-        fan = cr.launch(carrier, line, length=length, n_rays=rays, n_steps=steps, status=launch_from)
+        fan = cr.launch(carrier, line, length=length, n_rays=rays, n_steps=steps, launch_from=launch_from)
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
         summary = _run_results.summary_of(body, speed, line, carrier, fan, curves)

@@ -13,7 +13,7 @@ from creeping.explorer.scene import Model, Stage
 from creeping.explorer.svg import cut_svg, plane_svg
 from creeping.explorer.text import colour_bar, settled_text
 from creeping.plotting import write_text
-from creeping.rays.fan import Flow
+from creeping.rays.transport import Flow
 
 STYLE = """
 #creeping{position:fixed;top:0;right:0;width:340px;max-height:100vh;overflow:auto;box-sizing:border-box;padding:10px;

@@ -28,7 +28,7 @@ from creeping.explorer.scene import Model, Stage, turned
 from creeping.explorer.svg import cut_svg, plane_svg
 from creeping.explorer.text import colour_bar, moving_text, settled_text
 from creeping.geometry.surface import size
-from creeping.rays.fan import Flow
+from creeping.rays.transport import Flow
 
 HOST = "127.0.0.1"
 REST = 0.4

@@ -16,9 +16,10 @@ from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import Triangulation
-from creeping.rays.fan import Flow, RayFan
+from creeping.rays.fan import RayFan, launch
 from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
-from creeping.rays.preview import quick_fan
+from creeping.rays.transport import Flow
+from creeping.shadow.line import shadow_line
 
 MOST_STEPS = 192
 """Of a ray."""
@@ -88,7 +89,8 @@ def moving_frame(flow: Flow, wish: Wish, step: float) -> MovingFrame:
         If the shadow line crosses itself.
     """
     count, step = steps_of(wish.length, step)
-    fan = quick_fan(flow, wish.direction, length=count * step, n_rays=wish.rays, n_steps=count)
+    line = shadow_line(flow.body, wish.direction, n_points=16)
+    fan = launch(flow, line, length=count * step, n_rays=wish.rays, n_steps=count, max_gap=np.inf, measured=False)
     return MovingFrame(wish, fan)
 
 

@@ -4,7 +4,7 @@ Each step asks before it starts whether the wish still stands, so that a newer o
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from creeping.field.far import FarField, far_field
 from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.speed import speed_of
 from creeping.plotting.field_pictures import surface_levels
-from creeping.rays.fan import Flow, RayFan, launch
-from creeping.rays.preview import measured
+from creeping.rays.fan import RayFan, end_error, launch
+from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
 
 CUT_STEP = 2.0
@@ -63,7 +63,7 @@ def settled(flow: Flow, frame: MovingFrame, vertices: FloatArray, stale: Tell = 
         If the shadow line crosses itself.
     """
     wish, body = frame.wish, flow.body
-    line, drawn = shadow_line(body, wish.direction), measured(frame.fan)
+    line, drawn = shadow_line(body, wish.direction), replace(frame.fan, error=end_error(frame.fan))
     if stale():
         return None
     steps = len(frame.fan.travel_time) - 1

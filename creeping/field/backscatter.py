@@ -14,13 +14,12 @@ from creeping.field.far_geometry import ALONG, EARLY, Geometry
 from creeping.field.forward import TAPER
 from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.surface import size
-from creeping.rays.fan import Flow
 from creeping.rays.observer_contour import HorizonRays
 from creeping.rays.quantities import TURN
 from creeping.rays.shedding import ShedRays
 from creeping.rays.single import SingleRayTracer
 from creeping.rays.specular import SpecularPoints, specular_points
-from creeping.rays.transport import carried
+from creeping.rays.transport import Flow, carried
 from creeping.shadow.many import ShadowLines, prepared
 
 ALIKE = 1e-2

@@ -9,7 +9,8 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_points
-from creeping.geodesics.integrator import MapError, as_times, pack, trace_states, unpack
+from creeping.geodesics.integrator import MapError, as_times, trace_states
+from creeping.geodesics.states import pack, unpack
 from creeping.geometry.surface import Surface
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import IntegrationError, InvalidInputError
 from creeping.geodesics.bundle import bundle_points
+from creeping.geodesics.states import pack, unpack
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads
@@ -127,25 +128,6 @@ def trace(
     values, scalar = as_times(times)
     x, p = bundle_points(body, points, directions)
     return unpack(trace_states(body, pack(x, p), values, rtol=rtol), x.shape, scalar)
-
-
-def unpack(states: FloatArray, shape: tuple[int, ...], scalar: bool) -> tuple[FloatArray, FloatArray]:
-    """Points and directions of states (n, m, 6), in the shape of the starting points; (..., 3) for a scalar time."""
-    states = states.reshape(*shape[:-1], states.shape[1], 6)
-    if scalar:
-        states = states[..., 0, :]
-    return states[..., :3].copy(), states[..., 3:].copy()
-
-
-def pack(points: FloatArray, directions: FloatArray, *, jacobi: bool = False, lanes: int = 6) -> FloatArray:
-    """States (n, lanes) from (..., 3) points and directions.
-
-    6 lanes are (x, p); lanes 6 to 9 the identity as Jacobi matrix (``jacobi`` asks for 10), lane 10 the attenuation
-    integral 0, lane 11 the time of detachment inf.
-    """
-    states = np.concatenate([points.reshape(-1, 3), directions.reshape(-1, 3)], axis=1)
-    riding = [1.0, 0.0, 0.0, 1.0, 0.0, np.inf][: (10 if jacobi else lanes) - 6]
-    return np.concatenate([states, np.tile(riding, (len(states), 1))], axis=1) if riding else states
 
 
 def trace_states(

@@ -17,7 +17,8 @@ from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import NODES, chebyshev_times, curvature_values
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.integrator import MapError, pack, runge_kutta_4, trace_states
+from creeping.geodesics.integrator import MapError, runge_kutta_4, trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.checks import check_surface
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.ambient import AmbientModel

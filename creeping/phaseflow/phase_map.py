@@ -17,7 +17,8 @@ from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_points
-from creeping.geodesics.integrator import MapError, as_times, pack, trace_states, unpack
+from creeping.geodesics.integrator import MapError, as_times, trace_states
+from creeping.geodesics.states import pack, unpack
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model
 from creeping.phaseflow.grid import Grid, Leap

@@ -44,15 +44,15 @@ def of_line(line: "ShadowLine") -> Facts:
 
 def of_shadow_curve(curve: "ShadowCurve") -> Facts:
     """Facts of one curve of a shadow line."""
-    yield "body", brief(curve.panels.body, 200)
-    yield "direction", _direction(curve.panels.direction)
+    yield "body", brief(curve.body, 200)
+    yield "direction", _direction(curve.direction)
     yield "points", str(len(curve.points))
     yield "length", f"{curve.length:.10g} L"
     yield from _shares(curve.fractions, curve.length)
     yield from _cut_short(
         (f"arc {k}", f"{status}, from {start:.6g} to {end:.6g} L") for k, (start, end, status) in enumerate(curve.arcs)
     )
-    yield "largest |n.d|", f"{np.max(np.abs(curve.normals @ curve.panels.direction)):.1e}"
+    yield "largest |n.d|", f"{np.max(np.abs(curve.normals @ curve.direction)):.1e}"
     yield "kappa_n(d)", _range(curve.curvature, "1/L")
 
 

@@ -36,7 +36,7 @@ class LineOf:
 
 def line_of(curve: "ShadowCurve") -> LineOf:
     """Shadow line that consists of one curve."""
-    return LineOf(curve.panels.body, curve.panels.direction, (curve,))
+    return LineOf(curve.body, curve.direction, (curve,))
 
 
 def plot_line(

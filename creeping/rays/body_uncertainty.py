@@ -13,7 +13,7 @@ from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.direct_flow import DirectFlow
-from creeping.geodesics.integrator import pack
+from creeping.geodesics.states import pack
 from creeping.geometry.surface import project
 from creeping.rays.fan import RayFan, RayStatus, launch
 from creeping.rays.spreading import spread

@@ -9,61 +9,33 @@ M the Jacobi matrix that the flow carries along, sigma measured across the ray, 
 where kappa_n first falls to 0 it is detached; its geometry goes on, its field does not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from creeping._presenting import DrawnOnBody, brief
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geodesics.integrator import MapError, pack, trace_states
+from creeping.geodesics.equations import points_of_charts
+from creeping.geodesics.integrator import MapError, trace_states
+from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, P, X, pack
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
-from creeping.geometry.speed import speed_values
+from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
+from creeping.rays.nonsmooth import rough_from
 from creeping.rays.spreading import spread, zeros_passed
-from creeping.shadow.attachment import (
-    Arc,
-    launch_positions,
-    launching_arcs,
-    line_tangents,
-    parting_positions,
-    position_statuses,
-)
+from creeping.rays.starts import Starts
+from creeping.rays.transport import Flow, carried
+from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
 from creeping.shadow.line import ShadowLine
+from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED
 
 MAX_RAYS = 200_000
 """Rays beyond which refinement stops."""
-ROUGH_SPACING = 0.005
-"""Spacing at which rays are looked at for rough ground, in sizes of the body,"""
-ROUGH_BLOCK = 64
-"""so many rays at a time."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
-
-
-class Flow(Protocol):
-    """What carries the rays: a `PhaseMap` or a `DirectFlow`."""
-
-    @property
-    def body(self) -> Surface:
-        """Body whose flow it is."""
-        ...
-
-    @property
-    def horizon(self) -> float:
-        """Time of one leap."""
-        ...
-
-    @property
-    def error(self) -> MapError | None:
-        """Measured error of one leap, None if direct."""
-        ...
-
-    def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 12) to ascending times (m,): (n, m, 12)."""
-        ...
 
 
 class RayStatus(IntEnum):
@@ -82,8 +54,8 @@ class RayStatus(IntEnum):
     """Came at ``RayFan.detachment`` to where the body is not smooth enough, by its own word; the field ends there."""
 
 
-LINE_STATUS = {"attached": RayStatus.OK, "occluded": RayStatus.OCCLUDED, "concave": RayStatus.CONCAVE}
-"""Status of a ray that starts well, by the status of the line at its launch point."""
+LINE_STATUS = {ATTACHED: RayStatus.OK, OCCLUDED: RayStatus.OCCLUDED, CONCAVE: RayStatus.CONCAVE}
+"""Status of a ray that starts well, by the state of the line at its launch point."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,15 +84,15 @@ class RayFan(DrawnOnBody):
     detachment : (rays,), L
         Travel time at which kappa_n first falls to 0 or the ray comes to rough ground, inf if neither happens.
     curve_index, arc_index : (rays,)
-        Curve of the shadow line, and arc: rays of one arc are neighbours; with ``status="all"`` an arc is a curve.
-    arclength : (rays,), L
-        Of the launch point along its curve.
+        Curve of the shadow line, and arc: rays of one arc are neighbours; with ``launch_from="all"`` an arc is a curve.
+    arclength, spacing : (rays,), L
+        Of the launch point along its curve, and the share of the curve that the ray stands for.
     closed_arcs : tuple of bool
         Whether the first and last ray of each arc are neighbours too.
     error : MapError
         Of (x, p) at the end, measured on some rays against direct integration.
-    flow_error : MapError or None
-        Of one step of the map that carried the rays; None for direct integration.
+    flow : PhaseMap or DirectFlow
+        What carried the rays.
     """
 
     body: Surface
@@ -139,9 +111,15 @@ class RayFan(DrawnOnBody):
     curve_index: IntArray
     arc_index: IntArray
     arclength: FloatArray
+    spacing: FloatArray
     closed_arcs: tuple[bool, ...]
     error: MapError
-    flow_error: MapError | None
+    flow: Flow
+
+    @property
+    def flow_error(self) -> MapError | None:
+        """Error of one step of the map that carried the rays; None for direct integration."""
+        return self.flow.error
 
     @property
     def length(self) -> float:
@@ -172,8 +150,9 @@ def launch(
     length: float,
     n_rays: int | None = None,
     n_steps: int | None = None,
-    status: str = "attached",
+    launch_from: str = "attached",
     max_gap: float | None = None,
+    measured: bool = True,
 ) -> RayFan:
     """Launch the fan of creeping rays of an incidence.
 
@@ -187,10 +166,12 @@ def launch(
         Rays, shared among the arcs by length; one per point of the line if not given.
     n_steps : int, optional
         Equal steps of travel time; at least 64 and enough to count caustics if not given.
-    status : {"attached", "all"}
+    launch_from : {"attached", "all"}
         "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
         Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none.
+    measured : bool
+        Whether the error at the end is measured.
 
     Returns
     -------
@@ -207,173 +188,137 @@ def launch(
         raise InvalidInputError(f"the flow is of {flow.body!r}, the line of {body!r}; use one body for both")
     if not (np.isfinite(length) and length > 0):
         raise InvalidInputError(f"length = {length!r} is not a positive finite number")
-    if status not in ("attached", "all"):
-        raise InvalidInputError(f"status = {status!r} is neither 'attached' nor 'all'")
+    if launch_from not in ("attached", "all"):
+        raise InvalidInputError(f"launch_from = {launch_from!r} is neither 'attached' nor 'all'")
     for name, number in (("n_rays", n_rays), ("n_steps", n_steps)):
         if number is not None and (not isinstance(number, (int, np.integer)) or number < 1):
             raise InvalidInputError(f"{name} = {number!r} is not a whole number >= 1")
     gap = 0.1 * size(body) if max_gap is None else float(max_gap)
     if not gap > 0:
         raise InvalidInputError(f"max_gap = {max_gap!r} is not positive; give inf for no refinement")
-    times = np.linspace(0.0, length, (n_steps or enough_steps(body, line, length)) + 1)
-    arcs = launching_arcs(line, every=status == "all")
-    arc, arclength = launch_positions(line, arcs, n_rays)
-    starts = _starts(line, arcs, arc, arclength)
-    states = _carry(flow, line, starts[:, :3], times)
-    while True:
-        new_arc, new_arclength = parting_positions(states[..., :3], arcs, arc, arclength, gap)
-        if not len(new_arc) or len(arc) + len(new_arc) > MAX_RAYS:
+    times = np.linspace(0.0, length, (n_steps or enough_steps(body, length)) + 1)
+    starts = Starts.of(line, n_rays, launch_from)
+    states = _carry(flow, line, starts, times)
+    while np.isfinite(gap):
+        arc, position = parting_positions(states[..., X], starts.arcs, starts.arc, starts.position, gap)
+        if not len(arc) or len(starts.arc) + len(arc) > MAX_RAYS:
             break
-        new_starts = _starts(line, arcs, new_arc, new_arclength)
-        arc, arclength = np.concatenate([arc, new_arc]), np.concatenate([arclength, new_arclength])
-        order = np.lexsort((arclength, arc))
-        arc, arclength = arc[order], arclength[order]
-        starts = np.concatenate([starts, new_starts])[order]
-        states = np.concatenate([states, _carry(flow, line, new_starts[:, :3], times)])[order]
-    return _assemble(flow, line, arcs, arc, arclength, starts, states, times)
+        more = Starts.at(line, starts.arcs, arc, position)
+        states = np.concatenate([states, _carry(flow, line, more, times)])
+        starts, order = starts.joined(more)
+        states = states[order]
+    fan = fan_of(flow, line, starts.launch_points(line), states, times)
+    return replace(fan, error=end_error(fan)) if measured else fan
 
 
-def enough_steps(body: Surface, line: ShadowLine, length: float) -> int:
+def enough_steps(body: Surface, length: float) -> int:
     """Steps of a fan unless their number is given: at least 64, and four between two zeros of J.
 
     Zeros are at least pi/sqrt(max K) apart.
     """
-    coarse = np.concatenate([curve.points for curve in line.curves] or [np.zeros((0, 3))])
-    uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 17)] * 2), axis=-1).reshape(-1, 2)
-    points = np.concatenate([coarse, *(chart.point(uv) for chart in body.atlas.charts)])
+    points = points_of_charts(body)
     fastest = float(np.max(speed_values(body, points)))
     curved = float(np.sqrt(np.max(np.abs(gaussian_curvature(body, points))))) * fastest
     return int(max(64, np.ceil(4 * length * curved / np.pi)))
 
 
-def _starts(line: ShadowLine, arcs: list[Arc], arc: IntArray, arclength: FloatArray) -> FloatArray:
-    """Points and tangents of the line at the positions: (n, 6)."""
-    starts = np.empty((len(arc), 6))
-    curve_of = np.array([a.curve for a in arcs], dtype=int)
-    for index, curve in enumerate(line.curves):
-        mine = curve_of[arc] == index if len(arc) else np.zeros(0, dtype=bool)
-        if np.any(mine):
-            points = curve.at(arclength[mine] % curve.length)
-            starts[mine] = np.concatenate([points, line_tangents(line.body, points, line.direction)], axis=1)
-    return starts
+def _carry(flow: Flow, line: ShadowLine, starts: Starts, times: FloatArray) -> FloatArray:
+    """States with all that is carried along: (rays, steps, 12)."""
+    if not len(starts.arc):
+        return np.empty((0, len(times), WHOLE))
+    return carried(flow, starts.launch_points(line), times, components=WHOLE)[0]
 
 
-def _carry(flow: Flow, line: ShadowLine, points: FloatArray, times: FloatArray) -> FloatArray:
-    """States with all that rides along: (rays, steps, 12)."""
-    if not len(points):
-        return np.empty((0, len(times), 12))
-    directions = np.broadcast_to(line.direction, points.shape)
-    return flow.transport(pack(points, directions, lanes=12), times)
+class RayArrays(NamedTuple):
+    """What rays of n incidences are: J and J' (n, rays, steps), codes of `RayStatus` and detachment (n, rays)."""
+
+    spreading: FloatArray
+    spreading_rate: FloatArray
+    status: IntArray
+    detachment: FloatArray
 
 
-def _assemble(
-    flow: Flow,
-    line: ShadowLine,
-    arcs: list[Arc],
-    arc: IntArray,
-    arclength: FloatArray,
-    starts: FloatArray,
-    states: FloatArray,
-    times: FloatArray,
-) -> RayFan:
-    curve_index = np.array([arcs[k].curve for k in arc], dtype=np.int64)
-    lengths = np.array([curve.length for curve in line.curves])
-    first = pack(starts[:, :3], np.broadcast_to(line.direction, (len(starts), 3)))
-    return fan_of(
-        flow,
-        line,
-        starts,
-        states,
-        times,
-        launched=np.array([LINE_STATUS[one] for one in position_statuses(line, arcs, arc, arclength)], dtype=np.int64),
-        curve_index=curve_index,
-        arc_index=arc,
-        arclength=arclength % lengths[curve_index] if len(arc) else arclength,
-        closed_arcs=tuple(a.closed for a in arcs),
-        error=end_error(line.body, first, states[:, -1, :6], float(times[-1])),
-    )
-
-
-def fan_of(
-    flow: Flow,
-    line: ShadowLine,
-    starts: FloatArray,
-    states: FloatArray,
-    times: FloatArray,
-    *,
-    launched: IntArray,
-    **places: Any,
-) -> RayFan:
-    """Fan of rays that have been carried.
+def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: FloatArray) -> RayArrays:
+    """Rays that have been carried.
 
     Parameters
     ----------
-    flow, line : Flow, ShadowLine
-    starts : (rays, 6)
-        Points and tangents of the line where rays start.
-    states : (rays, steps, 12)
-        At the times, the first of which is 0.
+    body : Surface
+    launch : LaunchPoints
+        Of n incidences.
+    states : (n, rays, steps, 12)
+        At the times, not to be read where there is no ray.
     times : (steps,)
-    launched : (rays,)
-        Codes of `RayStatus` where they start.
-    **places
-        ``curve_index``, ``arc_index``, ``arclength``, ``closed_arcs`` and ``error`` of the fan.
     """
-    body = line.body
-    points, directions = states[..., :3].copy(), states[..., 3:6].copy()
-    spreading, rate, stalled = spread(body, starts, np.broadcast_to(line.direction, (len(starts), 3)), states)
+    there = np.nonzero(launch.there)
+    full = len(there[0]) == launch.there.size
+    # a copy of all states takes as long as a leap
+    path = states.reshape(-1, *states.shape[2:]) if full else states[there]
+    points = launch.points.reshape(-1, 3) if full else launch.points[there]
+    directions = launch.directions[there[0]]
+    tangents = None if speed_of(body) is None else line_tangents(body, points, directions)
+    J, rate, stalled = spread(body, points, tangents, directions, path)
     # a flow writes where a ray detaches beside every state
-    detachment = states[:, -1, 11].copy()
-    status = launched.copy()
+    detachment = path[:, -1, DETACHMENT]
+    status = np.array([LINE_STATUS[k] for k in sorted(LINE_STATUS)])[launch.state[there].astype(int)]
     # a ray that never was a creeping ray keeps the reason
     status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
-    rough = rough_from(body, points, times)
+    rough = np.full(len(points), np.inf)
+    if hasattr(body, "rough"):
+        begun = np.concatenate([points[:, None], path[..., X]], axis=1) if times[0] > 0 else path[..., X]
+        rough = rough_from(body, begun, np.concatenate([[0.0], times]) if times[0] > 0 else times)
     status[((status == RayStatus.OK) | (status == RayStatus.DETACHED)) & (rough < detachment)] = RayStatus.ROUGH
     status[stalled] = RayStatus.STALLED
+
+    def placed(values: Any, fill: float) -> Any:
+        shape = *launch.there.shape, *values.shape[1:]
+        if full:
+            return values.reshape(shape)
+        out = np.full(shape, fill, dtype=values.dtype)
+        out[there] = values
+        return out
+
+    return RayArrays(
+        placed(J, np.nan), placed(rate, np.nan), placed(status, NO_RAY), placed(np.minimum(detachment, rough), np.nan)
+    )
+
+
+def fan_of(flow: Flow, line: ShadowLine, launch: LaunchPoints, states: FloatArray, times: FloatArray) -> RayFan:
+    """Fan of one incidence whose rays have been carried: states (rays, steps, 12), the first time 0."""
+    body = line.body
+    rays = ray_arrays(body, launch, states[None], times)
+    points, directions = states[..., X].copy(), states[..., P].copy()
+    arc = launch.arc_index[0].astype(np.int64)
     return RayFan(
         body=body,
         line=line,
         points=points,
         directions=directions,
         travel_time=times,
-        eikonal=(starts[:, :3] @ line.direction)[:, None] + times,
-        spreading=spreading,
-        spreading_rate=rate,
+        eikonal=(points[:, 0] @ line.direction)[:, None] + times,
+        spreading=rays.spreading[0],
+        spreading_rate=rays.spreading_rate[0],
         curvature=normal_curvature(body, points, directions),
-        attenuation=states[..., 10].copy(),
-        caustic_index=zeros_passed(spreading),
-        status=status,
-        detachment=np.minimum(detachment, rough),
-        flow_error=flow.error,
-        **places,
+        attenuation=states[..., ATTENUATION].copy(),
+        caustic_index=zeros_passed(rays.spreading[0]),
+        status=rays.status[0],
+        detachment=rays.detachment[0],
+        curve_index=launch.curve_index[0],
+        arc_index=arc,
+        arclength=launch.arclength[0],
+        spacing=launch.spacing[0],
+        closed_arcs=tuple(bool(launch.closed[0, arc == k][0]) for k in range(int(arc.max(initial=-1)) + 1)),
+        error=MapError(0.0, 0.0, 0),
+        flow=flow,
     )
 
 
-def rough_from(body: Surface, points: FloatArray, times: FloatArray) -> FloatArray:
-    """Travel time (rays,) of the last place before rough ground, inf on rays that do not come there."""
-    rough: Any = getattr(body, "rough", None)
-    if rough is None or not points.size:
-        return np.full(len(points), np.inf)
-    # between the steps on chords: rough places may be small
-    parts = int(np.ceil(np.max(np.diff(times), initial=0.0) / (ROUGH_SPACING * size(body)))) or 1
-    fine = np.interp(np.arange((len(times) - 1) * parts + 1) / parts, np.arange(len(times)), times)
-    share = (np.arange(parts) / parts)[:, None]
-    found = np.full(len(points), np.inf)
-    for first in range(0, len(points), ROUGH_BLOCK):
-        path = points[first : first + ROUGH_BLOCK, :, None]
-        dense = path[:, :-1] + share * (path[:, 1:] - path[:, :-1])
-        dense = np.concatenate([dense.reshape(len(path), -1, 3), path[:, -1]], axis=1)
-        met = rough(dense)
-        before = np.maximum(np.argmax(met, axis=1) - 1, 0)
-        found[first : first + ROUGH_BLOCK] = np.where(met.any(axis=1), fine[before], np.inf)
-    return found
-
-
-def end_error(body: Surface, first: FloatArray, last: FloatArray, time: float) -> MapError:
-    """Error of (x, p) at the end (rays, 6) against direct integration of evenly chosen rays from their start."""
-    if not len(first):
+def end_error(fan: RayFan) -> MapError:
+    """Error of (x, p) at the end of a fan, against direct integration of evenly chosen rays from their start."""
+    if not len(fan.points):
         return MapError(0.0, 0.0, 0)
-    chosen = np.unique(np.linspace(0, len(first) - 1, CHECKED_RAYS).astype(int))
-    exact = trace_states(body, first[chosen], np.array([time]), rtol=1e-12)[:, 0]
-    error = np.linalg.norm(last[chosen] - exact, axis=1)
+    chosen = np.unique(np.linspace(0, len(fan.points) - 1, CHECKED_RAYS).astype(int))
+    first = pack(fan.points[chosen, 0], fan.directions[chosen, 0])
+    exact = trace_states(fan.body, first, np.array([fan.length]), rtol=1e-12)[:, 0]
+    error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
     return MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))

@@ -17,7 +17,8 @@ from scipy.interpolate import make_interp_spline
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan, RayStatus

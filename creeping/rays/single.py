@@ -13,7 +13,8 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.geodesics.equations import points_of_charts
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.curvature import principal_curvature_bound
 from creeping.geometry.surface import size
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, TURN, RayPoints

@@ -9,32 +9,39 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geodesics.equations import launch_spreading
+from creeping.geodesics.states import M11, M12, M21, M22, P, X
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface
 
 
 def spread(
-    body: Surface, starts: FloatArray, directions: FloatArray, states: FloatArray
+    body: Surface, points: FloatArray, tangents: FloatArray | None, directions: FloatArray, states: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """J, J' (rays, steps) and the rays whose launch point has no speed.
 
-    ``starts`` (rays, 6) are points and tangents of the line, ``directions`` (rays, 3) those of the launch, ``states``
-    (rays, steps, 10 or more) what the flow carried from there.
+    Parameters
+    ----------
+    body : Surface
+    points, tangents, directions : (rays, 3)
+        Of the line, where the rays start, and those of the launch; without a weight the tangents are not needed.
+    states : (rays, steps, 10 or more)
+        What the flow carried from there.
     """
-    first = launch_spreading(body, starts[:, :3], directions, starts[:, 3:])
-    i, j = first[:, 0], first[:, 1]
-    x, p = states[..., :3], states[..., 3:6]
-    c = speed_values(body, x)
-    rate = np.zeros_like(c)
-    stalled = np.zeros(len(starts), dtype=bool)
-    if speed_of(body) is not None:
-        rate = np.sum(speed_of(body).gradient(x) * p, axis=-1)
-        stalled = c[:, 0] < 1e-12 * float(np.max(c, initial=0.0))
-        c0 = np.where(stalled, np.nan, c[:, 0])
-        i = i / c0
-        j = (j - rate[:, 0]) / c0
-    reduced = i[:, None] * states[..., 6] + j[:, None] * states[..., 8]
-    reduced_rate = i[:, None] * states[..., 7] + j[:, None] * states[..., 9]
+    speed = speed_of(body)
+    if speed is None:
+        # J(0) = 1, J'(0) = 0: the first column of the Jacobi matrix
+        return states[..., M11], states[..., M21], np.zeros(len(points), dtype=bool)
+    assert tangents is not None
+    first = launch_spreading(body, points, directions, tangents)
+    x, p = states[..., X], states[..., P]
+    c, c0 = speed_values(body, x), speed_values(body, points)
+    rate = np.sum(speed.gradient(x) * p, axis=-1)
+    stalled = c0 < 1e-12 * float(np.max(c, initial=0.0))
+    c0 = np.where(stalled, np.nan, c0)
+    i = first[:, 0] / c0
+    j = (first[:, 1] - np.sum(speed.gradient(points) * directions, axis=-1)) / c0
+    reduced = i[:, None] * states[..., M11] + j[:, None] * states[..., M12]
+    reduced_rate = i[:, None] * states[..., M21] + j[:, None] * states[..., M22]
     # J' = c I' + (dc/dt) I with dc/dt = c grad c.p
     return c * reduced, c * reduced_rate + c * rate * reduced, stalled
 

@@ -4,36 +4,60 @@ Rays of an incidence start in blocks of their own, the last one filled up: a tra
 then gives the same, bit for bit, in whatever company an incidence is computed.
 """
 
+from typing import Protocol
+
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geodesics.integrator import pack
-from creeping.rays.fan import Flow
-from creeping.shadow.many import ShadowLines
-from creeping.shadow.status import NO_RAY
+from creeping.geodesics.integrator import MapError
+from creeping.geodesics.states import pack
+from creeping.geometry.surface import Surface
+from creeping.kernels.threads import CHUNK
+from creeping.shadow.attachment import LaunchPoints
 
 
-def carried(flow: Flow, lines: ShadowLines, times: FloatArray, *, lanes: int) -> FloatArray:
-    """States (n, rays, m, lanes) of all rays at the times (m,); what stands for no ray is not to be read."""
-    from creeping.kernels.block import BLOCK
+class Flow(Protocol):
+    """What carries the rays: a `PhaseMap` or a `DirectFlow`."""
 
-    there = lines.curve_index != NO_RAY
+    @property
+    def body(self) -> Surface:
+        """Body whose flow it is."""
+        ...
+
+    @property
+    def horizon(self) -> float:
+        """Time of one leap."""
+        ...
+
+    @property
+    def error(self) -> MapError | None:
+        """Measured error of one leap, None if direct."""
+        ...
+
+    def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
+        """Advance states (n, 12) to ascending times (m,): (n, m, 12)."""
+        ...
+
+
+def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: int) -> FloatArray:
+    """States (n, rays, m, components) of all rays at the times (m,); what stands for no ray is not to be read."""
+    there = launch.there
     n, rays = there.shape
-    padded = -(-rays // BLOCK) * BLOCK
-    some = np.flatnonzero(there[:, 0])
-    points = lines.launch_points
+    padded = -(-rays // CHUNK) * CHUNK
+    some = np.flatnonzero(there.any(axis=1))
+    points = launch.points
     if padded > rays or not there.all():
         points = np.empty((len(some), padded, 3))
-        points[:, :rays] = lines.launch_points[some]
+        points[:, :rays] = launch.points[some]
         # places without a ray go along as copies of the first
         filled = np.zeros((len(some), padded), dtype=bool)
         filled[:, :rays] = there[some]
         points[~filled] = np.broadcast_to(points[:, :1], points.shape)[~filled]
-    directions = np.broadcast_to(lines.directions[some, None], points.shape)
-    states = flow.transport(pack(points, directions, lanes=lanes), times)
-    states = states.reshape(len(some), padded, len(times), lanes)[:, :rays]
+    directions = np.broadcast_to(launch.directions[some, None], points.shape)
+    states = flow.transport(pack(points, directions, lanes=components), times)
+    states = states.reshape(len(some), padded, len(times), components)[:, :rays]
     if len(some) == n:
         return states
-    whole = np.full((n, rays, len(times), lanes), np.nan)
+    whole = np.full((n, rays, len(times), components), np.nan)
     whole[some] = states
     return whole

@@ -1,16 +1,17 @@
-"""Where rays leave the shadow line: arcs that launch, positions on them, and new positions where rays part.
+"""Attachment points: where creeping rays are launched from the shadow line, and new ones where rays part.
 
 A position is (arc, arclength) with the arclength unwrapped, so that it grows along an arc that crosses the start of its
 closed curve; the point is that of the arclength modulo the curve's length.
 """
 
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.surface import Surface
-from creeping.shadow.line import ShadowLine
+from creeping.shadow.status import NO_RAY
 
 
 class Arc(NamedTuple):
@@ -22,61 +23,53 @@ class Arc(NamedTuple):
     closed: bool
 
 
-def launching_arcs(line: ShadowLine, *, every: bool) -> list[Arc]:
-    """Attached arcs of the line, or its whole curves."""
-    arcs = []
-    for index, curve in enumerate(line.curves):
-        if every:
-            arcs.append(Arc(index, 0.0, curve.length, True))
-            continue
-        for start, end, status in curve.arcs:
-            if status == "attached":
-                arcs.append(Arc(index, start, end, len(curve.arcs) == 1))
-    return arcs
+@dataclass(frozen=True, eq=False)
+class LaunchPoints:
+    """Places for so many rays on the shadow lines of n incidences.
 
-
-def position_statuses(line: ShadowLine, arcs: list[Arc], arc: IntArray, arclength: FloatArray) -> list[str]:
-    """Status of the line at each position: (n,)."""
-    found = []
-    for k, s in zip(arc, arclength, strict=True):
-        curve = line.curves[arcs[k].curve]
-        holding = [status for start, end, status in curve.arcs if (s - start) % curve.length < end - start]
-        # rounding may leave a position between two arcs: then it is of neither side, and concave launches nothing
-        found.append(holding[0] if holding else "concave")
-    return found
-
-
-def launch_positions(line: ShadowLine, arcs: list[Arc], n_rays: int | None) -> tuple[IntArray, FloatArray]:
-    """Arc numbers and arclengths of the first rays: (n,), (n,).
-
-    Rays are evenly spaced on each arc, half a spacing from its ends, where kappa_n or the illumination stops. Without
-    ``n_rays`` the spacing is that of the line's points.
+    Attributes
+    ----------
+    directions : (n, 3)
+        Unit vectors d.
+    points : (n, rays, 3), L
+        NaN where there is no ray, as below.
+    arclength, phase : (n, rays), L
+        Along the curve, and d.x0.
+    curve_index : (n, rays)
+        The longest curve is 0; NO_RAY where there is no ray.
+    arc_index, spacing, closed : (n, rays)
+        Number of the arc, distance of neighbours on it, L, and 1 if it is a whole curve.
+    state : (n, rays)
+        Codes of `creeping.shadow.status.STATUSES`.
     """
-    lengths = np.array([arc.end - arc.start for arc in arcs])
-    if n_rays is None:
-        spacing = [line.curves[arc.curve].length / len(line.curves[arc.curve].points) for arc in arcs]
-        counts = np.maximum(1, np.round(lengths / np.array(spacing)).astype(int)) if arcs else np.zeros(0, dtype=int)
-    else:
-        counts = _shares(lengths, n_rays)
-    arc = np.repeat(np.arange(len(arcs)), counts)
-    parts = []
-    for k, count in enumerate(counts):
-        offset = 0.0 if arcs[k].closed else 0.5
-        parts.append(arcs[k].start + lengths[k] * (np.arange(count) + offset) / max(count, 1))
-    return arc.astype(np.int64), np.concatenate(parts) if parts else np.zeros(0)
 
+    directions: FloatArray
+    points: FloatArray
+    arclength: FloatArray
+    phase: FloatArray
+    curve_index: IntArray
+    arc_index: FloatArray
+    spacing: FloatArray
+    closed: FloatArray
+    state: FloatArray
 
-def _shares(lengths: FloatArray, total: int) -> IntArray:
-    """Whole numbers of at least one in proportion to the lengths, of the given sum (or one each if that is more)."""
-    if not len(lengths):
-        return np.zeros(0, dtype=np.int64)
-    exact = lengths / lengths.sum() * max(total, len(lengths))
-    counts = np.maximum(1, np.floor(exact)).astype(np.int64)
-    while counts.sum() < total:
-        counts[np.argmax(exact - counts)] += 1
-    while counts.sum() > max(total, len(lengths)):
-        counts[np.argmax(np.where(counts > 1, counts - exact, -np.inf))] -= 1
-    return np.asarray(counts)
+    @classmethod
+    def unpacked(cls, directions: FloatArray, launched: FloatArray, places: Any) -> "LaunchPoints":
+        """From what the kernels fill, (n, rays, LAUNCHED) and (n, rays)."""
+        from creeping.shadow.kernels.trace import ARC, ARCLENGTH, CLOSED, PHASE, SPACING, STATE
+
+        parts = (launched[..., k] for k in (ARCLENGTH, PHASE))
+        rest = (launched[..., k] for k in (ARC, SPACING, CLOSED, STATE))
+        return cls(directions, launched[..., :3], *parts, places, *rest)
+
+    @property
+    def there(self) -> BoolArray:
+        """Whether a place holds a ray (n, rays)."""
+        return np.asarray(self.curve_index != NO_RAY)
+
+    def of(self, rows: IntArray) -> "LaunchPoints":
+        """Those of some incidences."""
+        return LaunchPoints(*(getattr(self, part.name)[rows] for part in fields(self)))
 
 
 def parting_positions(
@@ -107,6 +100,7 @@ def parting_positions(
 
 
 def line_tangents(body: Surface, points: FloatArray, direction: FloatArray) -> FloatArray:
-    """Unit tangents grad F x Hd/|.| of n.d = 0 at its points: (n, 3) -> (n, 3)."""
-    tangent = np.cross(body.gradient(points), body.hessian(points) @ direction)
+    """Unit tangents grad F x Hd/|.| of n.d = 0 at its points; d is (3,) or one for each: (n, 3) -> (n, 3)."""
+    direction = np.broadcast_to(direction, points.shape)
+    tangent = np.cross(body.gradient(points), np.einsum("nij,nj->ni", body.hessian(points), direction))
     return np.asarray(tangent / np.linalg.norm(tangent, axis=-1, keepdims=True))

@@ -2,26 +2,28 @@
 
     F(x) = 0,   grad F(x).d = 0,   T = grad F x Hd / |.|,   kappa_n(d) = d.Hd/|grad F|
 
-Seen from outside, the lit side (n.d < 0) is on the left of T. The steps are one module each: critical points of n.d,
-where the line would cross itself (`singular`), its topology (`contour`), its points (`panels`), its state
-(`visibility`).
+Seen from outside, the lit side (n.d < 0) is on the left of T. The line is that of `creeping.shadow.many`, the same to
+the last bit; next to a singular direction, where that cannot be certain, its topology is proven (`following`).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from creeping._presenting import DrawnOnBody, brief
-from creeping._typing import Any, ArrayLike, FloatArray
+from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.surface import Surface, normal
-from creeping.geometry.triangulation import triangulate
-from creeping.shadow.critical_points import critical_points
-from creeping.shadow.occlusion import incident_curvature, split_arcs
-from creeping.shadow.panels import PanelCurve, newton_step
-from creeping.shadow.refinement import shadow_curves
-from creeping.shadow.status import STATUSES
+from creeping.shadow.attachment import Arc, LaunchPoints
+from creeping.shadow.following import followed
+from creeping.shadow.nodes import Finished, LineNodes, finished, line_nodes, polished
+from creeping.shadow.panels import PanelCurve, fit_panels
+from creeping.shadow.status import CONCAVE, NEAR_SINGULAR, STATUSES
+
+HALF = 6
+"""Nodes on either side that a polynomial along a curve goes through."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,6 +32,7 @@ class ShadowCurve(DrawnOnBody):
 
     Attributes
     ----------
+    body, direction : Surface, (3,)
     points : (n, 3), L
         The last is one spacing before the first.
     normals, tangents : (n, 3)
@@ -37,25 +40,30 @@ class ShadowCurve(DrawnOnBody):
     arclength : (n,), L
         From 0, growing along T.
     length : float, L
+    error : float
+        Estimated relative error of the length, and so of places along the curve.
     status : (n,) of str
         "attached", "occluded" (the incident ray is stopped before) or "concave" (kappa_n(d) <= 0).
     curvature : (n,), 1/L
         kappa_n(d).
     arcs : tuple of (start, end, status)
         Arclengths at which the status changes; the end passes the length where an arc wraps.
-    panels : PanelCurve
-        The curve at any arclength.
+    nodes : (k, 3), L
+        Equally spaced points that the curve was found by.
     """
 
+    body: Surface
+    direction: FloatArray
     points: FloatArray
     normals: FloatArray
     tangents: FloatArray
     arclength: FloatArray
     length: float
+    error: float
     status: np.ndarray[Any, np.dtype[np.str_]]
     curvature: FloatArray
     arcs: tuple[tuple[float, float, str], ...]
-    panels: PanelCurve = field(repr=False)
+    nodes: FloatArray
 
     @property
     def fractions(self) -> dict[str, float]:
@@ -65,17 +73,37 @@ class ShadowCurve(DrawnOnBody):
             shares[status] += (end - start) / self.length
         return shares
 
+    @cached_property
+    def panels(self) -> PanelCurve:
+        """The curve in panels that are exact to rounding, fitted when first asked for."""
+        spacing = np.full(len(self.nodes), self.length / len(self.nodes))
+        return fit_panels(self.body, self.direction, self.nodes, spacing)
+
+    def state_at(self, arclength: FloatArray) -> IntArray:
+        """Codes of the status at arclengths modulo the length: (m,)."""
+        # rounding may leave a place between two arcs: then it is of neither side, and concave launches nothing
+        codes = np.full(len(arclength), CONCAVE)
+        for start, end, status in self.arcs:
+            codes[np.mod(arclength - start, self.length) < end - start] = STATUSES.index(status)
+        return codes
+
     def at(self, arclength: ArrayLike) -> FloatArray:
-        """Points of the curve, exact at any arclength modulo the length: (m,) -> (m, 3), L."""
+        """Points of the curve at any arclength modulo the length: (m,) -> (m, 3), L.
+
+        On the line to rounding, along it as exact as the length.
+        """
         s = np.asarray(arclength, dtype=float)
         if s.ndim > 1 or not np.all(np.isfinite(s)):
             raise InvalidInputError(
                 f"arclength of shape {s.shape} is not one finite number or a row of them; give (m,)"
             )
-        return self.panels.at(s.ravel()).reshape(*s.shape, 3)
+        if "panels" in vars(self):
+            return self.panels.at(s.ravel()).reshape(*s.shape, 3)
+        points = interpolated(self.nodes, s.ravel() / self.length * len(self.nodes))
+        return polished(self.body, self.direction, points)[0].reshape(*s.shape, 3)
 
     def __repr__(self) -> str:
-        n_dot_d = np.abs(self.normals @ self.panels.direction)
+        n_dot_d = np.abs(self.normals @ self.direction)
         return (
             f"ShadowCurve({len(self.points)} points, length {self.length:.10g} L)\n"
             f"  {_spelled(self.fractions)}; {_count(len(self.arcs), 'arc')}\n"
@@ -98,12 +126,15 @@ class ShadowLine(DrawnOnBody):
     singular_distance : float
         Least |n.d| at critical points of n.d on the body apart from n = +-d, inf if there are none; also, to first
         order, the angle from d to the next direction whose shadow line crosses itself.
+    nodes : LineNodes
+        What the line was found by.
     """
 
     body: Surface
     direction: FloatArray
     curves: tuple[ShadowCurve, ...]
     singular_distance: float
+    nodes: LineNodes
 
     @property
     def length(self) -> float:
@@ -117,6 +148,22 @@ class ShadowLine(DrawnOnBody):
         return {
             status: sum(curve.fractions[status] * curve.length for curve in self.curves) / length for status in STATUSES
         }
+
+    def arcs(self, launch_from: str = "attached") -> list[Arc]:
+        """Arcs that launch rays: the attached ones, or with "all" each whole curve."""
+        if launch_from == "all":
+            return [Arc(number, 0.0, curve.length, True) for number, curve in enumerate(self.curves)]
+        return [
+            Arc(number, start, end, len(curve.arcs) == 1)
+            for number, curve in enumerate(self.curves)
+            for start, end, status in curve.arcs
+            if status == "attached"
+        ]
+
+    def launch_points(self, n_rays: int, launch_from: str = "attached") -> LaunchPoints:
+        """So many launch points on the arcs, as `shadow_lines` gives them: n is 1."""
+        found = finished(self.body, self.direction, self.nodes, n_rays, every=launch_from == "all")
+        return LaunchPoints.unpacked(self.direction[None], found.launched[None], found.places[None])
 
     def __repr__(self) -> str:
         worst = max((float(np.max(np.abs(curve.normals @ self.direction))) for curve in self.curves), default=0.0)
@@ -158,12 +205,33 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     d = unit_direction(direction)
     if isinstance(n_points, bool) or not isinstance(n_points, (int, np.integer)) or n_points < 16:
         raise InvalidInputError(f"n_points = {n_points!r} is not a whole number >= 16")
-    mesh = triangulate(body.level, body.gradient, body.bounds)
-    critical = critical_points(body, d, mesh)
-    critical.refuse()
-    curves = [_sampled(panels, int(n_points)) for panels in shadow_curves(body, d, mesh, critical)]
-    curves.sort(key=lambda curve: -curve.length)
-    return ShadowLine(body, d, tuple(curves), critical.distance)
+    nodes, code, distance = line_nodes(body, d)
+    panels: tuple[PanelCurve, ...] = ()
+    if nodes is None or code == NEAR_SINGULAR:
+        exact, panels, distance = followed(body, d)
+        if nodes is not None and len(nodes.spacing) == len(panels):
+            # the meshes had the right number of curves: the line is theirs, as in a sweep
+            exact, panels = nodes, ()
+        nodes = exact
+    found = finished(body, d, nodes, 0)
+    curves = [_curve(body, d, nodes, found, k, int(n_points)) for k in range(len(nodes.spacing))]
+    for curve, exact_curve in zip(curves, panels, strict=False):
+        # the nodes of a line that turns this fast are too far apart to go through
+        vars(curve)["panels"] = exact_curve
+    return ShadowLine(body, d, tuple(curves), distance, nodes)
+
+
+def interpolated(nodes: FloatArray, places: FloatArray) -> FloatArray:
+    """Points of a closed curve at numbers of nodes with fractions, by polynomials: (k, 3), (m,) -> (m, 3)."""
+    first = np.floor(places).astype(np.int64)
+    offsets = np.arange(1 - HALF, HALF + 1)
+    u = (places - first)[:, None] - offsets
+    before, after = np.ones_like(u), np.ones_like(u)
+    before[:, 1:] = np.cumprod(u[:, :-1], axis=1)
+    after[:, :-1] = np.cumprod(u[:, :0:-1], axis=1)[:, ::-1]
+    scale = np.array([np.prod([j - i for i in offsets if i != j], dtype=float) for j in offsets])
+    weights = before * after / scale
+    return np.einsum("mj,mjc->mc", weights, nodes[(first[:, None] + offsets) % len(nodes)])
 
 
 def _spelled(fractions: dict[str, float]) -> str:
@@ -174,20 +242,33 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
 
-def _sampled(panels: PanelCurve, n_points: int) -> ShadowCurve:
-    body, direction, length = panels.body, panels.direction, panels.length
+def _curve(
+    body: Surface, direction: FloatArray, nodes: LineNodes, found: Finished, number: int, n_points: int
+) -> ShadowCurve:
+    first, last = nodes.starts[number : number + 2]
+    own = np.ascontiguousarray(nodes.points[:, first:last].T)
+    spacing = float(nodes.spacing[number])
+    length = spacing * len(own)
     arclength = np.linspace(0.0, length, n_points, endpoint=False, dtype=np.float64)
-    points = panels.at(arclength)
-    _, tangents = newton_step(body, direction, points)
-    arcs = split_arcs(panels)
+    points, tangents, curvature = polished(body, direction, interpolated(own, arclength / spacing))
+    mine = found.curve == number
+    ends, codes = spacing * found.arcs[mine], found.state[mine]
+    ends -= length * np.floor(ends[:, :1] / length)
+    order = np.argsort(ends[:, 0])
+    ends, codes = ends[order], codes[order]
+    # the arc before the first start is the last one, which comes round
+    place = np.searchsorted(ends[:, 0], arclength, side="right") - 1
     return ShadowCurve(
+        body=body,
+        direction=direction,
         points=points,
         normals=normal(body, points),
         tangents=tangents,
         arclength=arclength,
         length=length,
-        status=np.array(STATUSES)[arcs.of(arclength)],
-        curvature=incident_curvature(body, points, direction),
-        arcs=arcs.listed(),
-        panels=panels,
+        error=nodes.error,
+        status=np.array(STATUSES)[codes[place]],
+        curvature=curvature,
+        arcs=tuple((start, end, STATUSES[code]) for (start, end), code in zip(ends.tolist(), codes, strict=True)),
+        nodes=own,
     )

@@ -6,7 +6,9 @@ in which the number of curves of the line is constant; to first order v = |n.d| 
 them.
 """
 
-from dataclasses import dataclass
+from functools import cached_property
+from threading import RLock
+from weakref import ref
 
 import numpy as np
 
@@ -14,46 +16,70 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.geometry.curvature import gaussian_curvature
 from creeping.geometry.surface import Surface, normal, project
 from creeping.geometry.triangulation import Triangulation, triangulate
+from creeping.shadow.refinement import halved
 
 TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096))
 """Vertices of the meshes, and nodes of a line on them."""
+FINEST_NODES = 8192
+"""Nodes of a line on the last mesh, the one before with every edge halved; it is made when a line asks for it."""
 
 
-@dataclass(frozen=True, eq=False)
 class LineMeshes:
-    """Meshes from coarse to fine, and where K = 0.
+    """Meshes from coarse to fine, each made when first asked for, and where K = 0.
 
-    Attributes
+    Parameters
     ----------
-    meshes : tuple
-        As `shadow.kernels.trace.trace_lines` takes them.
-    critical : (m, 2, 6)
-        (n, n x a) at both ends of the segments of K = 0.
-    coarsest : Triangulation
-    """
-
-    meshes: tuple[tuple[Any, ...], ...]
-    critical: FloatArray
-    coarsest: Triangulation
-
-    @property
-    def turns(self) -> FloatArray:
-        """Rms angle between the normals at the ends of an edge, per mesh, radians."""
-        return np.array([mesh[5] for mesh in self.meshes])
-
-
-def line_meshes(body: Surface) -> LineMeshes:
-    """Prepare a body.
+    body : Surface
 
     Raises
     ------
     SurfaceError
         If F = 0 has no closed triangulation in its bounds.
     """
-    found = [_mesh_of(body, vertices) for vertices, _ in TIERS]
-    packed = tuple(_packed(body, mesh, nodes) for mesh, (_, nodes) in zip(found, TIERS, strict=True))
-    # the finer the mesh, the fewer small parabolic loops are missed
-    return LineMeshes(packed, singular_segments(body, found[-1]), found[0])
+
+    count = len(TIERS) + 1
+
+    def __init__(self, body: Surface) -> None:
+        # no strong reference: meshes are kept as long as their body lives
+        self._body = ref(body)
+        self._meshes: dict[int, Triangulation] = {}
+        self._packed: dict[int, tuple[Any, ...]] = {}
+        self._lock = RLock()
+        self.mesh(0)
+
+    def mesh(self, tier: int) -> Triangulation:
+        """Triangulation of a tier."""
+        body: Any = self._body()
+        with self._lock:
+            if tier not in self._meshes:
+                last = len(TIERS)
+                self._meshes[tier] = (
+                    halved(body, self.mesh(last - 1)) if tier == last else _mesh_of(body, TIERS[tier][0])
+                )
+            return self._meshes[tier]
+
+    def packed(self, tier: int) -> tuple[Any, ...]:
+        """Mesh of a tier as `shadow.kernels.trace` takes it."""
+        with self._lock:
+            if tier not in self._packed:
+                nodes = FINEST_NODES if tier == len(TIERS) else TIERS[tier][1]
+                self._packed[tier] = _packed(self._body(), self.mesh(tier), nodes)  # type: ignore[arg-type]
+            return self._packed[tier]
+
+    def turn(self, tier: int) -> float:
+        """Rms angle between the normals at the ends of an edge, radians."""
+        return float(self.packed(tier)[5])
+
+    @property
+    def coarsest(self) -> Triangulation:
+        """The first mesh."""
+        return self.mesh(0)
+
+    @cached_property
+    def critical(self) -> FloatArray:
+        """(n, n x a) at both ends of the segments of K = 0: (m, 2, 6)."""
+        # the finer the mesh, the fewer small parabolic loops are missed
+        return singular_segments(self._body(), self.mesh(len(TIERS) - 1))  # type: ignore[arg-type]
 
 
 def _mesh_of(body: Surface, vertices: int) -> Triangulation:

@@ -102,12 +102,6 @@ class PanelCurve:
         """Length, L."""
         return float(self.breaks[-1])
 
-    @property
-    def gauss_arclengths(self) -> FloatArray:
-        """Arclengths of the Gauss points, dense where the curve turns: (p ORDER,), L."""
-        integral = legendre.legint(self.speed, lbnd=-1, axis=1) @ legendre.legvander(_U, ORDER).T
-        return np.asarray((self.breaks[:-1, None] + integral).ravel())
-
     def at(self, arclength: FloatArray) -> FloatArray:
         """Points at any arclength, modulo the length: (m,) -> (m, 3), L."""
         breaks = self.breaks

@@ -46,11 +46,10 @@ def shadow_curves(
     """
     mesh, h = _resolve(body, direction, mesh, critical)
     edges, sides = _edges(mesh.triangles)
-    loops = _loops(sides, h[edges] >= 0, h[mesh.triangles] >= 0)
-    halved = _split(body, mesh, np.ones(len(mesh.triangles), dtype=bool))
-    h_halved = np.concatenate([h, _values(body, direction, halved.vertices[len(h) :])])
-    edges_halved, sides_halved = _edges(halved.triangles)
-    again = _loops(sides_halved, h_halved[edges_halved] >= 0, h_halved[halved.triangles] >= 0)
+    loops = _loops(sides, h[mesh.triangles] >= 0)
+    finer = halved(body, mesh)
+    h_finer = np.concatenate([h, _values(body, direction, finer.vertices[len(h) :])])
+    again = _loops(_edges(finer.triangles)[1], h_finer[finer.triangles] >= 0)
     if len(again) != len(loops):
         raise _unsettled(
             critical, f"has {len(loops)} curves on one mesh and {len(again)} on the next; it nearly crosses itself"
@@ -123,7 +122,7 @@ def _edges(triangles: IntArray) -> tuple[IntArray, IntArray]:
     return np.stack([keys // stride, keys % stride], axis=1), sides.reshape(-1, 3)
 
 
-def _loops(sides: IntArray, edge_signs: BoolArray, corner_signs: BoolArray) -> list[IntArray]:
+def _loops(sides: IntArray, corner_signs: BoolArray) -> list[IntArray]:
     """Cycles of crossed edges, in walking order: arrays of edge numbers."""
     following = np.roll(corner_signs, -1, axis=1)
     mixed = np.any(corner_signs != following, axis=1)
@@ -140,6 +139,11 @@ def _loops(sides: IntArray, edge_signs: BoolArray, corner_signs: BoolArray) -> l
             edge = successor.pop(edge)
         loops.append(np.array(loop, dtype=np.int64))
     return loops
+
+
+def halved(body: Surface, mesh: Triangulation) -> Triangulation:
+    """The mesh with every edge halved; old vertices keep their numbers."""
+    return _split(body, mesh, np.ones(len(mesh.triangles), dtype=bool))
 
 
 def _split(body: Surface, mesh: Triangulation, marked: BoolArray) -> Triangulation:

@@ -20,7 +20,7 @@ from creeping.geodesics.integrator import MapError
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.cache import load_phase_map
 from creeping.phaseflow.phase_map import PhaseMap
-from creeping.rays.fan import Flow
+from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
 from creeping.sweeping.request import SweepRequest

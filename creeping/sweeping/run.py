@@ -13,7 +13,7 @@ from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike, Impedance
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.surface import size
-from creeping.rays.fan import Flow
+from creeping.rays.transport import Flow
 from creeping.sweeping.plan import Arrays, Beginning, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, sweep_request
 from creeping.sweeping.results import as_dataset, require

@@ -10,7 +10,8 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.phaseflow.tuning.flow_choice import tuned_direct
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import metric_curvature
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.curvature import gaussian_curvature
 
 TIMES = np.array([0.4, 1.0, 2.5, 4.0])

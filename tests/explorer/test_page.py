@@ -7,8 +7,8 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
+from creeping.explorer.preview import moving_frame
 from creeping.explorer.request import Wish
-from creeping.rays.preview import quick_fan
 
 pytest.importorskip("viser")
 BODY = sc.TwistedEllipsoid()
@@ -28,7 +28,8 @@ def rays_of(page, **values):
     """Segments of the rays by the engine, for the wish with other values."""
     wish = WISH.changed(**values)
     count = round(wish.length / page.step)
-    fan = quick_fan(page.flow, wish.direction, length=count * page.step, n_rays=wish.rays, n_steps=count)
+    fan = moving_frame(page.flow, wish, page.step).fan
+    assert len(fan.travel_time) == count + 1
     return np.stack([fan.points[:, :-1], fan.points[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 

@@ -21,7 +21,8 @@ from creeping.geodesics.attenuation import (
 )
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.hermite import sliding
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
 
 NON_CONVEX = {"torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}

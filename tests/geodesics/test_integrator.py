@@ -10,7 +10,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import vector_field
-from creeping.geodesics.integrator import dormand_prince_8, pack, trace_states
+from creeping.geodesics.integrator import dormand_prince_8, trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.speed import speed_values
 from creeping.geometry.surface import normal
 

@@ -42,15 +42,13 @@ def extend(values, time, now, total, end):
             end[row] = now[row] + root * time
 
 
-def _until(
-    zero, values, points, weights, nodes = None
-):
+def _until(zero, values, points, weights, nodes=None):
     """Integral of max(g, 0)^(2/3) up to the zero, of the polynomial g through values at the nodes."""
     g = lagrange(zero * (1 - points**3), nodes) @ values
     return 3 * zero * float(np.sum(weights * points**2 * np.maximum(g, 0.0) ** (2 / 3)))
 
 
-def first_zero(values, matrix = None, nodes = None):
+def first_zero(values, matrix=None, nodes=None):
     """First zero in [0, 1] of the polynomial through the values at the nodes, inf without one.
 
     The matrix gives its values at equally spaced points; both are those of a leap unless given.
@@ -124,5 +122,3 @@ def extend_along(body, states, fine, place, out):
                     end[row] = now + root * (time - now)
             total += np.where(np.isinf(end), grown, 0.0)
         out[:, place == k, 10], out[:, place == k, 11] = total[:, None], end[:, None]
-
-

@@ -26,9 +26,7 @@ def evaluate(table, chart, grid, degree):
     return out
 
 
-def carry_riding(
-    grid, leap, chart, place, states, out
-):
+def carry_riding(grid, leap, chart, place, states, out):
     """Fill lanes 6 to 9 of out with M times those of states, lanes 10 and 11 with attenuation and detachment.
 
     Times of detachment count from the start of the leap.

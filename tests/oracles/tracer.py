@@ -4,7 +4,7 @@ import numpy as np
 
 from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.equations import metric_curvature, vector_field
-from creeping.geodesics.integrator import MAX_STEPS, Tableau, error_scale
+from creeping.geodesics.integrator import MAX_STEPS, error_scale
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.speed import speed_values
 
@@ -23,9 +23,7 @@ def derivative(body, states):
     return k
 
 
-def trace(
-    body, states, times, method, *, rtol, step
-):
+def trace(body, states, times, method, *, rtol, step):
     """Trace all states with one common step; arguments as for `trace_states`."""
     y = np.array(states, dtype=float)
     out = np.full((len(y), len(times), y.shape[1]), np.nan)
@@ -60,9 +58,7 @@ def trace(
     return out
 
 
-def _step(
-    body, y, h, method, rtol, scale
-):
+def _step(body, y, h, method, rtol, scale):
     """One step, and its largest error in units of the tolerance."""
     stages = len(method.b)
     k = np.empty((stages + 1, *y.shape))

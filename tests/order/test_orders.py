@@ -7,7 +7,8 @@ from tolerances import ORDER
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.phaseflow.building import measure
 
 

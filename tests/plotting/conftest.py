@@ -109,7 +109,7 @@ def twisted_fan():
 def torus_fan():
     body = sc.Torus()
     line = cr.shadow_line(body, (1, 0.3, 0.5), n_points=64)
-    return cr.launch(cr.DirectFlow(body), line, length=1.0, n_rays=12, n_steps=10, max_gap=np.inf, status="all")
+    return cr.launch(cr.DirectFlow(body), line, length=1.0, n_rays=12, n_steps=10, max_gap=np.inf, launch_from="all")
 
 
 @pytest.fixture(scope="session")

@@ -115,7 +115,7 @@ def test_only_attached_points_launch_unless_asked(phase_map):
     body = sc.Torus()
     line = cr.shadow_line(body, (1, 1, 1))
     some = cr.launch(phase_map(body), line, length=1.0, max_gap=np.inf)
-    every = cr.launch(phase_map(body), line, length=1.0, max_gap=np.inf, status="all")
+    every = cr.launch(phase_map(body), line, length=1.0, max_gap=np.inf, launch_from="all")
     assert set(some.status) <= {cr.RayStatus.OK, cr.RayStatus.DETACHED}
     inner = every.curve_index == 1
     shares = [np.mean(every.status[inner] == s) for s in (cr.RayStatus.OCCLUDED, cr.RayStatus.CONCAVE)]

@@ -73,7 +73,7 @@ def test_two_components_give_two_curves(phase_map):
 def test_curves_of_all_points_are_whole(phase_map):
     # the inner component has six arcs of three states, and one iso-phase curve
     body = sc.Torus()
-    fan = cr.launch(phase_map(body), cr.shadow_line(body, (1, 1, 1)), length=0.5, n_rays=200, status="all")
+    fan = cr.launch(phase_map(body), cr.shadow_line(body, (1, 1, 1)), length=0.5, n_rays=200, launch_from="all")
     assert [curve.closed for curve in cr.iso_phase_curves(fan, 0.3)] == [True, True]
 
 

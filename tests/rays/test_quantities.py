@@ -166,7 +166,7 @@ def test_detached_rays_end(body):
 
 def test_rays_that_the_wave_does_not_launch_are_not_alive():
     body = sc.Torus()
-    fan = launched(body, (1, 1, 1), length=1.0, n_rays=60, status="all")
+    fan = launched(body, (1, 1, 1), length=1.0, n_rays=60, launch_from="all")
     _, rays = points_of(fan)
     idle = (fan.status == cr.RayStatus.OCCLUDED) | (fan.status == cr.RayStatus.CONCAVE)
     assert idle.any()

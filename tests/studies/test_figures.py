@@ -154,7 +154,8 @@ def test_exact_solution_is_one():
 
 def test_caustic_is_where_neighbours_meet():
     """On the conjugate locus x(t, alpha) stops moving with alpha; it moves by sin t or so elsewhere."""
-    from creeping.geodesics.integrator import pack, trace_states
+    from creeping.geodesics.integrator import trace_states
+    from creeping.geodesics.states import pack
     from studies._curves import directions_at
 
     body, source = figure3_circles.BODY, figure3_circles.SOURCE

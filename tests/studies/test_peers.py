@@ -7,7 +7,8 @@ import pytest
 
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
 from studies._peers import HeyokaFlow, heyoka_at_error, measured, scipy_flow
 

@@ -16,7 +16,8 @@ from creeping.errors import IntegrationError, InvalidInputError, ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.integrator import MapError, pack, trace_states
+from creeping.geodesics.integrator import MapError, trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import Progress, require_checked, settled, upper_bound
 from creeping.phaseflow.cache import cached_phase_map, is_cached

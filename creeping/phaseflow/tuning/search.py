@@ -20,7 +20,8 @@ from creeping._typing import FloatArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import Plan, Progress, build_direct, curvature_reach, measured
 from creeping.phaseflow.coordinates.base import Model, model_of

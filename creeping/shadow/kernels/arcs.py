@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import strict_options as options
-from creeping.shadow.kernels.newton import hermite, newton
+from creeping.shadow.kernels.newton import HALF, interpolate, newton
 from creeping.shadow.status import ATTACHED, CONCAVE, OCCLUDED
 
 SAMPLES = 192
@@ -55,26 +55,19 @@ def arcs_of(places, where, count, starts, components, arcs, owner):
 
 
 @njit(**options)
-def point_at(x, tangents, first, number, spacing, place, out, m):
-    """Point at a place of a component, on the cubic between its nodes, into out[:, m]."""
-    k = np.int64(math.floor(place))
-    hermite(x, tangents, first + k % number, first + (k + 1) % number, spacing, place - k, out, m)
-
-
-@njit(**options)
-def classify(level, level_par, box, d, x, tangents, starts, spacing, extreme, arcs, owner, total, reach, work, state):
+def classify(level, level_par, box, d, x, starts, extreme, arcs, owner, total, reach, work, state):
     """State of each arc; returns whether all rays agree.
 
     ``box`` (2, 3) holds the body, ``extreme`` are the outermost nodes.
     """
     agree = True
-    probes, slopes, kappa = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    probes, slopes, kappa, w = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(2 * HALF)
     for k in range(total):
         c = owner[k]
         first, number = starts[c], starts[c + 1] - starts[c]
         long = arcs[k, 1] - arcs[k, 0]
         for m, share in enumerate((0.5, 0.2, 0.8)):
-            point_at(x, tangents, first, number, spacing[c], arcs[k, 0] + share * long, probes, m)
+            interpolate(x, first, number, arcs[k, 0] + share * long, w, probes, m)
         newton(level, level_par, d, probes, reach, work, slopes, kappa)
         if not kappa[0] > 0.0:
             state[k] = CONCAVE
@@ -90,20 +83,22 @@ def classify(level, level_par, box, d, x, tangents, starts, spacing, extreme, ar
             continue
         hidden = 0
         for m in range(3):
-            hidden |= blocked(level, level_par, box, d, probes, m) << m
+            hidden |= blocked(level, level_par, box, d, probes, m, math.inf) << m
         state[k] = OCCLUDED if hidden & 1 else ATTACHED
         agree &= hidden == 0 or hidden == 7
     return agree
 
 
 @njit(**options)
-def blocked(level, level_par, box, d, points, m):
-    """Whether the backward ray from points[:, m] enters the body."""
-    exit_ = 1e300
+def blocked(level, level_par, box, d, points, m, reach):
+    """Whether the backward ray from points[:, m] enters the body within ``reach``."""
+    exit_, diagonal = math.inf, 0.0
     for axis in range(3):
+        diagonal += (box[1, axis] - box[0, axis]) ** 2
         if d[axis] != 0.0:
             exit_ = min(exit_, (points[axis, m] - box[0 if d[axis] > 0.0 else 1, axis]) / d[axis])
-    step = max(exit_, 1e-3 * (box[1, 0] - box[0, 0])) / SAMPLES
+    # a point on the face of the box, or just beyond it by rounding, has nothing behind
+    step = min(max(exit_, 0.5e-3 * math.sqrt(diagonal)), reach) / SAMPLES
     n = SAMPLES + 1
     x, values = np.empty((3, n)), np.empty((10, n))
     for i in range(n):
@@ -132,6 +127,13 @@ def blocked(level, level_par, box, d, points, m):
             if found[0, 0] < 0.0:
                 return True
     return False
+
+
+@njit(**options)
+def blocked_rays(level, level_par, box, directions, points, reach, out):
+    """`blocked` for the columns of points (3, n), with a direction (n, 3) and a reach (n,) each, into out (n,)."""
+    for m in range(points.shape[1]):
+        out[m] = blocked(level, level_par, box, directions[m], points, m, reach[m])
 
 
 @njit(**options)

@@ -11,26 +11,12 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import strict_options as options
+from creeping.shadow.kernels.newton import HALF, interpolate
 
 BOX = 8
 """Segments of a box."""
 LIMIT = 64
 """Breaks of a line at most."""
-_LAGRANGE = np.array([-1 / 120, 1 / 24, -1 / 12, 1 / 12, -1 / 24, 1 / 120])
-"""Inverse products of the differences of the places -2 ... 3."""
-
-
-@njit(**options)
-def polynomial(values, first, number, k, u):
-    """Value at k + u of the polynomial of degree 5 through the nodes k - 2 ... k + 3 of a periodic row."""
-    total = 0.0
-    for m in range(6):
-        product = _LAGRANGE[m]
-        for j in range(6):
-            if j != m:
-                product *= u - (j - 2)
-        total += product * values[first + (k + m - 2) % number]
-    return total
 
 
 @njit(**options)
@@ -64,9 +50,11 @@ def cusps(values, first, number, places):
 def _zero(values, first, number, k, a, b):
     """Zero in [0, 1] of the polynomial between node k and the next, values a and b, by the Illinois method."""
     low, high, side = 0.0, 1.0, 0
+    rows, w, found = values.reshape(1, -1), np.empty(2 * HALF), np.empty((1, 1))
     for _ in range(40):
         u = (low * b - high * a) / (b - a)
-        value = polynomial(values, first, number, k, u)
+        interpolate(rows, first, number, k + u, w, found, 0)
+        value = found[0, 0]
         if high - low < 1e-13 or value == 0.0:
             return u
         if (value > 0.0) == (b > 0.0):
@@ -246,7 +234,10 @@ def _cubic(plane, row, i, j, h, u):
 
 @njit(**options)
 def _solve(plane, first, number, k, h, first2, number2, m, g):
-    """Places at which the cubics cross near those of the chords after nodes k and m; of the chords where that fails."""
+    """Places at which two pieces cross near those of the chords after nodes k and m; of the chords where that fails.
+
+    Newton's method on the cubics between nodes, which do not leave their cell by much, and then on the polynomials.
+    """
     i, j, p, q = first + k % number, first + (k + 1) % number, first2 + m % number2, first2 + (m + 1) % number2
     a, b = plane[0, j] - plane[0, i], plane[1, j] - plane[1, i]
     c, d = plane[0, q] - plane[0, p], plane[1, q] - plane[1, p]
@@ -268,4 +259,13 @@ def _solve(plane, first, number, k, h, first2, number2, m, g):
         two += min(max((e * b - f * a) / determinant, -1.0), 1.0)
     if not (abs(one - start) < 2.0 and abs(two - begin) < 2.0):
         return start, begin
+    here, there, w = np.empty((5, 1)), np.empty((5, 1)), np.empty(2 * HALF)
+    for _ in range(3):
+        interpolate(plane, first, number, one, w, here, 0)
+        interpolate(plane, first2, number2, two, w, there, 0)
+        a, b, c, d = h * here[3, 0], h * here[4, 0], g * there[3, 0], g * there[4, 0]
+        determinant = a * d - b * c
+        e, f = there[0, 0] - here[0, 0], there[1, 0] - here[1, 0]
+        one += min(max((e * d - f * c) / determinant, -1.0), 1.0)
+        two += min(max((e * b - f * a) / determinant, -1.0), 1.0)
     return one, two

@@ -5,9 +5,11 @@
 dx is the Newton step of least norm. Between neighbours x_0, x_1 with chord c and tangents T the curve is a cubic; its
 arclength comes from the chord and the mean of T over the step, for nodes equally spaced,
 
-    h = |c|/|A|,   A = [802 (T_0 + T_1) - 93 (T_-1 + T_2) + 11 (T_-2 + T_3)]/1440,
+    h = |c|/|A|,   A = sum_j a_j (T_-j + T_(1+j)),
 
-of order 6, against that of order 4, A = [13 (T_0 + T_1) - (T_-1 + T_2)]/24: their difference is the estimate.
+the integral of the polynomial through the tangents of the nodes around; its order is the number of them. Twelve give
+the length, and how far eight are off is the estimate of its error; [13 (T_0 + T_1) - (T_-1 + T_2)]/24 against six says
+whether the line is resolved.
 """
 
 import math
@@ -19,6 +21,14 @@ from creeping.kernels.block import BLOCK
 from creeping.kernels.block import strict_options as options
 
 FAILED = 1e300
+HALF = 6
+"""Nodes on either side that a polynomial along the line goes through."""
+_TWELVE = np.array([548839986, -91373082, 27022635, -6409423, 995469, -73985]) / 958003200
+_EIGHT = np.array([68323, -9531, 1879, -191]) / 120960
+_INVERSE = np.array(
+    [(-1.0) ** (2 * HALF - 1 - j) / (math.factorial(j) * math.factorial(2 * HALF - 1 - j)) for j in range(2 * HALF)]
+)
+"""Inverse products of the differences of the places 1 - HALF ... HALF."""
 
 
 @njit(**options)
@@ -172,40 +182,48 @@ def resample(x, tangents, kept, first, count, length, out, place, number):
 
 @njit(**options)
 def _padded(rows, first, number, out):
-    """Copy one component of rows (3, n) into out (3, number + 6), three nodes from the other end on either side."""
+    """Copy one component of rows (3, n) into out (3, number + 2 HALF), HALF nodes from the other end on either side."""
     for axis in range(3):
-        out[axis, 3 : number + 3] = rows[axis, first : first + number]
-        for k in range(3):
-            out[axis, k] = rows[axis, first + number - 3 + k]
-            out[axis, number + 3 + k] = rows[axis, first + k]
+        out[axis, HALF : number + HALF] = rows[axis, first : first + number]
+        for k in range(HALF):
+            out[axis, k] = rows[axis, first + number - HALF + k]
+            out[axis, number + HALF + k] = rows[axis, first + k]
 
 
 @njit(**options)
 def spacings(x, tangents, first, number, h, places, slopes):
-    """Arclengths h[first:] between neighbours of one component; returns its length and the estimate of its error.
+    """Arclengths h[first:] between neighbours of one component, by order 12.
 
-    places, slopes (3, number + 6 or more) are left with its nodes and tangents, three more on either side.
+    Returns its length, the sums of how far order 8 is off, and order 4 from order 6. places, slopes
+    (3, number + 2 HALF or more) are left with its nodes and tangents, HALF more on either side.
     """
     _padded(x, first, number, places)
     _padded(tangents, first, number, slopes)
-    length = doubt = least = 0.0
+    length = error = rough = least = 0.0
     for k in range(number):
-        square = sixth = fourth = 0.0
+        i = k + HALF
+        square = twelfth = eighth = sixth = fourth = 0.0
         for axis in range(3):
-            x_, t = places[axis], slopes[axis]
-            c = x_[k + 4] - x_[k + 3]
-            near, next_, far = t[k + 3] + t[k + 4], t[k + 2] + t[k + 5], t[k + 1] + t[k + 6]
-            six = (802.0 / 1440.0) * near - (93.0 / 1440.0) * next_ + (11.0 / 1440.0) * far
-            four = (13.0 / 24.0) * near - (1.0 / 24.0) * next_
+            t = slopes[axis]
+            c = places[axis, i + 1] - places[axis, i]
+            a, b, d = t[i] + t[i + 1], t[i - 1] + t[i + 2], t[i - 2] + t[i + 3]
+            e, f, g = t[i - 3] + t[i + 4], t[i - 4] + t[i + 5], t[i - 5] + t[i + 6]
+            twelve = _TWELVE[0] * a + _TWELVE[1] * b + _TWELVE[2] * d + _TWELVE[3] * e + _TWELVE[4] * f + _TWELVE[5] * g
+            eight = _EIGHT[0] * a + _EIGHT[1] * b + _EIGHT[2] * d + _EIGHT[3] * e
+            six = (802.0 / 1440.0) * a - (93.0 / 1440.0) * b + (11.0 / 1440.0) * d
+            four = (13.0 / 24.0) * a - (1.0 / 24.0) * b
             square += c * c
+            twelfth += twelve * twelve
+            eighth += eight * eight
             sixth += six * six
             fourth += four * four
         # of unit length but for the turn of T
-        h[first + k] = math.sqrt(square / (sixth + 1e-12))
+        h[first + k] = math.sqrt(square / max(twelfth, 1e-12))
         length += h[first + k]
-        doubt += abs(h[first + k] - math.sqrt(square / (fourth + 1e-12)))
-        least += 1.0 / (sixth + 1e-12) + 1.0 / (fourth + 1e-12)
-    return (length, doubt) if least < 1e4 * number else (FAILED, FAILED)
+        error += abs(h[first + k] - math.sqrt(square / max(eighth, 1e-12)))
+        rough += abs(math.sqrt(square / max(sixth, 1e-12)) - math.sqrt(square / max(fourth, 1e-12)))
+        least += 1.0 / max(twelfth, 1e-12) + 1.0 / max(fourth, 1e-12)
+    return (length, error, rough) if least < 1e4 * number else (FAILED, FAILED, FAILED)
 
 
 @njit(**options)
@@ -217,5 +235,33 @@ def equalise(x, slopes, first, number, length, h):
         move = k * step - s
         s += h[first + k]
         for axis in range(3):
-            bend = (slopes[axis, k + 4] - slopes[axis, k + 2]) / (2.0 * step)
-            x[axis, first + k] += move * (slopes[axis, k + 3] + 0.5 * move * bend)
+            bend = (slopes[axis, k + HALF + 1] - slopes[axis, k + HALF - 1]) / (2.0 * step)
+            x[axis, first + k] += move * (slopes[axis, k + HALF] + 0.5 * move * bend)
+
+
+@njit(**options)
+def lagrange(u, w):
+    """Weights w (2 HALF,) of the polynomial through the places 1 - HALF ... HALF at u in [0, 1]."""
+    before = 1.0
+    for j in range(2 * HALF):
+        w[j] = before * _INVERSE[j]
+        before *= u - (j + 1 - HALF)
+    after = 1.0
+    for j in range(2 * HALF - 1, -1, -1):
+        w[j] *= after
+        after *= u - (j + 1 - HALF)
+
+
+@njit(**options)
+def interpolate(rows, first, number, place, w, out, m):
+    """Rows (r, n) of equally spaced nodes of a component at a place, by degree 2 HALF - 1, into out[:, m].
+
+    w (2 HALF,) is work space.
+    """
+    k = np.int64(math.floor(place))
+    lagrange(place - k, w)
+    for row in range(out.shape[0]):
+        total = 0.0
+        for j in range(2 * HALF):
+            total += w[j] * rows[row, first + (k + j + 1 - HALF) % number]
+        out[row, m] = total

@@ -1,8 +1,7 @@
 """Compiled shadow lines of many incidences: the steps of `marching`, `newton`, `crossings`, `arcs`.
 
-A line is sought on the coarsest of three meshes, and again on the next if a step has flagged it, if its length is not
-certain to SETTLED, or if the incidence is so near a singular one, v < e^2 with e the mean angle between neighbouring
-normals, that the mesh might miss a small loop.
+A line is sought on one mesh; a step that is not sure of it says so, and so does its length if it is not certain to
+SETTLED. `creeping.shadow.many` goes on to finer meshes.
 """
 
 import numpy as np
@@ -10,20 +9,29 @@ from numba import njit
 
 from creeping.kernels.block import BLOCK, aligned
 from creeping.kernels.block import strict_options as options
-from creeping.shadow.kernels.arcs import arcs_of, classify, merge, order_breaks, point_at, share_rays
+from creeping.shadow.kernels.arcs import arcs_of, classify, merge, order_breaks, share_rays
 from creeping.shadow.kernels.crossings import BOX, LIMIT, convex, crossings, cusps, project
 from creeping.shadow.kernels.marching import incidence_at, mixed_triangles, walk
 from creeping.shadow.kernels.newton import (
     FAILED,
+    HALF,
     equalise,
+    interpolate,
     newton,
     prune,
     resample,
     share_nodes,
     spacings,
 )
-from creeping.shadow.status import ATTACHED, FOLLOWED, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
+from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY
 
+CURVES, LENGTH, ERROR, SHARES = 0, 1, 2, 3
+"""Components of what is known of a line: curves, length, its relative error, shares of the three states; SUMMARY."""
+SUMMARY = 6
+ARCLENGTH, PHASE, ARC, SPACING, CLOSED, STATE = 3, 4, 5, 6, 7, 8
+"""Components of a launch point beside x0: arclength, d.x0, number of its arc, spacing of its rays, 1 if the arc is a
+whole curve, state of the line; LAUNCHED in all."""
+LAUNCHED = 9
 COMPONENTS = 16
 """Curves of a line at most."""
 COARSE_STEP = 0.22
@@ -35,8 +43,6 @@ APART = 0.45
 LOST, UNSETTLED, SETTLED = 1e-3, 1e-6, 2e-6
 """Last step of the final nodes, in body sizes, that flags a line and that sends it to the next mesh; relative error of
 its length that does."""
-FORBIDDEN = 1e-6
-"""v below which the line crosses itself."""
 
 
 @njit(**options)
@@ -55,8 +61,15 @@ def least_critical(points, d):
 
 
 @njit(**options)
-def trace_lines(level, level_par, box, meshes, critical, directions, summary, status, launched, places):
-    """Lines of incidences (n, 3) and where their rays start.
+def least_criticals(points, directions, least):
+    """`least_critical` of directions (n, 3) into least (n,)."""
+    for row in range(directions.shape[0]):
+        least[row] = least_critical(points, directions[row])
+
+
+@njit(**options)
+def trace_lines(level, level_par, box, mesh, directions, every, summary, sure, launched, places):
+    """Lines of incidences (n, 3) on a mesh, and where their rays start.
 
     Parameters
     ----------
@@ -64,73 +77,98 @@ def trace_lines(level, level_par, box, meshes, critical, directions, summary, st
         The body's block evaluator.
     box : (2, 3)
         That holds the body.
-    meshes : tuple of (vertices (3, n), normals (3 n,), triangles (m, 3), neighbours (m, 3), edge, turn, nodes)
-        From coarse to fine; ``nodes`` is the number for the line.
-    critical : (m, 2, 6)
-        See `least_critical`.
-    summary : (n, 7), filled
-        Curves, length, relative error, shares attached, occluded, concave, v.
-    status : (n,), filled
-    launched : (n, rays, 8), filled
-        x0, arclength, d.x0, number of the arc, spacing on it, 1 if it is closed; NaN where there is no ray.
+    mesh : (vertices (3, n), normals (3 n,), triangles (m, 3), neighbours (m, 3), edge, turn, nodes)
+        ``nodes`` is the number for the line.
+    every : bool
+        Whether rays start from the whole line, not from its attached arcs alone.
+    summary : (n, SUMMARY), filled
+    sure : (n,) of bool, filled
+        Whether every step was sure of the line.
+    launched : (n, rays, LAUNCHED), filled
+        NaN where there is no ray.
     places : (n, rays), filled
         Curve of each ray, NO_RAY where there is none.
     """
-    work = _work(meshes)
+    work = work_of(mesh)
+    starts, spacing = np.empty(COMPONENTS + 1, np.int64), np.empty(COMPONENTS)
     for row in range(directions.shape[0]):
         d = directions[row]
-        v = least_critical(critical, d)
         summary[row, :] = np.nan
-        summary[row, 6] = v
         places[row, :] = NO_RAY
         launched[row, :, :] = np.nan
-        if v < FORBIDDEN:
-            status[row] = SINGULAR
-            continue
-        for tier in range(len(meshes)):
-            mesh = meshes[tier]
-            sure = _trace(level, level_par, box, mesh, d, row, summary[row], launched[row], places[row], work[tier])
-            far = v > mesh[5] * mesh[5]
-            if sure and far:
-                break
-        status[row] = OK if sure and far else (NEAR_SINGULAR if sure else FOLLOWED)
+        found, certain, components, length, error = find_nodes(
+            level, level_par, box, mesh, d, row, work, starts, spacing
+        )
+        if found:
+            total = starts[components]
+            x, T = work[3][2][: 3 * total].reshape(3, total), work[3][3][: 3 * total].reshape(3, total)
+            summary[row, CURVES], summary[row, LENGTH], summary[row, ERROR] = components, length, error
+            arcs, which = np.empty((LIMIT + components, 2)), np.empty((2, LIMIT + components), np.int64)
+            certain &= finish(
+                level, level_par, box, d, x, T, work[4][0], starts, components, spacing, every, summary[row],
+                launched[row], places[row], arcs, which,
+            )[0]  # fmt: skip
+        sure[row] = found and certain
 
 
 @njit(**options)
-def _work(meshes):
-    """Work space for each mesh."""
-    return _work_of(meshes[0]), _work_of(meshes[1]), _work_of(meshes[2])
+def trace_nodes(level, level_par, box, mesh, d):
+    """Nodes of one line on a mesh.
+
+    Returns
+    -------
+    found, sure : bool
+    x, T : (3, n)
+    kappa : (n,)
+        kappa_n(d).
+    starts : (components + 1,)
+        First node of each component.
+    spacing : (components,)
+    length, error : float
+    """
+    work = work_of(mesh)
+    starts, spacing = np.empty(COMPONENTS + 1, np.int64), np.empty(COMPONENTS)
+    found, sure, components, length, error = find_nodes(level, level_par, box, mesh, d, 0, work, starts, spacing)
+    total = starts[components] if found else 0
+    x, T = work[3][2][: 3 * total].reshape(3, total), work[3][3][: 3 * total].reshape(3, total)
+    kappa = work[4][0][:total].copy()
+    return found, sure, x.copy(), T.copy(), kappa, starts[: components + 1], spacing[:components], length, error
 
 
 @njit(**options)
-def _work_of(mesh):
+def work_of(mesh):
+    """Work space for lines on a mesh."""
     vertices, triangles, nodes = mesh[0], mesh[2], mesh[6]
     n, m = vertices.shape[1], triangles.shape[0]
     # every component has 64 nodes at least; mixed triangles of a line are far fewer than all of them
     cap = max(nodes + 72 * COMPONENTS, 8 * int(np.sqrt(m)) + 256, 1024)
     marks = np.zeros(n, np.uint8), np.empty(m + 1, np.int64), np.full(m, -1, np.int64)
-    wide = 8 * (cap // 8 + 2)
+    wide = 8 * (cap // 8 + 4)
     raw_starts, kept = np.empty(COMPONENTS + 1, np.int64), np.empty(wide, np.int64)
     # one piece of memory: rows then start on cache lines
-    space = aligned(29, wide)
+    space = aligned(24, wide)
     flat = space[3:15].reshape(-1)
     lines = flat[: 3 * wide], flat[3 * wide : 6 * wide], flat[6 * wide : 9 * wide], flat[9 * wide :]
-    nodal = space[15], space[16], space[17:20], space[20:23], space[23:28]
-    scratch = space[28, : 18 * BLOCK].reshape(18, BLOCK)
-    return np.empty(n), marks, (space[:3], raw_starts, kept), lines, nodal, scratch, np.empty((6, wide // BOX))
+    nodal = space[15], space[16], space[17:20], space[20:23]
+    scratch = space[23, : 18 * BLOCK].reshape(18, BLOCK)
+    return np.empty(n), marks, (space[:3], raw_starts, kept), lines, nodal, scratch
 
 
 @njit(**options)
-def _trace(level, level_par, box, mesh, d, number, summary, launched, places, work):
-    """One line on one mesh; returns whether every step was sure of it."""
+def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
+    """Equally spaced nodes of one line on one mesh, the longest curve first, left in the work space.
+
+    Returns whether there are any, whether every step was sure of them, and components, length and its relative error.
+    """
     vertices, normals, triangles, neighbours, edge, _, wanted = mesh
-    s, (lit, found, stamp), (raw, raw_starts, kept), flat, (kappa, h, beside, slopes, plane), scratch, boxes = work
+    s, (lit, found, stamp), (raw, raw_starts, kept), flat, (kappa, h, beside, slopes), scratch = work
     extent = max(box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[1, 2] - box[0, 2])
+    nothing = False, False, 0, np.nan, np.nan
     incidence_at(normals, d, s)
     mixed = mixed_triangles(s, triangles, lit, found)
     components = walk(s, vertices, triangles, neighbours, found, mixed, stamp, number, raw, raw_starts)
     if components < 1:
-        return False
+        return nothing
     n = raw_starts[components]
     x, T = flat[0][: 3 * n].reshape(3, n), flat[1][: 3 * n].reshape(3, n)
     for axis in range(3):
@@ -139,7 +177,7 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
     # next to a small loop a longer step would end on another branch
     reach = REACH * edge
     if newton(level, level_par, d, x, reach, scratch, T, kappa) == FAILED:
-        return False
+        return nothing
     step = newton(level, level_par, d, x, reach, scratch, T, kappa)
     sure = step < COARSE_STEP * edge
     for _ in range(MORE if not sure else 0):
@@ -149,12 +187,12 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
     lengths, counts = np.empty(COMPONENTS), np.empty(COMPONENTS, np.int64)
     share_nodes(x, T, kept, kept_starts, components, wanted, lengths, counts)
     # the longest curve first
-    starts, total = np.empty(COMPONENTS + 1, np.int64), 0
+    total = 0
     left = lengths[:components].copy()
     for c in range(components):
         total += counts[c]
-    if not (total <= kappa.shape[0] and lengths[:components].sum() < 1e6 * extent):
-        return False
+    if not (total + 2 * HALF <= kappa.shape[0] and lengths[:components].sum() < 1e6 * extent):
+        return nothing
     y, U = flat[2][: 3 * total].reshape(3, total), flat[3][: 3 * total].reshape(3, total)
     total = 0
     for c in range(components):
@@ -166,54 +204,42 @@ def _trace(level, level_par, box, mesh, d, number, summary, launched, places, wo
         total += counts[best]
     starts[components] = total
     if newton(level, level_par, d, y, reach, scratch, U, kappa) == FAILED:
-        return False
+        return nothing
     last = newton(level, level_par, d, y, reach, scratch, U, kappa)
     if not last < LOST * extent:
-        return False
+        return nothing
     sure &= last < UNSETTLED * extent
-    spacing, length, doubt = np.empty(COMPONENTS), 0.0, 0.0
+    length, error, rough = 0.0, 0.0, 0.0
     for again in range(2):
-        length, doubt = 0.0, 0.0
+        length, error, rough = 0.0, 0.0, 0.0
         for c in range(components):
             size = starts[c + 1] - starts[c]
-            own, error = spacings(y, U, starts[c], size, h, beside, slopes)
+            own, off, coarse = spacings(y, U, starts[c], size, h, beside, slopes)
             if own == FAILED:
-                return False
+                return nothing
             spacing[c] = own / size
-            length, doubt = length + own, doubt + error
+            length, error, rough = length + own, error + off, rough + coarse
             if again == 0:
                 equalise(y, slopes, starts[c], size, own, h)
         if again == 0 and not newton(level, level_par, d, y, reach, scratch, U, kappa) < LOST * extent:
-            return False
-    sure &= doubt < SETTLED * length
-    summary[0], summary[1], summary[2] = components, length, doubt / length
-    sure &= _finish(
-        level,
-        level_par,
-        box,
-        d,
-        y,
-        U,
-        kappa,
-        starts,
-        components,
-        spacing,
-        plane,
-        boxes,
-        scratch,
-        summary,
-        launched,
-        places,
-    )
-    return sure
+            return nothing
+    sure &= rough < SETTLED * length
+    return True, sure, components, length, error / length
 
 
 @njit(**options)
-def _finish(
-    level, level_par, box, d, x, T, kappa, starts, components, spacing, plane, boxes, scratch, summary, launched, places
+def finish(
+    level, level_par, box, d, x, T, kappa, starts, components, spacing, every, summary, launched, places, arcs, which
 ):
-    """Breaks, arcs and rays of a line with equally spaced nodes; returns whether every step was sure."""
+    """Arcs and rays of a line with equally spaced nodes.
+
+    arcs (LIMIT + components, 2) gets their ends, as numbers of nodes with fractions, and ``which`` (2, the same) their
+    component and state. Shares and rays are filled in; returns whether every step was sure, and the number of arcs.
+    """
     sure = True
+    n = starts[components]
+    owner, state = which[0], which[1]
+    plane, boxes, scratch = np.empty((5, n)), np.empty((6, n // BOX + 1)), aligned(18, BLOCK)
     at, where = np.empty(LIMIT), np.empty(LIMIT, np.int64)
     count = 0
     for c in range(components):
@@ -221,8 +247,8 @@ def _finish(
         where[count : count + some] = c
         count += some
         sure &= not hidden
-    extreme = project(x, T, x.shape[1], d, plane)
-    owner_of_box = np.empty(x.shape[1] // BOX + 1, np.int64)
+    extreme = project(x, T, n, d, plane)
+    owner_of_box = np.empty(n // BOX + 1, np.int64)
     if not convex(plane, starts, components):
         some = crossings(plane, starts, components, spacing, boxes, owner_of_box, at[count:], where[count:])
         sure &= some >= 0
@@ -231,47 +257,64 @@ def _finish(
     for c in range(components):
         number[c] = starts[c + 1] - starts[c]
     order_breaks(at, where, count, number)
-    arcs, owner = np.empty((LIMIT + COMPONENTS, 2)), np.empty(LIMIT + COMPONENTS, np.int64)
-    state = np.empty(LIMIT + COMPONENTS, np.int64)
     total = arcs_of(at, where, count, starts, components, arcs, owner)
     extent = max(box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[1, 2] - box[0, 2])
     reach = 0.01 * extent
-    sure &= classify(
-        level, level_par, box, d, x, T, starts, spacing, extreme, arcs, owner, total, reach, scratch, state
-    )
+    sure &= classify(level, level_par, box, d, x, starts, extreme, arcs, owner, total, reach, scratch, state)
     total = merge(arcs, owner, state, total, starts)
-    summary[3:6] = 0.0
+    summary[SHARES : SHARES + 3] = 0.0
     for k in range(total):
-        summary[3 + state[k]] += (arcs[k, 1] - arcs[k, 0]) * spacing[owner[k]] / summary[1]
-    rays = launched.shape[0]
-    given = np.empty(LIMIT + COMPONENTS, np.int64)
-    filled = share_rays(arcs, owner, state, total, spacing, rays, given)
-    points = np.empty((3, max(filled, 1)))
+        summary[SHARES + state[k]] += (arcs[k, 1] - arcs[k, 0]) * spacing[owner[k]] / summary[LENGTH]
+    if every:
+        whole, bearing, open_ = np.zeros((components, 2)), np.arange(components), np.full(components, ATTACHED)
+        whole[:, 1] = number
+        filled = _share(whole, bearing, open_, components, starts, spacing, x, launched, places)
+    else:
+        filled = _share(arcs, owner, state, total, starts, spacing, x, launched, places)
+    points, tangents, curvature = np.empty((3, filled)), np.empty((3, filled)), np.empty(filled)
+    for m in range(filled):
+        for axis in range(3):
+            points[axis, m] = launched[m, axis]
+    if filled:
+        newton(level, level_par, d, points, reach, scratch, tangents, curvature)
+    for m in range(filled):
+        c = places[m]
+        place = launched[m, ARCLENGTH] / spacing[c]
+        launched[m, PHASE] = 0.0
+        for axis in range(3):
+            launched[m, axis] = points[axis, m]
+            launched[m, PHASE] += d[axis] * points[axis, m]
+        if every:
+            # rounding may leave a place between two arcs: a concave point launches no creeping ray
+            launched[m, STATE] = CONCAVE
+        for k in range(total if every else 0):
+            if owner[k] == c and (place - arcs[k, 0]) % number[c] < arcs[k, 1] - arcs[k, 0]:
+                launched[m, STATE] = state[k]
+    return sure, total
+
+
+@njit(**options)
+def _share(arcs, owner, state, total, starts, spacing, x, launched, places):
+    """Share the rays among the arcs that launch, evenly spaced on each; returns how many there are."""
+    given, w = np.empty(total, np.int64), np.empty(2 * HALF)
+    filled = share_rays(arcs, owner, state, total, spacing, launched.shape[0], given)
+    point = np.empty((3, 1))
     r = 0
     for k in range(total):
         c = owner[k]
         size = starts[c + 1] - starts[c]
         long = arcs[k, 1] - arcs[k, 0]
+        # half a spacing from the ends of an arc, where kappa_n or the illumination stops
         offset = 0.0 if long == size else 0.5
         for m in range(given[k]):
             if state[k] != ATTACHED or r == filled:
                 break
-            place = arcs[k, 0] + long * (m + offset) / given[k]
-            point_at(x, T, starts[c], size, spacing[c], place, points, r)
-            launched[r, 3], launched[r, 5] = (place % size) * spacing[c], k
-            launched[r, 6], launched[r, 7] = long * spacing[c] / given[k], long == size
+            place = (arcs[k, 0] + long * (m + offset) / given[k]) % size
+            interpolate(x, starts[c], size, place, w, point, 0)
+            launched[r, 0], launched[r, 1], launched[r, 2] = point[0, 0], point[1, 0], point[2, 0]
+            launched[r, ARCLENGTH], launched[r, ARC] = place * spacing[c], k
+            launched[r, SPACING], launched[r, CLOSED] = long * spacing[c] / given[k], long == size
+            launched[r, STATE] = ATTACHED
             places[r] = c
             r += 1
-    tangents, curvature = np.empty_like(points), np.empty(points.shape[1])
-    if filled:
-        newton(level, level_par, d, points, reach, scratch, tangents, curvature)
-    for m in range(rays):
-        if m < filled:
-            launched[m, 4] = 0.0
-            for axis in range(3):
-                launched[m, axis] = points[axis, m]
-                launched[m, 4] += d[axis] * points[axis, m]
-        else:
-            launched[m, :] = np.nan
-            places[m] = NO_RAY
-    return sure
+    return filled

@@ -20,7 +20,7 @@ import numpy as np
 from creeping._typing import Any, IntArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.geometry.surface import Surface
-from creeping.rays.fan import Flow
+from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
 from creeping.sweeping.plan import Arrays, SweepPlan, differing, open_flow, save_flow

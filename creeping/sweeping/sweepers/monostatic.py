@@ -6,8 +6,8 @@ from creeping._typing import Any
 from creeping.field.backscatter import BackscatterGeometry
 from creeping.field.boundary import parse_boundary
 from creeping.field.far import FORWARD, field_of
-from creeping.rays.fan import Flow
 from creeping.rays.single import SingleRayTracer
+from creeping.rays.transport import Flow
 from creeping.shadow.many import ShadowLines
 from creeping.shadow.status import SINGULAR
 from creeping.sweeping.request import LINE, SweepRequest

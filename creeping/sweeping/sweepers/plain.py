@@ -10,7 +10,8 @@ from creeping.errors import SingularIncidenceError
 from creeping.field.boundary import parse_boundary
 from creeping.field.far import far_field
 from creeping.geometry.surface import Surface
-from creeping.rays.fan import Flow, RayFan, launch
+from creeping.rays.fan import RayFan, launch
+from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.status import NO_RAY, OK, SINGULAR
 from creeping.sweeping.request import SweepRequest

@@ -9,7 +9,7 @@ from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import compiled_parts
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
-from creeping.rays.fan import Flow
+from creeping.rays.transport import Flow
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.sweepers.compiled import CompiledSweeper
 from creeping.sweeping.sweepers.plain import PlainSweeper

@@ -6,7 +6,8 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.integrator import pack, trace_states
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import pack
 from creeping.kernels.threads import thread_count
 from creeping.phaseflow.building import Plan, build_direct, measured
 from creeping.phaseflow.coordinates import rotation as compiled_models

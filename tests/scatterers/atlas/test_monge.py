@@ -11,7 +11,7 @@ from tolerances import TWIN
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.integrator import pack
+from creeping.geodesics.states import pack
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import project
 from scatterers.atlas.monge.atlas import MongeAtlas

@@ -1,0 +1,52 @@
+"""A shadow line followed by itself: critical points of n.d, a mesh refined until the signs decide, panels to rounding.
+
+The last resort, some tenths of a second a line; what comes out is a `LineNodes` like any other.
+"""
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.geometry.surface import Surface
+from creeping.shadow.critical_points import critical_points
+from creeping.shadow.nodes import LineNodes, prepared
+from creeping.shadow.panels import PanelCurve, newton_step
+from creeping.shadow.refinement import shadow_curves
+
+NODES = (512, 16_384)
+"""Fewest and most nodes of a curve."""
+A_PANEL = 24
+"""Nodes on the shortest panel."""
+
+
+def followed(body: Surface, direction: FloatArray) -> tuple[LineNodes, tuple[PanelCurve, ...], float]:
+    """Nodes of the line of a unit direction, its curves in panels, and the least |n.d| at a critical point.
+
+    Raises
+    ------
+    SingularIncidenceError
+        If the line crosses itself, or so nearly that its curves cannot be told apart.
+    """
+    mesh = prepared(body).coarsest
+    critical = critical_points(body, direction, mesh)
+    critical.refuse()
+    curves = tuple(sorted(shadow_curves(body, direction, mesh, critical), key=lambda curve: -curve.length))
+    points, spacing = [], []
+    for curve in curves:
+        shortest = float(np.min(np.diff(curve.breaks)))
+        # a multiple of 8, as the search for crossings goes by boxes of so many
+        count = 8 * int(np.clip(np.ceil(A_PANEL * curve.length / shortest), *NODES) / 8)
+        points.append(curve.at(curve.length * np.arange(count) / count))
+        spacing.append(curve.length / count)
+    x = np.concatenate(points)
+    _, tangents = newton_step(body, direction, x)
+    bent = np.einsum("nij,i,j->n", body.hessian(x), direction, direction)
+    nodes = LineNodes(
+        points=np.ascontiguousarray(x.T),
+        tangents=np.ascontiguousarray(tangents.T),
+        curvature=bent / np.linalg.norm(body.gradient(x), axis=1),
+        starts=np.cumsum([0, *map(len, points)]).astype(np.int64),
+        spacing=np.array(spacing),
+        # panels are exact to rounding
+        error=1e-12,
+    )
+    return nodes, curves, critical.distance

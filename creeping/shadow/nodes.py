@@ -1,0 +1,169 @@
+"""A shadow line as equally spaced nodes, on the coarsest mesh that is sure of it; its arcs and its launch points.
+
+Where no mesh is sure, or next to a singular direction, the line is followed with its topology proven (`following`) and
+the same kernels finish it.
+"""
+
+from dataclasses import dataclass
+from weakref import finalize
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.surface import Surface, size
+from creeping.shadow.meshes import LineMeshes
+from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
+
+NEAR = 1e-3
+"""Longest step, in body sizes, that brings an interpolated point onto the line."""
+FORBIDDEN = 1e-6
+"""v below which a line counts as one that crosses itself."""
+_PREPARED: dict[int, LineMeshes] = {}
+"""By identity: bodies may be equal to others, or not be hashable."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineNodes:
+    """Nodes of the closed curves of one line, the longest first.
+
+    Attributes
+    ----------
+    points, tangents : (3, n), L and 1
+        One curve after the other.
+    curvature : (n,), 1/L
+        kappa_n(d).
+    starts : (curves + 1,)
+        First node of each curve, and their number.
+    spacing : (curves,), L
+    error : float
+        Estimated relative error of the length.
+    """
+
+    points: FloatArray
+    tangents: FloatArray
+    curvature: FloatArray
+    starts: IntArray
+    spacing: FloatArray
+    error: float
+
+    @property
+    def length(self) -> float:
+        """Length of all curves, L."""
+        return float(np.sum(self.spacing * np.diff(self.starts)))
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """Arcs and launch points of one line.
+
+    Attributes
+    ----------
+    arcs : (a, 2)
+        Ends in nodes of their curve, the second beyond their number where an arc comes round.
+    curve, state : (a,)
+        Of each arc.
+    shares : (3,)
+        Of the length, by state.
+    launched : (rays, LAUNCHED), places : (rays,)
+        See `creeping.shadow.kernels.trace`.
+    sure : bool
+    """
+
+    arcs: FloatArray
+    curve: IntArray
+    state: IntArray
+    shares: FloatArray
+    launched: FloatArray
+    places: np.ndarray[Any, np.dtype[np.int16]]
+    sure: bool
+
+
+def prepared(body: Surface) -> LineMeshes:
+    """Meshes of a body, made once."""
+    key = id(body)
+    if key not in _PREPARED:
+        _PREPARED[key] = LineMeshes(body)
+        finalize(body, _PREPARED.pop, key, None)
+    return _PREPARED[key]
+
+
+def box_of(body: Surface) -> FloatArray:
+    """Bounds as kernels take them: (2, 3), L."""
+    return np.ascontiguousarray(body.bounds, dtype=float)
+
+
+def critical_distances(body: Surface, directions: FloatArray) -> FloatArray:
+    """v, least |n.d| at critical points of n.d with K = 0, inf without one: (n, 3) -> (n,)."""
+    from creeping.shadow.kernels.trace import least_criticals
+
+    least = np.empty(len(directions))
+    least_criticals(prepared(body).critical, directions, least)
+    return least
+
+
+def settled(v: FloatArray, sure: BoolArray, turn: float, tier: int) -> tuple[BoolArray, IntArray]:
+    """Which lines go on to the next mesh, and the codes of the others.
+
+    A line is certain if every step was sure of it and the direction is so far from a singular one, v > e^2 with e the
+    mean angle between neighbouring normals, that the mesh cannot have missed a small loop.
+    """
+    far = v > turn * turn
+    last = tier >= LineMeshes.count - 2
+    code = np.where(sure, np.where(far, OK, NEAR_SINGULAR), FOLLOWED)
+    onward = ~sure | (~far & (not last))
+    return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
+
+
+def line_nodes(body: Surface, direction: FloatArray) -> tuple[LineNodes | None, int, float]:
+    """Nodes of the line of a unit direction, its code, and v; no nodes where the line is to be followed."""
+    from creeping.shadow.kernels.trace import trace_nodes
+
+    v = float(critical_distances(body, direction[None])[0])
+    if v < FORBIDDEN:
+        return None, SINGULAR, v
+    box = box_of(body)
+    for tier in range(LineMeshes.count):
+        with evaluators(body) as parts:
+            found, sure, x, T, kappa, starts, spacing, _, error = trace_nodes(
+                *parts[:2], box, prepared(body).packed(tier), direction
+            )
+        nodes = LineNodes(x, T, kappa, starts, spacing, error) if found else None
+        sure = nodes is not None and sure and finished(body, direction, nodes, 0).sure
+        onward, code = settled(np.array([v]), np.array([sure]), prepared(body).turn(tier), tier)
+        if not onward[0]:
+            return nodes if sure else None, int(code[0]), v
+    raise AssertionError("the last mesh sends no line on")
+
+
+def polished(body: Surface, direction: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points next to a line moved onto it, with T and kappa_n(d): (n, 3) -> (n, 3), (n, 3), (n,)."""
+    from creeping.kernels.block import BLOCK, aligned
+    from creeping.shadow.kernels.newton import newton
+
+    x, tangents, curvature = np.ascontiguousarray(points.T), np.empty((3, len(points))), np.empty(len(points))
+    work = aligned(18, BLOCK)
+    with evaluators(body) as parts:
+        for _ in range(2):
+            newton(*parts[:2], direction, x, NEAR * size(body), work, tangents, curvature)
+    return np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T), curvature
+
+
+def finished(body: Surface, direction: FloatArray, nodes: LineNodes, n_rays: int, *, every: bool = False) -> Finished:
+    """Arcs of a line, and so many launch points: on its attached arcs, or with ``every`` on the whole of it."""
+    from creeping.shadow.kernels.crossings import LIMIT
+    from creeping.shadow.kernels.trace import ERROR, LAUNCHED, LENGTH, SHARES, SUMMARY, finish
+    from creeping.shadow.status import NO_RAY
+
+    curves = len(nodes.spacing)
+    summary, arcs = np.zeros(SUMMARY), np.empty((LIMIT + curves, 2))
+    summary[LENGTH], summary[ERROR] = nodes.length, nodes.error
+    which = np.empty((2, LIMIT + curves), np.int64)
+    launched, places = np.full((n_rays, LAUNCHED), np.nan), np.full(n_rays, NO_RAY, np.int16)
+    with evaluators(body) as parts:
+        sure, total = finish(
+            *parts[:2], box_of(body), direction, nodes.points, nodes.tangents, nodes.curvature, nodes.starts, curves,
+            nodes.spacing, every, summary, launched, places, arcs, which,
+        )  # fmt: skip
+    shares = summary[SHARES : SHARES + 3]
+    return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, bool(sure))
