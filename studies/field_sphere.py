@@ -65,7 +65,7 @@ def worst(found: ComplexArray, exact: ComplexArray) -> float:
 def creeping_rays(fan: RayFan, k: float, boundary: Any, order: int) -> float:
     """Short and long isolated ray, 30 to 150 deg, against the Regge poles."""
     theta = np.radians(np.arange(30, 151, 10.0))
-    geometry = far_geometry(fan, observers(theta), k)
+    geometry = far_geometry(fan, observers(theta))
     kind = scalar_boundaries(boundary)[0]
     found = np.zeros(len(theta), dtype=complex)
     np.add.at(found, geometry.shed.observer, isolated_rays(geometry, k, kind, order))
@@ -75,7 +75,7 @@ def creeping_rays(fan: RayFan, k: float, boundary: Any, order: int) -> float:
 
 def back_axis(fan: RayFan, k: float, boundary: Any, order: int) -> float:
     """Fan integral at backscatter, where all rays merge, against the Regge poles."""
-    geometry = far_geometry(fan, [[0.0, 0, -1]], k)
+    geometry = far_geometry(fan, [[0.0, 0, -1]])
     nodes = geometry.fan_nodes(k, np.array([True]))
     found = fan_half(nodes, geometry.directions, k, scalar_boundaries(boundary)[0], order).sum()
     return worst(np.array([found]), watson.far_field(k, 1.0, [np.pi], boundary))

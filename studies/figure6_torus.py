@@ -25,7 +25,7 @@ LAUNCHED = {"all": "all of the shadow line launches", "attached": "attached poin
 def fans(flow: cr.PhaseMap, rays: int) -> list[cr.RayFan]:
     """Rays of both kinds of launch."""
     line = cr.shadow_line(BODY, DIRECTION)
-    return [cr.launch(flow, line, length=LENGTH, n_rays=rays, status=status) for status in LAUNCHED]
+    return [cr.launch(flow, line, length=LENGTH, n_rays=rays, launch_from=status) for status in LAUNCHED]
 
 
 def draw(path: Path, quick: bool) -> dict[str, Any]:

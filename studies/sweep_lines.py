@@ -18,7 +18,10 @@ import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.geometry.directions import fibonacci_directions
-from creeping.shadow.many import prepared, shadow_lines
+from creeping.geometry.evaluators import evaluators
+from creeping.shadow.many import shadow_lines
+from creeping.shadow.meshes import LineMeshes
+from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, prepared, settled
 from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
 from studies._flow_cases import Row, show, threads
 from studies._peers import measured
@@ -45,19 +48,19 @@ class Lines(NamedTuple):
     singular_distance: FloatArray
 
 
-def on_meshes(body: Any, directions: FloatArray, tiers: tuple[int, int, int]) -> Lines:
-    """Lines on chosen meshes, one for each attempt; none is followed by other means."""
-    from creeping.shadow.kernels.trace import trace_lines
+def on_mesh(body: Any, directions: FloatArray, tier: int) -> Lines:
+    """Lines on one mesh; none is sought on another or followed."""
+    from creeping.shadow.kernels.trace import LAUNCHED, SUMMARY, trace_lines
 
     n, lines = len(directions), prepared(body)
-    summary, status = np.empty((n, 7)), np.empty(n, np.int8)
-    launched, places = np.empty((n, RAYS, 8)), np.empty((n, RAYS), np.int16)
-    box, level = np.ascontiguousarray(body.bounds, dtype=float), body.compiled
-    meshes = tuple(lines.meshes[tier] for tier in tiers)
-    trace_lines(
-        level.function, level.parameters, box, meshes, lines.critical, directions, summary, status, launched, places
-    )
-    return Lines(status, summary[:, 0], summary[:, 1], summary[:, 3:6], summary[:, 6])
+    summary, sure = np.empty((n, SUMMARY)), np.empty(n, bool)
+    launched, places = np.empty((n, RAYS, LAUNCHED)), np.empty((n, RAYS), np.int16)
+    with evaluators(body) as parts:
+        trace_lines(*parts[:2], box_of(body), lines.packed(tier), directions, False, summary, sure, launched, places)
+    v = critical_distances(body, directions)
+    _, status = settled(v, sure, lines.turn(tier), LineMeshes.count - 2)
+    status[v < FORBIDDEN] = SINGULAR
+    return Lines(status, summary[:, 0], summary[:, 1], summary[:, 3:6], v)
 
 
 def swept(body: Any, directions: FloatArray) -> Lines:
@@ -105,18 +108,18 @@ def measure(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     found = swept(body, directions)
     seconds, meshes = (
         measured(call, REPEATS) / count
-        for call in (partial(swept, body, directions), partial(on_meshes, body, directions, (0, 1, 2)))
+        for call in (partial(swept, body, directions), partial(on_mesh, body, directions, 0))
     )
-    second = int(np.sum(on_meshes(body, directions, (0, 0, 0)).status != OK))
-    third = int(np.sum(on_meshes(body, directions, (0, 1, 1)).status != OK))
-    first: Row = {"body": name, "us a line": 1e6 * seconds, "on meshes": 1e6 * meshes}
+    second = int(np.sum(on_mesh(body, directions, 0).status != OK))
+    third = int(np.sum(on_mesh(body, directions, 1).status != OK))
+    first: Row = {"body": name, "us a line": 1e6 * seconds, "on the first mesh": 1e6 * meshes}
     for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
         first[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
     least = np.min(found.singular_distance)
     first |= {"need mesh 2": second, "need mesh 3": third}
     counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
     first |= {"curves seen": " ".join(map(str, counts)), "least v": float(least) if np.isfinite(least) else np.nan}
-    finest = on_meshes(body, directions, (2, 2, 2))
+    finest = on_mesh(body, directions, 2)
     # what even the finest mesh is not sure of is no reference
     finest.length[finest.status == FOLLOWED] = np.nan
     panels, each = independent(body, directions[::every])

@@ -21,8 +21,7 @@ from creeping.phaseflow.tuning.flow_choice import tuned_direct
 from creeping.shadow.many import shadow_lines
 from creeping.shadow.status import SINGULAR
 from creeping.sweeping.request import sweep_request
-from creeping.sweeping.sweepers.compiled import CompiledSweeper
-from creeping.sweeping.sweepers.plain import PlainSweeper
+from creeping.sweeping.sweeper import Sweeper
 from studies._flow_cases import Row, body, closed_form, show, threads
 from studies._peers import measured, scipy_flow
 
@@ -50,8 +49,8 @@ def errors_of_rays(name: str, flow: Any, incidences: FloatArray, n_rays: int) ->
     counted in "missed" and its attenuation left out.
     """
     request = sweep_request("rays", length=LENGTH, n_rays=n_rays)
-    exact = CompiledSweeper(cr.DirectFlow(body(name), rtol=1e-12), request)(incidences)
-    found = CompiledSweeper(flow, request)(incidences)
+    exact = Sweeper(cr.DirectFlow(body(name), rtol=1e-12), request)(incidences)
+    found = Sweeper(flow, request)(incidences)
     gap = np.linalg.norm(found["points"] - exact["points"], axis=-1)
     J = (found["spreading"] - exact["spreading"]) / (1 + np.abs(exact["spreading"]))
     A = (found["attenuation"] - exact["attenuation"])[..., 0]
@@ -69,7 +68,7 @@ def errors_of_rays(name: str, flow: Any, incidences: FloatArray, n_rays: int) ->
 def _parts(name: str, flow: Any, incidences: FloatArray, n_rays: int) -> Row:
     """Incidences a second, and us an incidence for line and rays."""
     n = len(incidences)
-    sweeper = CompiledSweeper(flow, sweep_request("rays", length=LENGTH, n_rays=n_rays))
+    sweeper = Sweeper(flow, sweep_request("rays", length=LENGTH, n_rays=n_rays))
     whole = measured(lambda: sweeper(incidences), REPEATS) / n
     # as the sweeper calls it: a batch at a time
     line = measured(lambda: [shadow_lines(body(name), part, n_rays) for part in _batches(incidences)], REPEATS) / n
@@ -107,7 +106,7 @@ def fields(names: tuple[str, ...] = BODIES, count: int = 256, checked: int = 4) 
     for name in names:
         reference: Any = None
         for direct in (True, False):
-            sweeper = CompiledSweeper(flow_of(name, TOLERANCES[0], direct), request)
+            sweeper = Sweeper(flow_of(name, TOLERANCES[0], direct), request)
             seconds = measured(partial(sweeper, incidences), REPEATS) / count
             found = sweeper(incidences)
             reference = found if direct else reference
@@ -116,19 +115,16 @@ def fields(names: tuple[str, ...] = BODIES, count: int = 256, checked: int = 4) 
             row["status > 0"] = int(np.sum(found["incidence_status"] > 0))
             gap = np.abs(found["creeping"] - reference["creeping"]) > 0.1 * np.abs(reference["creeping"])
             row["off"] = float(np.mean(np.any(gap & ~found["unresolved"], axis=(1, 2))))
-            row |= _against_plain(name, found, incidences, request, checked)
+            row |= _against_finer(name, found, incidences, request, checked)
             rows.append(row)
     return rows
 
 
-def _against_plain(name: str, found: dict[str, Any], incidences: FloatArray, request: Any, checked: int) -> Row:
-    """Creeping and reflected fields against the plain route with an exact flow and four times the rays.
-
-    Each over its own size. With as many rays as the sweep the plain route misses some that are shed, on the torus.
-    """
+def _against_finer(name: str, found: dict[str, Any], incidences: FloatArray, request: Any, checked: int) -> Row:
+    """Creeping and reflected fields against those of an exact flow and four times the rays, each over its own size."""
     some = np.flatnonzero(found["incidence_status"] < SINGULAR)[:: max(1, len(incidences) // checked)]
     more = replace(request, n_rays=4 * request.n_rays)
-    plain = PlainSweeper(cr.DirectFlow(body(name), rtol=1e-10), more)(incidences[some])
+    plain = Sweeper(cr.DirectFlow(body(name), rtol=1e-10), more)(incidences[some])
     gaps = {}
     for part in ("creeping", "reflected"):
         exact = plain[part]
@@ -163,7 +159,7 @@ def against_scipy(names: tuple[str, ...] = BODIES, count: int = 512, lines: int 
         shape, form = body(name), closed_form(name)
         line = measured(partial(_lines_one_by_one, shape, few), 1) / len(few)
         found = shadow_lines(shape, few, rays)
-        states = pack(found.launch_points.reshape(-1, 3), np.repeat(found.directions, rays, axis=0), lanes=12)
+        states = pack(found.launch.points.reshape(-1, 3), np.repeat(found.directions, rays, axis=0), lanes=12)
         states = states[np.isfinite(states[:, 0])]
         times = np.array([LENGTH])
         exact = cr.DirectFlow(shape, rtol=1e-12).transport(states, times)[:, 0]
@@ -194,7 +190,7 @@ def growth(
     flow, incidences = flow_of("twisted", TOLERANCES[0]), fibonacci_directions(count)
 
     def run(d: FloatArray, **options: Any) -> float:
-        sweeper = CompiledSweeper(flow, sweep_request(length=LENGTH, **options))
+        sweeper = Sweeper(flow, sweep_request(length=LENGTH, **options))
         return measured(lambda: sweeper(d), REPEATS)
 
     by_number = [run(fibonacci_directions(n), quantity="rays", n_rays=64) for n in numbers]

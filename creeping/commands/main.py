@@ -163,7 +163,7 @@ def _carrier(
     import creeping as cr
     from creeping.rays.fan import enough_steps
 
-    steps = enough_steps(shape, line, length)
+    steps = enough_steps(shape, length)
     if flow == "direct":
         # errors of the steps add up and grow along the rays
         return cr.DirectFlow(shape, rtol=min(max(1e-4 * tolerance, 1e-13), 1e-8)), steps

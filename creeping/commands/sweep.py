@@ -146,7 +146,7 @@ def _flow(read: Any, body: Any, request: Any, cache: bool, say: Any) -> Any:
     if read.flow == "direct":
         # errors of the steps add up and grow along the rays
         return cr.DirectFlow(body, rtol=min(max(1e-4 * read.tolerance, 1e-13), 1e-8))
-    from creeping.sweeping.sweepers.selection import outputs_of
+    from creeping.sweeping.sweeper import outputs_of
 
     asked = {"length": request.length, "outputs": outputs_of(body, request), "tolerance": read.tolerance}
     asked |= {"rays": len(read.incidences) * request.n_rays, "cache": cache, "progress": say}

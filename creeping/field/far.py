@@ -17,7 +17,7 @@ from creeping._presenting import Drawn
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.far_geometry import FarGeometry, Geometry, far_geometry, merging, off_axis
+from creeping.field.far_geometry import FarGeometry, far_geometry, merging, off_axis
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.polarisation import dyads, wave_frame
 from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude
@@ -124,11 +124,11 @@ def far_field(
     """
     scalar_boundaries(boundary)
     k = checked(wavenumber, order)
-    return field_of(far_geometry(fan, observation, k), k, boundary, order)
+    return field_of(far_geometry(fan, observation), k, boundary, order)
 
 
-def field_of(geometry: Geometry, k: float, boundary: BoundaryLike, order: int) -> FarField:
-    """Far field of a geometry; its observers may have an incidence each."""
+def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int) -> FarField:
+    """Far field of a geometry, one row for each observer of each incidence."""
     kinds = scalar_boundaries(boundary)
     parts = _Parts(geometry, len(kinds), k, order)
     for number, kind in enumerate(kinds):
@@ -159,7 +159,7 @@ def checked(wavenumber: float, order: int) -> float:
     return k
 
 
-def isolated_rays(geometry: Geometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
+def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
     rays = geometry.shed.rays
     m1, m2 = scales(rays, wavenumber)
@@ -175,7 +175,7 @@ def isolated_rays(geometry: Geometry, wavenumber: float, boundary: Boundary, ord
     return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
 
 
-def passed_fold(geometry: Geometry) -> BoolArray:
+def passed_fold(geometry: FarGeometry) -> BoolArray:
     """Whether a shed ray is past the fold J' = 0 of its launch point (n,): φ outside [0, π/2], or turned back.
 
     Over ground with K < 0, φ may come back to 0.
@@ -209,9 +209,9 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
 class _Parts:
     """Weighted parts of the far field, summed contribution by contribution."""
 
-    def __init__(self, geometry: Geometry, kinds: int, wavenumber: float, order: int) -> None:
+    def __init__(self, geometry: FarGeometry, kinds: int, wavenumber: float, order: int) -> None:
         self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
-        self.incident = np.broadcast_to(geometry.direction, geometry.directions.shape)
+        self.incident = geometry.direction
         self.vector = kinds == 2
         m = len(geometry.directions)
         self.creeping, self.reflected, self.forward = (
@@ -263,26 +263,25 @@ class _Parts:
             self._add_forward(number, kind)
 
     def _add_forward(self, number: int, kind: Boundary) -> None:
-        """Add the forward lobe, that of one incidence."""
+        """Add the forward lobes."""
         g, k, order, w = self.geometry, self.wavenumber, self.order, self.in_forward
-        assert isinstance(g, FarGeometry)
-        d = g.direction
         shadow, lit, lost = g.forward_nodes(k, w > 0)
         self.lost[lost] = True
-        if g.line.fractions["occluded"] > HIDDEN:
-            self.lost[w > 0] = True
-        wave = shadow_half(shadow, g.directions, d, k, kind, order, self.beyond_axis[shadow.observer])
+        wave = shadow_half(shadow, g.directions, self.incident, k, kind, order, self.beyond_axis[shadow.observer])
         wave = _weighted(w[shadow.observer], wave)
         self._sum(
             self.forward, number, shadow.observer, wave, shadow.rays.first_normal, g.normals_of(shadow.rays.points)
         )
-        wave = lit_half(lit, g.directions, d, k, kind, order, self.beyond_axis[lit.observer])
+        wave = lit_half(lit, g.directions, self.incident, k, kind, order, self.beyond_axis[lit.observer])
         self._sum(self.forward, number, lit.observer, _weighted(w[lit.observer], wave), lit.normals, lit.normals)
-        ahead = np.flatnonzero((w > 0) & (self.beyond_axis < 1))
-        wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(g.line, g.directions[ahead], k)
-        # any normal of the plane of d and r will do, and any vector across d where they are one
-        aside = np.cross(d, off_axis(g.directions[ahead], d))
-        self._sum(self.forward, number, ahead, wave, aside, aside)
+        for incidence in np.unique(g.incidence[w > 0]):
+            here, line = (g.incidence == incidence) & (w > 0), g.line_of(int(incidence))
+            self.lost[here] |= line.fractions["occluded"] > HIDDEN
+            ahead = np.flatnonzero(here & (self.beyond_axis < 1))
+            wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(line, g.directions[ahead], k)
+            # any normal of the plane of d and r will do, and any vector across d where they are one
+            aside = np.cross(line.direction, off_axis(g.directions[ahead], line.direction))
+            self._sum(self.forward, number, ahead, wave, aside, aside)
 
     def _sum(
         self, into: ComplexArray, number: int, observer: IntArray, wave: ComplexArray, n0: FloatArray, n: FloatArray

@@ -1,22 +1,34 @@
-"""Geometry of the far field of one incidence in given directions; no wavenumber but in how finely it is sampled."""
+"""Geometry of the far field: what every frequency and boundary shares, of many incidences with their observers.
 
-from abc import ABC, abstractmethod
+Rays of the fans, carried in long steps, tell where to look; those that matter are traced again, exactly. Observers are
+numbered through: (incidence 0, its first observer), (incidence 0, its second), ...
+"""
+
+from collections.abc import Callable
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.creeping_modes import fock_scale
-from creeping.geometry.surface import Surface, normal, project, size
-from creeping.rays.fan import RayFan
-from creeping.rays.observer_contour import HorizonGrid, HorizonRays, MidHorizon, forward_nodes
+from creeping.geodesics.equations import natural_horizon
+from creeping.geodesics.states import WITH_JACOBI
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.surface import normal, project, size
+from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.observer_contour import HorizonRays, MidHorizon, forward_nodes
 from creeping.rays.quantities import RayPoints
-from creeping.rays.shedding import ShedRays, shed_far
+from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
+from creeping.rays.tracer import TURN, RayTracer
+from creeping.rays.transport import Flow, carried
+from creeping.shadow.attachment import LaunchPoints
+from creeping.shadow.line import ShadowLine
+from creeping.shadow.nodes import prepared
 from creeping.shadow.occlusion import occluded
+from creeping.shadow.status import ATTACHED, NO_RAY
 
 _KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionary()
 _STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()
@@ -26,66 +38,14 @@ ALONG = 0.9
 """p.r above which a crossing is near a ray towards the observer."""
 EARLY = 0.28
 """Time, in body sizes, before which a horizon crossing does not count for merging."""
-
-
-class Geometry(ABC):
-    """What the far field in m directions is assembled from.
-
-    The incidence is one, d (3,), or one for each observer, (m, 3); the forward lobe asks for a `FarGeometry`.
-    """
-
-    body: Surface
-    directions: FloatArray
-    direction: FloatArray
-
-    @property
-    @abstractmethod
-    def angle(self) -> FloatArray:
-        """Angle from d (m,)."""
-
-    @property
-    @abstractmethod
-    def mean_root_radius(self) -> FloatArray | float:
-        """Mean of ρ^(1/3) over the launch points, one or (m,): m̄ = (k/2)^(1/3) times it."""
-
-    @property
-    @abstractmethod
-    def shed(self) -> ShedRays:
-        """Rays with p = r."""
-
-    @property
-    @abstractmethod
-    def long(self) -> BoolArray:
-        """Whether a shed ray has crossed the observer's horizon before (n,)."""
-
-    @property
-    @abstractmethod
-    def specular(self) -> SpecularPoints:
-        """Specular points of the lit side."""
-
-    @property
-    @abstractmethod
-    def least_merging(self) -> FloatArray:
-        """Least χ = |J|/(|J| + ρ|J'|) over horizon crossings with p.r > ALONG, of each observer (m,); 0 without any."""
-
-    @abstractmethod
-    def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
-        """Nodes of the fan integral for the wanted observers."""
-
-    @cached_property
-    def shed_normals(self) -> FloatArray:
-        """Normals where shed rays leave (n, 3)."""
-        return self.normals_of(self.shed.rays.points)
-
-    @cached_property
-    def leaves(self) -> BoolArray:
-        """Whether a shed ray misses the body on its way out (n,)."""
-        # interpolated points may lie below the surface by their error
-        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
-
-    def normals_of(self, points: FloatArray) -> FloatArray:
-        """N at points (n, 3)."""
-        return normal(self.body, points)
+TAPERED = 0.2
+"""p.r up to which a crossing is no node of the fan integral: its taper starts at 0.3."""
+ALIKE = 1e-2
+"""Distance, in cells, below which two rays found are one: searches end within 1e-4 or so of each other."""
+APART = 2.0
+"""Spacing of the nodes of a fan integral, in 1/k: a periodic integrand sampled so errs by less than 1e-6 of itself."""
+LONGEST_TIE = 12
+"""Solutions of one observer that may end at equal times: mirror images of each other, and what was found twice."""
 
 
 def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
@@ -95,7 +55,7 @@ def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
     return tuple(strip for strip in _STRIPS[fan] if single or len(strip.positions) > 1)
 
 
-def far_geometry(fan: RayFan, observation: ArrayLike, wavenumber: float) -> "FarGeometry":
+def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     """Geometry of a fan for directions (..., 3), kept with the fan until other directions are asked for."""
     try:
         r = np.array(observation, dtype=float)
@@ -114,8 +74,50 @@ def far_geometry(fan: RayFan, observation: ArrayLike, wavenumber: float) -> "Far
     key = r.tobytes()
     kept = _KEPT.get(fan)
     if kept is None or kept[0] != key:
-        _KEPT[fan] = kept = (key, FarGeometry(fan, r))
+        tracer = RayTracer(fan.body, fan.length)
+        # not the fan itself: this is kept as long as the fan lives
+        line, make = fan.line, _forward_parts(fan)
+        geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], lambda _: (line, make()))
+        _KEPT[fan] = kept = (key, geometry)
     return kept[1]
+
+
+def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":
+    from weakref import ref
+
+    known = ref(fan)
+
+    def make() -> tuple[Strip, ...]:
+        found = known()
+        assert found is not None
+        return fan_strips(found)
+
+    return make
+
+
+def launched_by(fan: RayFan) -> LaunchPoints:
+    """Launch points of the rays of a fan that the wave itself launches: n is 1.
+
+    Each run of neighbours among them is an arc of its own, closed if it is a whole closed arc of the fan.
+    """
+    creeping = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.ROUGH))
+    mine = np.flatnonzero(creeping)
+    starts = fan.arc_index[mine[1:]] != fan.arc_index[mine[:-1]]
+    arc = np.cumsum(np.concatenate([[0], starts | (np.diff(mine) > 1)])) if len(mine) else np.zeros(0)
+    whole = [bool(creeping[fan.arc_index == k].all()) and closed for k, closed in enumerate(fan.closed_arcs)]
+    closed = np.array([whole[k] for k in fan.arc_index[mine]], dtype=float)
+    x = fan.points[mine, 0]
+    rows: tuple[Any, ...] = (
+        x,
+        fan.arclength[mine],
+        np.sum(x * fan.line.direction, axis=1),
+        fan.curve_index[mine],
+        arc.astype(float),
+        fan.spacing[mine],
+        closed,
+        np.full(len(mine), ATTACHED),
+    )
+    return LaunchPoints(fan.line.direction[None], *(row[None] for row in rows))
 
 
 def off_axis(directions: FloatArray, axis: FloatArray) -> FloatArray:
@@ -133,91 +135,230 @@ def merging(rays: RayPoints) -> FloatArray:
         return np.nan_to_num(J / (J + rate / rays.curvature[1]))
 
 
-class FarGeometry(Geometry):
-    """What every frequency shares: rays shed towards the observers, specular points, nodes of the integrals."""
+class FarGeometry:
+    """What the far field of n incidences in m directions each is assembled from.
 
-    def __init__(self, fan: RayFan, directions: FloatArray) -> None:
-        # not the fan itself: this is kept as long as the fan lives
-        self.directions, self.launch_curvature = directions, fan.curvature[:, 0]
-        self.line, self.body, self.direction = fan.line, fan.body, fan.line.direction
-        self.strips = fan_strips(fan)
-        self._fan_nodes: tuple[tuple[int, bytes], HorizonRays] | None = None
-        self._forward: tuple[tuple[int, bytes], tuple[HorizonRays, MidHorizon, IntArray]] | None = None
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+        Of a plain body.
+    launch : LaunchPoints
+        Of the incidences (n); the attached ones alone.
+    tracer : RayTracer
+        Its length is that of the rays.
+    observers : (n, m, 3)
+        Unit directions r.
+    forward : callable
+        The shadow line and the strips of the fan of an incidence, for its forward lobe.
+
+    Attributes
+    ----------
+    directions, direction : (n m, 3)
+        r and d of each observer.
+    incidence : (n m,) of int
+    """
+
+    def __init__(
+        self,
+        flow: Flow,
+        launch: LaunchPoints,
+        tracer: RayTracer,
+        observers: FloatArray,
+        forward: Callable[[int], tuple[ShadowLine, tuple[Strip, ...]]],
+    ) -> None:
+        self.flow, self.body, self.launch, self.tracer = flow, flow.body, launch, tracer
+        n, m = observers.shape[:2]
+        self.observers = np.ascontiguousarray(observers)
+        self.directions = self.observers.reshape(-1, 3)
+        self.incidence = np.repeat(np.arange(n), m)
+        self.direction = launch.directions[self.incidence]
+        self._forward = forward
+        self._lobes: dict[tuple[int, bytes], tuple[HorizonRays, MidHorizon, IntArray]] = {}
+        self._nodes: dict[bytes, HorizonRays] = {}
+        self._search()
 
     @cached_property
     def angle(self) -> FloatArray:
-        """Angle from d (m,), accurate at 0 and π."""
+        """Angle from d (n m,), accurate at 0 and π."""
         apart = np.linalg.norm(self.directions - self.direction, axis=1)
         return np.asarray(2 * np.arctan2(apart, np.linalg.norm(self.directions + self.direction, axis=1)))
 
-    @cached_property
-    def mean_root_radius(self) -> float:
-        """Mean of ρ^(1/3) over the launch points: m̄ = (k/2)^(1/3) times it."""
-        kappa = self.launch_curvature
-        return float(np.mean(fock_scale(2.0, kappa[kappa > 0]))) if np.any(kappa > 0) else 1.0
+    def _search(self) -> None:
+        """Carry the fans, and find cells and crossings."""
+        from creeping.rays.kernels.shed_search import PARTS, quintic_weights, seek_all
+
+        launch, (n, many) = self.launch, self.observers.shape[:2]
+        rays = launch.arc_index.shape[1]
+        times = coarse_times(self.flow, self.tracer.length)
+        states = np.ascontiguousarray(carried(self.flow, launch, times, components=WITH_JACOBI))
+        self._chi, self._roots = np.zeros((n, many)), np.ones(n)
+        back = np.ascontiguousarray((self.angle > np.pi / 2).reshape(n, many))
+        # a ray crosses about once in every half turn; at worst each sample is a cell and a crossing
+        cells, crossings = 64, 2 + int(self.tracer.steps * TURN / np.pi)
+        most = len(times) * PARTS
+        arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
+        while rays:
+            found, places = np.empty((cells * n * many, 4), np.int64), np.empty((cells * n * many, 2))
+            crossed = np.empty((crossings * rays * max(1, int(back.sum())), 4))
+            with evaluators(self.body) as parts:
+                a, b = seek_all(
+                    *parts[:2], times[1], quintic_weights(times[1]), states, arc, launch.closed, self.observers, back,
+                    EARLY * size(self.body), ALONG, cells * many, crossings * rays, found, places, crossed, self._chi,
+                    self._roots,
+                )  # fmt: skip
+            if a >= 0:
+                break
+            cells, crossings = min(8 * cells, most * rays), min(2 * crossings, most)
+        else:
+            a = b = 0
+            found, places, crossed = np.empty((0, 4), np.int64), np.empty((0, 2)), np.empty((0, 4))
+        self._found, self._places, self._crossed = found[:a], places[:a], crossed[:b]
+        self._fine = times[:-1, None] + np.diff(times)[:, None] * (np.arange(PARTS) / PARTS)
+
+    @property
+    def mean_root_radius(self) -> FloatArray:
+        """Mean of ρ^(1/3) over the launch points (n m,): m̄ = (k/2)^(1/3) times it."""
+        return np.asarray(self._roots[self.incidence])
+
+    @property
+    def least_merging(self) -> FloatArray:
+        """Least χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > ALONG, of observers behind, else 0."""
+        return self._chi.ravel()
 
     @cached_property
+    def _shed(self) -> tuple[ShedRays, BoolArray]:
+        row, ray, after, sample = self._found.T
+        launch, which = self.launch, self.incidence[row]
+        across, along = self._places[:, :1], self._places[:, 1]
+        near = (1 - across) * launch.points[which, ray] + across * launch.points[which, after]
+        fine = np.append(self._fine.ravel(), self.tracer.length)
+        long = fine[sample + 1] - fine[sample]
+        cell = np.stack([launch.spacing[which, ray], long], axis=1)
+        begin = fine[sample] + along * long
+        one, found, moved = self.tracer.towards(self.direction[row], self.directions[row], near, begin, cell)
+        row, ray, cell, across = row[found], ray[found], cell[found], across[found, 0]
+        which = which[found]
+        arc = launch.arc_index
+        same = arc[which] == arc[which, ray][:, None]
+        first, last = np.argmax(same, axis=1), same.shape[1] - 1 - np.argmax(same[:, ::-1], axis=1)
+        place = ray + across + moved
+        inside = (launch.closed[which, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))
+        kept = np.flatnonzero(inside)
+        kept = kept[_distinct(row[kept], one.starts[kept], one.rays.time[kept], cell[kept])]
+        shed = ShedRays(row[kept], np.zeros_like(kept), place[kept], one.rays[kept], np.full(len(kept), np.inf))
+        return shed, one.risen[kept]
+
+    @property
     def shed(self) -> ShedRays:
         """Rays with p = r."""
-        return shed_far(self.strips, self.body, self.directions)
+        return self._shed[0]
 
     @cached_property
     def long(self) -> BoolArray:
-        """Whether a shed ray has crossed the observer's horizon before (n,)."""
-        shed = self.shed
-        r = self.directions[shed.observer]
-        found = np.sum(shed.rays.first_normal * r, axis=1) > 0
-        for number, strip in enumerate(self.strips):
-            mine = np.flatnonzero(shed.strip == number)
-            # n.r along the next ray of the fan, up to a step and a half before
-            n = strip.coarse_normals(self.body)[strip.nearest(shed.sigma[mine])]
-            before = strip.times[strip.coarse_steps] < shed.rays.time[mine, None] - 1.5 * strip.cell[1]
-            found[mine] |= np.any((np.einsum("nsi,ni->ns", n, r[mine]) > 0) & before, axis=1)
-        return np.asarray(found)
+        """Whether a shed ray has crossed the observer's horizon before (s,)."""
+        shed, risen = self._shed
+        return np.asarray(risen | (np.sum(shed.rays.first_normal * self.directions[shed.observer], axis=1) > 0))
 
     @cached_property
     def specular(self) -> SpecularPoints:
         """Specular points of the lit side."""
-        return specular_points(self.body, self.direction, self.directions)
-
-    @cached_property
-    def least_merging(self) -> FloatArray:
-        """Least χ = |J|/(|J| + ρ|J'|) over horizon crossings with p.r > 0.9, of each observer (m,); 0 without any."""
-        least = np.ones(len(self.directions))
-        found = np.zeros(len(self.directions), dtype=bool)
-        back = np.flatnonzero(self.angle > np.pi / 2)
-        nodes = HorizonGrid(self.strips, self.body, np.inf).crossings(back, self.directions)
-        rays = nodes.rays
-        near = np.sum(rays.directions * self.directions[nodes.observer], axis=1) > ALONG
-        near &= (rays.time > EARLY * size(self.body)) & rays.alive
-        np.minimum.at(least, nodes.observer[near], merging(rays)[near])
-        found[nodes.observer[near]] = True
-        return np.where(found, least, 0.0)
+        return specular_points(self.body, self.direction, self.directions, prepared(self.body).coarsest)
 
     def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
-        """Nodes of the fan integral for the wanted observers, at most 1/k apart on the shadow line."""
-        longest = max((curve.length for curve in self.line.curves), default=1.0)
-        # in steps of a quarter octave, so that near frequencies share them
-        fineness = int(np.ceil(4 * np.log2(max(wavenumber * longest, 256.0))))
-        key = (fineness, wanted.tobytes())
-        kept = self._fan_nodes
-        if kept is None or kept[0] != key:
-            rows = np.flatnonzero(wanted)
-            strips = self.strips if len(rows) else ()
-            grid = HorizonGrid(strips, self.body, longest / 2 ** (fineness / 4))
-            self._fan_nodes = kept = (key, grid.crossings(rows, self.directions))
-        return kept[1]
+        """Nodes of the fan integral for the wanted observers, at most APART/k apart on the shadow line."""
+        spacing = np.nan_to_num(self.launch.spacing)
+        widest = np.max(spacing, axis=1, initial=0.0)
+        # rays stand for themselves unless they are too far apart; powers of two, so that frequencies share them
+        parts = 2 ** np.ceil(np.log2(np.maximum(wavenumber * widest / APART, 1.0)) - 1e-9).astype(np.int64)
+        key = parts.tobytes() + wanted.tobytes()
+        if key not in self._nodes:
+            self._nodes[key] = self._fan_nodes(parts, wanted)
+        return self._nodes[key]
+
+    def _fan_nodes(self, parts: IntArray, wanted: BoolArray) -> HorizonRays:
+        row, ray = self._crossed[:, :2].astype(np.int64).T
+        mine = np.flatnonzero(wanted[row] & (self._crossed[:, 3] > TAPERED))
+        row, ray, time = row[mine], ray[mine], self._crossed[mine, 2]
+        which = self.incidence[row]
+        share = parts[which]
+        # node j of a crossing starts at fraction (j + 1/2)/parts of the piece of line that the ray stands for
+        row, ray, time, which = (np.repeat(v, share) for v in (row, ray, time, which))
+        number = np.arange(len(row)) - np.repeat(np.cumsum(share) - share, share)
+        total = parts[which]
+        several = int(parts.max(initial=1))
+        code = (which * self.launch.spacing.shape[1] + ray) * several + number
+        codes, owner = np.unique(code, return_inverse=True)
+        one, part = np.divmod(codes, several)
+        at, start = np.divmod(one, self.launch.spacing.shape[1])
+        directions, spacing = self.launch.directions[at], self.launch.spacing[at, start]
+        starts, tangents = self.tracer.onto_line(self.launch.points[at, start], directions, 1)
+        offset = (part + 0.5) / parts[at] - 0.5
+        starts = starts + (offset * spacing)[:, None] * tangents
+        weight = self.launch.spacing[which, ray] / total
+        rays = self.tracer.crossing(directions, starts, owner, self.directions[row], time).rays
+        ahead = np.sum(rays.directions * self.directions[row], axis=1) > 0
+        return HorizonRays(row[ahead], rays[ahead], (weight * rays.width)[ahead])
 
     def forward_nodes(self, wavenumber: float, wanted: BoolArray) -> tuple[HorizonRays, MidHorizon, IntArray]:
         """Nodes of both halves of the forward integral for the wanted observers, and observers that lack some."""
         fineness = int(np.ceil(4 * np.log2(max(wavenumber * size(self.body), 16.0))))
         key = (fineness, wanted.tobytes())
-        kept = self._forward
-        if kept is None or kept[0] != key:
-            rows = np.flatnonzero(wanted)
-            # at r = d every ray meets the horizon where it starts; the lobe is flat there to second order
-            r = off_axis(self.directions, self.direction)
-            reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
-            counts = (48 + 1.5 * reach).astype(np.int64)
-            self._forward = kept = (key, forward_nodes(self.strips, self.line, rows, r, counts))
-        return kept[1]
+        if key not in self._lobes:
+            parts = []
+            for incidence in np.unique(self.incidence[wanted]):
+                rows = np.flatnonzero(wanted & (self.incidence == incidence))
+                line, strips = self._forward(int(incidence))
+                # at r = d every ray meets the horizon where it starts; the lobe is flat there to second order
+                r = off_axis(self.directions, line.direction)
+                reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
+                counts = (48 + 1.5 * reach).astype(np.int64)
+                parts.append(forward_nodes(strips, line, rows, r, counts))
+            shadow, lit, lost = zip(*parts, strict=True)
+            self._lobes[key] = HorizonRays.joined(shadow), MidHorizon.joined(lit), np.concatenate(lost)
+        return self._lobes[key]
+
+    def line_of(self, incidence: int) -> ShadowLine:
+        """The shadow line of an incidence, for its forward lobe."""
+        return self._forward(incidence)[0]
+
+    @cached_property
+    def shed_normals(self) -> FloatArray:
+        """Normals where shed rays leave (s, 3)."""
+        return self.normals_of(self.shed.rays.points)
+
+    @cached_property
+    def leaves(self) -> BoolArray:
+        """Whether a shed ray misses the body on its way out (s,)."""
+        # interpolated points may lie below the surface by their error
+        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
+
+    def normals_of(self, points: FloatArray) -> FloatArray:
+        """N at points (s, 3)."""
+        return normal(self.body, points)
+
+
+def coarse_times(flow: Flow, length: float) -> FloatArray:
+    """Times of the fan, from 0: steps that the flow takes at once, about those that resolve the body."""
+    natural = natural_horizon(flow.body)
+    count = max(1, int(np.ceil(length / natural - 1e-9)))
+    if flow.error is not None and flow.horizon < length:
+        leaps = max(1, round(natural / flow.horizon))
+        if abs(length / flow.horizon - round(length / flow.horizon)) < 1e-9:
+            whole = round(length / flow.horizon)
+            while whole % leaps:
+                leaps -= 1
+            count = whole // leaps
+    return np.asarray(np.linspace(0.0, length, count + 1))
+
+
+def _distinct(row: IntArray, starts: FloatArray, times: FloatArray, cell: FloatArray) -> IntArray:
+    """Numbers of the solutions that no other one of the same observer equals, but for the first of those that do."""
+    order = np.lexsort((times, row))
+    kept = np.ones(len(row), dtype=bool)
+    # times of equal solutions follow each other
+    for shift in range(1, min(len(row), LONGEST_TIE)):
+        one, two = order[shift:], order[:-shift]
+        alike = (row[one] == row[two]) & (np.abs(times[one] - times[two]) < ALIKE * cell[one, 1])
+        alike &= np.linalg.norm(starts[one] - starts[two], axis=1) < ALIKE * cell[one, 0]
+        kept[one[alike]] = False
+    return np.flatnonzero(kept)

@@ -35,7 +35,7 @@ def shadow_half(
 ) -> ComplexArray:
     """Integrand of I_S times its weight (n,), L; ``pole_share`` (n,) weights the term in c², 0 near d and 1 beyond."""
     rays = nodes.rays
-    r = observers[nodes.observer]
+    r, direction = observers[nodes.observer], direction[nodes.observer]
     xi = fock_parameter(rays, wavenumber)
     e = r - np.sum(r * direction, axis=1, keepdims=True) * direction
     c = np.sum(rays.first_normal * e, axis=1) / np.maximum(np.linalg.norm(e, axis=1), 1e-300)
@@ -75,11 +75,11 @@ def lit_half(
     pole_share: FloatArray,
 ) -> ComplexArray:
     """Integrand of I_L times its weight (n,), L."""
-    r = observers[nodes.observer]
+    r, direction = observers[nodes.observer], direction[nodes.observer]
     m = fock_scale(wavenumber, nodes.along)
     curved = np.isfinite(m)
     m = np.where(curved, m, 1.0)
-    xi = np.minimum(2 * m * (nodes.normals @ direction), 0.0)
+    xi = np.minimum(2 * m * np.sum(nodes.normals * direction, axis=1), 0.0)
     away = r - direction
     c = np.sum(nodes.normals * away, axis=1) / np.maximum(np.linalg.norm(away, axis=1), 1e-300)
     ratio = np.where(curved, nodes.across / np.where(curved, nodes.along, 1.0), 0.0)

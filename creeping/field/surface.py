@@ -36,8 +36,9 @@ from creeping.field.special.airy import Modes
 from creeping.field.special.fock import surface_function, surface_slope
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.rays.fan import RayFan
-from creeping.rays.quantities import RayPoints, substeps
+from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import shed_on
+from creeping.rays.tracer import ray_points
 
 
 def surface_field(
@@ -73,13 +74,7 @@ def surface_field(
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     if points is None:
-        times = [strip.rays[:, :: substeps(fan)] for strip in fan_strips(fan, single=True)]
-        if not times:
-            return np.zeros(fan.spreading.shape, dtype=complex)
-        out = np.empty(fan.spreading.shape, dtype=complex)
-        for number, rays in enumerate(times):
-            out[fan.arc_index == np.unique(fan.arc_index)[number]] = surface_waves(rays, k, kind, order)
-        return out
+        return surface_waves(ray_points(fan, fan.travel_time)[1], k, kind, order)
     y = as_points(points)
     flat = on_body(fan.body, y).reshape(-1, 3)
     found = shed_on(fan_strips(fan), fan.body, flat)

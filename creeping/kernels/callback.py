@@ -19,7 +19,7 @@ _LEVEL = types.void(_ROWS, _ROW, _ROWS, _ROWS, _ROW)
 _LOCATOR = types.void(_ROWS, _ROWS, _WHOLE, _ROWS, _ROWS, _ROW)
 
 
-class BlockCallback(types.WrapperAddressProtocol):
+class BlockCallback(types.WrapperAddressProtocol):  # type: ignore[misc]
     """A Python function that kernels take in the place of a compiled one.
 
     Parameters
@@ -64,7 +64,7 @@ class BlockCallback(types.WrapperAddressProtocol):
             shape = fields[at + 5 : at + 5 + ndim]
             count = int(np.prod(shape))
             data = (kind * count).from_address(fields[at + 4])
-            yield np.frombuffer(data, dtype=np.dtype(kind)).reshape(shape)
+            yield np.ctypeslib.as_array(data).reshape(shape)
             at += 5 + 2 * ndim
 
     def _call(self, *fields: int) -> None:

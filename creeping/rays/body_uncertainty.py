@@ -106,6 +106,6 @@ def _ends(body: Any, starts: FloatArray, fan: RayFan) -> FloatArray:
     x, p = project_bundle(body, project(body, starts), d)
     states = DirectFlow(body, rtol=RTOL).transport(pack(x, p, lanes=12), fan.travel_time[[0, -1]])
     tangents = line_tangents(body, x, fan.line.direction)
-    j, _, _ = spread(body, np.concatenate([x, tangents], axis=1), p, states)
+    j, _, _ = spread(body, x, tangents, p, states)
     end = states[:, -1]
     return np.column_stack([end[:, :3], j[:, -1], end[:, 10:]])

@@ -226,7 +226,7 @@ def _carry(flow: Flow, line: ShadowLine, starts: Starts, times: FloatArray) -> F
     """States with all that is carried along: (rays, steps, 12)."""
     if not len(starts.arc):
         return np.empty((0, len(times), WHOLE))
-    return carried(flow, starts.launch_points(line), times, components=WHOLE)[0]
+    return np.asarray(carried(flow, starts.launch_points(line), times, components=WHOLE)[0])
 
 
 class RayArrays(NamedTuple):

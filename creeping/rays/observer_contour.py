@@ -5,7 +5,8 @@ integral takes the first one of each ray that starts with n.r < 0. Its lit half 
 n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to both d and r, the joints.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,15 @@ class HorizonRays:
     observer: IntArray
     rays: RayPoints
     weight: FloatArray
+
+    @classmethod
+    def joined(cls, parts: Sequence["HorizonRays"]) -> "HorizonRays":
+        """All parts as one."""
+        return cls(
+            np.concatenate([part.observer for part in parts]),
+            RayPoints.joined([part.rays for part in parts]),
+            np.concatenate([part.weight for part in parts]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,42 +58,10 @@ class MidHorizon:
     along: FloatArray
     across: FloatArray
 
-
-class HorizonGrid:
-    """Normals of the strips at evenly spaced σ, fine enough for a wavenumber, and coarse steps.
-
-    Parameters
-    ----------
-    strips : tuple of Strip
-    body : Surface
-    spacing : float, L
-        Largest spacing of σ.
-    """
-
-    def __init__(self, strips: tuple[Strip, ...], body: Surface, spacing: float) -> None:
-        self.strips, self.body = strips, body
-        self.parts = []
-        for strip in strips:
-            low, high = strip.span
-            count = max(len(strip.positions), int(np.ceil((high - low) / spacing)))
-            sigma = low + (high - low) * (np.arange(count) + 0.5) / count
-            s = strip.times[strip.coarse_steps]
-            pairs = np.stack(np.meshgrid(sigma, s, indexing="ij"), axis=-1).reshape(-1, 2)
-            n = normal(body, strip.at(pairs[:, 0], pairs[:, 1]).points)
-            self.parts.append((sigma, s, n.reshape(count, len(s), 3), (high - low) / count))
-
-    def crossings(self, wanted: IntArray, directions: FloatArray) -> HorizonRays:
-        """Every crossing with p.r > 0, for the wanted rows of the observers' unit directions (m, 3)."""
-        seeds = []
-        for k, (sigma, s, n, step) in enumerate(self.parts):
-            for row in wanted:
-                height = n @ directions[row]
-                ray, j = np.nonzero(height[:, :-1] * height[:, 1:] < 0)
-                share = height[ray, j] / (height[ray, j] - height[ray, j + 1])
-                seeds.append(_Seeds.of(row, k, sigma[ray], s[j] + share * (s[j + 1] - s[j]), step))
-        nodes = _polish(self.strips, self.body, _Seeds.joined(seeds), directions)
-        ahead = np.sum(nodes.rays.directions * directions[nodes.observer], axis=1) > 0
-        return HorizonRays(nodes.observer[ahead], nodes.rays[ahead], nodes.weight[ahead])
+    @classmethod
+    def joined(cls, parts: Sequence["MidHorizon"]) -> "MidHorizon":
+        """All parts as one."""
+        return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
 
 
 class _Seeds(NamedTuple):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.line import ShadowLine
 
@@ -79,7 +79,7 @@ class Starts(NamedTuple):
             ends = [s[-1] - long, *s, s[0] + long] if arc.closed else [2 * arc.start - s[0], *s, 2 * arc.end - s[-1]]
             spacing[mine] = 0.5 * (np.array(ends[2:]) - np.array(ends[:-2]))
         curve = np.array([self.arcs[k].curve for k in self.arc], dtype=np.int64)
-        rows = (
+        rows: tuple[Any, ...] = (
             self.points,
             self.position % lengths[curve] if len(curve) else self.position,
             np.sum(self.points * line.direction, axis=1),

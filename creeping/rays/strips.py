@@ -12,7 +12,8 @@ from scipy.interpolate import NdBSpline, make_interp_spline
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.surface import Surface, normal
 from creeping.rays.fan import RayFan
-from creeping.rays.quantities import LANES, START_LANES, RayPoints, ray_points
+from creeping.rays.quantities import LANES, START_LANES, RayPoints
+from creeping.rays.tracer import ray_points
 
 DEGREE = 5
 COARSE = 64
@@ -152,10 +153,4 @@ def gather(strips: tuple[Strip, ...], which: IntArray, sigma: FloatArray, s: Flo
         return empty[np.zeros(0, dtype=int), np.zeros(0, dtype=int)]
     found = [strip.at(sigma[rows], s[rows]) for rows, strip in parts]
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-    return RayPoints(
-        np.concatenate([f.lanes for f in found])[order],
-        np.concatenate([f.starts for f in found])[order],
-        np.concatenate([f.time for f in found])[order],
-        np.concatenate([f.alive for f in found])[order],
-        found[0].scale,
-    )
+    return RayPoints.joined(found)[order]

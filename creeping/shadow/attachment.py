@@ -58,9 +58,10 @@ class LaunchPoints:
         """From what the kernels fill, (n, rays, LAUNCHED) and (n, rays)."""
         from creeping.shadow.kernels.trace import ARC, ARCLENGTH, CLOSED, PHASE, SPACING, STATE
 
-        parts = (launched[..., k] for k in (ARCLENGTH, PHASE))
-        rest = (launched[..., k] for k in (ARC, SPACING, CLOSED, STATE))
-        return cls(directions, launched[..., :3], *parts, places, *rest)
+        arclength, phase = launched[..., ARCLENGTH], launched[..., PHASE]
+        arc, spacing, closed = launched[..., ARC], launched[..., SPACING], launched[..., CLOSED]
+        state = launched[..., STATE]
+        return cls(directions, launched[..., :3], arclength, phase, places, arc, spacing, closed, state)
 
     @property
     def there(self) -> BoolArray:

@@ -231,7 +231,7 @@ def interpolated(nodes: FloatArray, places: FloatArray) -> FloatArray:
     after[:, :-1] = np.cumprod(u[:, :0:-1], axis=1)[:, ::-1]
     scale = np.array([np.prod([j - i for i in offsets if i != j], dtype=float) for j in offsets])
     weights = before * after / scale
-    return np.einsum("mj,mjc->mc", weights, nodes[(first[:, None] + offsets) % len(nodes)])
+    return np.asarray(np.einsum("mj,mjc->mc", weights, nodes[(first[:, None] + offsets) % len(nodes)]))
 
 
 def _spelled(fractions: dict[str, float]) -> str:

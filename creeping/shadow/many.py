@@ -51,8 +51,8 @@ class ShadowLines:
 
     def of(self, rows: IntArray) -> "ShadowLines":
         """Those of some incidences."""
-        parts = [getattr(self, part.name) for part in fields(self)]
-        return ShadowLines(*(part.of(rows) if isinstance(part, LaunchPoints) else part[rows] for part in parts))
+        parts: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
+        return ShadowLines(**{name: part.of(rows) if name == "launch" else part[rows] for name, part in parts.items()})
 
 
 def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: bool = False) -> ShadowLines:

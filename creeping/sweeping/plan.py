@@ -24,7 +24,7 @@ from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.sweepers.selection import Sweeper, sweeper_of
+from creeping.sweeping.sweeper import Sweeper
 
 MOST_IN_TASK = 1024
 TASK_BYTES = 64_000_000
@@ -61,7 +61,7 @@ class SweepPlan:
     request: SweepRequest
     incidences: FloatArray
     chunk: int
-    make: Maker = sweeper_of
+    make: Maker = Sweeper
     asked: dict[str, Any] = field(default_factory=dict)
     text: str = ""
 

@@ -61,19 +61,19 @@ def _add(kappa, rate, bend, transverse, weight, total):
 
 
 @njit(**options)
-def cross(level, level_par, matrix, states, step, observers, times):
-    """Refine the times (n,) at which rays cross n.r = 0, within two steps; arguments as for `lanes_at`."""
+def cross(level, level_par, matrix, states, step, owner, observers, times):
+    """Refine the times (n,) at which rays cross n.r = 0, within two steps; arguments as for `quantities_at`."""
     x, g, w, p = np.empty((3, 1)), np.empty((10, 1)), np.empty((3, WIDTH)), np.empty(3)
-    for row in range(states.shape[0]):
-        r, begin = observers[row], times[row]
+    for row in range(owner.shape[0]):
+        ray, r, begin = states[owner[row]], observers[row], times[row]
         for _ in range(4):
             last = min(max(int(times[row] / step), 0), states.shape[1] - 2 * GUARD - 1)
             _weights(matrix, times[row] / step - last, step, w)
             for axis in range(3):
                 x[axis, 0] = p[axis] = 0.0
                 for j in range(WIDTH):
-                    x[axis, 0] += w[0, j] * states[row, last + j + 1, axis]
-                    p[axis] += w[0, j] * states[row, last + j + 1, 3 + axis]
+                    x[axis, 0] += w[0, j] * ray[last + j + 1, axis]
+                    p[axis] += w[0, j] * ray[last + j + 1, 3 + axis]
             level(x, g[0], g[1:4], g[4:], level_par)
             rate = p[0] * (g[4, 0] * r[0] + g[9, 0] * r[1] + g[8, 0] * r[2])
             rate += p[1] * (g[9, 0] * r[0] + g[5, 0] * r[1] + g[7, 0] * r[2])
@@ -85,56 +85,143 @@ def cross(level, level_par, matrix, states, step, observers, times):
 
 
 @njit(**options)
-def lanes_at(level, level_par, matrix, nodes, gauss_weights, scale, states, step, times, whole, lanes, starts, alive):
-    """Fill lanes (n, 18), starts (n, 9) but for d.x0 and the width, and alive (n,) at a time of each ray (n,).
+def _along(level, level_par, rule, scale, ray, step, known, kappa, across, normals, totals, angles, good, g):
+    """Fill what is known along one ray, states (K, 8), at its steps from the launch point to number ``known``.
 
-    Without ``whole`` the angle φ, the integrals and alive are left out.
+    kappa, across (K,) and normals (3, K) at all states; totals (K, 5), angles (K,) and good (K,) are integrals, the
+    angle phi and whether kappa_n has stayed positive, at the steps counted from the launch point.
+    """
+    K = ray.shape[0]
+    weights, gauss_weights = rule
+    x = np.empty((3, K))
+    for k in range(K):
+        for axis in range(3):
+            x[axis, k] = ray[k, axis]
+    level(x, g[0], g[1:4], g[4:], level_par)
+    for k in range(K):
+        px, py, pz = ray[k, 3], ray[k, 4], ray[k, 5]
+        gx, gy, gz = g[1, k], g[2, k], g[3, k]
+        inverse = 1.0 / math.sqrt(gx * gx + gy * gy + gz * gz)
+        nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
+        bx, by, bz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
+        xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
+        bent = px * px * xx + py * py * yy + pz * pz * zz
+        kappa[k] = (bent + 2 * (py * pz * yz + px * pz * xz + px * py * xy)) * inverse
+        bent = bx * bx * xx + by * by * yy + bz * bz * zz
+        across[k] = (bent + 2 * (by * bz * yz + bx * bz * xz + bx * by * xy)) * inverse
+        normals[0, k], normals[1, k], normals[2, k] = nx, ny, nz
+    totals[0, :] = 0.0
+    good[0] = kappa[GUARD] > 0.0
+    angles[0] = math.atan2(-scale * ray[GUARD, 7], ray[GUARD, 6])
+    for k in range(known):
+        i = k + GUARD
+        totals[k + 1] = totals[k]
+        positive = good[k]
+        for q in range(GAUSS):
+            curved = _applied(weights[q], 0, kappa, i)
+            positive &= curved > 0.0
+            _add(
+                curved,
+                _applied(weights[q], 1, kappa, i),
+                _applied(weights[q], 2, kappa, i),
+                _applied(weights[q], 0, across, i),
+                gauss_weights[q] * step,
+                totals[k + 1],
+            )
+        good[k + 1] = positive
+        angles[k + 1] = _turned(angles[k], ray[i + 1, 6], ray[i + 1, 7], scale)
+
+
+@njit(**options)
+def _turned(before, J, rate, scale):
+    """Angle phi of (J, -J') next to the one before, a whole number of turns from the principal one."""
+    angle = math.atan2(-scale * rate, J)
+    return angle + 2 * math.pi * math.floor((before - angle) / (2 * math.pi) + 0.5)
+
+
+@njit(**options)
+def quantities_at(
+    level,
+    level_par,
+    matrix,
+    nodes,
+    gauss_weights,
+    scale,
+    states,
+    step,
+    owner,
+    times,
+    whole,
+    observers,
+    lanes,
+    starts,
+    alive,
+    risen,
+):
+    """Fill lanes (n, 18), starts (n, 9) but for d.x0 and the width, and alive (n,) at points of rays.
+
+    Without ``whole`` the angle phi, the integrals and alive are left out.
 
     Parameters
     ----------
     matrix, nodes, gauss_weights
         `polynomial_matrix`, and Gauss points and weights of the unit interval.
     scale : float, L
-        Of the angle φ.
-    states : (n, K, 8)
+        Of the angle phi.
+    states : (rays, K, 8)
         x, p, J, J' at equal steps; the launch point is at number GUARD.
+    owner, times : (n,)
+        Ray of each point, ascending, and its time.
+    observers : (n or 0, 3)
+        With observers, risen (n,) tells whether n.r > 0 somewhere before, two steps or more.
     """
     K = states.shape[1]
-    x, g, w = np.empty((3, K)), np.empty((10, K)), np.empty((3, WIDTH))
-    kappa, across, total = np.empty(K), np.empty(K), np.empty(5)
-    for row in range(states.shape[0]):
-        for k in range(K):
-            for axis in range(3):
-                x[axis, k] = states[row, k, axis]
-        level(x, g[0], g[1:4], g[4:], level_par)
-        for k in range(K):
-            px, py, pz = states[row, k, 3], states[row, k, 4], states[row, k, 5]
-            gx, gy, gz = g[1, k], g[2, k], g[3, k]
-            inverse = 1.0 / math.sqrt(gx * gx + gy * gy + gz * gz)
-            nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
-            bx, by, bz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-            xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
-            bent = px * px * xx + py * py * yy + pz * pz * zz
-            kappa[k] = (bent + 2 * (py * pz * yz + px * pz * xz + px * py * xy)) * inverse
-            bent = bx * bx * xx + by * by * yy + bz * bz * zz
-            across[k] = (bent + 2 * (by * bz * yz + bx * bz * xz + bx * by * xy)) * inverse
-            if k == GUARD:
-                starts[row, 6], starts[row, 7], starts[row, 8] = nx, ny, nz
+    g, w, total = np.empty((10, K)), np.empty((3, WIDTH)), np.empty(5)
+    kappa, across, normals = np.empty(K), np.empty(K), np.empty((3, K))
+    totals, angles, good = np.empty((K, 5)), np.empty(K), np.empty(K, np.bool_)
+    weights = np.empty((GAUSS, 3, WIDTH))
+    for q in range(GAUSS):
+        _weights(matrix, nodes[q], step, weights[q])
+    row, n = 0, owner.shape[0]
+    while row < n:
+        ray = states[owner[row]]
+        end, latest = row, 0.0
+        while end < n and owner[end] == owner[row]:
+            latest = max(latest, times[end])
+            end += 1
+        known = min(max(int(latest / step), 0), K - 2 * GUARD - 1) if whole else 0
+        _along(
+            level, level_par, (weights, gauss_weights), scale, ray, step, known, kappa, across, normals, totals,
+            angles, good, g,
+        )  # fmt: skip
         _weights(matrix, 0.0, step, w)
         for d in range(3):
             starts[row, 2 + d] = _applied(w, d, kappa, GUARD)
         starts[row, 5] = across[GUARD]
-        last = int(times[row] / step)
-        last = min(max(last, 0), K - 2 * GUARD - 1)
-        total[:] = 0.0
-        good = kappa[GUARD] > 0.0
-        for k in range(last + 1 if whole else 0):
-            part = 1.0 if k < last else times[row] / step - last
-            for q in range(GAUSS):
+        for axis in range(3):
+            starts[row, 6 + axis] = normals[axis, GUARD]
+        for point in range(row, end):
+            starts[point, 2:] = starts[row, 2:]
+            last = min(max(int(times[point] / step), 0), K - 2 * GUARD - 1)
+            part = times[point] / step - last
+            i = last + GUARD
+            _weights(matrix, part, step, w)
+            for lane in range(8):
+                lanes[point, lane] = 0.0
+                for j in range(WIDTH):
+                    lanes[point, lane] += w[0, j] * ray[i + j - GUARD + 1, lane]
+            for d in range(3):
+                lanes[point, 9 + d] = _applied(w, d, kappa, i)
+            lanes[point, 12] = _applied(w, 0, across, i)
+            if not whole:
+                continue
+            lanes[point, 8] = _turned(angles[last], lanes[point, 6], lanes[point, 7], scale)
+            positive = good[last]
+            total[:] = totals[last]
+            for q in range(GAUSS if part > 0.0 else 0):
                 _weights(matrix, part * nodes[q], step, w)
-                i = k + GUARD
                 curved = _applied(w, 0, kappa, i)
-                good &= curved > 0.0
+                positive &= curved > 0.0
                 _add(
                     curved,
                     _applied(w, 1, kappa, i),
@@ -143,30 +230,14 @@ def lanes_at(level, level_par, matrix, nodes, gauss_weights, scale, states, step
                     gauss_weights[q] * part * step,
                     total,
                 )
-        i = last + GUARD
-        _weights(matrix, times[row] / step - last, step, w)
-        turned = 0.0
-        before = 0.0
-        for k in range(last + 2 if whole else 0):
-            if k <= last:
-                J, rate = states[row, k + GUARD, 6], states[row, k + GUARD, 7]
-            else:
-                J, rate = 0.0, 0.0
-                for j in range(WIDTH):
-                    J += w[0, j] * states[row, i + j - GUARD + 1, 6]
-                    rate += w[0, j] * states[row, i + j - GUARD + 1, 7]
-            angle = math.atan2(-scale * rate, J)
-            change = angle - before
-            turned += change - 2 * math.pi * math.floor((change + math.pi) / (2 * math.pi)) if k > 0 else angle
-            before = angle
-        for lane in range(8):
-            lanes[row, lane] = 0.0
-            for j in range(WIDTH):
-                lanes[row, lane] += w[0, j] * states[row, i + j - GUARD + 1, lane]
-        lanes[row, 8] = turned
-        for d in range(3):
-            lanes[row, 9 + d] = _applied(w, d, kappa, i)
-        lanes[row, 12] = _applied(w, 0, across, i)
-        for d in range(5):
-            lanes[row, 13 + d] = total[d]
-        alive[row] = good and lanes[row, 9] > 0.0
+            for d in range(5):
+                lanes[point, 13 + d] = total[d]
+            alive[point] = positive and lanes[point, 9] > 0.0
+            if observers.shape[0]:
+                risen[point] = False
+                for k in range(GUARD, i - 1):
+                    height = 0.0
+                    for axis in range(3):
+                        height += normals[axis, k] * observers[point, axis]
+                    risen[point] |= height > 0.0
+        row = end

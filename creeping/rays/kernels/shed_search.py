@@ -1,10 +1,11 @@
-"""Compiled search on the fans of a sweep: where rays leave towards r, and where they cross the horizon n.r = 0.
+"""Compiled search on fans: where rays leave towards observers r, and where they cross their horizons n.r = 0.
 
 Between the carried states x and J are quintics through value, slope and second derivative at both ends,
 
     x'' = -kappa_n n,   J'' = -K J,
 
-close enough to tell cells apart; what is found there is refined on rays traced for it.
+close enough to tell cells apart; what is found there is refined on rays traced for it. A fan is sampled once for all
+observers of its incidence.
 """
 
 import math
@@ -16,6 +17,9 @@ from creeping.kernels.block import strict_options as options
 
 PARTS = 4
 """Samples of a step."""
+NORMAL, ASIDE, TANGENT, TURN, SPREADING, RATE, CURVATURE = 0, 3, 6, 9, 12, 13, 14
+"""Components of a sample: n, b = n x p, p, dn/ds, J, J', kappa_n; SAMPLE in all."""
+SAMPLE = 15
 AWAY = -0.5
 """p.r at the end of a step up to which it is passed over; a step turns a ray by about a radian at most."""
 
@@ -84,19 +88,66 @@ def _sample(level, level_par, weights, states, first, work, fine, J):
 
 
 @njit(**options)
-def seek(level, level_par, step, weights, states, arc, closed, r, early, along, cells, inside, heights, crossings, at):
+def sample_fan(level, level_par, weights, states, arc, first, samples, alive, work):
+    """Fill samples (rays, SAMPLE, m) of a fan from step ``first`` on, and alive (rays,); returns the mean rho^(1/3).
+
+    ``alive`` says whether kappa_n > 0 at the states up to ``first``. states (rays, K, 10); the mean is over the launch
+    points.
+    """
+    K = states.shape[1]
+    m = (K - 1) * PARTS + 1
+    roots, launched = 0.0, 0
+    skipped = first * PARTS
+    n = m - skipped
+    J = np.empty((2, m))
+    flat = work[13 * K :]
+    fine, g = flat[: 6 * n].reshape(6, n), flat[6 * m : 6 * m + 10 * n].reshape(10, n)
+    for ray in range(states.shape[0]):
+        if not arc[ray] < 1e9:
+            continue
+        alive[ray], kappa = _sample(level, level_par, weights, states[ray], first, work, fine, J)
+        if kappa > 0.0:
+            roots += (1.0 / kappa) ** (1 / 3)
+            launched += 1
+        level(fine[:3], g[0], g[1:4], g[4:], level_par)
+        out = samples[ray]
+        for i in range(n):
+            gx, gy, gz = g[1, i], g[2, i], g[3, i]
+            px, py, pz = fine[3, i], fine[4, i], fine[5, i]
+            inverse = 1.0 / math.sqrt(gx * gx + gy * gy + gz * gz)
+            nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
+            hx = (g[4, i] * px + g[9, i] * py + g[8, i] * pz) * inverse
+            hy = (g[9, i] * px + g[5, i] * py + g[7, i] * pz) * inverse
+            hz = (g[8, i] * px + g[7, i] * py + g[6, i] * pz) * inverse
+            along = nx * hx + ny * hy + nz * hz
+            s = skipped + i
+            out[NORMAL, s], out[NORMAL + 1, s], out[NORMAL + 2, s] = nx, ny, nz
+            out[ASIDE, s], out[ASIDE + 1, s] = ny * pz - nz * py, nz * px - nx * pz
+            out[ASIDE + 2, s] = nx * py - ny * px
+            out[TANGENT, s], out[TANGENT + 1, s], out[TANGENT + 2, s] = px, py, pz
+            out[TURN, s], out[TURN + 1, s], out[TURN + 2, s] = hx - along * nx, hy - along * ny, hz - along * nz
+            out[SPREADING, s], out[RATE, s] = J[0, i], J[1, i]
+            out[CURVATURE, s] = px * hx + py * hy + pz * hz
+    return roots / launched if launched else 1.0
+
+
+@njit(**options)
+def seek(step, samples, sure, arc, closed, r, back, skipped, early, along, cells, inside, heights, crossings, at):
     """Cells in which rays leave towards r, and where rays cross the horizon.
 
     Parameters
     ----------
-    step, weights
-        Time between states, and `quintic_weights` of it.
-    states : (rays, K, 10)
+    step : float
+        Time between states.
+    samples, sure : (rays, SAMPLE, m), (rays,)
+        See `sample_fan`; the first ``skipped`` of a ray are not there.
     arc, closed : (rays,)
         Number of each ray's arc, not finite where there is no ray, and 1 if the arc is a whole curve.
     r : (3,)
+    back : bool
+        Whether crossings are wanted.
     early, along : float
-        Time and p.r from which a crossing counts for χ.
+        Time and p.r from which a crossing counts for chi.
     cells, inside : (n, 3) of int, (n, 2), filled
         Both rays of a cell and the sample before; fractions of the cell at which the heights, bilinear, vanish.
     heights : (rays, 3, m), work space
@@ -108,65 +159,47 @@ def seek(level, level_par, step, weights, states, arc, closed, r, early, along, 
     -------
     cells, crossings : int
         -1 if there is no room.
-    χ, root : float
-        Least |J|/(|J| + ρ|J'|) over crossings, 0 without any; mean of ρ^(1/3) over launch points, 1 without any.
+    chi : float
+        Least |J|/(|J| + rho |J'|) over the crossings that count, 0 without any.
     """
-    K = states.shape[1]
-    m = (K - 1) * PARTS + 1
-    work, flat, J = np.empty(13 * K), np.empty(16 * m), np.empty((2, m))
-    found = crossed = launched = 0
-    least, any_, roots = 1.0, False, 0.0
+    m = samples.shape[2]
+    h = step / PARTS
+    found = crossed = 0
+    least, any_ = 1.0, False
     for ray in range(arc.shape[0]):
         if not arc[ray] < 1e9:
             continue
-        # rays start away from r: what goes on doing so is passed over
-        first = 0
-        while first < K - 2 and _ahead(states[ray, first + 1], r) < AWAY:
-            first += 1
-        skipped = first * PARTS
-        n = m - skipped
-        fine, g = flat[: 6 * n].reshape(6, n), flat[6 * m : 6 * m + 10 * n].reshape(10, n)
-        alive, kappa = _sample(level, level_par, weights, states[ray], first, work, fine, J)
-        if kappa > 0.0:
-            roots += (1.0 / kappa) ** (1 / 3)
-            launched += 1
+        one, height = samples[ray], heights[ray]
         # no p.r is so small: cells with such corners are passed over
-        heights[ray, 2, :skipped] = -2.0
-        level(fine[:3], g[0], g[1:4], g[4:], level_par)
-        before = last = 0.0
-        for i in range(n):
-            gx, gy, gz = g[1, i], g[2, i], g[3, i]
-            px, py, pz = fine[3, i], fine[4, i], fine[5, i]
-            inverse = 1.0 / math.sqrt(gx * gx + gy * gy + gz * gz)
-            nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
-            height = nx * r[0] + ny * r[1] + nz * r[2]
-            heights[ray, 0, skipped + i] = height
-            heights[ray, 1, skipped + i] = (
-                (ny * pz - nz * py) * r[0] + (nz * px - nx * pz) * r[1] + (nx * py - ny * px) * r[2]
-            )
-            ahead = px * r[0] + py * r[1] + pz * r[2]
-            heights[ray, 2, skipped + i] = ahead
-            kappa = px * px * g[4, i] + py * py * g[5, i] + pz * pz * g[6, i]
-            kappa = (kappa + 2 * (py * pz * g[7, i] + px * pz * g[8, i] + px * py * g[9, i])) * inverse
-            alive &= kappa > 0.0
-            if i > 0 and height * before < 0.0 and ahead > 0.0:
-                h = step / PARTS
-                slope, after = _height_rate(g, fine, i - 1, r), _height_rate(g, fine, i, r)
-                u = before / (before - height)
-                for _ in range(3):
-                    value, rate = _cubic(before, h * slope, height, h * after, u)
-                    u = min(max(u - value / rate, 0.0), 1.0) if rate != 0.0 else u
-                if crossed == crossings.shape[0]:
-                    return -1, -1, 0.0, 1.0
-                crossings[crossed], at[crossed, 0], at[crossed, 1] = ray, (skipped + i - 1 + u) * h, ahead
-                crossed += 1
-                if alive and ahead > along and (skipped + i - 1 + u) * h > early:
-                    spread, rate = _cubic(J[0, i - 1], h * J[1, i - 1], J[0, i], h * J[1, i], u)
-                    curved = last + u * (kappa - last)
-                    least = min(least, abs(spread) / (abs(spread) + abs(rate) / h / curved))
-                    any_ = True
-            last = kappa
-            before = height
+        height[2, :skipped] = -2.0
+        for row in range(3):
+            for i in range(skipped, m):
+                height[row, i] = one[3 * row, i] * r[0] + one[3 * row + 1, i] * r[1] + one[3 * row + 2, i] * r[2]
+        if not back:
+            continue
+        alive = sure[ray]
+        for i in range(skipped, m):
+            alive &= one[CURVATURE, i] > 0.0
+            if i == skipped or not (height[0, i] * height[0, i - 1] < 0.0 and height[2, i] > 0.0):
+                continue
+            before, now = height[0, i - 1], height[0, i]
+            slope = one[TURN, i - 1] * r[0] + one[TURN + 1, i - 1] * r[1] + one[TURN + 2, i - 1] * r[2]
+            after = one[TURN, i] * r[0] + one[TURN + 1, i] * r[1] + one[TURN + 2, i] * r[2]
+            u = before / (before - now)
+            for _ in range(3):
+                value, rate = _cubic(before, h * slope, now, h * after, u)
+                u = min(max(u - value / rate, 0.0), 1.0) if rate != 0.0 else u
+            if crossed == crossings.shape[0]:
+                return -1, -1, 0.0
+            crossings[crossed], at[crossed, 0], at[crossed, 1] = ray, (i - 1 + u) * h, height[2, i]
+            crossed += 1
+            if alive and height[2, i] > along and (i - 1 + u) * h > early:
+                spread, rate = _cubic(
+                    one[SPREADING, i - 1], h * one[RATE, i - 1], one[SPREADING, i], h * one[RATE, i], u
+                )
+                curved = one[CURVATURE, i - 1] + u * (one[CURVATURE, i] - one[CURVATURE, i - 1])
+                least = min(least, abs(spread) / (abs(spread) + abs(rate) / h / curved))
+                any_ = True
     for ray in range(arc.shape[0]):
         if not arc[ray] < 1e9:
             continue
@@ -183,11 +216,11 @@ def seek(level, level_par, step, weights, states, arc, closed, r, early, along, 
                 continue
             if _mixed(one[0], two[0], i) and _mixed(one[1], two[1], i):
                 if found == cells.shape[0]:
-                    return -1, -1, 0.0, 1.0
+                    return -1, -1, 0.0
                 cells[found, 0], cells[found, 1], cells[found, 2] = ray, after, i
                 inside[found, 0], inside[found, 1] = _bilinear(one, two, i)
                 found += 1
-    return found, crossed, least if any_ else 0.0, roots / launched if launched else 1.0
+    return found, crossed, least if any_ else 0.0
 
 
 @njit(**options)
@@ -196,19 +229,6 @@ def _cubic(a, p, b, q, u):
     v = 1.0 - u
     value = v * v * (1.0 + 2.0 * u) * a + u * u * (3.0 - 2.0 * u) * b + u * v * (v * p - u * q)
     return value, 6.0 * u * v * (b - a) + v * (v - 2.0 * u) * p + u * (u - 2.0 * v) * q
-
-
-@njit(**options)
-def _height_rate(g, fine, i, r):
-    """Rate of n.r along a ray at a sample: r.Hp and n.Hp over |grad F|."""
-    px, py, pz = fine[3, i], fine[4, i], fine[5, i]
-    hx = g[4, i] * px + g[9, i] * py + g[8, i] * pz
-    hy = g[9, i] * px + g[5, i] * py + g[7, i] * pz
-    hz = g[8, i] * px + g[7, i] * py + g[6, i] * pz
-    square = g[1, i] * g[1, i] + g[2, i] * g[2, i] + g[3, i] * g[3, i]
-    normal = (g[1, i] * hx + g[2, i] * hy + g[3, i] * hz) / square
-    height = g[1, i] * r[0] + g[2, i] * r[1] + g[3, i] * r[2]
-    return (r[0] * hx + r[1] * hy + r[2] * hz - normal * height) / math.sqrt(square)
 
 
 @njit(**options)
@@ -251,6 +271,7 @@ def seek_all(
     arcs,
     closed,
     observers,
+    back,
     early,
     along,
     most,
@@ -258,46 +279,51 @@ def seek_all(
     found,
     places,
     crossed,
-    summary,
+    chi,
+    roots,
 ):
-    """`seek` for incidences (n): found (f, 4) rows and cells, places (f, 2) in them.
+    """`seek` for incidences (n) with observers (n, m, 3) each, numbered through.
 
-    crossed (c, 4) is filled with rows, rays, times and p.r, summary (n, 2) with χ and the mean root radius. Returns the
-    numbers of cells and crossings, -1 where room ran out.
+    found (f, 4) is filled with observers and cells, places (f, 2) with the fractions in them, crossed (c, 4) with
+    observers, rays, times and p.r, chi (n, m), and roots (n,) with the mean root radius. Returns the numbers of cells
+    and crossings, -1 where room ran out.
     """
     n, rays = arcs.shape
-    m = (states.shape[2] - 1) * PARTS + 1
-    heights = np.empty((rays, 3, m))
+    K, many = states.shape[2], observers.shape[1]
+    m = (K - 1) * PARTS + 1
+    heights, samples = np.empty((rays, 3, m)), np.empty((rays, SAMPLE, m))
+    alive, work = np.empty(rays, np.bool_), np.empty(13 * K + 16 * m)
     cells, inside = np.empty((most, 3), np.int64), np.empty((most, 2))
     ray_of, at = np.empty(crossings, np.int64), np.empty((crossings, 2))
     total = passed = 0
     for row in range(n):
-        a, b, summary[row, 0], summary[row, 1] = seek(
-            level,
-            level_par,
-            step,
-            weights,
-            states[row],
-            arcs[row],
-            closed[row],
-            observers[row],
-            early,
-            along,
-            cells,
-            inside,
-            heights,
-            ray_of,
-            at,
-        )
-        if a < 0 or total + a > found.shape[0] or passed + b > crossed.shape[0]:
-            return -1, -1
-        for k in range(a):
-            found[total + k, 0] = row
-            found[total + k, 1:] = cells[k]
-            places[total + k] = inside[k]
-        for k in range(b):
-            crossed[passed + k, 0], crossed[passed + k, 1] = row, ray_of[k]
-            crossed[passed + k, 2:] = at[k]
-        total += a
-        passed += b
+        # steps that no observer looks at are passed over
+        first = K - 2
+        for ray in range(rays):
+            if not arcs[row, ray] < 1e9:
+                continue
+            for o in range(many):
+                k = 0
+                while k < first and _ahead(states[row, ray, k + 1], observers[row, o]) < AWAY:
+                    k += 1
+                first = min(first, k)
+            if first == 0:
+                break
+        roots[row] = sample_fan(level, level_par, weights, states[row], arcs[row], first, samples, alive, work)
+        for o in range(many):
+            a, b, chi[row, o] = seek(
+                step, samples, alive, arcs[row], closed[row], observers[row, o], back[row, o], first * PARTS, early,
+                along, cells, inside, heights, ray_of, at,
+            )  # fmt: skip
+            if a < 0 or total + a > found.shape[0] or passed + b > crossed.shape[0]:
+                return -1, -1
+            for k in range(a):
+                found[total + k, 0] = row * many + o
+                found[total + k, 1:] = cells[k]
+                places[total + k] = inside[k]
+            for k in range(b):
+                crossed[passed + k, 0], crossed[passed + k, 1] = row * many + o, ray_of[k]
+                crossed[passed + k, 2:] = at[k]
+            total += a
+            passed += b
     return total, passed

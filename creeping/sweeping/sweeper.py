@@ -1,35 +1,54 @@
-"""The compiled route of a sweep: lines of many incidences, then the rays of all of them at once."""
+"""What computes the results of a sweep: lines of many incidences, then all their rays at once, or their fields."""
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.field.boundary import parse_boundary
+from creeping.field.far import field_of
+from creeping.field.far_geometry import FarGeometry
+from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, WHOLE, P, X
 from creeping.geometry.surface import Surface
-from creeping.rays.fan import ray_arrays
-from creeping.rays.single import SingleRayTracer
+from creeping.rays.fan import launch, ray_arrays
+from creeping.rays.strips import Strip, strips_of
+from creeping.rays.tracer import RayTracer
 from creeping.rays.transport import Flow, carried
+from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.many import ShadowLines, shadow_lines
 from creeping.shadow.status import SINGULAR
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.sweepers.monostatic import fill_monostatic
 
 BATCH, FIELD_BATCH = 16_384, 65_536
 """Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
 numbers, and want more."""
 
 
-class CompiledSweeper:
-    """Results of incidences (n, 3) on a body with a compiled level; see `PlainSweeper`.
+def outputs_of(body: Surface, request: SweepRequest) -> int:
+    """Equal steps of the rays at which a request needs them: what a flow for it is to be tuned for."""
+    if request.quantity == "rays":
+        return request.n_steps
+    return int(np.ceil(request.length / natural_horizon(body) - 1e-9))
+
+
+class Sweeper:
+    """Results of incidences.
+
+    The same call gives the same bits, and an incidence has the same results in whatever company it is computed.
 
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
     request : SweepRequest
+
+    Raises
+    ------
+    InvalidInputError
+        If fields are asked for of a weighted body.
     """
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
-        self._tracer = None if request.quantity == "rays" else SingleRayTracer(flow.body, request.length)
+        self._tracer = None if request.quantity == "rays" else RayTracer(flow.body, request.length)
 
     @property
     def body(self) -> Surface:
@@ -37,7 +56,7 @@ class CompiledSweeper:
         return self.flow.body
 
     def __call__(self, incidences: FloatArray) -> dict[str, np.ndarray[Any, Any]]:
-        """Arrays of results, the first axis the incidence; see `SweepRequest.variables`."""
+        """Arrays of results of unit directions (n, 3), the first axis the incidence; see `SweepRequest.variables`."""
         incidences = np.asarray(incidences, dtype=float)
         out = self.request.empty(len(incidences))
         together = BATCH if self._tracer is None else FIELD_BATCH
@@ -53,7 +72,33 @@ class CompiledSweeper:
         if self._tracer is None:
             fill_rays(self.flow, lines, self.request.travel_times, out)
         else:
-            fill_monostatic(self.flow, lines, self._tracer, self.request, out)
+            self._fill_fields(lines, self._tracer, out)
+
+    def _fill_fields(self, lines: ShadowLines, tracer: RayTracer, out: dict[str, Any]) -> None:
+        rows = np.flatnonzero(lines.status != SINGULAR)
+        if not len(rows):
+            return
+        request, directions = self.request, lines.directions[rows]
+        bistatic = request.quantity == "bistatic"
+        observers = -directions[:, None]
+        if bistatic:
+            observers = np.broadcast_to(np.array(request.observation), (len(rows), len(request.observation), 3))
+
+        def forward(number: int) -> tuple[ShadowLine, tuple[Strip, ...]]:
+            line = shadow_line(self.body, directions[number])
+            fan = launch(self.flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
+            return line, tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1)
+
+        geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, forward)
+        for name, which, suffix in request.problems:
+            for k, wavenumber in enumerate(request.wavenumbers):
+                field = field_of(geometry, wavenumber, parse_boundary(name), request.order)
+                for part in ("creeping", "reflected", "forward", "unresolved"):
+                    if part + suffix in out:
+                        values = getattr(field, part)
+                        if bistatic:
+                            values = values.reshape(len(rows), -1, *values.shape[1:])
+                        out[part + suffix][(rows, *which, k)] = values
 
 
 def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:

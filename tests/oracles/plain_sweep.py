@@ -1,7 +1,4 @@
-"""The plain route of a sweep: one incidence at a time by `shadow_line`, `launch` and `far_field`.
-
-It takes any body and any flow, a hundred times slower than the compiled route, and is what that is tested against.
-"""
+"""A sweep one incidence at a time by `shadow_line`, `launch`, `far_field`: what the sweep of many is to equal."""
 
 import numpy as np
 

@@ -1,0 +1,326 @@
+"""Creeping rays traced for what a field needs to know of them: of a fan, or near given points of a shadow line.
+
+    F(x0) = 0,  grad F(x0).d = 0;   dσ⊥ = b0.dx0,  b0 = n0 x d
+
+Rays that leave towards r are found by Newton's method on p(σ, s) = r, with p and b = n x p at the end,
+
+    b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ ds - τ J dσ⊥,   τ = b.Hp/|grad F|.
+
+Rays go by equal steps, in which the most curved part of the body turns them by TURN: what comes out of one does not
+depend on the others that are traced with it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.geodesics.equations import points_of_charts
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import M11, M21, P, X, pack
+from creeping.geometry.curvature import principal_curvature_bound
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.speed import speed_of
+from creeping.geometry.surface import Surface, size
+from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.nonsmooth import rough_from
+from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
+from creeping.shadow.attachment import line_tangents
+from creeping.shadow.panels import newton_step
+
+TURN = 0.12
+"""Largest angle by which a ray turns in one step; polynomials of degree 7 then err by about 1e-8."""
+CLOSE = 1e-6
+"""Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
+ROUNDS = 10
+TOGETHER = 192
+"""Rays traced in one call."""
+LONG = 2
+"""Steps of a search, in steps of what it finds: points err less than derivatives of curvature do."""
+
+
+@dataclass(frozen=True, eq=False)
+class SingleRays:
+    """Rays (n,), each with its incidence.
+
+    Attributes
+    ----------
+    directions : (n, 3)
+    starts : (n, 3), L
+        Launch points.
+    tangents : (n, 3)
+        Of the shadow line there.
+    rays : RayPoints
+        (n,) Where each ends.
+    risen : (n,) of bool
+        Whether n.r > 0 somewhere before, of rays traced for observers r.
+    """
+
+    directions: FloatArray
+    starts: FloatArray
+    tangents: FloatArray
+    rays: RayPoints
+    risen: BoolArray
+
+
+class RayTracer:
+    """Traces rays of a body, no longer than ``length``.
+
+    Parameters
+    ----------
+    body : Surface
+    length : float, L
+
+    Raises
+    ------
+    InvalidInputError
+        If the body is weighted.
+    """
+
+    def __init__(self, body: Surface, length: float) -> None:
+        from creeping.rays.kernels.quantities import polynomial_matrix
+
+        if speed_of(body) is not None:
+            raise InvalidInputError(f"{body!r} has a speed; the diffracted field is that of a plain body")
+        self.body, self.length = body, length
+        curved = principal_curvature_bound(body, points_of_charts(body))
+        self.steps = max(16, int(np.ceil(length * curved / TURN)))
+        self.step = length / self.steps
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+        self._rule = polynomial_matrix(), 0.5 * (nodes + 1), 0.5 * weights
+
+    def onto_line(self, points: FloatArray, directions: FloatArray, steps: int = 4) -> tuple[FloatArray, FloatArray]:
+        """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""
+        reach = 0.1 * size(self.body)
+        tangents = np.zeros_like(points)
+        for _ in range(steps):
+            step, tangents = newton_step(self.body, directions, points)
+            long = np.linalg.norm(step, axis=1, keepdims=True)
+            points = points + step * np.minimum(1.0, reach / np.maximum(long, 1e-300))
+        return points, tangents
+
+    def _states(
+        self, directions: FloatArray, starts: FloatArray, latest: float, step: float, before: bool
+    ) -> FloatArray:
+        """x, p, J, J' at equal steps, GUARD of them before the launch point and beyond a time: (n, K, 8).
+
+        Those ``before`` are copies of the launch point unless they are wanted.
+        """
+        last = int(np.ceil(latest / step)) + GUARD + 1
+        forward: FloatArray = step * np.arange(last + 1, dtype=np.float64)
+        ahead = trace_states(self.body, pack(starts, directions, jacobi=True), forward, rtol=0.0, step=step)
+        if not before:
+            # never read, but polynomials of the first steps pass there
+            return np.concatenate([np.repeat(ahead[:, :1, :8], GUARD, axis=1), ahead[..., :8]], axis=1)
+        some = forward[: GUARD + 1]
+        back = trace_states(self.body, pack(starts, -directions, jacobi=True), some, rtol=0.0, step=step)
+        states = np.empty((len(starts), last + 1 + GUARD, 8))
+        states[:, GUARD:] = ahead[..., :8]
+        behind = back[:, GUARD:0:-1]
+        states[:, :GUARD, X], states[:, :GUARD, P] = behind[..., X], -behind[..., P]
+        states[:, :GUARD, M11], states[:, :GUARD, M21] = behind[..., M11], -behind[..., M21]
+        return states
+
+    def at(
+        self,
+        directions: FloatArray,
+        starts: FloatArray,
+        tangents: FloatArray,
+        times: FloatArray,
+        owner: IntArray | None = None,
+        *,
+        whole: bool = True,
+        observers: FloatArray | None = None,
+        cross: bool = False,
+    ) -> SingleRays:
+        """Points of rays.
+
+        Parameters
+        ----------
+        directions, starts, tangents : (rays, 3)
+            d, points of the shadow lines, and T there.
+        times : (n,), L
+        owner : (n,), optional
+            Ray of each point; each has its own if not given.
+        whole : bool
+            Without, integrals along the ray are left out.
+        observers : (n, 3), optional
+            r of each point.
+        cross : bool
+            Whether to move each point along its ray to n.r = 0 near it.
+
+        Returns
+        -------
+        SingleRays
+            (n,) points.
+        """
+        from creeping.rays.kernels.quantities import cross as to_crossing
+        from creeping.rays.kernels.quantities import quantities_at
+
+        n, rays = len(times), len(starts)
+        owner = np.arange(n) if owner is None else owner
+        lanes, first = np.zeros((n, LANES)), np.zeros((n, START_LANES))
+        alive, risen = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        times = np.array(times)
+        step = self.step if whole else LONG * self.step
+        scale = size(self.body)
+        latest = np.zeros(rays)
+        np.maximum.at(latest, owner, times)
+        # those of like length together: all rays of a call are traced to the latest time
+        order = np.argsort(latest, kind="stable")
+        rank = np.empty(rays, dtype=np.int64)
+        rank[order] = np.arange(rays)
+        place = np.argsort(rank[owner], kind="stable")
+        ends = np.searchsorted(rank[owner][place], np.arange(0, rays + TOGETHER, TOGETHER))
+        with evaluators(self.body) as parts:
+            evaluator = parts[:2]
+            for k in range(0, rays, TOGETHER):
+                mine = order[k : k + TOGETHER]
+                rows = place[ends[k // TOGETHER] : ends[k // TOGETHER + 1]]
+                if not len(rows):
+                    continue
+                now, which = times[rows], rank[owner[rows]] - k
+                before = whole or float(np.min(now)) < GUARD * step
+                states = self._states(
+                    directions[mine], starts[mine], float(np.max(latest[mine])) + 2 * step, step, before
+                )
+                seen = np.zeros((0, 3)) if observers is None else observers[rows]
+                if cross:
+                    to_crossing(*evaluator, self._rule[0], states, step, which, seen, now)
+                out = (
+                    np.zeros((len(rows), LANES)),
+                    np.zeros((len(rows), START_LANES)),
+                    np.zeros(len(rows), dtype=bool),
+                    np.zeros(len(rows), dtype=bool),
+                )
+                quantities_at(*evaluator, *self._rule, scale, states, step, which, now, whole, seen, *out)
+                times[rows] = now
+                lanes[rows], first[rows], alive[rows], risen[rows] = out
+        directions, starts, tangents = directions[owner], starts[owner], tangents[owner]
+        first[:, 0] = np.sum(starts * directions, axis=1)
+        first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
+        if whole and hasattr(self.body, "rough") and n:
+            alive &= times < self._rough(directions, starts, times)
+        return SingleRays(directions, starts, tangents, RayPoints(lanes, first, times, alive, scale), risen)
+
+    def _rough(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
+        """Times (n,) at which rays come to where the body is not smooth enough, inf where they do not before theirs."""
+        forward = self.step * np.arange(int(np.ceil(np.max(times) / self.step)) + 1, dtype=float)
+        states = trace_states(self.body, pack(starts, directions), forward, rtol=0.0, step=self.step)
+        return rough_from(self.body, states[..., X], forward)
+
+    def towards(
+        self, directions: FloatArray, observers: FloatArray, near: FloatArray, times: FloatArray, cell: FloatArray
+    ) -> tuple[SingleRays, IntArray, FloatArray]:
+        """Rays with p = r next to given points and times.
+
+        Parameters
+        ----------
+        directions, observers, near : (n, 3)
+            d, r, and points next to the shadow line.
+        times : (n,)
+        cell : (n, 2), L
+            Distances of neighbouring rays and samples: a search that leaves its neighbourhood is given up.
+
+        Returns
+        -------
+        SingleRays (m,)
+            Those that were found.
+        found, moved : (m,)
+            Their rows, and how far along the line they start from where the search began, in cells.
+        """
+        starts, tangents = self.onto_line(near, directions)
+        times, begin = times.copy(), times
+        moved, residual = np.zeros(len(times)), np.full(len(times), np.inf)
+        lanes, first = np.empty((len(times), LANES)), np.empty((len(times), START_LANES))
+        active = np.arange(len(times))
+        for _ in range(ROUNDS):
+            now = self.at(directions[active], starts[active], tangents[active], times[active], whole=False).rays
+            lanes[active], first[active] = now.lanes, now.starts
+            p = lanes[active, 3:6] / np.linalg.norm(lanes[active, 3:6], axis=1, keepdims=True)
+            residual[active] = np.linalg.norm(observers[active] - p, axis=1)
+            lost = (np.abs(moved) > 3) | (np.abs(times - begin) > 3 * cell[:, 1])
+            active = np.flatnonzero((residual > CLOSE) & ~lost)
+            if not len(active):
+                break
+            along_line, later = self._newton(directions, observers, tangents, lanes, first, cell, active)
+            moved[active] += along_line / cell[active, 0]
+            times[active] = np.clip(times[active] + later, 0.0, self.length)
+            guess = starts[active] + along_line[:, None] * tangents[active]
+            starts[active], tangents[active] = self.onto_line(guess, directions[active], 2)
+        good = (residual < 10 * CLOSE) & (np.abs(moved) <= 3) & (np.abs(times - begin) <= 3 * cell[:, 1])
+        found = np.flatnonzero(good)
+        last = self.at(directions[found], starts[found], tangents[found], times[found], observers=observers[found])
+        return last, found, moved[found]
+
+    def _newton(
+        self,
+        directions: FloatArray,
+        observers: FloatArray,
+        tangents: FloatArray,
+        lanes: FloatArray,
+        first: FloatArray,
+        cell: FloatArray,
+        active: IntArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Steps along the line and along the ray for the active rows, no longer than a cell."""
+        x, p, J, rate, kappa = (lanes[active, part] for part in (slice(0, 3), slice(3, 6), 6, 7, 9))
+        gap = observers[active] - p / np.linalg.norm(p, axis=1, keepdims=True)
+        gradient = self.body.gradient(x)
+        g = np.linalg.norm(gradient, axis=1)
+        n = gradient / g[:, None]
+        b = np.cross(n, p)
+        torsion = np.einsum("ni,nij,nj->n", b, self.body.hessian(x), p) / g
+        facing = np.sum(np.cross(first[active, 6:9], directions[active]) * tangents[active], axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along_line = np.nan_to_num(np.sum(b * gap, axis=1) / rate / facing)
+            along_line = np.clip(along_line, -cell[active, 0], cell[active, 0])
+            later = -(np.sum(n * gap, axis=1) + torsion * J * along_line * facing) / kappa
+        return along_line, np.clip(np.nan_to_num(later), -cell[active, 1], cell[active, 1])
+
+    def crossing(
+        self,
+        directions: FloatArray,
+        starts: FloatArray,
+        owner: IntArray,
+        observers: FloatArray,
+        times: FloatArray,
+    ) -> SingleRays:
+        """Points (n,) where rays (m, 3) x 2 from next to their lines cross n.r = 0 next to the times (n,)."""
+        starts, tangents = self.onto_line(starts, directions)
+        return self.at(directions, starts, tangents, times, owner, observers=observers, cross=True)
+
+
+def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray, RayPoints]:
+    """Points of every ray of a fan, at equal steps that resolve the body if not at given times.
+
+    Returns
+    -------
+    times : (steps,), L
+    points : RayPoints
+        (rays, steps)
+
+    Raises
+    ------
+    InvalidInputError
+        If the body is weighted.
+    """
+    tracer = RayTracer(fan.body, fan.length)
+    equal: FloatArray = tracer.step * np.arange(tracer.steps + 1, dtype=np.float64)
+    times = equal if times is None else times
+    rays, steps = len(fan.points), len(times)
+    starts = fan.points[:, 0]
+    d = np.broadcast_to(fan.line.direction, starts.shape)
+    tangents = line_tangents(fan.body, starts, d) if rays else np.zeros((0, 3))
+    owner = np.repeat(np.arange(rays), steps)
+    found = tracer.at(d, starts, tangents, np.tile(times, rays), owner).rays
+    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.ROUGH))
+    alive = found.alive.reshape(rays, steps) & launched[:, None]
+    return times, RayPoints(
+        found.lanes.reshape(rays, steps, LANES),
+        found.starts.reshape(rays, steps, START_LANES),
+        np.broadcast_to(times, alive.shape),
+        alive,
+        found.scale,
+    )
