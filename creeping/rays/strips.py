@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import NdBSpline, make_interp_spline
+from scipy.interpolate import BSpline, NdBSpline
+from scipy.linalg import solve_banded
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.surface import Surface, normal
@@ -16,6 +17,8 @@ from creeping.rays.quantities import LANES, START_LANES, RayPoints
 from creeping.rays.tracer import ray_points
 
 DEGREE = 5
+ROUND = 40
+"""Rays of a closed strip beyond either end that its splines go through."""
 COARSE = 64
 """Steps at least that a search looks at."""
 
@@ -83,18 +86,16 @@ class Strip:
     def _splines(self) -> tuple[NdBSpline, NdBSpline]:
         """Splines of the lanes in (σ, s) and of the starts in σ."""
         sigma, lanes, starts = self.positions, self.rays.lanes, self.rays.starts[:, 0]
-        kind = None
         if self.closed:
-            sigma = np.append(sigma, sigma[0] + self.period)
-            lanes, starts = np.concatenate([lanes, lanes[:1]]), np.concatenate([starts, starts[:1]])
-            kind = "periodic"
+            # what a ray does to the spline fades by half from ray to ray: so many on either side make it periodic
+            rows = np.arange(-ROUND, len(sigma) + ROUND + 1)
+            sigma = sigma[rows % len(sigma)] + self.period * (rows // len(sigma))
+            lanes, starts = lanes[rows % len(lanes)], starts[rows % len(starts)]
         degree = DEGREE if len(sigma) > DEGREE else max(1, 2 * ((len(sigma) - 1) // 2) - 1)
-        across = make_interp_spline(sigma, lanes, k=degree, axis=0, bc_type=kind)
-        along = make_interp_spline(self.times, across.c, k=DEGREE, axis=1)
-        # make_interp_spline leaves its axis first in c
-        table = np.moveaxis(along.c, 0, 1)
-        first = make_interp_spline(sigma, starts, k=degree, axis=0, bc_type=kind)
-        return NdBSpline((across.t, along.t), table, (degree, DEGREE)), first
+        knots, table = _interpolating(sigma, lanes, degree)
+        later, along = _interpolating(self.times, np.moveaxis(table, 1, 0), DEGREE)
+        first = BSpline(*_interpolating(sigma, starts, degree), degree)
+        return NdBSpline((knots, later), np.moveaxis(along, 0, 1), (degree, DEGREE)), first
 
     def wrap(self, sigma: FloatArray) -> FloatArray:
         """σ within the strip's period."""
@@ -123,6 +124,21 @@ class Strip:
         following = (ray + 1) % len(self.positions) if self.closed else np.minimum(ray + 1, len(self.positions) - 1)
         step = np.clip(np.searchsorted(self.times, s, side="right") - 1, 0, len(self.times) - 1)
         return np.asarray(self.rays.alive[ray, step] & self.rays.alive[following, step])
+
+
+def _interpolating(places: FloatArray, values: FloatArray, degree: int) -> tuple[FloatArray, FloatArray]:
+    """Knots and coefficients of the not-a-knot spline of odd degree through values (n, ...) at places (n,).
+
+    What `scipy.interpolate.make_interp_spline` gives, for many columns in a hundredth of the time.
+    """
+    half = (degree + 1) // 2
+    ends = np.repeat(places[[0]], degree + 1), np.repeat(places[[-1]], degree + 1)
+    knots = np.concatenate([ends[0], places[half:-half], ends[1]])
+    matrix = BSpline.design_matrix(places, knots, degree).todia()
+    below, above = max(-int(matrix.offsets.min()), 0), max(int(matrix.offsets.max()), 0)
+    bands = np.zeros((below + above + 1, len(places)))
+    bands[above - matrix.offsets] = matrix.data
+    return knots, solve_banded((below, above), bands, values.reshape(len(places), -1)).reshape(values.shape)
 
 
 def strips_of(fan: RayFan) -> tuple[Strip, ...]:

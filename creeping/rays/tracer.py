@@ -10,11 +10,12 @@ Rays go by equal steps, in which the most curved part of the body turns them by 
 depend on the others that are traced with it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.integrator import trace_states
@@ -33,11 +34,15 @@ TURN = 0.12
 """Largest angle by which a ray turns in one step; polynomials of degree 7 then err by about 1e-8."""
 CLOSE = 1e-6
 """Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
+ACCEPTED = 1e-4
+"""Residual of what was found, on exact rays: its phase errs by half the square of it, in radii of curvature."""
 ROUNDS = 10
 TOGETHER = 192
 """Rays traced in one call."""
 LONG = 2
 """Steps of a search, in steps of what it finds: points err less than derivatives of curvature do."""
+NEARLY = 2e-4
+"""Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +67,19 @@ class SingleRays:
     tangents: FloatArray
     rays: RayPoints
     risen: BoolArray
+
+    def __getitem__(self, index: Any) -> "SingleRays":
+        """Part of the rays."""
+        return SingleRays(
+            self.directions[index], self.starts[index], self.tangents[index], self.rays[index], self.risen[index]
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence["SingleRays"]) -> "SingleRays":
+        """All parts as one."""
+        names = ("directions", "starts", "tangents", "risen")
+        directions, starts, tangents, risen = (np.concatenate([getattr(p, name) for p in parts]) for name in names)
+        return cls(directions, starts, tangents, RayPoints.joined([part.rays for part in parts]), risen)
 
 
 class RayTracer:
@@ -130,7 +148,7 @@ class RayTracer:
         times: FloatArray,
         owner: IntArray | None = None,
         *,
-        whole: bool = True,
+        long: int = 0,
         observers: FloatArray | None = None,
         cross: bool = False,
     ) -> SingleRays:
@@ -143,8 +161,8 @@ class RayTracer:
         times : (n,), L
         owner : (n,), optional
             Ray of each point; each has its own if not given.
-        whole : bool
-            Without, integrals along the ray are left out.
+        long : int
+            0 for all quantities; else steps are so many times as long, and integrals along the ray are left out.
         observers : (n, 3), optional
             r of each point.
         cross : bool
@@ -163,7 +181,7 @@ class RayTracer:
         lanes, first = np.zeros((n, LANES)), np.zeros((n, START_LANES))
         alive, risen = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         times = np.array(times)
-        step = self.step if whole else LONG * self.step
+        whole, step = long == 0, max(1, long) * self.step
         scale = size(self.body)
         latest = np.zeros(rays)
         np.maximum.at(latest, owner, times)
@@ -230,29 +248,57 @@ class RayTracer:
         found, moved : (m,)
             Their rows, and how far along the line they start from where the search began, in cells.
         """
+        found, result, moved = self._sought(directions, observers, near, times, cell, LONG, NEARLY)
+        lost = np.setdiff1d(np.arange(len(times)), found)
+        if len(lost):
+            # those that the quick search gave up, or ended too early
+            rows = [part[lost] for part in (directions, observers, near, times, cell)]
+            again, more, further = self._sought(*rows, 1, 0.0)
+            result = SingleRays.joined([result, more])
+            found, moved = np.concatenate([found, lost[again]]), np.concatenate([moved, further])
+            order = np.argsort(found)
+            found, moved, result = found[order], moved[order], result[order]
+        return result, found, moved
+
+    def _sought(
+        self,
+        directions: FloatArray,
+        observers: FloatArray,
+        near: FloatArray,
+        times: FloatArray,
+        cell: FloatArray,
+        long: int,
+        nearly: float,
+    ) -> tuple[IntArray, SingleRays, FloatArray]:
+        """What `towards` finds with steps of so many, without another look after one from a residual of ``nearly``."""
         starts, tangents = self.onto_line(near, directions)
         times, begin = times.copy(), times
-        moved, residual = np.zeros(len(times)), np.full(len(times), np.inf)
+        moved = np.zeros(len(times))
         lanes, first = np.empty((len(times), LANES)), np.empty((len(times), START_LANES))
-        active = np.arange(len(times))
+        active, wanted = np.arange(len(times)), np.zeros(len(times), dtype=bool)
         for _ in range(ROUNDS):
-            now = self.at(directions[active], starts[active], tangents[active], times[active], whole=False).rays
+            rows = directions[active], starts[active], tangents[active], times[active]
+            now = self.at(*rows, long=long).rays
             lanes[active], first[active] = now.lanes, now.starts
-            p = lanes[active, 3:6] / np.linalg.norm(lanes[active, 3:6], axis=1, keepdims=True)
-            residual[active] = np.linalg.norm(observers[active] - p, axis=1)
-            lost = (np.abs(moved) > 3) | (np.abs(times - begin) > 3 * cell[:, 1])
-            active = np.flatnonzero((residual > CLOSE) & ~lost)
+            residual = _apart(now, observers[active])
+            wanted[active] = residual <= max(CLOSE, nearly)
+            lost = (np.abs(moved[active]) > 3) | (np.abs(times[active] - begin[active]) > 3 * cell[active, 1])
+            last = active[(residual > CLOSE) & ~lost]
+            if not len(last):
+                break
+            along_line, later = self._newton(directions, observers, tangents, lanes, first, cell, last)
+            moved[last] += along_line / cell[last, 0]
+            times[last] = np.clip(times[last] + later, 0.0, self.length)
+            guess = starts[last] + along_line[:, None] * tangents[last]
+            starts[last], tangents[last] = self.onto_line(guess, directions[last], 2)
+            active = last[~wanted[last]]
             if not len(active):
                 break
-            along_line, later = self._newton(directions, observers, tangents, lanes, first, cell, active)
-            moved[active] += along_line / cell[active, 0]
-            times[active] = np.clip(times[active] + later, 0.0, self.length)
-            guess = starts[active] + along_line[:, None] * tangents[active]
-            starts[active], tangents[active] = self.onto_line(guess, directions[active], 2)
-        good = (residual < 10 * CLOSE) & (np.abs(moved) <= 3) & (np.abs(times - begin) <= 3 * cell[:, 1])
-        found = np.flatnonzero(good)
-        last = self.at(directions[found], starts[found], tangents[found], times[found], observers=observers[found])
-        return last, found, moved[found]
+        within = (np.abs(moved) <= 3) & (np.abs(times - begin) <= 3 * cell[:, 1])
+        kept = np.flatnonzero(wanted & within)
+        found = self.at(directions[kept], starts[kept], tangents[kept], times[kept], observers=observers[kept])
+        good = _apart(found.rays, observers[kept]) < ACCEPTED
+        return kept[good], found[good], moved[kept[good]]
 
     def _newton(
         self,
@@ -290,6 +336,12 @@ class RayTracer:
         """Points (n,) where rays (m, 3) x 2 from next to their lines cross n.r = 0 next to the times (n,)."""
         starts, tangents = self.onto_line(starts, directions)
         return self.at(directions, starts, tangents, times, owner, observers=observers, cross=True)
+
+
+def _apart(rays: RayPoints, observers: FloatArray) -> FloatArray:
+    """|r - p| (n,)."""
+    p = rays.directions / np.linalg.norm(rays.directions, axis=1, keepdims=True)
+    return np.asarray(np.linalg.norm(observers - p, axis=1))
 
 
 def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray, RayPoints]:
