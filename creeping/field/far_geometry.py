@@ -11,9 +11,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
-from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import WITH_JACOBI
+from creeping.geometry.directions import unit_directions
+from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import normal, project, size
 from creeping.rays.fan import RayFan, RayStatus
@@ -44,8 +45,6 @@ ALIKE = 1e-2
 """Distance, in cells, below which two rays found are one: searches end within 1e-4 or so of each other."""
 APART = 2.0
 """Spacing of the nodes of a fan integral, in 1/k: a periodic integrand sampled so errs by less than 1e-6 of itself."""
-LONGEST_TIE = 12
-"""Solutions of one observer that may end at equal times: mirror images of each other, and what was found twice."""
 
 
 def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
@@ -57,20 +56,7 @@ def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
 
 def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     """Geometry of a fan for directions (..., 3), kept with the fan until other directions are asked for."""
-    try:
-        r = np.array(observation, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"observation is not an array of numbers: {error}") from error
-    if r.ndim < 1 or r.shape[-1] != 3:
-        raise InvalidInputError(f"observation has shape {r.shape}; give directions (..., 3)")
-    r = r.reshape(-1, 3)
-    length = np.linalg.norm(r, axis=1)
-    bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)))
-    if len(bad):
-        raise InvalidInputError(
-            f"{len(bad)} of {len(r)} observation directions are zero or not finite (first: row {bad[0]})"
-        )
-    r = r / length[:, None]
+    r = unit_directions(observation, "observation directions").reshape(-1, 3)
     key = r.tobytes()
     kept = _KEPT.get(fan)
     if kept is None or kept[0] != key:
@@ -244,7 +230,13 @@ class FarGeometry:
         place = ray + across + moved
         inside = (launch.closed[which, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))
         kept = np.flatnonzero(inside)
-        kept = kept[_distinct(row[kept], one.starts[kept], one.rays.time[kept], cell[kept])]
+        starts, ends, width = one.starts[kept], one.rays.time[kept], ALIKE * cell[kept]
+
+        def alike(i: IntArray, j: IntArray) -> BoolArray:
+            late = np.abs(ends[i] - ends[j]) < width[i, 1]
+            return np.asarray(late & (np.linalg.norm(starts[i] - starts[j], axis=1) < width[i, 0]))
+
+        kept = kept[first_of_equals(row[kept], alike)]
         shed = ShedRays(row[kept], np.zeros_like(kept), place[kept], one.rays[kept], np.full(len(kept), np.inf))
         return shed, one.risen[kept]
 
@@ -349,16 +341,3 @@ def coarse_times(flow: Flow, length: float) -> FloatArray:
                 leaps -= 1
             count = whole // leaps
     return np.asarray(np.linspace(0.0, length, count + 1))
-
-
-def _distinct(row: IntArray, starts: FloatArray, times: FloatArray, cell: FloatArray) -> IntArray:
-    """Numbers of the solutions that no other one of the same observer equals, but for the first of those that do."""
-    order = np.lexsort((times, row))
-    kept = np.ones(len(row), dtype=bool)
-    # times of equal solutions follow each other
-    for shift in range(1, min(len(row), LONGEST_TIE)):
-        one, two = order[shift:], order[:-shift]
-        alike = (row[one] == row[two]) & (np.abs(times[one] - times[two]) < ALIKE * cell[one, 1])
-        alike &= np.linalg.norm(starts[one] - starts[two], axis=1) < ALIKE * cell[one, 0]
-        kept[one[alike]] = False
-    return np.flatnonzero(kept)

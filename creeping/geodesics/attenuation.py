@@ -9,9 +9,7 @@ the interval that ends at a zero t1, t = t1 (1 - s^3) makes g^(2/3) dt smooth ag
 """
 
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -34,8 +32,6 @@ DIP, REFINED = 0.2, 3
 """Least over greatest curvature of an interval below which each of its parts is integrated, at so many Gauss points."""
 WORKSPACE = 2**24
 """Numbers that the states at fine times may take."""
-
-_horizons: WeakKeyDictionary[Surface, float] = WeakKeyDictionary()
 
 
 @cache
@@ -130,14 +126,7 @@ def fine_spacing(body: Surface, rtol: float, step: float | None = None) -> float
     Measured on an ellipsoid, a torus and a twisted ellipsoid: half a natural horizon, taken for rtol = 1e-8, leaves an
     rms error of A after T = 8 of 2e-7 at most, about that of (x, p). The error is like the spacing's 12th power.
     """
-    try:
-        horizon = _horizons[body]
-    except (KeyError, TypeError):
-        horizon = natural_horizon(body)
-        # finding it takes as long as tracing a fan; a body of the user's may offer neither a hash nor weak references
-        with suppress(TypeError):
-            _horizons[body] = horizon
-    spacing = 0.5 * horizon * float(min(1.0, 1e8 * rtol) ** (1 / 12))
+    spacing = 0.5 * natural_horizon(body) * float(min(1.0, 1e8 * rtol) ** (1 / 12))
     # whole steps, or the trace would take more of them
     return spacing if step is None or step > spacing else step * float(np.floor(spacing / step))
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.geometry.curvature import gaussian_curvature, principal_curvature_bound
+from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_hessian, speed_of, speed_values
 from creeping.geometry.surface import Surface
 
@@ -30,9 +31,17 @@ def points_of_charts(body: Surface) -> FloatArray:
 
 def natural_horizon(body: Surface) -> float:
     """Power of two next to the time a ray takes over the smallest radius of curvature."""
-    points = points_of_charts(body)
-    fastest = float(np.max(speed_values(body, points)))
-    return float(2.0 ** np.round(np.log2(1 / (principal_curvature_bound(body, points) * fastest))))
+
+    def found() -> float:
+        fastest = float(np.max(speed_values(body, points_of_charts(body))))
+        return float(2.0 ** np.round(np.log2(1 / (sharpest_curvature(body) * fastest))))
+
+    return kept(body, "natural horizon", found)
+
+
+def sharpest_curvature(body: Surface) -> float:
+    """Largest |kappa_1| or |kappa_2| over points all over a body, 1/L."""
+    return kept(body, "sharpest curvature", lambda: principal_curvature_bound(body, points_of_charts(body)))
 
 
 def metric_curvature(body: Surface, points: FloatArray) -> FloatArray:

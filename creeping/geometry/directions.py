@@ -192,11 +192,17 @@ def unit_directions(directions: ArrayLike, what: str = "directions") -> FloatArr
                 f"{tuple(flat[rows[0]].tolist())}); leave them out",
                 rows=rows,
             )
+    return _normalised(flat).reshape(d.shape)
+
+
+def _normalised(flat: FloatArray) -> FloatArray:
+    """Finite vectors (n, 3), none of them zero, of unit length."""
     # first by the largest component, whose square may overflow or vanish
+    largest = np.max(np.abs(flat), axis=1)
     unit = np.abs(np.linalg.norm(np.clip(flat, -2, 2), axis=1) - 1) < 4e-16
     scaled = flat / largest[:, None]
     scaled /= np.linalg.norm(scaled, axis=1, keepdims=True)
-    return np.where(unit[:, None], flat, scaled).reshape(d.shape)
+    return np.where(unit[:, None], flat, scaled)
 
 
 def _angles(**named: ArrayLike) -> list[FloatArray]:
@@ -241,8 +247,6 @@ def unit_direction(direction: ArrayLike) -> FloatArray:
         raise InvalidInputError(f"direction has shape {d.shape}; give three numbers, e.g. (1, 1, 1)")
     if not np.all(np.isfinite(d)):
         raise InvalidInputError(f"direction {tuple(d.tolist())} is not finite; give three finite numbers")
-    largest = float(np.max(np.abs(d)))
-    if largest == 0.0:
+    if not np.any(d):
         raise InvalidInputError("direction is the zero vector; give where the wave travels, e.g. (1, 1, 1)")
-    d = d / largest
-    return np.asarray(d / np.linalg.norm(d))
+    return np.asarray(_normalised(d[None])[0])

@@ -10,12 +10,13 @@ A body with numpy methods only goes through the same kernels as a compiled one, 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
-from weakref import finalize, ref
+from weakref import ref
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.geometry.frames import polar_frame
+from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_hessian, speed_of
 from creeping.geometry.surface import Surface
 
@@ -33,16 +34,12 @@ class Evaluators(NamedTuple):
     weighted: bool
 
 
-_CALLBACKS: dict[tuple[int, str], Any] = {}
-"""By identity: bodies may be equal to others, or not be hashable."""
-
-
 @contextmanager
 def evaluators(body: Surface) -> Iterator[Evaluators]:
     """Evaluators of a body for the kernels called inside; what its methods raise there is raised at the end."""
     speed = speed_of(body)
-    level = _kept(body, "level", lambda: _level(body), body)
-    weight = level if speed is None else _kept(body, "speed", lambda: _speed(body), speed)
+    level = _offered(body, "level", lambda: _level(body), body)
+    weight = level if speed is None else _offered(body, "speed", lambda: _speed(body), speed)
     yield Evaluators(level.function, level.parameters, weight.function, weight.parameters, speed is not None)
     _raise_failures(level, weight)
 
@@ -50,7 +47,7 @@ def evaluators(body: Surface) -> Iterator[Evaluators]:
 @contextmanager
 def locator(body: Surface) -> Iterator[tuple[Any, FloatArray]]:
     """Locator of a body's atlas for the kernels called inside, with its parameters."""
-    found = _kept(body, "locator", lambda: _locator(body), body.atlas)
+    found = _offered(body, "locator", lambda: _locator(body), body.atlas)
     yield found.function, found.parameters
     _raise_failures(found)
 
@@ -62,20 +59,12 @@ def is_compiled(body: Surface) -> bool:
     return all(getattr(part, "compiled", None) is not None for part in parts)
 
 
-def _kept(body: Surface, role: str, make: Callable[[], Any], source: Any) -> Any:
+def _offered(body: Surface, role: str, make: Callable[[], Any], source: Any) -> Any:
     """The compiled function that the source offers, or the callback of this body, made once."""
     compiled = getattr(source, "compiled", None)
     if compiled is not None:
         return compiled
-    key = id(body), role
-    if key not in _CALLBACKS:
-        _CALLBACKS[key] = make()
-        try:
-            finalize(body, _CALLBACKS.pop, key, None)
-        except TypeError:
-            # without weak references the identity may come again: nothing is kept
-            return _CALLBACKS.pop(key)
-    return _CALLBACKS[key]
+    return kept(body, role, make)
 
 
 def _raise_failures(*functions: Any) -> None:

@@ -125,15 +125,19 @@ def normal(body: Surface, points: FloatArray) -> FloatArray:
 
 
 def project(body: Surface, points: FloatArray, *, iterations: int = 8) -> FloatArray:
-    """Newton steps x <- x - F grad F/|grad F|^2 until |F| is at rounding level: (..., 3) -> (..., 3)."""
+    """Newton steps x <- x - F grad F/|grad F|^2 until |F| is at rounding level: (..., 3) -> (..., 3).
+
+    Each point stops by itself: it does not depend on the others.
+    """
     points = np.array(points, dtype=float)
+    close = 1e-15 * size(body)
     for _ in range(iterations):
         gradient = body.gradient(points)
         step = body.level(points) / np.sum(gradient * gradient, axis=-1)
-        points -= step[..., None] * gradient
-        moved = np.abs(step) * np.linalg.norm(gradient, axis=-1)
-        if np.all(moved <= 1e-15 * size(body)):
+        moving = ~(np.abs(step) * np.linalg.norm(gradient, axis=-1) <= close)
+        if not np.any(moving):
             break
+        points -= np.where(moving, step, 0.0)[..., None] * gradient
     return points
 
 

@@ -22,6 +22,7 @@ from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.integrator import MapError, trace_states
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, P, X, pack
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
+from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
 from creeping.rays.nonsmooth import rough_from
@@ -216,9 +217,13 @@ def enough_steps(body: Surface, length: float) -> int:
 
     Zeros are at least pi/sqrt(max K) apart.
     """
-    points = points_of_charts(body)
-    fastest = float(np.max(speed_values(body, points)))
-    curved = float(np.sqrt(np.max(np.abs(gaussian_curvature(body, points))))) * fastest
+
+    def found() -> float:
+        points = points_of_charts(body)
+        fastest = float(np.max(speed_values(body, points)))
+        return float(np.sqrt(np.max(np.abs(gaussian_curvature(body, points))))) * fastest
+
+    curved = kept(body, "fastest oscillation of J", found)
     return int(max(64, np.ceil(4 * length * curved / np.pi)))
 
 

@@ -14,12 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
 
 BLOCK = 4_000_000
 """Values of a function on a strip for several observers that are held at once."""
+ALIKE = 1e-5
+"""Distance, in cells, up to which two solutions of an observer are one."""
 CLOSE = 1e-9
 """Residual at which a search ends, in radians or body sizes; splines of a coarse fan leave up to 1000 times that."""
 
@@ -207,22 +210,13 @@ def _newton(
     low, high = strip.positions[0] - widths[0], strip.positions[-1] + widths[0]
     if not strip.closed:
         good &= (sigma > low) & (sigma < high)
-    return _distinct(row[good], strip.wrap(sigma[good]), s[good], strip, size_of=widths)
+    row, sigma, s = row[good], strip.wrap(sigma[good]), s[good]
 
-
-def _distinct(
-    row: IntArray, sigma: FloatArray, s: FloatArray, strip: Strip, *, size_of: tuple[float, float]
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """One of each group of solutions of an observer that agree to 1e-5 of a cell."""
-    keep: list[int] = []
-    near = (1e-5 * size_of[0], 1e-5 * size_of[1])
-    mine: dict[int, list[int]] = {}
-    for k in range(len(row)):
-        others = mine.setdefault(int(row[k]), [])
-        apart = [abs(sigma[k] - sigma[j]) for j in others]
+    def alike(i: IntArray, j: IntArray) -> BoolArray:
+        apart = np.abs(sigma[i] - sigma[j])
         if strip.closed:
-            apart = [min(a, strip.period - a) for a in apart]
-        if all(a > near[0] or abs(s[k] - s[j]) > near[1] for a, j in zip(apart, others, strict=True)):
-            others.append(k)
-            keep.append(k)
-    return row[keep], sigma[keep], s[keep]
+            apart = np.minimum(apart, strip.period - apart)
+        return np.asarray((apart <= ALIKE * widths[0]) & (np.abs(s[i] - s[j]) <= ALIKE * widths[1]))
+
+    kept = first_of_equals(row, alike)
+    return row[kept], sigma[kept], s[kept]

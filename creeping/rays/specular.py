@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
+from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.shadow.occlusion import occluded
@@ -188,25 +189,9 @@ def _newton(body: Surface, points: FloatArray, wanted: FloatArray, which: IntArr
         points[active] = project(body, points[active] + step)
     good = np.sum((normal(body, points) - wanted[which]) ** 2, axis=1) < (100 * CONVERGED) ** 2
     which, points = which[good], points[good]
-    keep = first_of_equals(which, points, ALIKE * size(body))
+    near = ALIKE * size(body)
+    keep = first_of_equals(which, lambda i, j: np.linalg.norm(points[i] - points[j], axis=1) <= near)
     return which[keep], points[keep]
-
-
-def first_of_equals(which: IntArray, points: FloatArray, gap: float) -> IntArray:
-    """Numbers (m,) of the points (n, 3) farther than ``gap`` from every earlier one kept of their ``which`` (n,)."""
-    if not len(which):
-        return np.zeros(0, dtype=np.int64)
-    order = np.argsort(which, kind="stable")
-    place = np.arange(len(which)) - np.searchsorted(which[order], which[order])
-    kept = np.ones(len(which), dtype=bool)
-    # in the order of their places, so that what is kept of earlier ones is known
-    for rank in range(1, int(place.max()) + 1):
-        late = order[place == rank]
-        for before in range(rank):
-            early = order[np.flatnonzero(place == rank) - rank + before]
-            near = np.linalg.norm(points[late] - points[early], axis=1) <= gap
-            kept[late[near & kept[early]]] = False
-    return np.flatnonzero(kept)
 
 
 def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -24,6 +24,8 @@ class Starts(NamedTuple):
     points : (n, 3), L
     state : (n,)
         Codes of `creeping.shadow.status.STATUSES`.
+    spacing : (n,), L
+        Length of the line that each stands for.
     """
 
     arcs: list[Arc]
@@ -31,6 +33,7 @@ class Starts(NamedTuple):
     position: FloatArray
     points: FloatArray
     state: IntArray
+    spacing: FloatArray
 
     @classmethod
     def of(cls, line: ShadowLine, n_rays: int | None, launch_from: str) -> "Starts":
@@ -51,7 +54,8 @@ class Starts(NamedTuple):
             closed = bool(launch.closed[0, there[mine[0]]] == 1)
             begin = float(position[mine[0]]) - (0.0 if closed else 0.5 * float(spacing[0]))
             found.append(Arc(curve, begin, begin + float(np.sum(spacing)), closed))
-        return cls(found, arc, position, launch.points[0, there], launch.state[0, there].astype(np.int64))
+        state = launch.state[0, there].astype(np.int64)
+        return cls(found, arc, position, launch.points[0, there], state, launch.spacing[0, there])
 
     @classmethod
     def at(cls, line: ShadowLine, arcs: list[Arc], arc: IntArray, position: FloatArray) -> "Starts":
@@ -61,23 +65,25 @@ class Starts(NamedTuple):
             mine = np.flatnonzero(arc == number)
             points[mine] = line.curves[one.curve].at(position[mine])
             state[mine] = line.curves[one.curve].state_at(position[mine])
-        return cls(arcs, arc, position, points, state)
+        return cls(arcs, arc, position, points, state, np.full(len(arc), np.nan))
 
     def joined(self, more: "Starts") -> tuple["Starts", IntArray]:
         """Both in order, and where each comes from in the one followed by the other."""
         arc, position = np.concatenate([self.arc, more.arc]), np.concatenate([self.position, more.position])
         points, state = np.concatenate([self.points, more.points]), np.concatenate([self.state, more.state])
         order = np.lexsort((position, arc))
-        return Starts(self.arcs, arc[order], position[order], points[order], state[order]), order
+        arc, position, spacing = arc[order], position[order], np.empty(len(order))
+        for number, one in enumerate(self.arcs):
+            mine = arc == number
+            s, long = position[mine], one.end - one.start
+            # half the way to either neighbour
+            ends = [s[-1] - long, *s, s[0] + long] if one.closed else [2 * one.start - s[0], *s, 2 * one.end - s[-1]]
+            spacing[mine] = 0.5 * (np.array(ends[2:]) - np.array(ends[:-2]))
+        return Starts(self.arcs, arc, position, points[order], state[order], spacing), order
 
     def launch_points(self, line: ShadowLine) -> LaunchPoints:
-        """As launch points of one incidence; each stands for half the way to either neighbour."""
-        spacing, lengths = np.empty(len(self.arc)), np.array([curve.length for curve in line.curves])
-        for number, arc in enumerate(self.arcs):
-            mine = self.arc == number
-            s, long = self.position[mine], arc.end - arc.start
-            ends = [s[-1] - long, *s, s[0] + long] if arc.closed else [2 * arc.start - s[0], *s, 2 * arc.end - s[-1]]
-            spacing[mine] = 0.5 * (np.array(ends[2:]) - np.array(ends[:-2]))
+        """As launch points of one incidence."""
+        lengths = np.array([curve.length for curve in line.curves])
         curve = np.array([self.arcs[k].curve for k in self.arc], dtype=np.int64)
         rows: tuple[Any, ...] = (
             self.points,
@@ -85,7 +91,7 @@ class Starts(NamedTuple):
             np.sum(self.points * line.direction, axis=1),
             curve,
             self.arc.astype(float),
-            spacing,
+            self.spacing,
             np.array([self.arcs[k].closed for k in self.arc], dtype=float),
             self.state,
         )

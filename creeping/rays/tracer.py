@@ -17,10 +17,9 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geodesics.equations import points_of_charts
+from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M21, P, X, pack
-from creeping.geometry.curvature import principal_curvature_bound
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, size
@@ -102,8 +101,7 @@ class RayTracer:
         if speed_of(body) is not None:
             raise InvalidInputError(f"{body!r} has a speed; the diffracted field is that of a plain body")
         self.body, self.length = body, length
-        curved = principal_curvature_bound(body, points_of_charts(body))
-        self.steps = max(16, int(np.ceil(length * curved / TURN)))
+        self.steps = max(16, int(np.ceil(length * sharpest_curvature(body) / TURN)))
         self.step = length / self.steps
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
         self._rule = polynomial_matrix(), 0.5 * (nodes + 1), 0.5 * weights
@@ -252,8 +250,9 @@ class RayTracer:
         lost = np.setdiff1d(np.arange(len(times)), found)
         if len(lost):
             # those that the quick search gave up, or ended too early
-            rows = [part[lost] for part in (directions, observers, near, times, cell)]
-            again, more, further = self._sought(*rows, 1, 0.0)
+            again, more, further = self._sought(
+                directions[lost], observers[lost], near[lost], times[lost], cell[lost], 1, 0.0
+            )
             result = SingleRays.joined([result, more])
             found, moved = np.concatenate([found, lost[again]]), np.concatenate([moved, further])
             order = np.argsort(found)

@@ -5,12 +5,12 @@ the same kernels finish it.
 """
 
 from dataclasses import dataclass
-from weakref import finalize
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.evaluators import evaluators
+from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
@@ -19,8 +19,6 @@ NEAR = 1e-3
 """Longest step, in body sizes, that brings an interpolated point onto the line."""
 FORBIDDEN = 1e-6
 """v below which a line counts as one that crosses itself."""
-_PREPARED: dict[int, LineMeshes] = {}
-"""By identity: bodies may be equal to others, or not be hashable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +79,7 @@ class Finished:
 
 def prepared(body: Surface) -> LineMeshes:
     """Meshes of a body, made once."""
-    key = id(body)
-    if key not in _PREPARED:
-        _PREPARED[key] = LineMeshes(body)
-        finalize(body, _PREPARED.pop, key, None)
-    return _PREPARED[key]
+    return kept(body, "line meshes", lambda: LineMeshes(body))
 
 
 def box_of(body: Surface) -> FloatArray:

@@ -26,7 +26,8 @@ from creeping.storage.folder import content_digest
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.sweeper import Sweeper
 
-MOST_IN_TASK = 1024
+MOST_IN_TASK, MOST_AT_ONCE = 1024, 256
+"""Incidences of a task, and of one that nobody else waits for."""
 TASK_BYTES = 64_000_000
 """Results of one task, in memory."""
 INCIDENCE_BYTES = 1_000_000_000
@@ -112,12 +113,12 @@ class SweepPlan:
         return content_digest(self.key)
 
 
-def task_size(request: SweepRequest, count: int, asked: int | None = None) -> int:
-    """Incidences of a task unless asked for: enough tasks to share and to save often, and not too large in memory."""
+def task_size(request: SweepRequest, count: int, asked: int | None = None, *, shared: bool = True) -> int:
+    """Incidences of a task unless asked for: not too large in memory, and ``shared`` enough of them to save often."""
     if asked:
         return min(int(asked), count)
-    each = bytes_of(request)
-    return int(np.clip(min(-(-count // 32), TASK_BYTES // each), 1, MOST_IN_TASK))
+    most = -(-count // 32) if shared else min(count, MOST_AT_ONCE)
+    return int(np.clip(min(most, TASK_BYTES // bytes_of(request)), 1, MOST_IN_TASK))
 
 
 def bytes_of(request: SweepRequest) -> int:

@@ -13,6 +13,7 @@ from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.far import checked
+from creeping.geometry.directions import unit_directions
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
@@ -211,12 +212,8 @@ def sweep_request(
         seen = np.zeros((0, 3)) if observation is None else np.asarray(observation, dtype=float)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"wavenumbers and observation must be arrays of numbers: {error}") from error
-    if seen.ndim < 1 or seen.shape[-1] != 3 or not np.all(np.isfinite(seen)):
-        raise InvalidInputError(f"observation has shape {seen.shape}; give finite directions (..., 3)")
-    seen = seen.reshape(-1, 3)
-    norm = np.linalg.norm(seen, axis=1, keepdims=True)
-    if np.any(norm == 0):
-        raise InvalidInputError(f"{int(np.sum(norm == 0))} of {len(seen)} observation directions are zero")
+    if seen.size or observation is not None:
+        seen = unit_directions(seen, "observation directions").reshape(-1, 3)
     return SweepRequest(
         quantity=quantity,  # type: ignore[arg-type]
         length=_plain(length),
@@ -226,7 +223,7 @@ def sweep_request(
         boundaries=tuple(
             b if isinstance(b, str) else f"impedance:{b.eta}".replace("(", "").replace(")", "") for b in several
         ),
-        observation=tuple((float(x), float(y), float(z)) for x, y, z in seen / norm),
+        observation=tuple((float(x), float(y), float(z)) for x, y, z in seen),
         order=_plain(order),
     )
 

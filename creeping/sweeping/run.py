@@ -123,7 +123,11 @@ def sweep_directions(
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, (int, np.integer)) or chunk < 1):
         raise InvalidInputError(f"chunk = {chunk!r} is not a whole number >= 1")
     going_on = store is not None and resume and Path(store).exists()
-    chunk = SweepStore.open(str(store)).chunk if going_on else task_size(request, len(directions), chunk)
+    chunk = (
+        SweepStore.open(str(store)).chunk
+        if going_on
+        else task_size(request, len(directions), chunk, shared=store is not None or client is not None)
+    )
     plan = SweepPlan(flow, request, directions, chunk)
     if store is None:
         return in_memory(plan, progress)
