@@ -34,26 +34,26 @@ __all__ = [
 ]
 
 _HOMES = {
-    "GLProbe": "display",
-    "decay_picture": "field_pictures",
-    "far_cut_picture": "far_cuts",
-    "gl_available": "display",
-    "parameter_picture": "pictures",
-    "picture": "pictures",
-    "plot_parameters": "parameter_plane",
-    "polydata": "_polylines",
-    "surface_field_picture": "field_pictures",
-    "write_csv": "export",
-    "write_ffe": "ffe",
-    "write_text": "export",
-    "write_vtp": "export",
+    "GLProbe": "creeping.plotting.display",
+    "decay_picture": "creeping.plotting.field_pictures",
+    "far_cut_picture": "creeping.plotting.far_cuts",
+    "gl_available": "creeping.plotting.display",
+    "parameter_picture": "creeping.plotting.pictures",
+    "picture": "creeping.plotting.pictures",
+    "plot_parameters": "creeping.plotting.parameter_plane",
+    "polydata": "creeping.files.polylines",
+    "surface_field_picture": "creeping.plotting.field_pictures",
+    "write_csv": "creeping.files.tables",
+    "write_ffe": "creeping.files.ffe",
+    "write_text": "creeping.files.tables",
+    "write_vtp": "creeping.files.tables",
 }
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 
