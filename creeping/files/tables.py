@@ -5,7 +5,7 @@ Numbers keep all 17 digits, so that what is read back is what was written. Nothi
 
 import os
 from collections.abc import Iterable, Sequence
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
@@ -13,18 +13,23 @@ from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.files import far_table as _far_table
 from creeping.files import vtp as _vtp
-from creeping.files._inputs import FarFieldLike, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.files.polylines import Polylines
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
+
+if TYPE_CHECKING:
+    from creeping.field.far import FarField
 
 _RAY_COLUMNS = ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
 
 
 def write_vtp(
     path: str | os.PathLike[str],
-    line: ShadowLineLike | None = None,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine | None = None,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
 ) -> None:
     """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
 
@@ -66,10 +71,10 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 def write_csv(
     path: str | os.PathLike[str],
     *,
-    line: ShadowLineLike | None = None,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] | None = None,
-    far: FarFieldLike | None = None,
+    line: ShadowLine | None = None,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] | None = None,
+    far: "FarField | None" = None,
 ) -> None:
     """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
 
@@ -142,14 +147,14 @@ def _write_table(stream: TextIO, notes: dict[str, str], rows: Iterable[tuple[Any
     stream.writelines(",".join(map(str, row)) + "\n" for row in rows)
 
 
-def _line_rows(line: ShadowLineLike) -> Iterable[tuple[Any, ...]]:
+def _line_rows(line: ShadowLine) -> Iterable[tuple[Any, ...]]:
     for number, curve in enumerate(line.curves):
         arclength, points = np.asarray(curve.arclength).tolist(), np.asarray(curve.points).tolist()
         for s, point, status in zip(arclength, points, curve.status, strict=True):
             yield (number, s, *point, status)
 
 
-def _fan_rows(fan: RayFanLike) -> Iterable[tuple[Any, ...]]:
+def _fan_rows(fan: RayFan) -> Iterable[tuple[Any, ...]]:
     times = np.asarray(fan.travel_time).tolist()
     for ray in range(len(fan.points)):
         status = int(fan.status[ray])
@@ -159,7 +164,7 @@ def _fan_rows(fan: RayFanLike) -> Iterable[tuple[Any, ...]]:
             yield (ray, step, t, *point, *direction, *carried, status)
 
 
-def _curve_rows(curves: Sequence[IsoPhaseCurveLike]) -> Iterable[tuple[Any, ...]]:
+def _curve_rows(curves: Sequence[IsoPhaseCurve]) -> Iterable[tuple[Any, ...]]:
     for number, curve in enumerate(curves):
         for point in np.asarray(curve.points).tolist():
             yield (number, curve.of, float(curve.level), int(curve.closed), *point)
