@@ -126,9 +126,7 @@ def polydata(line: ShadowLine | None = None, fan: RayFan | None = None, curves: 
     import pyvista
 
     collected = Polylines(line, fan, curves)
-    if not collected.lines:
-        return pyvista.PolyData()
-    cells = np.concatenate([np.concatenate([[len(one)], one]) for one in collected.lines])
+    cells = np.concatenate([np.zeros(0, dtype=np.int64), *(np.append(len(one), one) for one in collected.lines)])
     mesh = pyvista.PolyData(collected.points, lines=cells)
     for name, values in collected.point_data.items():
         mesh.point_data[name] = values

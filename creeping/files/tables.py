@@ -1,6 +1,6 @@
 """Files of shadow lines, fans, iso-phase curves and far fields for other programs: VTK PolyData (.vtp) and CSV.
 
-Numbers keep all 17 digits, so that what is read back is what was written. Nothing here imports VTK.
+Numbers keep all 17 digits, so that what is read back is what was written.
 """
 
 import os
@@ -12,8 +12,7 @@ import numpy as np
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.files import far_table as _far_table
-from creeping.files import vtp as _vtp
-from creeping.files.polylines import Polylines
+from creeping.files.polylines import polydata
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -50,10 +49,18 @@ def write_vtp(
     CreepingError
         If the file cannot be written.
     """
-    collected = Polylines(line, fan, curves)
-    text = _vtp.document(collected.points, collected.lines, collected.point_data, collected.cell_data)
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    # to memory, then by Python: a full disk is an error here, whereas VTK's own writing to a file only logs it
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(polydata(line, fan, curves))
+    writer.SetHeaderTypeToUInt64()
+    # binary, because VTK's reader stops at an ascii nan
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
     with written_aside(path) as aside:
-        aside.write_text(text, encoding="ascii")
+        aside.write_text(writer.GetOutputString(), encoding="ascii")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
