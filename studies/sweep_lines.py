@@ -16,7 +16,6 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.errors import SingularIncidenceError
 from creeping.geometry.directions import fibonacci_directions
 from creeping.shadow.many import prepared, shadow_lines
 from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
@@ -76,7 +75,7 @@ def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
     for row, d in enumerate(directions):
         try:
             line = cr.shadow_line(body, d)
-        except SingularIncidenceError:
+        except cr.SingularIncidenceError:
             lines.status[row] = SINGULAR
             continue
         lines.curves[row], lines.length[row] = len(line.curves), line.length

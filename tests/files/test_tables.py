@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from creeping.errors import CreepingError, InvalidInputError
-from creeping.plotting import write_csv, write_text, write_vtp
+from creeping import CreepingError, InvalidInputError
+from creeping.files import write_csv, write_text, write_vtp
 
 
 def table(path):
@@ -66,7 +66,7 @@ def test_vtp_keeps_every_bit_without_a_library_that_draws(tmp_path):
 import sys
 from types import SimpleNamespace as S
 import numpy as np
-from creeping.plotting import write_vtp
+from creeping.files import write_vtp
 curve = S(points=np.array([[0.1, np.nan, 1e-300], [1 / 3, 2, 3], [4, 5, -0.0]]), status=["concave"] * 3)
 write_vtp(sys.argv[1], S(curves=[curve]))
 drawing = [name for name in sys.modules if "vtkRendering" in name or name.startswith("pyvista.plotting")]

@@ -5,7 +5,6 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.rays.preview import quick_fan
 
 CASES = [
@@ -52,7 +51,7 @@ def test_what_rides_along_is_that_of_launch(body, direction):
 
 def test_trouble_is_named():
     flow = cr.DirectFlow(sc.Torus())
-    with pytest.raises(SingularIncidenceError, match="crosses itself"):
+    with pytest.raises(cr.SingularIncidenceError, match="crosses itself"):
         quick_fan(flow, (1, 0, 0), length=1.0, n_rays=8, n_steps=2)
-    with pytest.raises(InvalidInputError):
+    with pytest.raises(cr.InvalidInputError):
         quick_fan(flow, (0, 0, np.nan), length=1.0, n_rays=8, n_steps=2)

@@ -8,7 +8,7 @@ import fake_sweeps as fake
 import numpy as np
 import pytest
 
-from creeping.errors import CreepingError
+from creeping import CreepingError
 from creeping.geometry.directions import fibonacci_directions
 from creeping.shadow.status import FAILED
 from creeping.sweeping.cluster.driver import driver as cluster
