@@ -33,8 +33,7 @@ def test_the_page_opens_from_its_file(tmp_path, browser):
     assert browser.driver.find_element("id", "plane").rect["height"] > 50
     assert "length 6.0202046 L" in browser.driver.find_element("id", "creeping").text
     assert browser.errors() == []
-    outside = [u for u in browser.requests() if not u.startswith(("file:", "data:", "blob:", "chrome:"))]
-    assert outside == []
+    assert browser.requests_outside() == []
 
 
 def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path):
