@@ -11,7 +11,7 @@ import pytest
 from creeping import CreepingError
 from creeping.geometry.directions import fibonacci_directions
 from creeping.shadow.status import FAILED
-from creeping.sweeping.cluster.driver import driver as cluster
+from creeping.sweeping.cluster import driver as cluster
 from creeping.sweeping.run import fill, sweep_directions
 from creeping.sweeping.storage.store import SweepStore
 
