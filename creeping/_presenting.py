@@ -71,13 +71,13 @@ class DrawnOnBody(Drawn):
     __slots__ = ()
 
     def to_polydata(self) -> Any:
-        """Its curves for pyvista and VTK, with the arrays of a file of `creeping.plotting.write_vtp`.
+        """Its curves for pyvista and VTK, with the arrays of a file of `creeping.files.write_vtp`.
 
         Points are copies, and all of them: those of a ray in trouble too. No display or OpenGL is needed.
 
         Returns
         -------
         pyvista.PolyData
-            Several results at once are joined by `creeping.plotting.polydata`.
+            Several results at once are joined by `creeping.files.polydata`.
         """
         return import_module(_module).to_polydata(self)

@@ -59,8 +59,8 @@ def draw(name: str, folder: str | Path, *, quick: bool = False) -> dict[str, Any
     CreepingError
         If a file cannot be written.
     """
-    from creeping.errors import InvalidInputError
-    from creeping.plotting import write_text
+    from creeping import InvalidInputError
+    from creeping.files import write_text
     from creeping.storage.atomic import written_aside
 
     if name not in FIGURES:

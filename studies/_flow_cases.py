@@ -14,7 +14,6 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.errors import ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
@@ -238,7 +237,7 @@ def attempted(name: str, rays: float = 1e6, outputs: int = 1, tolerance: float =
     """The map, or why there is none."""
     try:
         return built(name, rays, outputs, tolerance)
-    except ToleranceError as error:
+    except cr.ToleranceError as error:
         return str(error)
 
 

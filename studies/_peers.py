@@ -17,8 +17,8 @@ from importlib import import_module
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from creeping import IntegrationError
 from creeping._typing import Any, FloatArray
-from creeping.errors import IntegrationError
 from scatterers import Ellipsoid, Torus, TwistedEllipsoid
 
 ORDERS = 3, 20

@@ -16,7 +16,6 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.errors import SingularIncidenceError
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.evaluators import evaluators
 from creeping.shadow.many import shadow_lines
@@ -79,7 +78,7 @@ def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
     for row, d in enumerate(directions):
         try:
             line = cr.shadow_line(body, d)
-        except SingularIncidenceError:
+        except cr.SingularIncidenceError:
             lines.status[row] = SINGULAR
             continue
         lines.curves[row], lines.length[row] = len(line.curves), line.length

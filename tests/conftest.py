@@ -2,6 +2,18 @@
 
 import numpy as np
 import pytest
+from results_to_show import (  # noqa: F401
+    ball_cut,
+    ball_fan,
+    dark_fan,
+    small_map,
+    sphere_curves,
+    sphere_fan,
+    sphere_line,
+    torus_fan,
+    twisted_curves,
+    twisted_fan,
+)
 
 import creeping as cr
 import scatterers as sc

@@ -133,7 +133,7 @@ def run(
             summary["field"]["seconds"] = field_seconds
             summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)
-        from creeping.plotting import write_text
+        from creeping.files import write_text
 
         write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
     print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))

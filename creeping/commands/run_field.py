@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from creeping import plotting
+from creeping import files, plotting
 from creeping._typing import FloatArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike, parse_boundary
@@ -86,7 +86,7 @@ class Job:
 
     def _write(self, far: FarField, fan: RayFan, output: Path, backend: str) -> list[str]:
         names = ["far.csv"]
-        plotting.write_csv(output / "far.csv", far=far)
+        files.write_csv(output / "far.csv", far=far)
         ends = np.cumsum([len(target.directions) for target in self.targets])
         pieces = [_part(far, end - len(t.directions), end) for t, end in zip(self.targets, ends, strict=True)]
         cuts = {
@@ -102,7 +102,7 @@ class Job:
             # a .ffe file holds no infinity; the table does
             if target.kind == "grid" and np.all(np.isfinite(piece.total)):
                 where = output / "far.ffe"
-                plotting.write_ffe(where, piece, target.theta, target.phi, direction=fan.line.direction)
+                files.write_ffe(where, piece, target.theta, target.phi, direction=fan.line.direction)
                 names.append(where.name)
         if self.boundary != "pec":
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}

@@ -64,7 +64,7 @@ def _of_the_body(fan: Any) -> dict[str, Any]:
 
 def write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend: str) -> tuple[list[str], str]:
     """Write pictures and data files; their names, and what drew the pictures."""
-    from creeping import plotting
+    from creeping import files, plotting
     from creeping.errors import InvalidInputError
 
     try:
@@ -72,12 +72,12 @@ def write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend:
     except OSError as error:
         raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
     # pictures last: a graphics driver that ends the process shall not take the numbers with it
-    plotting.write_vtp(output / "line.vtp", line=line)
-    plotting.write_vtp(output / "rays.vtp", fan=fan)
-    plotting.write_vtp(output / "curves.vtp", curves=curves)
-    plotting.write_csv(output / "line.csv", line=line)
-    plotting.write_csv(output / "rays.csv", fan=fan)
-    plotting.write_csv(output / "curves.csv", curves=curves)
+    files.write_vtp(output / "line.vtp", line=line)
+    files.write_vtp(output / "rays.vtp", fan=fan)
+    files.write_vtp(output / "curves.vtp", curves=curves)
+    files.write_csv(output / "line.csv", line=line)
+    files.write_csv(output / "rays.csv", fan=fan)
+    files.write_csv(output / "curves.csv", curves=curves)
     drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend)
     plotting.parameter_picture(output / "parameters.png", line, fan, curves)
     names = ["rays.png", "parameters.png"] + [

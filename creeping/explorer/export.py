@@ -12,7 +12,7 @@ from creeping.explorer.request import Wish
 from creeping.explorer.scene import Model, Stage
 from creeping.explorer.svg import cut_svg, plane_svg
 from creeping.explorer.text import colour_bar, settled_text
-from creeping.plotting import write_text
+from creeping.files import write_text
 from creeping.rays.transport import Flow
 
 STYLE = """

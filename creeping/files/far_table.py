@@ -1,12 +1,15 @@
 """A far field as a table: one row per direction, the total and its parts, for a vector field each component."""
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.field.decibels import decibels
-from creeping.files._inputs import FarFieldLike
+
+if TYPE_CHECKING:
+    from creeping.field.far import FarField
 
 PARTS = ("creeping", "reflected", "forward")
 _COMPONENTS = ("_tt", "_tp", "_pt", "_pp")
@@ -21,7 +24,7 @@ def angles_of(directions: FloatArray) -> FloatArray:
     return np.stack([np.arctan2(across, z), np.where(phi >= 2 * np.pi, 0.0, phi)], axis=-1)
 
 
-def notes(far: FarFieldLike) -> dict[str, str]:
+def notes(far: "FarField") -> dict[str, str]:
     """Columns and what they hold."""
     of = f"k = {far.wavenumber!r} 1/L, {far.boundary} boundary, order {far.order}, time factor exp(-i w t)"
     columns = {
@@ -44,7 +47,7 @@ def notes(far: FarFieldLike) -> dict[str, str]:
     return columns
 
 
-def rows(far: FarFieldLike) -> Iterable[tuple[Any, ...]]:
+def rows(far: "FarField") -> Iterable[tuple[Any, ...]]:
     """One tuple for each direction, in the order of `notes`."""
     columns: list[Any] = [*np.asarray(far.directions).T, *np.degrees(angles_of(far.directions)).T]
     for k in range(len(_suffixes(far))):
@@ -58,7 +61,7 @@ def rows(far: FarFieldLike) -> Iterable[tuple[Any, ...]]:
         yield (*row, method, int(lost))
 
 
-def _suffixes(far: FarFieldLike) -> tuple[str, ...]:
+def _suffixes(far: "FarField") -> tuple[str, ...]:
     return ("",) if np.ndim(far.total) == 1 else _COMPONENTS
 
 

@@ -9,6 +9,7 @@ Rows run over θ first, then φ, in degrees.
 
 import os
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +17,12 @@ from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.polarisation import spherical_frame
-from creeping.files._inputs import FarFieldLike
 from creeping.files.far_table import angles_of
 from creeping.geometry.directions import unit_direction
 from creeping.storage.atomic import written_aside
+
+if TYPE_CHECKING:
+    from creeping.field.far import FarField
 
 LIGHT = 299792458.0
 """Speed of light, m/s."""
@@ -35,7 +38,7 @@ def grid_directions(theta: ArrayLike, phi: ArrayLike) -> FloatArray:
 
 def write_ffe(
     path: str | os.PathLike[str],
-    far: FarFieldLike,
+    far: "FarField",
     theta: ArrayLike,
     phi: ArrayLike,
     *,
@@ -78,7 +81,7 @@ def write_ffe(
         stream.writelines(line + "\n" for line in _lines(far, t, p, direction))
 
 
-def _check_grid(far: FarFieldLike, theta: FloatArray, phi: FloatArray) -> None:
+def _check_grid(far: "FarField", theta: FloatArray, phi: FloatArray) -> None:
     remedy = "; give far_field the directions of grid_directions(theta, phi)"
     if theta.ndim != 1 or phi.ndim != 1 or not (np.all(np.isfinite(theta)) and np.all(np.isfinite(phi))):
         raise InvalidInputError(f"theta {theta.shape} and phi {phi.shape} are not axes (t,), (p,) of finite radians")
@@ -98,7 +101,7 @@ def _check_grid(far: FarFieldLike, theta: FloatArray, phi: FloatArray) -> None:
         )
 
 
-def _lines(far: FarFieldLike, theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:
+def _lines(far: "FarField", theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:
     vector = np.ndim(far.total) == 3
     yield "##File Type: Far field"
     yield "##File Format: 8"
@@ -133,7 +136,7 @@ def _lines(far: FarFieldLike, theta: FloatArray, phi: FloatArray, direction: Arr
             yield " " + "".join(f"{value:26.16E}" for value in (*row, float(np.sum(sections))))
 
 
-def _components(far: FarFieldLike, theta: FloatArray, phi: FloatArray, incident: int) -> ComplexArray:
+def _components(far: "FarField", theta: FloatArray, phi: FloatArray, incident: int) -> ComplexArray:
     """θ̂ and φ̂ components for one incident polarisation (t, p, 2); at a pole those of the row's φ, not of φ = 0."""
     total = np.asarray(far.total)
     if total.ndim == 1:

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.files._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
-from creeping.rays.fan import RayStatus
+from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
+from creeping.shadow.status import STATUSES
 
 KINDS = ("shadow line", "ray", "iso-phase curve")
 RAY_ARRAYS = ("eikonal", "spreading", "spreading_rate", "curvature", "attenuation")
@@ -34,9 +36,9 @@ class Polylines:
 
     def __init__(
         self,
-        line: ShadowLineLike | None = None,
-        fan: RayFanLike | None = None,
-        curves: Sequence[IsoPhaseCurveLike] = (),
+        line: ShadowLine | None = None,
+        fan: RayFan | None = None,
+        curves: Sequence[IsoPhaseCurve] = (),
     ) -> None:
         self._count = 0
         self._points: list[FloatArray] = []
@@ -66,12 +68,12 @@ class Polylines:
         """Arrays (lines,) by name."""
         return _joined(self._of_lines, CELL_ARRAYS)
 
-    def _add_line(self, line: ShadowLineLike) -> None:
+    def _add_line(self, line: ShadowLine) -> None:
         for number, curve in enumerate(line.curves):
-            status = np.array([LINE_STATUSES.index(str(name)) for name in curve.status], dtype=np.int64)
+            status = np.array([STATUSES.index(str(name)) for name in curve.status], dtype=np.int64)
             self._add("shadow line", curve.points[None], True, {"line_status": status}, curve_index=[number])
 
-    def _add_fan(self, fan: RayFanLike) -> None:
+    def _add_fan(self, fan: RayFan) -> None:
         times = np.broadcast_to(fan.travel_time, np.shape(fan.eikonal))
         arrays = {name: getattr(fan, name) for name in (*RAY_ARRAYS, "caustic_index")} | {"travel_time": times}
         status, detachment = np.asarray(fan.status)[:, None], np.asarray(fan.detachment)[:, None]
@@ -106,9 +108,7 @@ def _joined(parts: dict[str, list[Any]], types: dict[str, type]) -> dict[str, An
     return {name: np.concatenate([np.zeros(0, dtype=types[name]), *columns]) for name, columns in parts.items()}
 
 
-def polydata(
-    line: ShadowLineLike | None = None, fan: RayFanLike | None = None, curves: Sequence[IsoPhaseCurveLike] = ()
-) -> Any:
+def polydata(line: ShadowLine | None = None, fan: RayFan | None = None, curves: Sequence[IsoPhaseCurve] = ()) -> Any:
     """Polylines as a ``pyvista.PolyData``, with the points and arrays that `write_vtp` writes.
 
     Building one loads no part of VTK that draws, so it needs neither a display nor OpenGL.
@@ -126,9 +126,7 @@ def polydata(
     import pyvista
 
     collected = Polylines(line, fan, curves)
-    if not collected.lines:
-        return pyvista.PolyData()
-    cells = np.concatenate([np.concatenate([[len(one)], one]) for one in collected.lines])
+    cells = np.concatenate([np.zeros(0, dtype=np.int64), *(np.append(len(one), one) for one in collected.lines)])
     mesh = pyvista.PolyData(collected.points, lines=cells)
     for name, values in collected.point_data.items():
         mesh.point_data[name] = values

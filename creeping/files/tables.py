@@ -1,30 +1,34 @@
 """Files of shadow lines, fans, iso-phase curves and far fields for other programs: VTK PolyData (.vtp) and CSV.
 
-Numbers keep all 17 digits, so that what is read back is what was written. Nothing here imports VTK.
+Numbers keep all 17 digits, so that what is read back is what was written.
 """
 
 import os
 from collections.abc import Iterable, Sequence
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.files import far_table as _far_table
-from creeping.files import vtp as _vtp
-from creeping.files._inputs import FarFieldLike, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
-from creeping.files.polylines import Polylines
+from creeping.files.polylines import polydata
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
+
+if TYPE_CHECKING:
+    from creeping.field.far import FarField
 
 _RAY_COLUMNS = ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
 
 
 def write_vtp(
     path: str | os.PathLike[str],
-    line: ShadowLineLike | None = None,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine | None = None,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
 ) -> None:
     """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
 
@@ -45,10 +49,18 @@ def write_vtp(
     CreepingError
         If the file cannot be written.
     """
-    collected = Polylines(line, fan, curves)
-    text = _vtp.document(collected.points, collected.lines, collected.point_data, collected.cell_data)
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    # to memory, then by Python: a full disk is an error here, whereas VTK's own writing to a file only logs it
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(polydata(line, fan, curves))
+    writer.SetHeaderTypeToUInt64()
+    # binary, because VTK's reader stops at an ascii nan
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
     with written_aside(path) as aside:
-        aside.write_text(text, encoding="ascii")
+        aside.write_text(writer.GetOutputString(), encoding="ascii")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -66,10 +78,10 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 def write_csv(
     path: str | os.PathLike[str],
     *,
-    line: ShadowLineLike | None = None,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] | None = None,
-    far: FarFieldLike | None = None,
+    line: ShadowLine | None = None,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] | None = None,
+    far: "FarField | None" = None,
 ) -> None:
     """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
 
@@ -142,14 +154,14 @@ def _write_table(stream: TextIO, notes: dict[str, str], rows: Iterable[tuple[Any
     stream.writelines(",".join(map(str, row)) + "\n" for row in rows)
 
 
-def _line_rows(line: ShadowLineLike) -> Iterable[tuple[Any, ...]]:
+def _line_rows(line: ShadowLine) -> Iterable[tuple[Any, ...]]:
     for number, curve in enumerate(line.curves):
         arclength, points = np.asarray(curve.arclength).tolist(), np.asarray(curve.points).tolist()
         for s, point, status in zip(arclength, points, curve.status, strict=True):
             yield (number, s, *point, status)
 
 
-def _fan_rows(fan: RayFanLike) -> Iterable[tuple[Any, ...]]:
+def _fan_rows(fan: RayFan) -> Iterable[tuple[Any, ...]]:
     times = np.asarray(fan.travel_time).tolist()
     for ray in range(len(fan.points)):
         status = int(fan.status[ray])
@@ -159,7 +171,7 @@ def _fan_rows(fan: RayFanLike) -> Iterable[tuple[Any, ...]]:
             yield (ray, step, t, *point, *direction, *carried, status)
 
 
-def _curve_rows(curves: Sequence[IsoPhaseCurveLike]) -> Iterable[tuple[Any, ...]]:
+def _curve_rows(curves: Sequence[IsoPhaseCurve]) -> Iterable[tuple[Any, ...]]:
     for number, curve in enumerate(curves):
         for point in np.asarray(curve.points).tolist():
             yield (number, curve.of, float(curve.level), int(curve.closed), *point)

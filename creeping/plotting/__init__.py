@@ -1,62 +1,9 @@
-"""Pictures of shadow lines, creeping rays, iso-phase curves and fields, and files of them for other programs.
+"""Pictures of shadow lines, creeping rays, iso-phase curves and fields.
 
 Every name is imported on first use, so that importing this package costs neither matplotlib nor pyvista.
 ``scene.plot_rays_3d`` draws with pyvista, ``axes3d.plot_rays_3d`` with matplotlib; ``picture`` chooses.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+import lazy_loader
 
-if TYPE_CHECKING:
-    from creeping.files.ffe import write_ffe
-    from creeping.files.polylines import polydata
-    from creeping.files.tables import write_csv, write_text, write_vtp
-    from creeping.plotting.display import GLProbe, gl_available
-    from creeping.plotting.far_cuts import far_cut_picture
-    from creeping.plotting.field_pictures import decay_picture, surface_field_picture
-    from creeping.plotting.parameter_plane import plot_parameters
-    from creeping.plotting.pictures import parameter_picture, picture
-
-__all__ = [
-    "GLProbe",
-    "decay_picture",
-    "far_cut_picture",
-    "gl_available",
-    "parameter_picture",
-    "picture",
-    "plot_parameters",
-    "polydata",
-    "surface_field_picture",
-    "write_csv",
-    "write_ffe",
-    "write_text",
-    "write_vtp",
-]
-
-_HOMES = {
-    "GLProbe": "display",
-    "decay_picture": "field_pictures",
-    "far_cut_picture": "far_cuts",
-    "gl_available": "display",
-    "parameter_picture": "pictures",
-    "picture": "pictures",
-    "plot_parameters": "parameter_plane",
-    "polydata": "_polylines",
-    "surface_field_picture": "field_pictures",
-    "write_csv": "export",
-    "write_ffe": "ffe",
-    "write_text": "export",
-    "write_vtp": "export",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

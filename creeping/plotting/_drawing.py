@@ -7,11 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.plotting._strokes import LevelColours, Stroke, strokes
 from creeping.plotting._view import View, shadow_view
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
 
 
 @dataclass(frozen=True)
@@ -140,9 +142,9 @@ class Drawing:
 
 
 def compose(
-    line: ShadowLineLike,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     *,
     view: View | None = None,
     rays: int = 48,

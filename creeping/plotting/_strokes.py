@@ -7,8 +7,11 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.files._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.geometry.surface import size
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
+from creeping.shadow.status import STATUSES
 
 BODY_COLOUR = "#dfe5ea"
 RAY_COLOUR = "#55606b"
@@ -47,9 +50,9 @@ class Stroke:
 
 
 def strokes(
-    line: ShadowLineLike,
-    fan: RayFanLike | None,
-    curves: Sequence[IsoPhaseCurveLike],
+    line: ShadowLine,
+    fan: RayFan | None,
+    curves: Sequence[IsoPhaseCurve],
     *,
     rays: int,
     until: float | None = None,
@@ -74,14 +77,14 @@ def strokes(
         # levels are read off the colour bar; a single one has none
         label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
         found.append(Stroke([points], colours(curve.level), 0.9, label=label, rank=1))
-    for status in LINE_STATUSES:
+    for status in STATUSES:
         pieces = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
         if pieces:
             found.append(Stroke(pieces, STATUS_COLOURS[status], 1.8, label=f"shadow line, {status}", rank=2))
     return found
 
 
-def chosen_rays(fan: RayFanLike, rays: int) -> list[int]:
+def chosen_rays(fan: RayFan, rays: int) -> list[int]:
     """Numbers of at most ``rays`` rays, evenly spread along the shadow line.
 
     Not evenly by number: a fan has more rays where they part fast.
@@ -101,7 +104,7 @@ def chosen_rays(fan: RayFanLike, rays: int) -> list[int]:
     return sorted({int(k) for k in after - nearer_before})
 
 
-def ray_strokes(fan: RayFanLike, rays: int, until: float, *, spacing: float = 0.015) -> list[Stroke]:
+def ray_strokes(fan: RayFan, rays: int, until: float, *, spacing: float = 0.015) -> list[Stroke]:
     """Chosen rays up to detachment, and faint beyond it, where they are geodesics but no creeping rays.
 
     ``spacing`` of the points is relative to the size of the body.
@@ -182,7 +185,7 @@ class LevelColours:
     name: str
 
     @classmethod
-    def of(cls, curves: Sequence[IsoPhaseCurveLike]) -> "LevelColours":
+    def of(cls, curves: Sequence[IsoPhaseCurve]) -> "LevelColours":
         """Colours for these curves."""
         levels = [float(curve.level) for curve in curves] or [0.0]
         names = {curve.of for curve in curves}

@@ -9,17 +9,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.geometry.surface import normal
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
 from creeping.plotting._view import View
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
 
 
 def plot_rays_3d(
-    line: ShadowLineLike,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     *,
     ax: Any = None,
     view: View | None = None,

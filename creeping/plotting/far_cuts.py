@@ -3,14 +3,17 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import cross_section_decibels, decibels, shown_range
-from creeping.files._inputs import FarFieldLike
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
+
+if TYPE_CHECKING:
+    from creeping.field.far import FarField
 
 KINDS = ("cartesian", "polar")
 QUANTITIES = {
@@ -41,7 +44,7 @@ class Curve:
 def far_cut_picture(
     path: str | os.PathLike[str],
     angles: ArrayLike,
-    fields: Mapping[str, FarFieldLike | ComplexArray],
+    fields: Mapping[str, "FarField | ComplexArray"],
     *,
     kind: str = "cartesian",
     quantity: str = "amplitude",
@@ -141,7 +144,7 @@ def level_name(quantity: str, unit: str) -> str:
 
 def cut_curves(
     count: int,
-    fields: Mapping[str, FarFieldLike | ComplexArray],
+    fields: Mapping[str, "FarField | ComplexArray"],
     *,
     quantity: str = "amplitude",
     exact: ComplexArray | None = None,

@@ -10,12 +10,12 @@ from creeping._presenting import brief
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import shown_range
-from creeping.files._inputs import FarFieldLike
 from creeping.plotting._cut_angles import CutAngles, cut_angles
 from creeping.plotting.far_cuts import COLOURS, Curve, checked_angles, cut_curves, draw_cut
 from creeping.plotting.pictures import add_legend, axes_or_new
 
 if TYPE_CHECKING:
+    from creeping.field.far import FarField
     from creeping.phaseflow.phase_map import PhaseMap
 
 PAGE = (6.4, 4.2)  # inches
@@ -23,7 +23,7 @@ GREY = COLOURS[-1]
 
 
 def plot_far(
-    far: FarFieldLike,
+    far: "FarField",
     ax: Any = None,
     *,
     quantity: str = "rcs",

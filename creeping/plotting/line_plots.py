@@ -1,51 +1,36 @@
 """Pictures that shadow lines, fans and iso-phase curves draw of themselves, in the plane of parameters or in space."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowCurveLike
-from creeping.geometry.surface import Surface
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import LEVEL_NAMES
 from creeping.plotting._view import View
 from creeping.plotting.parameter_plane import draw_curves, frame, plot_parameters
 from creeping.plotting.pictures import add_legend, axes_or_new, drawn_page
-
-if TYPE_CHECKING:
-    from creeping.rays.fan import RayFan
-    from creeping.rays.isophase import IsoPhaseCurve
-    from creeping.shadow.line import ShadowCurve, ShadowLine
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowCurve, ShadowLine
 
 KINDS = ("parameters", "3d")
 PLANE = (6.4, 4.4)  # inches
 
 
-@dataclass(frozen=True)
-class LineOf:
-    """Some curves of a shadow line, shown as one."""
-
-    body: Surface
-    direction: FloatArray
-    curves: Sequence[ShadowCurveLike]
-
-
-def line_of(curve: "ShadowCurve") -> LineOf:
-    """Shadow line that consists of one curve."""
-    return LineOf(curve.body, curve.direction, (curve,))
+def line_of(curve: ShadowCurve) -> ShadowLine:
+    """Shadow line that consists of one curve, for pictures: how far it is from crossing itself is not known."""
+    return ShadowLine(curve.body, curve.direction, (curve,), np.nan, curve.line_nodes())
 
 
 def plot_line(
-    line: "ShadowLine | LineOf",
+    line: ShadowLine,
     ax: Any = None,
     *,
     kind: str | None = None,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     rays: int = 48,
     until: float | None = None,
     view: View | None = None,
@@ -93,17 +78,17 @@ def plot_line(
     return plot_parameters(line, fan, curves, ax=ax, legend=fresh if legend is None else legend, **shown)
 
 
-def plot_shadow_curve(curve: "ShadowCurve", ax: Any = None, **options: Any) -> Any:
+def plot_shadow_curve(curve: ShadowCurve, ax: Any = None, **options: Any) -> Any:
     """Draw one curve of a shadow line; options as for `plot_line`."""
     return plot_line(line_of(curve), ax, **options)
 
 
-def plot_fan(fan: "RayFan", ax: Any = None, **options: Any) -> Any:
+def plot_fan(fan: RayFan, ax: Any = None, **options: Any) -> Any:
     """Draw a fan and its shadow line; options as for `plot_line`."""
     return plot_line(fan.line, ax, fan=fan, **options)
 
 
-def plot_curve(curve: "IsoPhaseCurve", ax: Any = None, *, kind: str | None = None, legend: bool | None = None) -> Any:
+def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None, legend: bool | None = None) -> Any:
     """Draw an iso-phase curve alone, or over what the axes have already.
 
     Parameters

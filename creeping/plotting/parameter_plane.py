@@ -5,15 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.files._inputs import LINE_STATUSES, IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._strokes import STATUS_COLOURS, LevelColours, ray_strokes, status_pieces
 from creeping.rays.angle_seams import split_at_seam
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
+from creeping.shadow.status import STATUSES
 
 
 def plot_parameters(
-    line: ShadowLineLike,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     *,
     ax: Any = None,
     rays: int = 48,
@@ -53,7 +56,7 @@ def plot_parameters(
             ]
             _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
     colours = draw_curves(ax, curves)
-    for status in LINE_STATUSES:
+    for status in STATUSES:
         lines = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
         pieces = _in_plane(body, lines)
         _add(ax, pieces, color=STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
@@ -63,7 +66,7 @@ def plot_parameters(
     return ax
 
 
-def draw_curves(ax: Any, curves: Sequence[IsoPhaseCurveLike]) -> LevelColours:
+def draw_curves(ax: Any, curves: Sequence[IsoPhaseCurve]) -> LevelColours:
     """Draw iso-phase curves, and return the colours of their levels."""
     colours = LevelColours.of(curves)
     for curve in curves:
@@ -78,7 +81,7 @@ def _in_plane(body: Any, lines: Sequence[FloatArray]) -> list[FloatArray]:
     return [piece for points in lines for piece in split_at_seam(body.parameters(points), closed=False)]
 
 
-def is_torus(line: ShadowLineLike) -> bool:
+def is_torus(line: ShadowLine) -> bool:
     """Whether theta runs all the way round, as on a torus, rather than from pole to pole.
 
     A polar angle is never negative, while the shadow line of a torus, n.d = 0, meets both signs of theta.

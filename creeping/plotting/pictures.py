@@ -7,11 +7,13 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import ARROW_COLOUR
 from creeping.plotting._view import View
 from creeping.plotting.display import gl_available
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
 
 BACKENDS = ("auto", "pyvista", "matplotlib")
@@ -21,9 +23,9 @@ Place = tuple[float, float, float, float]  # left, bottom, width, height, as sha
 
 def picture(
     path: str | os.PathLike[str],
-    line: ShadowLineLike,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     *,
     backend: str = "auto",
     view: View | None = None,
@@ -75,9 +77,9 @@ def picture(
 
 def parameter_picture(
     path: str | os.PathLike[str],
-    line: ShadowLineLike,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     *,
     rays: int = 48,
     until: float | None = None,

@@ -9,20 +9,22 @@ from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
-from creeping.files._inputs import IsoPhaseCurveLike, RayFanLike, ShadowLineLike
 from creeping.geometry.surface import normal
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
 from creeping.plotting._view import View
 from creeping.plotting.display import gl_available
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
 
 DEPTH_UNITS = 40.0  # of 1/65000 of the depth of the scene
 
 
 def plot_rays_3d(
-    line: ShadowLineLike,
-    fan: RayFanLike | None = None,
-    curves: Sequence[IsoPhaseCurveLike] = (),
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     *,
     plotter: Any = None,
     view: View | None = None,

@@ -79,6 +79,13 @@ class ShadowCurve(DrawnOnBody):
         spacing = np.full(len(self.nodes), self.length / len(self.nodes))
         return fit_panels(self.body, self.direction, self.nodes, spacing)
 
+    def line_nodes(self) -> LineNodes:
+        """The curve as the nodes of a line of its own."""
+        x, tangents, curvature = polished(self.body, self.direction, self.nodes)
+        spacing = np.array([self.length / len(x)])
+        columns = np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T)
+        return LineNodes(*columns, curvature, np.array([0, len(x)]), spacing, self.error)
+
     def state_at(self, arclength: FloatArray) -> IntArray:
         """Codes of the status at arclengths modulo the length: (m,)."""
         # rounding may leave a place between two arcs: then it is of neither side, and concave launches nothing

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from creeping.errors import CreepingError
+from creeping import CreepingError
 from studies import FIGURES
 from studies.gallery.building import build_site
 

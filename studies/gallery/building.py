@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import studies
+from creeping import CreepingError, InvalidInputError
 from creeping._version import __version__
-from creeping.errors import CreepingError, InvalidInputError
 from studies.gallery.figure_page import figure_page, gallery_page
 
 PAGES = Path(__file__).parent / "pages"

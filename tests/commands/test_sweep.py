@@ -11,7 +11,7 @@ from filelock import FileLock
 from creeping.commands import main as cli
 from creeping.commands import sweep as _sweep_command
 from creeping.sweeping import run as running
-from creeping.sweeping.cluster.driver import driver as cluster
+from creeping.sweeping.cluster import driver as cluster
 from creeping.sweeping.studyfile.study import EXAMPLE
 
 STUDY = """

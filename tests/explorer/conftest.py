@@ -3,6 +3,7 @@
 import json
 import shutil
 import time
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -29,6 +30,8 @@ for (const scene of window.__scenes) {
 }
 return null;
 """
+# what never leaves the machine; with "chrome" and its relatives the browser fetches its own pages, a new tab's for one
+LOCAL = ("about", "blob", "chrome", "chrome-extension", "chrome-untrusted", "data", "devtools", "file")
 FLAGS = (
     "--headless=new",
     "--no-sandbox",
@@ -73,10 +76,14 @@ class Browser:
         """Lines of the console that are errors."""
         return [line for line in self.driver.get_log("browser") if line["level"] == "SEVERE"]
 
-    def requests(self):
-        """Addresses that the page has asked for."""
+    def requests_outside(self, *hosts):
+        """Addresses that the page has asked for over a network, but for those of the hosts (name:port)."""
         events = [json.loads(line["message"])["message"] for line in self.driver.get_log("performance")]
-        return [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
+        asked = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
+        # a socket is no request to the browser, and has an event of its own; sockets of workers are not told
+        asked += [e["params"]["url"] for e in events if e["method"] == "Network.webSocketCreated"]
+        parts = {address: urlsplit(address) for address in asked}
+        return [address for address, at in parts.items() if at.scheme not in LOCAL and at.netloc not in hosts]
 
 
 @pytest.fixture

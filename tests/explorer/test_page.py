@@ -1,6 +1,7 @@
 """The page in a real browser: it loads, a slider moves the rays, nothing leaves the machine."""
 
 import time
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -62,10 +63,7 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
     np.testing.assert_allclose(held, rays_of(page, theta=page.wish.theta), rtol=0, atol=1e-6)
     assert np.max(np.abs(held - first)) > 1e-3
     assert browser.errors() == []
-    outside = [
-        u for u in browser.requests() if not u.startswith((page.address, "data:", "blob:", "ws://127.0.0.1", "chrome:"))
-    ]
-    assert outside == []
+    assert browser.requests_outside(urlsplit(page.address).netloc) == []
 
 
 def test_the_arrow_turns_the_sliders_and_the_program_turns_nothing(page):

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from creeping.errors import InvalidInputError
+from creeping import InvalidInputError
 from creeping.explorer.latest import Newest
 from creeping.explorer.request import Wish, angles
 

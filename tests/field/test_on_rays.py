@@ -5,7 +5,6 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import InvalidInputError
 from creeping.field.on_rays import creeps, ray_magnitude
 
 
@@ -26,5 +25,5 @@ def test_it_is_the_field_on_the_surface(body, boundary):
 def test_a_weighted_body_has_none():
     body = sc.Sphere(speed="1 + 0.3*x")
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=1.0, n_rays=4)
-    with pytest.raises(InvalidInputError, match="speed"):
+    with pytest.raises(cr.InvalidInputError, match="speed"):
         ray_magnitude(fan, wavenumber=10.0)

@@ -6,11 +6,11 @@ import re
 import numpy as np
 import pytest
 
-from creeping.errors import InvalidInputError
+from creeping import InvalidInputError
 from creeping.field.far import FarField
+from creeping.files import write_csv, write_ffe
 from creeping.files.far_table import angles_of
 from creeping.files.ffe import grid_directions
-from creeping.plotting import write_csv, write_ffe
 
 THETA, PHI = np.linspace(0, np.pi, 5), np.linspace(0, 2 * np.pi, 4)
 

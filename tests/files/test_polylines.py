@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import creeping as cr
+from creeping.files import polydata, write_vtp
 from creeping.files.polylines import CELL_ARRAYS, POINT_ARRAYS
-from creeping.plotting import polydata, write_vtp
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_polydata_loads_nothing_that_draws():
 import sys, pathlib
 from types import SimpleNamespace as S
 import numpy as np
-from creeping.plotting import polydata
+from creeping.files import polydata
 curve = S(points=np.eye(3), arclength=np.arange(3.0), status=np.array(["attached"] * 3))
 mesh = polydata(S(body=None, direction=None, curves=[curve]))
 assert mesh.n_lines == 1, mesh

@@ -3,14 +3,17 @@
 import csv
 import errno
 import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from creeping.errors import CreepingError, InvalidInputError
-from creeping.plotting import write_csv, write_text, write_vtp
+from creeping import CreepingError, InvalidInputError
+from creeping.files import write_csv, write_text, write_vtp
 
 
 def table(path):
@@ -56,6 +59,25 @@ def test_vtp_of_one_part_is_well_formed(tmp_path, sphere_line, sphere_fan, spher
     write_vtp(path, **given.get(part, {}))
     piece = ET.parse(path).getroot().find("PolyData/Piece")
     assert int(piece.get("NumberOfLines")) == {"line": 1, "fan": 30, "curves": 3, "nothing": 0}[part]
+
+
+def test_vtp_keeps_every_bit_without_a_library_that_draws(tmp_path):
+    code = """
+import sys
+from types import SimpleNamespace as S
+import numpy as np
+from creeping.files import write_vtp
+curve = S(points=np.array([[0.1, np.nan, 1e-300], [1 / 3, 2, 3], [4, 5, -0.0]]), status=["concave"] * 3)
+write_vtp(sys.argv[1], S(curves=[curve]))
+drawing = [name for name in sys.modules if "vtkRendering" in name or name.startswith("pyvista.plotting")]
+assert not drawing, drawing
+import pyvista
+mesh = pyvista.read(sys.argv[1])
+assert mesh.points.tobytes() == curve.points.tobytes()
+assert mesh.point_data["line_status"].tolist() == [2] * 3
+assert np.isnan(mesh.point_data["eikonal"]).all()
+"""
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "line.vtp")], check=True)
 
 
 def test_csv_of_a_fan_keeps_every_bit(tmp_path, sphere_fan):
@@ -106,16 +128,19 @@ def test_missing_folder_is_named(tmp_path, sphere_line):
         write_vtp(tmp_path / "missing" / "line.vtp", sphere_line)
 
 
-def test_full_disk_leaves_the_old_file(tmp_path, sphere_line, monkeypatch):
-    path = tmp_path / "line.csv"
+@pytest.mark.parametrize("write", [write_csv, write_vtp])
+def test_full_disk_leaves_the_old_file(tmp_path, sphere_line, monkeypatch, write):
+    path = tmp_path / "line.old"
     path.write_text("old")
 
-    def full(*_args):
+    def full(*_args, **_options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("creeping.files.tables._write_table", full)
+    for opened in ("open", "write_text"):
+        monkeypatch.setattr(Path, opened, full)
     with pytest.raises(CreepingError, match="free some space") as caught:
-        write_csv(path, line=sphere_line)
+        write(path, line=sphere_line)
+    monkeypatch.undo()
     assert caught.value.path == path
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]

@@ -9,7 +9,6 @@ from scipy.optimize import brentq
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import IntegrationError
 from creeping.geodesics import attenuation
 from creeping.geodesics.attenuation import (
     NODES,
@@ -233,6 +232,6 @@ def test_rays_that_fail_are_numbered_through(rng, monkeypatch):
     states = pack(*random_bundle_points(body, 100, rng=rng), lanes=12)
     states[70, 0] = np.nan
     monkeypatch.setattr(attenuation, "WORKSPACE", 1)
-    with pytest.raises(IntegrationError, match="rays from 64") as caught:
+    with pytest.raises(cr.IntegrationError, match="rays from 64") as caught:
         cr.DirectFlow(body).transport(states, np.array([1.0]))
     assert 70 in caught.value.failed and min(caught.value.failed) >= 64

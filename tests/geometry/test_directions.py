@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creeping.errors import InvalidInputError
+from creeping import InvalidInputError
 from creeping.geometry import directions as dirs
 
 

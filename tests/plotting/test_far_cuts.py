@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from creeping.errors import CreepingError, InvalidInputError
+from creeping import CreepingError, InvalidInputError
 from creeping.field.decibels import cross_section_decibels, decibels, shown_range
 from creeping.plotting import far_cut_picture
 from creeping.plotting.far_cuts import cut_curves

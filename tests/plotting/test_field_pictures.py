@@ -5,7 +5,6 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import InvalidInputError
 from creeping.plotting import decay_picture, field_pictures, surface_field_picture
 from creeping.plotting.display import GLProbe
 from creeping.plotting.field_pictures import lit_points, surface_levels
@@ -126,13 +125,13 @@ def test_bad_input_is_refused(tmp_path, fan, draw, change, match):
     options = {"wavenumber": K, **change}
     if draw is surface_field_picture:
         options["cells"] = 8
-    with pytest.raises(InvalidInputError, match=match):
+    with pytest.raises(cr.InvalidInputError, match=match):
         draw(tmp_path / "a.png", fan, **options)
     assert not list(tmp_path.iterdir())
 
 
 def test_unknown_backend_and_no_rays(tmp_path, fan):
-    with pytest.raises(InvalidInputError, match="backend 'povray'"):
+    with pytest.raises(cr.InvalidInputError, match="backend 'povray'"):
         surface_field_picture(tmp_path / "a.png", fan, wavenumber=K, backend="povray")
-    with pytest.raises(InvalidInputError, match="at least one ray"):
+    with pytest.raises(cr.InvalidInputError, match="at least one ray"):
         decay_picture(tmp_path / "a.png", fan, wavenumber=K, rays=0)

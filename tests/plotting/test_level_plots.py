@@ -8,7 +8,6 @@ from fake_fields import far_of
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import InvalidInputError
 from creeping.plotting.pictures import new_figure
 from studies.reference import sphere
 
@@ -125,14 +124,14 @@ def test_angle_of_a_cut_is_found():
 def test_directions_on_no_cut_are_refused():
     directions = np.random.default_rng(1).normal(size=(9, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    with pytest.raises(InvalidInputError, match="9 directions are on no cut"):
+    with pytest.raises(cr.InvalidInputError, match="9 directions are on no cut"):
         far_of(directions, np.ones(9)).plot()
     found, name = degrees_of(directions, angles=np.linspace(0, 1, 9), angle_name="tilt")
     np.testing.assert_allclose(found, np.degrees(np.linspace(0, 1, 9)))
     assert name == "tilt (degrees)"
-    with pytest.raises(InvalidInputError, match="give two at least"):
+    with pytest.raises(cr.InvalidInputError, match="give two at least"):
         far_of(directions[:1], [1.0]).plot()
-    with pytest.raises(InvalidInputError, match=r"shape \(9,\); 8 angles"):
+    with pytest.raises(cr.InvalidInputError, match=r"shape \(9,\); 8 angles"):
         far_of(directions, np.ones(9)).plot(angles=np.linspace(0, 1, 8))
 
 

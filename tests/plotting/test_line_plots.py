@@ -5,7 +5,6 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import InvalidInputError
 from creeping.plotting._view import View
 from creeping.plotting.pictures import new_figure
 
@@ -110,11 +109,11 @@ def test_axes_in_space_choose_the_picture(twisted_fan, twisted_curves, name):
     shown = {"fan": twisted_fan, "line": twisted_fan.line, "curve": twisted_curves[0]}[name]
     assert shown.plot(ax) is ax
     assert len(ax.collections) + len(ax.lines) >= 1
-    with pytest.raises(InvalidInputError, match="does not fit the axes, which are made for '3d'"):
+    with pytest.raises(cr.InvalidInputError, match="does not fit the axes, which are made for '3d'"):
         shown.plot(ax, kind="parameters")
-    with pytest.raises(InvalidInputError, match="made for 'parameters'"):
+    with pytest.raises(cr.InvalidInputError, match="made for 'parameters'"):
         shown.plot(new_figure((4, 4)).add_subplot(), kind="3d")
-    with pytest.raises(InvalidInputError, match="kind '4d' is unknown"):
+    with pytest.raises(cr.InvalidInputError, match="kind '4d' is unknown"):
         shown.plot(kind="4d")
 
 
@@ -125,5 +124,5 @@ def test_curve_in_space_keeps_its_points(twisted_curves):
 
 
 def test_view_is_for_space(twisted_fan):
-    with pytest.raises(InvalidInputError, match="kind='3d'"):
+    with pytest.raises(cr.InvalidInputError, match="kind='3d'"):
         twisted_fan.plot(view=View(0.1, 0.2))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creeping.errors import CreepingError
+from creeping import CreepingError
 from creeping.plotting.mesh_picture import HEIGHT, WIDTH, MeshValues, mesh_picture
 from studies._meshes import geodesic_sphere
 

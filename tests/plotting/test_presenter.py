@@ -14,7 +14,6 @@ from fake_fields import HOSTILE, Awkward, far_of
 import creeping as cr
 import scatterers as sc
 from creeping._presenting import brief
-from creeping.errors import InvalidInputError
 
 
 class Table(HTMLParser):
@@ -226,7 +225,7 @@ def test_a_map_that_was_not_measured_says_so(small_map):
     blank = replace(small_map, growth=None, error=cr.MapError(np.nan, np.nan, 0))
     assert "not measured" in repr(blank)
     assert table(blank).rows["error of one g_T0"] == "not measured"
-    with pytest.raises(InvalidInputError, match="not been measured"):
+    with pytest.raises(cr.InvalidInputError, match="not been measured"):
         blank.plot()
 
 
@@ -247,5 +246,5 @@ def test_a_line_without_curves_and_a_field_without_directions(twisted_fan):
     assert table(bare).rows["curves"] == "0"
     far = far_of(np.zeros((0, 3)), np.zeros(0))
     assert table(far).rows["directions"] == "0"
-    with pytest.raises(InvalidInputError, match="0 directions make no cut"):
+    with pytest.raises(cr.InvalidInputError, match="0 directions make no cut"):
         far.plot()

@@ -9,7 +9,6 @@ import pytest
 
 import creeping as cr
 import studies
-from creeping.errors import CreepingError, InvalidInputError
 from studies import figure3_circles, figure5_weighted
 
 MAP = 1e-4
@@ -180,7 +179,7 @@ def test_titles_are_one_line_each():
 
 
 def test_unknown_figure_leaves_nothing(tmp_path):
-    with pytest.raises(InvalidInputError, match="fig3-circles"):
+    with pytest.raises(cr.InvalidInputError, match="fig3-circles"):
         studies.draw("fig7", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -191,14 +190,14 @@ def test_failed_figure_leaves_nothing(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(figure3_circles, "draw", fail)
-    with pytest.raises(CreepingError, match=r"fig3-circles\.png"):
+    with pytest.raises(cr.CreepingError, match=r"fig3-circles\.png"):
         studies.draw("fig3-circles", tmp_path)
     assert not list(tmp_path.iterdir())
 
 
 def test_folder_that_is_a_file_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(InvalidInputError, match="file"):
+    with pytest.raises(cr.InvalidInputError, match="file"):
         studies.draw("fig3-circles", tmp_path / "file")
 
 

@@ -43,7 +43,7 @@ def test_requested_tolerances_are_met():
 
 
 def test_refusals_keep_their_reason(monkeypatch):
-    from creeping.errors import ToleranceError
+    from creeping import ToleranceError
 
     def none(*_args):
         raise ToleranceError("no map")

@@ -14,8 +14,8 @@ import pytest
 import creeping
 import scatterers
 import studies
+from creeping import InvalidInputError
 from creeping.commands.main import app
-from creeping.errors import InvalidInputError
 from creeping.sweeping.studyfile.study import parse_study
 from studies import __main__ as command
 from studies import field_sphere

@@ -7,7 +7,6 @@ import xarray
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import CreepingError, InvalidInputError
 from creeping.sweeping import results as dataset
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
@@ -101,7 +100,7 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
         raise ModuleNotFoundError(name=name)
 
     monkeypatch.setattr(dataset, "import_module", gone)
-    with pytest.raises(CreepingError, match=r"need xarray: pip install 'creeping\[sweep\]'"):
+    with pytest.raises(cr.CreepingError, match=r"need xarray: pip install 'creeping\[sweep\]'"):
         cr.sweep_directions(fake.FLOW, [(0, 0, 1)], quantity="rays")
 
 
@@ -125,11 +124,11 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
     ],
 )
 def test_bad_input_is_refused_before_anything_is_computed(options, words):
-    with pytest.raises(InvalidInputError, match=words):
+    with pytest.raises(cr.InvalidInputError, match=words):
         cr.sweep_directions(fake.FLOW, **({"incidences": [(0, 0, 1)], "quantity": "rays"} | options))
 
 
 def test_a_field_on_a_weighted_body_is_refused():
     flow = cr.DirectFlow(sc.Sphere(speed="1 + x"))
-    with pytest.raises(InvalidInputError, match="constant speed"):
+    with pytest.raises(cr.InvalidInputError, match="constant speed"):
         cr.sweep_directions(flow, [(0, 0, 1)], wavenumbers=1.0)

@@ -8,10 +8,10 @@ import fake_sweeps as fake
 import numpy as np
 import pytest
 
-from creeping.errors import CreepingError
+from creeping import CreepingError
 from creeping.geometry.directions import fibonacci_directions
 from creeping.shadow.status import FAILED
-from creeping.sweeping.cluster.driver import driver as cluster
+from creeping.sweeping.cluster import driver as cluster
 from creeping.sweeping.run import fill, sweep_directions
 from creeping.sweeping.storage.store import SweepStore
 

@@ -11,7 +11,6 @@ from filelock import FileLock
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import CreepingError, InvalidInputError
 from creeping.shadow.status import FAILED
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
@@ -72,7 +71,7 @@ def test_the_flow_is_kept(tmp_path):
         assert SweepPlan(again, request, plan.incidences, 1).key == plan.key
         x, p = np.array([1.5, 0, 0]), np.array([0, 0.6, 0.8])
         assert np.array_equal(again.apply(x, p), flow.apply(x, p))
-        with pytest.raises(CreepingError, match="map of torus|Torus" if name == "map" else "another study.*body"):
+        with pytest.raises(cr.CreepingError, match="map of torus|Torus" if name == "map" else "another study.*body"):
             other = store.flow(sc.Torus(R=1.5))
             store.require_same(SweepPlan(other, request, plan.incidences, 1))
 
@@ -98,30 +97,33 @@ def test_resuming_does_what_is_missing_and_nothing_else(tmp_path, monkeypatch):
 
 def test_another_study_is_refused_with_what_differs(tmp_path):
     _, store = filled(tmp_path / "s.zarr")
-    with pytest.raises(InvalidInputError, match="exists; give resume=True"):
+    with pytest.raises(cr.InvalidInputError, match="exists; give resume=True"):
         open_store(fake.plan(18, 4), store.folder, resume=False)
     other = fake.plan(17, 5, asked={"tolerance": 1e-3})
-    with pytest.raises(InvalidInputError, match="another study") as caught:
+    with pytest.raises(cr.InvalidInputError, match="another study") as caught:
         open_store(other, store.folder, resume=True)
     names = [text.split()[0] for text in caught.value.differing]
     assert names == ["asked.tolerance", "chunk", "incidences.count", "incidences.digest"]
     (tmp_path / "empty").mkdir()
-    with pytest.raises(CreepingError, match="holds no sweep"):
+    with pytest.raises(cr.CreepingError, match="holds no sweep"):
         SweepStore.open(tmp_path / "empty")
 
 
 def test_two_drivers_do_not_fill_one_store(tmp_path):
     plan, store = filled(tmp_path / "s.zarr")
-    with FileLock(store.folder / "study" / ".lock"), pytest.raises(CreepingError, match="another process is filling"):
+    with (
+        FileLock(store.folder / "study" / ".lock"),
+        pytest.raises(cr.CreepingError, match="another process is filling"),
+    ):
         fill(plan, store)
     with FileLock(store.folder / "study" / ".lock"):
         assert store.verify() == []
-        with pytest.raises(CreepingError, match="another process is filling"):
+        with pytest.raises(cr.CreepingError, match="another process is filling"):
             store.verify(repair=True)
     # who holds it may ask again, and holds it until the end
     with store.locked():
         fill(plan, store)
-        with pytest.raises(CreepingError, match="another process is filling"):
+        with pytest.raises(cr.CreepingError, match="another process is filling"):
             fill(plan, SweepStore.open(store.folder))
     assert fill(plan, SweepStore.open(store.folder))
 
@@ -129,10 +131,10 @@ def test_two_drivers_do_not_fill_one_store(tmp_path):
 def test_a_flow_of_no_known_kind_is_told(tmp_path):
     _, store = filled(tmp_path / "s.zarr")
     store.key["flow"]["kind"] = "spline"
-    with pytest.raises(CreepingError, match="flow of kind 'spline', which is neither"):
+    with pytest.raises(cr.CreepingError, match="flow of kind 'spline', which is neither"):
         store.flow(sc.Sphere())
     del store.key["flow"]["kind"]
-    with pytest.raises(CreepingError, match="lacks 'kind' of its flow"):
+    with pytest.raises(cr.CreepingError, match="lacks 'kind' of its flow"):
         store.flow(sc.Sphere())
 
 
@@ -157,9 +159,9 @@ def test_a_sweep_whose_first_task_fails_as_one_ends(tmp_path, monkeypatch, chunk
     plan = fake.plan(18, chunk)
     store = SweepStore.create(tmp_path / "s.zarr", plan)
     words = f"the first {max(chunk, 2)} incidences failed, all with ArithmeticError: a poison.* nothing would come"
-    with pytest.raises(CreepingError, match=words):
+    with pytest.raises(cr.CreepingError, match=words):
         fill(plan, store)
-    with pytest.raises(CreepingError, match=words):
+    with pytest.raises(cr.CreepingError, match=words):
         in_memory(plan)
     assert store.dataset().attrs["incidences_failed"] == max(chunk, 2)
     if chunk == 4:
@@ -188,7 +190,7 @@ def test_a_full_disk_is_one_clear_error_and_loses_nothing(tmp_path, monkeypatch)
 
     real = _local._put
     monkeypatch.setattr(_local, "_put", put)
-    with pytest.raises(CreepingError, match=r"No space left on device .*MB are free.*resume"):
+    with pytest.raises(cr.CreepingError, match=r"No space left on device .*MB are free.*resume"):
         fill(plan, store)
     monkeypatch.undo()
     kept = 5 - len(store.missing())
@@ -201,7 +203,7 @@ def test_a_full_disk_is_one_clear_error_and_loses_nothing(tmp_path, monkeypatch)
 
 def test_a_folder_that_cannot_be_made_leaves_nothing(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(CreepingError, match="cannot make the store"):
+    with pytest.raises(cr.CreepingError, match="cannot make the store"):
         SweepStore.create(tmp_path / "file" / "s.zarr", fake.plan())
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
@@ -231,7 +233,7 @@ def test_a_damaged_status_tells_which_task(tmp_path):
     _, store = filled(tmp_path / "s.zarr")
     victim = store.folder / "incidence_status/c/2"
     victim.write_bytes(victim.read_bytes()[:-1] + b"?")
-    with pytest.raises(CreepingError, match=r"incidence_status of task 2 .incidences 8 to 11.*--verify") as caught:
+    with pytest.raises(cr.CreepingError, match=r"incidence_status of task 2 .incidences 8 to 11.*--verify") as caught:
         store.finish(0.0)
     assert caught.value.task == 2
 
@@ -240,7 +242,7 @@ def test_a_damaged_study_is_not_trusted(tmp_path):
     _, store = filled(tmp_path / "s.zarr")
     file = store.folder / "study/zarr.json"
     file.write_text(file.read_text().replace('"chunk": 4', '"chunk": 5'))
-    with pytest.raises(CreepingError, match="damaged"):
+    with pytest.raises(cr.CreepingError, match="damaged"):
         SweepStore.open(store.folder)
 
 
@@ -273,5 +275,5 @@ def test_a_long_message_is_cut_and_a_wrong_shape_is_told(tmp_path):
     store.write_task(0, arrays, {2: 300 * "ä"})
     store.commit(0, failures=True)
     assert dict(store.failures())[2].rstrip("\ufffd") == 128 * "ä"
-    with pytest.raises(CreepingError, match=r"curves of shape \(3,\), not \(4,\)"):
+    with pytest.raises(cr.CreepingError, match=r"curves of shape \(3,\), not \(4,\)"):
         store.write_task(0, arrays | {"curves": arrays["curves"][:3]}, {})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scatterers as sc
-from creeping.errors import InvalidInputError
+from creeping import InvalidInputError
 from creeping.geometry.directions import angles_of, azimuth_elevation_of
 from creeping.sweeping.studyfile import directions as study_directions
 from creeping.sweeping.studyfile.directions import KINDS
