@@ -1,6 +1,8 @@
 """Body whose F is given by samples on a Cartesian grid: F = quintic tensor-product B-spline through them.
 
 F and its derivatives are those of the spline, exactly.
+
+Sources: [B78]; Derivations, B7.
 """
 
 import hashlib

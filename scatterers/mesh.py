@@ -3,6 +3,8 @@
 Vertices are taken to lie on the body. Their normals are those of osculating jets (`scatterers.triangles.jets`), which
 give points between them, too; to both a quintic tensor-product B-spline is fitted (`scatterers.spline.fitting`), twice,
 on grids of different spacing: by their difference the curvatures' error is known.
+
+Sources: [CP05]; Derivations, B5 and B6.
 """
 
 import json

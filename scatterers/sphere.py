@@ -15,7 +15,7 @@ class Sphere(BentEllipsoid):
     radius : float
         L; positive.
     speed : str or object with ``value`` and ``gradient``, optional
-        Speed c(x) of the weighted flow; ``"1 + x"`` is Example 3 of Ying and Candes 2006. On the unit sphere it
+        Speed c(x) of the weighted flow; ``"1 + x"`` is an example of [YC06b]. On the unit sphere it
         vanishes at (-1, 0, 0), which no ray reaches in finite time: ds/c is there the flat metric of a plane.
 
     Raises

@@ -1,7 +1,7 @@
 """Torus about z: F = ((sqrt(x^2 + y^2) - R)^2 + z^2)/r^2 - 1.
 
 x = (R + r cos theta)(cos psi, sin psi), z = r sin theta; chart variables u = psi/2 pi, v = theta/2 pi. The coordinate
-lines are orthogonal, so the isometric frame is the pair of their unit tangents. The inner half is not convex.
+lines are orthogonal, so the polar frame is the pair of their unit tangents. The inner half is not convex.
 """
 
 import math
@@ -150,7 +150,7 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
 
 
 def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame."""
+    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame."""
     turn = 1 / (2 * math.pi)
     for i in range(points.shape[1]):
         x, y, z = points[0, i], points[1, i], points[2, i]

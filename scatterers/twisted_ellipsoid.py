@@ -12,7 +12,7 @@ from scatterers.base.quadrics import BentEllipsoid, finite, positive
 
 @dataclass(frozen=True)
 class TwistedEllipsoid(BentEllipsoid):
-    """Ellipsoid whose y is shifted by d cos(pi z); the body of Figure 5 of Ying and Candes 2006.
+    """Ellipsoid whose y is shifted by d cos(pi z); the body of the creeping rays in [YC06b].
 
     Parameters
     ----------

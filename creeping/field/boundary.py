@@ -6,6 +6,8 @@
     conductor   "electric soft" for E along b, "electric hard" for E along n
 
 Of the Airy functions of a mode (`creeping.field.creeping_modes`), q is i m eta: infinite if soft, 0 if hard.
+
+Sources: [F65] for q, [PBM80] for the conductor; Derivations, F1 and F14.
 """
 
 from dataclasses import dataclass

@@ -9,6 +9,8 @@ add up by themselves but for a last ξ, where UTD's form stands, with X = k l ξ
     P̂ = P(ξ) + (e^{iπ/4}/(2√π ξ)) [1 - F_t(X)].
 
 N counts zeros of J on (0, s) and of J + l' J' on (0, l).
+
+Sources: [LK59], [P79], [KP74] for F_t; Derivations, F3 and F8. The power Y/(1 + Y) was found by trial.
 """
 
 import numpy as np

@@ -11,6 +11,8 @@ plane, and each negative principal curvature turns the phase by -π/2.
 The bracket is what the next order of the reflected field's series adds to that of P: Λ, from third and fourth
 derivatives of the surface (`creeping.rays.specular.shape_term`), is 1/(2a) on a sphere, where the bracket is 1, and
 3/(16a) on a cylinder, where κ_b = 0. It comes from Green's formula with the field on the surface to the same order.
+
+Sources: [KLS56] for the series, [P79] for P; Derivations, F13.
 """
 
 import numpy as np

@@ -7,6 +7,8 @@ At small ξ the corrected series diverges. There each power of τ is read as one
 a derivative of P, and M0 = dτ/dq as a change of q; both forms are the same series. For an impedance q varies along the
 ray: τ_p is taken at the mean of q weighted by κₙ^(2/3), so that its first-order variation is exact, and R_p at the
 geometric mean of both ends.
+
+Sources: Derivations, F4 to F7.
 """
 
 import numpy as np

@@ -11,6 +11,8 @@ both ends:
 
 from the expansions of Hankel functions in the transition region [AS64, sec. 9.3] for the circular cylinder
 and the sphere; the decay c and the attachment factor exp{-i τ² ρ1'/(12 m1)} are those of `creeping.field.boundary`.
+
+Sources: [F46], [LK59]; Derivations, F3 and F9.
 """
 
 import numpy as np

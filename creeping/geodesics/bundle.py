@@ -1,6 +1,8 @@
 """Points (x, p) of the unit tangent bundle T1Q = {F(x) = 0, p.grad F(x) = 0, |p| = 1}.
 
 Projection: x <- x - F grad F/|grad F|^2 until |F| is at rounding level, p <- its tangential part, normalised.
+
+Sources: [YC06b]; Derivations, R1.
 """
 
 import numpy as np

@@ -12,6 +12,8 @@ J = c I and I'' + G I = 0; G is the Gaussian curvature of that metric,
 
 Lap the Laplacian on Q, Lap c = tr(P Hess c) - (kappa_1 + kappa_2) n.grad c with P = 1 - n n^T.
 Normal curvature kappa_n = p.Hp/|grad F| is positive where the body is convex along p.
+
+Sources: [YC06b], [C76], [G05]; Derivations, R1 to R4.
 """
 
 import numpy as np

@@ -4,6 +4,8 @@ With g = grad F, H the Hessian of F and p, b unit tangents:
 
     kappa_n = p.Hp/|g|          normal curvature along p, positive where the body is convex along p
     K = (g.adj(H) g)/|g|^4      Gaussian curvature
+
+Sources: [G05]; Derivations, R1.
 """
 
 import numpy as np

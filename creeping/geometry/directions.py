@@ -2,6 +2,8 @@
 
 A direction is where the wave travels. theta is measured from z, phi and the azimuth from x towards y, the elevation
 from the plane of x and y; all in radians.
+
+Sources: [G10], [LL99], [W06]; Derivations, B9.
 """
 
 import numpy as np

@@ -2,8 +2,10 @@
 
 The body is Q = {x : F(x) = 0}, F > 0 outside, with outward normal n = grad F/|grad F| and Hessian H.
 A chart is a map (u, v) -> x; its part used for look-ups is the unit square, its grid reaches beyond
-it by the margin of the spline. The isometric frame of a chart with tangents T = [x_u, x_v] (3 x 2) is
+it by the margin of the spline. The polar frame of a chart with tangents T = [x_u, x_v] (3 x 2) is
 the orthogonal polar factor E = T (T^T T)^(-1/2): orthonormal, tangent, and nearest to T.
+
+Sources: Derivations, R1 and B2.
 """
 
 import hashlib

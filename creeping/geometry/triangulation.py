@@ -3,6 +3,8 @@
 Every cell of the grid with corners of both signs gives one vertex, every grid edge whose ends differ in sign one
 quadrilateral between the four cells around it; vertices are then brought onto F = 0. The mesh is closed and
 oriented by construction and follows the topology of F at the grid's resolution, whatever the genus.
+
+Sources: [G98], [JLSW02]; Derivations, B8.
 """
 
 from collections.abc import Callable

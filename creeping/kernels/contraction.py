@@ -6,6 +6,8 @@ not find this from loops: 16 to 36 rows of run-time length cost it four times th
 Tables may be float32: products over j are then summed in float32, eight at a time, all other sums in float64, which
 keeps the error of a sum below that of the stored coefficients.
 The twin in plain numpy is `creeping.phaseflow.splines.evaluate`.
+
+Sources: Derivations, B7.
 """
 
 from typing import Any

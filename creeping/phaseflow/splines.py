@@ -3,6 +3,8 @@
 Along an axis with nodes 0..n-1 the spline is sum_j c_j N_p(t - j) with the uniform B-spline N_p of degree p: not-a-knot
 ends where the axis is a chart variable (n + p - 1 coefficients), period n where it is periodic (n, continued by p).
 A not-a-knot spline has fewer knots than the uniform basis, so it is contained in it and nothing is lost.
+
+Sources: [B78]; Derivations, B7.
 """
 
 from functools import cache

@@ -5,6 +5,8 @@
 Seen from outside, the lit side (n.d < 0) is on the left of T. The steps are one module each: critical points of n.d,
 where the line would cross itself (`singular`), its topology (`contour`), its points (`panels`), its state
 (`visibility`).
+
+Sources: Derivations, R6.
 """
 
 from dataclasses import dataclass, field

@@ -6,6 +6,8 @@ largest component is s_a; with (a, b, c) cyclic and sign = +-1,
     s = (sign, sign tan xi, tan eta)/|.| in the order (a, b, c),  xi = (u - 1/2) pi/2,  eta = (v - 1/2) pi/2,
 
 so the unit squares of (u, v) tile the sphere, and every point finds the chart in which it is farthest from the edge.
+
+The equiangular cubed sphere is that of [RIP96]; Derivations, B1.
 """
 
 from collections.abc import Callable, Sequence

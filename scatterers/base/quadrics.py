@@ -160,7 +160,7 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
 
 
 def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame."""
+    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame."""
     a, b, c, d = parameters[0], parameters[1], parameters[2], parameters[3]
     for i in range(points.shape[1]):
         z = points[2, i]

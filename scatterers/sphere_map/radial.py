@@ -9,6 +9,8 @@ an upright body has T = 1. With y = A s and g = DT^T grad F(x): d psi/ds = r DT 
 psi^-1(x) = A^-1 (w - c)/|A^-1 (w - c)|, w = T^-1(x). Every ray meets the body once where g.(w - c) > 0 on all of it.
 The root is found by Newton steps from r = 1, halved into the bracket when they leave it; beyond the grid counts as
 outside the body. `scatterers.kernels.radial` is the compiled twin.
+
+Sources: Derivations, B4.
 """
 
 from collections.abc import Callable, Mapping

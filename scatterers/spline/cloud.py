@@ -3,6 +3,8 @@
 An edge from node a to node b with F of both signs gives x = a + F(a)/(F(a) - F(b)) (b - a); then Newton steps
 x <- x - F grad F/|grad F|^2, none longer than a cell. Edges that meet near one node give points close together, of
 which one a voxel of half a cell is kept. Their number goes with 1/spacing^2: a first grid tells which one to take.
+
+Sources: Derivations, B8.
 """
 
 from collections.abc import Callable

@@ -7,6 +7,8 @@ With g = (x - origin)/spacing, cell k = floor(g) and fraction t = g - k, axis by
 n nodes carrying n + 4 coefficients. Ends are not-a-knot, so quintics are reproduced and F converges as h^6. Beyond
 the grid the outermost cell's polynomial goes on for one cell; from there on t is held. A NaN stays one.
 `scatterers.kernels.tensor` is the compiled twin.
+
+Sources: [B78]; Derivations, B7.
 """
 
 from collections.abc import Callable

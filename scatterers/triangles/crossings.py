@@ -4,6 +4,8 @@ A segment pq crosses the triangle abc where the volumes [a b c p] and [a b c q] 
 [p q b c], [p q c a] do not; triangles cross if an edge of one crosses the other. Pairs that share a vertex are tried
 with the edges opposite to it, pairs that share an edge only for being folded onto each other. Candidates come from a
 sweep along one axis. Touching is no crossing, and overlapping parts of one plane are seen only by the edges around.
+
+Sources: Derivations, B10.
 """
 
 import numpy as np

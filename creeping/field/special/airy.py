@@ -5,6 +5,8 @@
 
 Roots of the soft and hard problem lie on the ray of angle π/3 at the zeros of Ai and Ai'. Those of an impedance are
 continued from the hard ones, q growing from 0 along its ray, so that root p stays root p while q varies.
+
+Sources: [F65], [L59]; Derivations, F1.
 """
 
 from dataclasses import dataclass

@@ -11,6 +11,8 @@ these integrals lose digits; there, in one, over the line of steepest descent th
 
 S the reflection coefficient, which tends to that of a plane boundary. A ``power`` n stands for t^n under each integral,
 which is (-i d/dξ)^n of the function and τ^n in its residue series.
+
+Sources: [F65], [P79], [PBM80], [KP74] for F_t; Derivations, F2 and F8.
 """
 
 from functools import cache

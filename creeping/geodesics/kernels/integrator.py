@@ -6,6 +6,8 @@ bodies. Lanes of a ray: x (3), p (3); with the ride-along the columns (M11, M21)
 [[I_1, I_2], [I_1', I_2']] with I'' + G I = 0, M(0) = 1, det M = 1; and last the attenuation integral A with
 
     A' = c max(kappa_n, 0)^(2/3),  kappa_n = p.Hp/|grad F|.
+
+Sources: [HNW93, sec. II.10]; Derivations, R3 and R13.
 """
 
 import math

@@ -4,6 +4,8 @@ The numpy twin is `compiled_models.AngleModel`.
 
 The tangent frames of the chart cover the body, so (u, v, angle), all in turns and none of them cut, are coordinates of
 the whole bundle, and a map stores their displacement. The frame is the orthogonal polar factor of (x_u, x_v).
+
+Sources: Derivations, B2.
 """
 
 import math

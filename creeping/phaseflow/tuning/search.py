@@ -8,6 +8,8 @@ the ray by the Jacobi matrices: G(T0)^2 = sum_k |M(L) M(k T0)^-1|^2/2, geometric
 
 Of all candidates the one that is cheapest for the rays to come, its build included, is built, measured at the end of
 rays, and refined until it meets the tolerance; three at most in turn.
+
+Sources: Derivations, R16.
 """
 
 from dataclasses import dataclass, replace
@@ -141,7 +143,7 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
 
 
 def _measured(built: PhaseMap, request: "Request", cost: float) -> PhaseMap:
-    """The map with its errors; where F is dear on fewer rays, and against a reference only so much better."""
+    """The map with its errors; where F is expensive on fewer rays, and against a reference only so much better."""
     length = request.length or built.horizon
     assert request.tolerance is not None
     budget = _budget(request, cost)

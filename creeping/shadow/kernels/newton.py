@@ -8,6 +8,8 @@ arclength comes from the chord and the mean of T over the step, for nodes equall
     h = |c|/|A|,   A = [802 (T_0 + T_1) - 93 (T_-1 + T_2) + 11 (T_-2 + T_3)]/1440,
 
 of order 6, against that of order 4, A = [13 (T_0 + T_1) - (T_-1 + T_2)]/24: their difference is the estimate.
+
+Sources: Derivations, R6 and R8.
 """
 
 import math

@@ -7,6 +7,8 @@ With x0 on the body, N = n(x0), E1 and E2 tangent, E1 x E2 = N, w the half width
 
 h is followed from the centre of the square: over s q, s in STEPS, Newton steps h <- h - F/(g.N) start from the Taylor
 series of the place before, dh/ds = -(g.q)/(g.N).
+
+Sources: Derivations, B3.
 """
 
 from collections.abc import Callable

@@ -4,6 +4,8 @@ With S the shape operator P H P/|grad F| and kappa the larger |eigenvalue|, a ch
 wide as n.N >= LEAST and w max(kappa) <= BENT allow on its square widened by the margin. It covers the points with
 n.N >= FACING and |q.E1|, |q.E2| <= w - gap, ``gap`` being how far other points of the body may be from a point of the
 cloud: so what lies between is covered too. Gaps are measured by `probes`, points between those of the cloud.
+
+The greedy rule is that of [C79]; Derivations, B3.
 """
 
 from dataclasses import dataclass
