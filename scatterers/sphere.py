@@ -22,6 +22,15 @@ class Sphere(BentEllipsoid):
     ------
     ValueError
         If the radius is not a positive finite number, or the speed is not usable.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere(radius=2.0)
+    >>> ball.level([[4.0, 0.0, 0.0], [0.0, 0.0, 1.0]])          # outside, inside
+    array([ 3.  , -0.75])
+    >>> ball.parameters([0.0, 2.0, 0.0]).round(6)               # theta, phi
+    array([1.570796, 1.570796])
     """
 
     radius: float = 1.0

@@ -27,6 +27,15 @@ class TwistedEllipsoid(BentEllipsoid):
     ------
     ValueError
         If a semi-axis is not a positive finite number, d is not finite, or the speed is not usable.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> body = sc.TwistedEllipsoid()
+    >>> body.bounds[1]
+    array([0.5, 0.7, 1. ])
+    >>> float(body.level([0.0, 0.2, 0.0]))                      # on the spine
+    -1.0
     """
 
     a: float = 0.5

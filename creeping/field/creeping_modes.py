@@ -11,8 +11,9 @@ Ends, 1 attachment and 2 launch:
     A = exp{-i τ² ρ1'/(12 m1)} exp{+i τ² ρ2'/(12 m2)}
     1 + (1/2) Σ_{i=1,2} [∂c/∂τ + ω r_i τ + β τ ρ_i ρ_i'']/m_i²,   ω = 1/4 (one ray), 1/2 (fan integral)
 
-After Keller and Levy; the amplitude term with β is fitted to an exact solution, see the README's table of errors.
-The torsion of the ray has no term here: its effect stayed below 1e-2 wherever it was measured.
+The term of varying curvature is that of [KL59], those of constant curvature agree with the zeros of Hankel functions
+[AS64, sec. 9.3]; A is derived, the amplitude term with β is fitted to an exact solution on one ellipsoid. The torsion of
+the ray has no term here: its effect stayed below 1e-2 wherever it was measured. Derivations, F4 to F6.
 """
 
 import numpy as np

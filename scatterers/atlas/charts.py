@@ -26,15 +26,15 @@ class SphereMap(Protocol):
     """A diffeomorphism psi from the unit sphere to the body, with its 3 x 3 derivative."""
 
     def forward(self, s: FloatArray) -> FloatArray:
-        """Body point of a sphere point: (..., 3) -> (..., 3)."""
+        """Body point, L, of a unit vector: (..., 3) -> (..., 3)."""
         ...
 
     def derivative(self, s: FloatArray) -> FloatArray:
-        """Derivative of psi as a map of space: (..., 3) -> (..., 3, 3)."""
+        """Derivative of psi as a map of space, L: (..., 3) -> (..., 3, 3)."""
         ...
 
     def inverse(self, points: FloatArray) -> FloatArray:
-        """Sphere point of a body point, up to its length: (..., 3) -> (..., 3)."""
+        """Sphere point of a body point, L, up to its length: (..., 3) -> (..., 3)."""
         ...
 
     @property

@@ -87,6 +87,15 @@ def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
     vertices : (n, 3), L
     triangles : (m, 3)
         Counter-clockwise seen from outside; they give first normals, and the mean edge, only.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import trimesh
+    >>> ball = trimesh.creation.icosphere(subdivisions=3)
+    >>> jets = osculating_jets(ball.vertices, ball.faces)
+    >>> bool(np.all(abs(jets.gaussian - 1) < 1e-3))
+    True
     """
     from scatterers.kernels.jets import TERMS, fit
 
@@ -108,7 +117,16 @@ def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
 
 
 def angle_weighted_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
-    """Outward unit normals (n, 3): face normals weighted by the angles at the vertex."""
+    """Outward unit normals (n, 3): face normals weighted by the angles at the vertex [TW98].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> angle_weighted_normals(corners, faces)[0].round(6)
+    array([-0.57735, -0.57735, -0.57735])
+    """
     corners = vertices[triangles]
     ahead = np.roll(corners, -1, axis=1) - corners
     length = np.linalg.norm(ahead, axis=-1)

@@ -53,7 +53,7 @@ class MongeCharts:
         return MongeCharts(self.level, self.gradient, *parts)
 
     def points(self, uv: FloatArray) -> FloatArray:
-        """Points of the body over (u, v) (..., 2), broadcast against the charts: (..., 3)."""
+        """Points of the body, L, over (u, v) (..., 2), broadcast against the charts: (..., 3)."""
         e1, e2, n = np.moveaxis(self.axes, -2, 0)
         s = 2 * uv - 1
         half = self.half[..., None]

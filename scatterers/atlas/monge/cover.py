@@ -54,7 +54,7 @@ class Cover:
 
 
 def probes(level: Field, gradient: Field, cloud: FloatArray, *, seed: int) -> FloatArray:
-    """Points of the body about those of a cloud, four for each: (4 n, 3)."""
+    """Points of the body about those of a cloud (n, 3), L, four for each: (4 n, 3)."""
     rng = np.random.default_rng(seed)
     n = gradient(cloud)
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
@@ -285,7 +285,7 @@ class _Candidates:
 
 
 def covered_by(level: Field, gradient: Field, hessian: Field, points: FloatArray, margin: float) -> Cover:
-    """Choose charts that cover the body and all its cloud of points (n, 3)."""
+    """Choose charts that cover the body and all its cloud of points (n, 3), L."""
     cloud = _Cloud.of(level, gradient, hessian, points)
     candidates = _Candidates(cloud, margin)
     fresh, before = cloud.spread(np.arange(len(points)), APART), len(points)
