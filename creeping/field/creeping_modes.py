@@ -12,8 +12,8 @@ Ends, 1 attachment and 2 launch:
     1 + (1/2) Σ_{i=1,2} [∂c/∂τ + ω r_i τ + β τ ρ_i ρ_i'']/m_i²,   ω = 1/4 (one ray), 1/2 (fan integral)
 
 The term of varying curvature is that of [KL59], those of constant curvature agree with the zeros of Hankel functions
-[AS64, sec. 9.3]; A is derived, the amplitude term with β is fitted to an exact solution on one ellipsoid. The torsion of
-the ray has no term here: its effect stayed below 1e-2 wherever it was measured. Derivations, F4 to F6.
+[AS64, sec. 9.3]; A is derived, the amplitude term with β is fitted to an exact solution on one ellipsoid. The torsion
+of the ray has no term here: its effect stayed below 1e-2 wherever it was measured. Derivations, F4 to F6.
 """
 
 import numpy as np
@@ -28,7 +28,13 @@ BETA = 0.08
 
 
 def fock_scale(wavenumber: float, curvature: FloatArray) -> FloatArray:
-    """m = (k/(2 κₙ))^(1/3), inf where κₙ <= 0: (...) -> (...)."""
+    """m = (k/(2 κₙ))^(1/3) without unit, inf where κₙ <= 0: k and κₙ in 1/L, (...) -> (...).
+
+    Examples
+    --------
+    >>> fock_scale(54.0, np.array([1.0, -1.0]))
+    array([ 3., inf])
+    """
     with np.errstate(divide="ignore"):
         return np.asarray(np.cbrt(wavenumber / (2 * np.maximum(curvature, 0.0))))
 
@@ -39,7 +45,7 @@ def modes_of(boundary: Boundary, m: FloatArray, n: int = MODES) -> Modes:
 
 
 def decay_terms(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Parts of c that are multiplied by 1, by r = ρ κ_t and by ρρ'' - (2/3) ρ'²."""
+    """Parts of c (n,), without unit, that are multiplied by 1, by r = ρ κ_t and by ρρ'' - (2/3) ρ'²."""
     tau, m0 = modes.tau, modes.m0
     y1 = (2 * tau - modes.q_m0) / 3
     y2 = (4 * tau * y1 - m0) / 5
@@ -47,7 +53,7 @@ def decay_terms(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray, 
 
 
 def decay_slopes(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray]:
-    """∂c/∂τ at constant q, parts multiplied by 1 and by r; ∂M0/∂τ = -M0²."""
+    """∂c/∂τ (n,) at constant q, without unit, parts multiplied by 1 and by r; ∂M0/∂τ = -M0²."""
     tau, m0 = modes.tau, modes.m0
     dm0 = -(m0**2)
     # q M0 ∂M0/∂M0: the derivative of q M0 is -q M0²

@@ -72,7 +72,7 @@ def near_field(
 
     Returns
     -------
-    complex, (...)
+    complex, (...), in units of the incident wave
         All rays through each point summed, 0 where none passes; grows without bound towards a caustic, and has no
         meaning on one.
 
@@ -80,6 +80,17 @@ def near_field(
     ------
     InvalidInputError
         On points inside the body or not finite, a bad wavenumber, boundary or order, and for a weighted body.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=24)
+    >>> u = cr.near_field(fan, [(0.3, 0.0, 1.5)], wavenumber=30.0, boundary="soft")
+    >>> u.shape, round(float(abs(u[0])), 2)
+    ((1,), 0.04)
     """
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
@@ -116,7 +127,7 @@ def _height(fan: RayFan, points: FloatArray) -> FloatArray:
 
 
 def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray (n,) at the distance l = reach (n,) along its tangent; 0 where it has ended."""
+    """Contribution of each ray (n,) to u at l = reach (n,), L, along its tangent; 0 where the ray has ended."""
     if not np.all(rays.alive):
         out = np.zeros(rays.time.shape, dtype=complex)
         out[rays.alive] = shed_waves(rays[rays.alive], reach[rays.alive], wavenumber, boundary, order)

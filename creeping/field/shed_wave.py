@@ -25,18 +25,24 @@ SECOND_ORDER = (0.5, 0.9)
 
 
 def smoothstep(x: FloatArray, start: float, end: float) -> FloatArray:
-    """0 below start, 1 above end, cubic between."""
+    """0 below start, 1 above end, cubic between: (...) -> (...), all of one unit.
+
+    Examples
+    --------
+    >>> smoothstep(np.array([0.0, 0.5, 2.0]), 0.0, 1.0)
+    array([0. , 0.5, 1. ])
+    """
     t = np.clip((x - start) / (end - start), 0.0, 1.0)
     return np.asarray(t * t * (3 - 2 * t))
 
 
 def fock_parameter(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """ξ (...)."""
+    """Fock parameter ξ (...), without unit; k in 1/L."""
     return np.asarray(np.cbrt(wavenumber / 2) * rays.integrals[..., 1])
 
 
 def scales(rays: RayPoints, wavenumber: float) -> tuple[FloatArray, FloatArray]:
-    """m at attachment and launch (...)."""
+    """m at attachment and launch (...), without unit; k in 1/L."""
     first, last = rays.curvature
     return fock_scale(wavenumber, first), fock_scale(wavenumber, last)
 

@@ -17,7 +17,7 @@ OFF_BODY = 1e-3
 
 
 def project_bundle(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Bring (x, p) onto T1Q: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    """Bring points, L, and directions onto T1Q: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
     points = project(body, points)
     n = normal(body, points)
     tangent = directions - np.sum(directions * n, axis=-1, keepdims=True) * n
@@ -92,7 +92,7 @@ def as_points(points: ArrayLike) -> FloatArray:
 
 
 def on_body(body: Surface, points: FloatArray) -> FloatArray:
-    """Put points within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
+    """Put points, L, within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
 
     Raises
     ------

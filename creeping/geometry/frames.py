@@ -12,9 +12,16 @@ from creeping._typing import FloatArray
 
 
 def polar_frame(tangents: FloatArray) -> FloatArray:
-    """Polar frame E = T (T^T T)^(-1/2) of chart tangents: (..., 3, 2) -> (..., 3, 2).
+    """Polar frame E = T (T^T T)^(-1/2) of chart tangents, of any unit: (..., 3, 2) -> (..., 3, 2).
 
     The 2 x 2 root is closed: G^(1/2) = (G + s)/t with s = sqrt(det G), t = sqrt(tr G + 2 s).
+
+    Examples
+    --------
+    >>> polar_frame(np.array([[2.0, 1.0], [0.0, 1.0], [0.0, 0.0]])).round(4)
+    array([[ 0.9487,  0.3162],
+           [-0.3162,  0.9487],
+           [ 0.    ,  0.    ]])
     """
     gram = np.swapaxes(tangents, -1, -2) @ tangents
     p, q, r = gram[..., 0, 0], gram[..., 0, 1], gram[..., 1, 1]

@@ -84,6 +84,14 @@ def triangulate(
     ------
     SurfaceError
         If F has no zero in the box, reaches its faces, or no grid of at most MAX_POINTS resolves its topology.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> ring = sc.Torus()
+    >>> mesh = triangulate(ring.level, ring.gradient, ring.bounds, cells=24)
+    >>> mesh.euler_characteristic, mesh.components
+    (0, 1)
     """
     box = np.asarray(bounds, dtype=float)
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):

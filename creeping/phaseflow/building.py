@@ -218,7 +218,7 @@ def settled(sample: Callable[[int], FloatArray], count: int, most: int, *, colum
 
 
 def upper_bound(errors: FloatArray) -> float:
-    """Rms of errors (n,), two standard errors of their squares above it."""
+    """Rms of errors (n,), of any unit, two standard errors of their squares above it."""
     square = errors**2
     return float(np.sqrt(np.mean(square) + 2 * np.std(square) / np.sqrt(len(square))))
 

@@ -37,6 +37,13 @@ class Growth:
     bound : float
         Of the rms at the last length, two standard errors of its square above it: where few rays carry most of the
         error, as beside an unstable geodesic, samples scatter.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> growth = cr.Growth(lengths=(1.0, 2.0, 4.0), rms=(1e-9, 2e-9, 8e-9), max=(3e-9, 6e-9, 2e-8), bound=9e-9)
+    >>> f"{growth.rms_after(2.0):.0e}"
+    '2e-09'
     """
 
     lengths: tuple[float, ...]
@@ -45,7 +52,7 @@ class Growth:
     bound: float
 
     def rms_after(self, length: float) -> float:
-        """Rms error after a length, by interpolation in logarithms; beyond the last one by its last slope."""
+        """Rms error after a length, L, by interpolation in logarithms; beyond the last one by its last slope."""
         if length <= self.lengths[0]:
             return self.rms[0]
         t, e = np.log(self.lengths), np.log(np.maximum(self.rms, 1e-300))
@@ -57,7 +64,7 @@ class Growth:
         return float(np.exp(np.interp(at, t, e)))
 
     def trusted_length(self, tolerance: float) -> float:
-        """Longest measured or extrapolated length, at most twice the measured, whose rms error meets the tolerance."""
+        """Longest length, L, at most twice the measured one, whose rms error (extrapolated there) meets the tolerance."""
         ends = np.linspace(self.lengths[0], 2 * self.lengths[-1], 2001)
         good = np.array([self.rms_after(float(t)) <= tolerance for t in ends])
         return float(ends[np.argmin(good) - 1]) if good[0] and not good.all() else float(ends[-1] if good[0] else 0.0)
@@ -81,6 +88,16 @@ class PhaseMap(Drawn):
         Error after longer and longer rays.
     parameters : dict
         How the map was built.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> pm = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), order=3, cache=False)
+    >>> x, p = pm.flow((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), np.pi)                     # half a great circle
+    >>> bool(np.allclose(x, [-1, 0, 0])), pm.error.rms < 1e-9
+    (True, True)
     """
 
     body: Surface
@@ -130,6 +147,11 @@ class PhaseMap(Drawn):
         Returns
         -------
         points, directions : (..., 3), (..., 3)
+
+        Raises
+        ------
+        InvalidInputError
+            On bad points or directions.
         """
         x, p = bundle_points(self.body, points, directions)
         states = self.leap(pack(x, p), 1)
@@ -140,13 +162,19 @@ class PhaseMap(Drawn):
 
         Parameters
         ----------
-        points, directions : (..., 3)
+        points : (..., 3), L
+        directions : (..., 3)
         times : scalar or (m,), L (travel time for a weighted body)
             Ascending.
 
         Returns
         -------
         points, directions : (..., 3) for a scalar time, (..., m, 3) else
+
+        Raises
+        ------
+        InvalidInputError
+            On bad points, directions or times.
         """
         values, scalar = as_times(times)
         x, p = bundle_points(self.body, points, directions)

@@ -50,6 +50,11 @@ def uniform_weights(t: FloatArray, degree: int) -> FloatArray:
     """Weights of the p + 1 B-splines that do not vanish at fraction t of a cell: (...) -> (..., p + 1).
 
     Cox-de Boor on uniform knots: w_j <- ((t + d - j) w_(j-1) + (j + 1 - t) w_j)/d for d = 1..p.
+
+    Examples
+    --------
+    >>> (6 * uniform_weights(np.array(0.0), 3)).round(12)
+    array([1., 4., 1., 0.])
     """
     t = np.asarray(t, dtype=float)
     w = np.zeros((*t.shape, degree + 1))

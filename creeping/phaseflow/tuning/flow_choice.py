@@ -84,6 +84,14 @@ def choose_flow(
         On a number out of range.
     ToleranceError
         If direct integration does not reach the tolerance.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> flow = cr.choose_flow(sc.Sphere(), rays=10, length=1.0, tolerance=1e-6, cache=False)
+    >>> type(flow).__name__, flow.error.rms < 1e-6             # few rays do not pay for a map
+    ('DirectFlow', True)
     """
     if not (isinstance(rays, (int, np.integer)) and rays >= 1):
         raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
