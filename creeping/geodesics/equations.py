@@ -76,7 +76,7 @@ def metric_curvature(body: Surface, points: FloatArray) -> FloatArray:
 
 
 def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Right-hand sides (x', p') of the flow at points, L, and unit tangents: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    """Right-hand sides (x', p') of the flow at points, L, and unit tangents: twice (..., 3) -> twice (..., 3)."""
     g, h = body.gradient(points), body.hessian(points)
     bent = np.einsum("...i,...ij,...j->...", directions, h, directions)
     turning = -(bent / np.sum(g * g, axis=-1))[..., None] * g

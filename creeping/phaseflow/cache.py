@@ -53,8 +53,8 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     >>> ball = sc.Sphere()
     >>> pm = cr.build_phase_map(ball, horizon=0.5, grid=(16, 16), order=3, cache=False)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     pm.save(f"{folder}/map")
-    ...     cr.load_phase_map(f"{folder}/map", ball).horizon
+    ...     stored = pm.save(f"{folder}/map")
+    ...     cr.load_phase_map(stored, ball).horizon
     0.5
     """
     folder = Path(folder)

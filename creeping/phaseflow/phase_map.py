@@ -64,7 +64,7 @@ class Growth:
         return float(np.exp(np.interp(at, t, e)))
 
     def trusted_length(self, tolerance: float) -> float:
-        """Longest length, L, at most twice the measured one, whose rms error (extrapolated there) meets the tolerance."""
+        """Longest length, L, at most twice the measured one, whose rms error, extrapolated, meets the tolerance."""
         ends = np.linspace(self.lengths[0], 2 * self.lengths[-1], 2001)
         good = np.array([self.rms_after(float(t)) <= tolerance for t in ends])
         return float(ends[np.argmin(good) - 1]) if good[0] and not good.all() else float(ends[-1] if good[0] else 0.0)
