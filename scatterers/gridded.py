@@ -108,7 +108,7 @@ class Gridded(LevelBody):
         nodes : int or three ints
             Nodes along each axis.
         margin : float
-            By how much of its half width the body's box is widened on every side.
+            By how much of its half width, without unit, the body's box is widened on every side.
         centre : (3,) array_like, optional
             As of the class.
 

@@ -94,7 +94,7 @@ class DirectFlow(Shown):
         return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same); see `PhaseMap.transport`."""
+        """Advance states (n, 6, 10 or 12) to ascending times (m,), L: (n, m, the same); see `PhaseMap.transport`."""
         if states.shape[1] > 10:
             return with_attenuation(self.body, states, times, rtol=self.rtol, step=self.step)
         return trace_states(self.body, states, times, rtol=self.rtol if self.step is None else 0.0, step=self.step)

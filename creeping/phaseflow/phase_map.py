@@ -181,10 +181,11 @@ class PhaseMap(Drawn):
         return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same).
+        """Advance states (n, 6, 10 or 12) to the ascending times (m,), L: (n, m, the same).
 
-        Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c, 10 and 11 the attenuation integral and the
-        time of detachment (`attenuation`; inf before).
+        Components 0 to 5 are x, L, and p; 6 to 9 the columns of the Jacobi matrix of the metric ds/c, whose M12 is a
+        time and M21 1/time; 10 and 11 the attenuation integral, L^(1/3), and the time of detachment (`attenuation`; inf
+        before).
 
         Raises
         ------
@@ -241,7 +242,13 @@ class PhaseMap(Drawn):
         return float(np.clip(1e-3 * self.error.rms, 1e-12, 1e-9)) if np.isfinite(self.error.rms) else 1e-12
 
     def leap(self, states: FloatArray, count: int, level: Leap | None = None) -> FloatArray:
-        """Compose one map (g_T0 by default) ``count`` times on states (n, 6 or 10)."""
+        """Compose one map (g_T0 by default) ``count`` times on states (n, 6 or 10), units as of `transport`.
+
+        Raises
+        ------
+        InvalidInputError
+            If ``count`` is negative, or the states carry more than the map does.
+        """
         if count < 0:
             raise InvalidInputError(f"cannot compose a map {count} times")
         states = np.array(states, dtype=float, order="C")

@@ -8,8 +8,6 @@
 F along the backward ray starts with F = 0, F' = 0, F'' = d.Hd, so behind a convex point it first rises; it enters the
 body where an interior local minimum is negative. The state changes at zeros of kappa_n(d) and where such a minimum
 is 0.
-
-Sources: [K84]; Derivations, R10.
 """
 
 from collections.abc import Callable

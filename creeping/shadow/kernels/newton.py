@@ -1,5 +1,7 @@
 """Compiled nodes of a shadow line: Newton steps onto it, equal arclength, and its length.
 
+Sources: Derivations, R6 and R8.
+
     F = 0, G = grad F.d = 0;   W = grad F x Hd,   T = W/|W|,   dx = -[F (Hd x W) + G (W x grad F)]/|W|^2
 
 dx is the Newton step of least norm. Between neighbours x_0, x_1 with chord c and tangents T the curve is a cubic; its
@@ -8,8 +10,6 @@ arclength comes from the chord and the mean of T over the step, for nodes equall
     h = |c|/|A|,   A = [802 (T_0 + T_1) - 93 (T_-1 + T_2) + 11 (T_-2 + T_3)]/1440,
 
 of order 6, against that of order 4, A = [13 (T_0 + T_1) - (T_-1 + T_2)]/24: their difference is the estimate.
-
-Sources: Derivations, R6 and R8.
 """
 
 import math

@@ -3,8 +3,6 @@
 A line is sought on the coarsest of three meshes, and again on the next if a step has flagged it, if its length is not
 certain to SETTLED, or if the incidence is so near a singular one, v < e^2 with e the mean angle between neighbouring
 normals, that the mesh might miss a small loop.
-
-Sources: Derivations, R11.
 """
 
 import numpy as np
