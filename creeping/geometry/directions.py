@@ -31,6 +31,11 @@ def directions_from_angles(theta: ArrayLike, phi: ArrayLike) -> FloatArray:
     -------
     (..., 3)
 
+    Raises
+    ------
+    InvalidInputError
+        If angles are not finite numbers, or do not broadcast.
+
     Examples
     --------
     >>> directions_from_angles([0.0, np.pi / 2], 0.0).round(12) + 0.0
@@ -178,6 +183,11 @@ def great_circle(
     -------
     (n, 3)
 
+    Raises
+    ------
+    InvalidInputError
+        If a direction is not three finite numbers, both are parallel, or n is out of range.
+
     Examples
     --------
     >>> great_circle((0, 0, 1), (1, 0, 0), 4).round(12) + 0.0
@@ -255,7 +265,13 @@ def _angles(**named: ArrayLike) -> list[FloatArray]:
 
 
 def direction_count(name: str, value: int) -> int:
-    """Return a number of directions, if it is one from 1 to `MOST`."""
+    """Return a number of directions, if it is one from 1 to `MOST`.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST:
         raise InvalidInputError(f"{name} = {value!r} is not a whole number from 1 to {MOST}")
     return int(value)

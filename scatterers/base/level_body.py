@@ -117,7 +117,13 @@ class LevelBody(Body):
 
     @cached_property
     def atlas(self) -> "CubeSphereAtlas | MongeAtlas":
-        """Six charts over the sphere map, or Monge charts."""
+        """Six charts over the sphere map, or Monge charts.
+
+        Raises
+        ------
+        ValueError
+            If the body is too thin, or too sharply curved, for charts.
+        """
         if self._map is not None:
             return CubeSphereAtlas(self._map, self._map.compiled_locator)
         from scatterers.atlas.monge.atlas import MongeAtlas

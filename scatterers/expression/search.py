@@ -27,7 +27,13 @@ def samples_of(space: ExpressionSpace, box: FloatArray, nodes: int) -> Samples:
 
 
 def found_box(space: ExpressionSpace) -> FloatArray:
-    """Box (2, 3), L, around the one body, from the smallest cube about the origin that holds it."""
+    """Box (2, 3), L, around the one body, from the smallest cube about the origin that holds it.
+
+    Raises
+    ------
+    ValueError
+        If there is no body, it is open, or no cube of a known size holds it alone.
+    """
     open_cubes = 0
     for k, half in enumerate(SIZES):
         samples = samples_of(space, np.array([[-half] * 3, [half] * 3]), COARSE)

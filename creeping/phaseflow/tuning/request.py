@@ -183,7 +183,13 @@ class Request:
         }
 
     def build(self, say: Progress) -> PhaseMap:
-        """Build with the parameters given, choosing the missing ones."""
+        """Build with the parameters given, choosing the missing ones.
+
+        Raises
+        ------
+        ToleranceError
+            If the map that was built misses the tolerance.
+        """
         require_checked(self.body)
         if self.nodes is None:
             return tuned_map(self, say)

@@ -85,7 +85,13 @@ class Candidate:
 
 
 def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None = None) -> PhaseMap:
-    """Build the fastest map that meets the request's tolerance, of the candidates if these are known already."""
+    """Build the fastest map that meets the request's tolerance, of the candidates if these are known already.
+
+    Raises
+    ------
+    ToleranceError
+        If no map within the limits meets the tolerance; with the best that was reached.
+    """
     body, tolerance = request.body, request.tolerance
     assert tolerance is not None
     model = model_of(body)

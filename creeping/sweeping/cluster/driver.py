@@ -92,7 +92,13 @@ def fill_on(
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
-    """Client of the scheduler at an address."""
+    """Client of the scheduler at an address.
+
+    Raises
+    ------
+    CreepingError
+        If no scheduler answers there.
+    """
     try:
         client = distributed.Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

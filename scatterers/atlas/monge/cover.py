@@ -285,7 +285,13 @@ class _Candidates:
 
 
 def covered_by(level: Field, gradient: Field, hessian: Field, points: FloatArray, margin: float) -> Cover:
-    """Choose charts that cover the body and all its cloud of points (n, 3), L."""
+    """Choose charts that cover the body and all its cloud of points (n, 3), L.
+
+    Raises
+    ------
+    ValueError
+        If no cover is found; with how much is left.
+    """
     cloud = _Cloud.of(level, gradient, hessian, points)
     candidates = _Candidates(cloud, margin)
     fresh, before = cloud.spread(np.arange(len(points)), APART), len(points)
