@@ -6,7 +6,7 @@ Y2 = (4τ Y1 - M0)/5 and r = ρ κ_t,
     c = -τ²/4 + τ Y1 - (3/4) Y2 - (1/4)(1 ± r) M0 - (1/12)[ρρ'' - (2/3) ρ'²] Y2
 
 (+ in acoustics, - for the magnetic field: electric "hard"). Soft is M0 = 0; c = τ²/60 there for constant curvature.
-Ends, 1 attachment and 2 launch:
+Ends, 1 attachment and 2 shedding:
 
     A = exp{-i τ² ρ1'/(12 m1)} exp{+i τ² ρ2'/(12 m2)}
     1 + (1/2) Σ_{i=1,2} [∂c/∂τ + ω r_i τ + β τ ρ_i ρ_i'']/m_i²,   ω = 1/4 (one ray), 1/2 (fan integral)

@@ -1,7 +1,7 @@
 """The diffracted field at points near the body, in its shadow: every ray whose tangent passes through the point.
 
     u = D e^{ik(d.x0 + s + l)} / √(l |J + l J'|) e^{-iπN/2},   D = -√(m1 m2) √(2/k) P̂(ξ, Y),   Y = (m2 l/ρ2)²
-    P̂ = 2i√π e^{iπ/4} Σ_p R_p A_p exp{...} H_p(Y),   H_p the height gain, launch factor to the power Y/(1 + Y)
+    P̂ = 2i√π e^{iπ/4} Σ_p R_p A_p exp{...} H_p(Y),   H_p the height gain, its end factor to the power Y/(1 + Y)
 
 Near the body the leading order is Fock's integral of the same modes, which holds down to ξ = 0. Farther off the modes
 add up by themselves but for a last ξ, where UTD's form stands, with X = k l ξ²/(2 m1 m2),

@@ -42,13 +42,13 @@ def fock_parameter(rays: RayPoints, wavenumber: float) -> FloatArray:
 
 
 def scales(rays: RayPoints, wavenumber: float) -> tuple[FloatArray, FloatArray]:
-    """m at attachment and launch (...), without unit; k in 1/L."""
+    """m at the attachment and the shedding point (...), without unit; k in 1/L."""
     first, last = rays.curvature
     return fock_scale(wavenumber, first), fock_scale(wavenumber, last)
 
 
 def mean_scale(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """Mean of m along the ray, weighted by κₙ^(2/3) (...); m at the launch point where the ray has no length."""
+    """Mean of m along the ray, weighted by κₙ^(2/3) (...); m at attachment where the ray has no length."""
     some = rays.integrals[..., 1] > 0
     mean = np.divide(rays.integrals[..., 0], rays.integrals[..., 1], out=np.zeros(some.shape), where=some)
     return np.asarray(np.where(some, np.cbrt(wavenumber / 2) * mean, scales(rays, wavenumber)[0]))
@@ -72,8 +72,8 @@ def mode_waves(
 ) -> ComplexArray:
     """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
 
-    ``launch_share`` (...) is the power of the launch factor: 0 on the body, 1 far away; None leaves both ends out. The
-    correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
+    ``launch_share`` (...) is the power of the factor of shedding: 0 on the body, 1 far away; None leaves both ends out.
+    The correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
     down.
     """
     leading = fock_parameter(rays, wavenumber)[..., None] * modes.tau
@@ -114,7 +114,7 @@ def _ends(rays: RayPoints, wavenumber: float) -> list[tuple[FloatArray, FloatArr
 
 
 def transverse_ratios(rays: RayPoints) -> tuple[FloatArray, FloatArray]:
-    """R = ρ κ_t at attachment and launch (...)."""
+    """r = ρ κ_t at the attachment and the shedding point (...), without unit."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = [t / c for t, c in zip(rays.transverse, rays.curvature, strict=True)]
     return np.nan_to_num(ratios[0]), np.nan_to_num(ratios[1])

@@ -1,6 +1,6 @@
 """Compiled composition of maps on bodies x = psi(s), s on the unit sphere.
 
-The numpy twin is `compiled_models.RotationModel`.
+The twin in plain numpy is in tests/oracles.
 
 The state of a ray is the unit quaternion r = (w, x, y, z) of the rotation R = [s, q, s x q], q the direction
 
