@@ -35,8 +35,14 @@ WITHOUT_EXAMPLE = {
 """Public objects that have no example yet; names leave this set, none is added."""
 NO_SOURCE_NEEDED = {"creeping/files/ffe.py"}
 """Modules whose equations are conversions of units, or conventions of a file format."""
-REWRITTEN = {"creeping/shadow/occlusion.py", "creeping.PhaseMap.leap_numpy"}
-"""What the rewrite of the shadow line and of the flows replaces."""
+REWRITTEN = {
+    "creeping.PhaseMap.leap_numpy",
+    "creeping/rays/kernels/shed_search.py",
+    "creeping/rays/quantities.py",
+    "creeping/rays/single.py",
+    "creeping/shadow/occlusion.py",
+}
+"""What the rewrite of the shadow line, the rays and the flows replaces."""
 _KEY = re.compile(r"\[[A-Z]{1,4}\d{2}[a-z]?(?:, [^\]]*)?\]")
 _SECTIONS = re.compile(r"[Dd]erivations?(?:,|:) ((?:[RFB]\d+(?:, | and | to )?)+)")
 _EQUATION = re.compile(r"^ {4,}.*(?:=|<-|<=)", re.MULTILINE)

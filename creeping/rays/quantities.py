@@ -8,8 +8,6 @@ With n the normal, p the ray's tangent, b = n × p, H the Hessian of F:
 
 Between the steps of the fan the rays are traced again, so that splines of degree 7 along them give κₙ' and κₙ''. Powers
 are taken after interpolation, and the integrals end where κₙ first falls to 0: there the creeping ray ends.
-
-Sources: Derivations, R1, R5 and F4.
 """
 
 from dataclasses import dataclass

@@ -5,8 +5,6 @@
 Rays that leave towards r are found by Newton's method on p(σ, s) = r, with p and b = n x p at the end,
 
     b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ ds - τ J dσ⊥,   τ = b.Hp/|grad F|.
-
-Sources: Derivations, R4 and R12.
 """
 
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Between the carried states x and J are quintics through value, slope and second 
     x'' = -kappa_n n,   J'' = -K J,
 
 close enough to tell cells apart; what is found there is refined on rays traced for it.
-
-Sources: Derivations, R12 and R14.
 """
 
 import math
