@@ -15,6 +15,16 @@ class CreepingError(ValueError):
         What, how many, the worst, the remedy.
     **numbers
         The figures of the message, kept as attributes.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> try:
+    ...     cr.shadow_line(sc.Sphere(), direction=(0, 0, 0))
+    ... except cr.CreepingError as error:
+    ...     print(error)
+    direction is the zero vector; give where the wave travels, e.g. (1, 1, 1)
     """
 
     def __init__(self, message: str, **numbers: Any) -> None:

@@ -61,6 +61,11 @@ class Cad(FittedBody):
         If the file cannot be read, is not one closed body, or has edges or tips.
     ModuleNotFoundError
         If gmsh is not installed.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> hull = sc.Cad("hull.step")                              # doctest: +SKIP
     """
 
     def __init__(

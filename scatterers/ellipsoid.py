@@ -21,6 +21,16 @@ class Ellipsoid(BentEllipsoid):
     ------
     ValueError
         If a semi-axis is not a positive finite number, or the speed is not usable.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> body = sc.Ellipsoid(2.0, 1.0, 0.5)
+    >>> body.bounds
+    array([[-2. , -1. , -0.5],
+           [ 2. ,  1. ,  0.5]])
+    >>> body.gradient([2.0, 0.0, 0.0])
+    array([1., 0., 0.])
     """
 
     a: float

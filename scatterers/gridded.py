@@ -1,6 +1,8 @@
 """Body whose F is given by samples on a Cartesian grid: F = quintic tensor-product B-spline through them.
 
 F and its derivatives are those of the spline, exactly.
+
+Sources: [B78]; Derivations, B7.
 """
 
 import hashlib
@@ -28,7 +30,7 @@ class Level(Protocol):
         ...
 
     def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: (..., 3) -> (...)."""
+        """F, positive outside: points (..., 3), L, to (...)."""
         ...
 
 
@@ -53,6 +55,16 @@ class Gridded(LevelBody):
     ValueError
         If the samples are too few or not finite, no node is inside, nodes of the grid's faces are not outside, or
         the body is not star-shaped about a given centre.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import scatterers as sc
+    >>> axis = np.linspace(-1.25, 1.25, 21)
+    >>> x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    >>> ball = sc.Gridded(x**2 + y**2 + z**2 - 1, [[-1.25] * 3, [1.25] * 3])
+    >>> float(abs(ball.level([0.6, 0.0, 0.8])).round(12))       # quintics are reproduced
+    0.0
     """
 
     def __init__(
@@ -96,7 +108,7 @@ class Gridded(LevelBody):
         nodes : int or three ints
             Nodes along each axis.
         margin : float
-            By how much of its half width the body's box is widened on every side.
+            By how much of its half width, without unit, the body's box is widened on every side.
         centre : (3,) array_like, optional
             As of the class.
 
@@ -104,6 +116,13 @@ class Gridded(LevelBody):
         ------
         ValueError
             As the class, and if the nodes or the margin are not usable.
+
+        Examples
+        --------
+        >>> import scatterers as sc
+        >>> body = sc.Gridded.sampled(sc.Ellipsoid(1.0, 0.8, 0.6), nodes=24)
+        >>> float(abs(body.level([0.0, 0.8, 0.0])).round(9))
+        0.0
         """
         counts = [nodes] * 3 if isinstance(nodes, int) else list(nodes)
         if len(counts) != 3 or any(isinstance(n, bool) or not isinstance(n, int) or n < FEWEST for n in counts):

@@ -50,6 +50,15 @@ class Implicit(LevelBody):
     ValueError
         If the expression contains anything else, or F = 0 is empty, open, unbounded, not finite, not connected, has a
         cavity, a point where grad F = 0, an edge, or unbounded curvature.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> body = sc.Implicit("x**2/4 + y**2 + z**2 - 1", bounds=[[-2.2, -1.1, -1.1], [2.2, 1.1, 1.1]])
+    >>> body.gradient([2.0, 0.0, 0.0])
+    array([1., 0., 0.])
+    >>> body.star_shaped
+    True
     """
 
     def __init__(

@@ -3,6 +3,8 @@
 Vertices are taken to lie on the body. Their normals are those of osculating jets (`scatterers.triangles.jets`), which
 give points between them, too; to both a quintic tensor-product B-spline is fitted (`scatterers.spline.fitting`), twice,
 on grids of different spacing: by their difference the curvatures' error is known.
+
+Sources: [CP05]; Derivations, B5 and B6.
 """
 
 import json
@@ -66,6 +68,17 @@ class Mesh(FittedBody):
     ------
     ValueError
         If the source is not one closed, smooth body that its triangles resolve; says what, how many and where.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import scatterers as sc
+    >>> import trimesh
+    >>> body = sc.Mesh(trimesh.creation.icosphere(subdivisions=3), cache=False)
+    >>> body.quality.verdict
+    'smooth'
+    >>> bool(np.all(abs(body.level(trimesh.creation.icosphere(subdivisions=4).vertices)) < 1e-4))
+    True
     """
 
     def __init__(
@@ -123,10 +136,32 @@ class Mesh(FittedBody):
 def examined_mesh(source: Any, units: str | None = None) -> tuple[TriangleMesh, MeshQuality]:
     """Read a mesh as `Mesh` does, and judge it; also one that `Mesh` refuses as not smooth.
 
+    Parameters
+    ----------
+    source : path, or object with ``vertices`` and ``faces``
+        As of `Mesh`.
+    units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
+        As of `Mesh`.
+
+    Returns
+    -------
+    mesh : TriangleMesh
+        Vertices in metres.
+    quality : MeshQuality
+        Its verdict is "smooth" if `Mesh` takes the mesh.
+
     Raises
     ------
     ValueError
         If the source is not one closed body.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> import trimesh
+    >>> mesh, quality = sc.examined_mesh(trimesh.creation.box())
+    >>> quality.verdict
+    'sharp'
     """
     mesh, _, quality = _examined(source, units, lambda _: None)
     return mesh, quality

@@ -29,6 +29,14 @@ class ExpressionSpeed:
     ------
     ValueError
         If the expression contains anything else.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import scatterers as sc
+    >>> speed = sc.ExpressionSpeed("1 + x/2")
+    >>> float(speed.value(np.array([1.0, 0.0, 0.0]))), speed.gradient(np.array([1.0, 0.0, 0.0]))
+    (1.5, array([0.5, 0. , 0. ]))
     """
 
     expression: str
@@ -53,15 +61,15 @@ class ExpressionSpeed:
         return Compiled(self._functions.block, "level", np.zeros(1))
 
     def value(self, points: FloatArray) -> FloatArray:
-        """c: (..., 3) -> (...)."""
+        """c, L over time: points (..., 3), L, to (...)."""
         return _stacked(self._functions.value, points)[..., 0]
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """grad c: (..., 3) -> (..., 3)."""
+        """grad c, 1/time: points (..., 3), L, to (..., 3)."""
         return _stacked(self._functions.gradient, points)
 
     def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of c: (..., 3) -> (..., 3, 3)."""
+        """Hessian of c, 1/(L time): points (..., 3), L, to (..., 3, 3)."""
         xx, yy, zz, yz, xz, xy = np.moveaxis(_stacked(self._functions.hessian, points), -1, 0)
         rows = [np.stack(row, axis=-1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
         return np.stack(rows, axis=-2)

@@ -1,7 +1,7 @@
 """Torus about z: F = ((sqrt(x^2 + y^2) - R)^2 + z^2)/r^2 - 1.
 
 x = (R + r cos theta)(cos psi, sin psi), z = r sin theta; chart variables u = psi/2 pi, v = theta/2 pi. The coordinate
-lines are orthogonal, so the isometric frame is the pair of their unit tangents. The inner half is not convex.
+lines are orthogonal, so the polar frame is the pair of their unit tangents. The inner half is not convex.
 """
 
 import math
@@ -37,6 +37,15 @@ class Torus(Body):
     ------
     ValueError
         If a radius is not a positive finite number, r >= R, or the speed is not usable.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> ring = sc.Torus(R=1.0, r=0.5)
+    >>> ring.level([[1.5, 0.0, 0.0], [1.0, 0.0, 0.0]])          # on the body, on the centre circle
+    array([ 0., -1.])
+    >>> ring.parameters([0.0, 1.5, 0.0]).round(6)               # theta, psi
+    array([0.      , 1.570796])
     """
 
     R: float = 1.0
@@ -56,19 +65,22 @@ class Torus(Body):
         return np.stack([-half, half])
 
     def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: (..., 3) -> (...)."""
+        """F, without unit, positive outside: points (..., 3), L, to (...)."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         return np.asarray(((np.hypot(x, y) - self.R) ** 2 + z**2) / self.r**2 - 1)
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: (..., 3) -> (..., 3); on the axis, far from the body, its radial part is set to 0."""
+        """Gradient of F, 1/L: points (..., 3), L, to (..., 3).
+
+        On the axis, far from the body, its radial part is set to 0.
+        """
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         rho = np.hypot(x, y)
         radial = np.where(rho > 0, 1 - self.R / np.where(rho > 0, rho, 1.0), 0.0)
         return np.stack([radial * x, radial * y, z], axis=-1) * (2 / self.r**2)
 
     def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        """Hessian of F, 1/L^2: points (..., 3), L, to (..., 3, 3)."""
         x, y, _ = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         rho = np.hypot(x, y)
         rho = np.where(rho > 0, rho, 1.0)
@@ -80,7 +92,7 @@ class Torus(Body):
         return h * (2 / self.r**2)
 
     def parameters(self, points: FloatArray) -> FloatArray:
-        """Angles (theta, psi), both in (-pi, pi]: (..., 3) -> (..., 2)."""
+        """Angles (theta, psi), radians, both in (-pi, pi]: points (..., 3), L, to (..., 2)."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         return np.stack([np.arctan2(z, np.hypot(x, y) - self.R), np.arctan2(y, x)], axis=-1)
 
@@ -150,7 +162,7 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
 
 
 def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame."""
+    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame."""
     turn = 1 / (2 * math.pi)
     for i in range(points.shape[1]):
         x, y, z = points[0, i], points[1, i], points[2, i]

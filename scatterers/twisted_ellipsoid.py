@@ -12,7 +12,7 @@ from scatterers.base.quadrics import BentEllipsoid, finite, positive
 
 @dataclass(frozen=True)
 class TwistedEllipsoid(BentEllipsoid):
-    """Ellipsoid whose y is shifted by d cos(pi z); the body of Figure 5 of Ying and Candes 2006.
+    """Ellipsoid whose y is shifted by d cos(pi z); the body of the creeping rays in [YC06b].
 
     Parameters
     ----------
@@ -27,6 +27,15 @@ class TwistedEllipsoid(BentEllipsoid):
     ------
     ValueError
         If a semi-axis is not a positive finite number, d is not finite, or the speed is not usable.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> body = sc.TwistedEllipsoid()
+    >>> body.bounds[1]
+    array([0.5, 0.7, 1. ])
+    >>> float(body.level([0.0, 0.2, 0.0]))                      # on the spine
+    -1.0
     """
 
     a: float = 0.5

@@ -1,6 +1,6 @@
 """Curves on a body without an incidence: geodesics from a point, their wavefronts, and the axes they are drawn on.
 
-Directions at a point are p(alpha) = cos(alpha) e1 + sin(alpha) e2 in the isometric frame of its chart. Hidden parts of
+Directions at a point are p(alpha) = cos(alpha) e1 + sin(alpha) e2 in the polar frame of its chart. Hidden parts of
 curves are faint, as in the pictures of `creeping.plotting`.
 """
 

@@ -110,7 +110,7 @@ class Sample:
 
 @cache
 def sample(name: str, count: int, seed: int = 11) -> Sample:
-    """Fresh random rays, traced at 1e-13; at most 400 where F is dear."""
+    """Fresh random rays, traced at 1e-13; at most 400 where F is expensive."""
     states = random_rays(body(name), min(count, 400) if name in DEAR else count, seed)
     return Sample(body(name), states, trace_states(body(name), states, np.array([LENGTH]), rtol=1e-13)[:, 0])
 
@@ -242,7 +242,7 @@ def attempted(name: str, rays: float = 1e6, outputs: int = 1, tolerance: float =
 
 
 def variants(name: str, tuned: tuple[float, ...], outputs: int, count: int) -> list[tuple[Build, float]]:
-    """Maps tuned for several numbers of rays, fewer where a build is dear, with the seconds of a ray."""
+    """Maps tuned for several numbers of rays, fewer where a build is expensive, with the seconds of a ray."""
     rays = starts(name, count, outputs)
     found = [attempted(name, n, outputs) for n in (tuned[::2] if name in DEAR else tuned)]
     return [(one, seconds_each(one.flow, rays, outputs)) for one in found if isinstance(one, Build)]

@@ -1,7 +1,7 @@
 """Figure 6, torus: creeping rays and iso-phase curves for d = (1, 1, 1), from all or part of the shadow line.
 
 The torus R = 1, r = 0.5 has two shadow curves for this incidence. [YC06b] launches from every point of both. Where the
-inner curve lies behind the body (occluded) or on ground that is hollow along d (kappa_n(d) <= 0) no incident ray grazes
+inner curve lies behind the body (occluded) or on a part that is hollow along d (kappa_n(d) <= 0) no incident ray grazes
 the body, so no creeping ray starts: on the right only attached points launch. Rays are drawn faint where they are
 detached. (theta, psi) as in x = ((R + r cos theta) cos psi, (R + r cos theta) sin psi, r sin theta).
 """

@@ -2,7 +2,7 @@
 
 Table 1: even meshes whose vertices lie on the body; rms distance, angle between normals and difference of kappa_n
 (random directions) over random points of T1Q, median distance of geodesics after t = 2, rms difference of the integral
-of kappa_n^(2/3) along those that stay on convex ground, the fit's own estimate of the error of kappa_n, seconds, and
+of kappa_n^(2/3) along those that stay on convex regions, the fit's own estimate of the error of kappa_n, seconds, and
 orders of convergence. Table 2: noisy and uneven meshes. Table 3: fan and far field of one ellipsoid as Implicit, Mesh
 and Cad against the exact one, with the estimates that the library reports. Table 4: maps of genus 2 and of a peanut.
 Run ``python -m studies.fitted_bodies [--quick]``.

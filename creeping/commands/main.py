@@ -141,7 +141,13 @@ def run(
 
 
 def levels_of(fan: Any, step: float, of: str) -> Any:
-    """Multiples of the step that rays of the fan meet, at most 1000."""
+    """Multiples of the step that rays of the fan meet, at most 1000.
+
+    Raises
+    ------
+    InvalidInputError
+        If the step gives more levels than that.
+    """
     import numpy as np
 
     from creeping.errors import InvalidInputError

@@ -6,6 +6,8 @@
     conductor   "electric soft" for E along b, "electric hard" for E along n
 
 Of the Airy functions of a mode (`creeping.field.creeping_modes`), q is i m eta: infinite if soft, 0 if hard.
+
+Sources: [F65] for q, [PBM80] for the conductor; Derivations, F1 and F14.
 """
 
 from dataclasses import dataclass
@@ -24,7 +26,19 @@ class Impedance:
     Parameters
     ----------
     eta : complex
-        Relative admittance: 0 is hard, infinite is soft, 1 absorbs at normal incidence; Re eta >= 0 is passive.
+        Relative admittance, without unit: 0 is hard, infinite is soft, 1 absorbs at normal incidence; Re eta >= 0 is
+        passive.
+
+    Raises
+    ------
+    InvalidInputError
+        If eta is not a finite number, or Re eta < 0.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> cr.Impedance(0.5 + 0.2j)
+    Impedance(eta=(0.5+0.2j))
     """
 
     eta: complex

@@ -6,13 +6,14 @@ Y2 = (4τ Y1 - M0)/5 and r = ρ κ_t,
     c = -τ²/4 + τ Y1 - (3/4) Y2 - (1/4)(1 ± r) M0 - (1/12)[ρρ'' - (2/3) ρ'²] Y2
 
 (+ in acoustics, - for the magnetic field: electric "hard"). Soft is M0 = 0; c = τ²/60 there for constant curvature.
-Ends, 1 attachment and 2 launch:
+Ends, 1 attachment and 2 shedding:
 
     A = exp{-i τ² ρ1'/(12 m1)} exp{+i τ² ρ2'/(12 m2)}
     1 + (1/2) Σ_{i=1,2} [∂c/∂τ + ω r_i τ + β τ ρ_i ρ_i'']/m_i²,   ω = 1/4 (one ray), 1/2 (fan integral)
 
-After Keller and Levy; the amplitude term with β is fitted to an exact solution, see the README's table of errors.
-The torsion of the ray has no term here: its effect stayed below 1e-2 wherever it was measured.
+The term of varying curvature is that of [KL59], those of constant curvature agree with the zeros of Hankel functions
+[AS64, sec. 9.3]; A is derived, the amplitude term with β is fitted to an exact solution on one ellipsoid. The torsion
+of the ray has no term here: its effect stayed below 1e-2 wherever it was measured. Derivations, F4 to F6.
 """
 
 import numpy as np
@@ -27,7 +28,13 @@ BETA = 0.08
 
 
 def fock_scale(wavenumber: float, curvature: FloatArray) -> FloatArray:
-    """m = (k/(2 κₙ))^(1/3), inf where κₙ <= 0: (...) -> (...)."""
+    """m = (k/(2 κₙ))^(1/3) without unit, inf where κₙ <= 0: k and κₙ in 1/L, (...) -> (...).
+
+    Examples
+    --------
+    >>> fock_scale(54.0, np.array([1.0, -1.0]))
+    array([ 3., inf])
+    """
     with np.errstate(divide="ignore"):
         return np.asarray(np.cbrt(wavenumber / (2 * np.maximum(curvature, 0.0))))
 
@@ -38,7 +45,7 @@ def modes_of(boundary: Boundary, m: FloatArray, n: int = MODES) -> Modes:
 
 
 def decay_terms(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Parts of c that are multiplied by 1, by r = ρ κ_t and by ρρ'' - (2/3) ρ'²."""
+    """Parts of c (n,), without unit, that are multiplied by 1, by r = ρ κ_t and by ρρ'' - (2/3) ρ'²."""
     tau, m0 = modes.tau, modes.m0
     y1 = (2 * tau - modes.q_m0) / 3
     y2 = (4 * tau * y1 - m0) / 5
@@ -46,7 +53,7 @@ def decay_terms(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray, 
 
 
 def decay_slopes(modes: Modes, sign: float) -> tuple[ComplexArray, ComplexArray]:
-    """∂c/∂τ at constant q, parts multiplied by 1 and by r; ∂M0/∂τ = -M0²."""
+    """∂c/∂τ (n,) at constant q, without unit, parts multiplied by 1 and by r; ∂M0/∂τ = -M0²."""
     tau, m0 = modes.tau, modes.m0
     dm0 = -(m0**2)
     # q M0 ∂M0/∂M0: the derivative of q M0 is -q M0²

@@ -9,13 +9,19 @@ from creeping.errors import InvalidInputError
 
 
 def decibels(values: ArrayLike) -> FloatArray:
-    """20 log10 |values|: -inf where 0, (...) -> (...)."""
+    """20 log10 |values|, dB relative to the unit of the values: -inf where 0, (...) -> (...).
+
+    Examples
+    --------
+    >>> decibels([1.0, 0.1, 0.0])
+    array([  0., -20., -inf])
+    """
     with np.errstate(divide="ignore"):
         return np.asarray(20 * np.log10(np.abs(np.asarray(values))))
 
 
 def cross_section_decibels(values: ArrayLike) -> FloatArray:
-    """10 log10(4π|values|²): (...) -> (...)."""
+    """10 log10(4π|f|²) of far fields f, L: dB relative to L^2, dBsm if L is the metre, (...) -> (...)."""
     return np.asarray(decibels(values) + 10 * np.log10(4 * np.pi))
 
 

@@ -7,6 +7,8 @@ with θ the angle from d, m̄ the mean of m over the shadow line and W a smooth 
     w = 1 - W(m̄ θ; 0.55, 0.85)                  F the forward lobe (`creeping.field.forward`)
     v = W(min χ; 0.38, 0.52) for θ > 90°      χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > 0.9
     f_rays = Σ -√(m1 m2) √(2/k) P |J'|^(-1/2) e^{-iπN/2} e^{ik(d.x0 + s - r.x)}   all rays with p = r
+
+Sources: [LK59], [P79]; Derivations, F3, F10, F14 and F15. The thresholds of W were set by trial.
 """
 
 from dataclasses import dataclass

@@ -1,12 +1,14 @@
 """The forward lobe, and the fan integral: integrals over the shadow line that no caustic spoils.
 
     I_S = -(1/√π) ∫ √(|J| m1 m2) e^{-iπN/2} g(ξ) e^{ik(d.x0 + s* - r.x*)} dσ⊥      rays at n.r = 0
-    I_L = -(1/√π) ∫ m g(ξ) e^{iξ³/12} e^{ik(d - r).x} dσ⊥,   ξ = 2 m n.d           mid-horizon, lit half
+    I_L = -(1/√π) ∫ m g(ξ) e^{iξ³/12} e^{ik(d - r).x} dσ⊥,   ξ = 2 m n.d           bisector contour, lit half
     near d      g = p*, and the silhouette -1/(4π(1 - d.r)) ∮ e^{ik(d - r).x} (d × r).dl; i k A/(2π) at r = d
     beyond      g = p* - c²/(2√π ξ),  c = n0.e on S (e along r across d), c = n.(r - d)/|r - d| on L
 
 By stationary phase I_S is the isolated ray and I_L the reflected field. The fan integral is I_S with g = e^{-iπ/4} P
 over every crossing, tapered in p.r; it replaces isolated rays where they merge.
+
+Sources: Derivations, F10 to F12.
 """
 
 import numpy as np

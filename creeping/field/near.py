@@ -1,7 +1,7 @@
 """The diffracted field at points near the body, in its shadow: every ray whose tangent passes through the point.
 
     u = D e^{ik(d.x0 + s + l)} / √(l |J + l J'|) e^{-iπN/2},   D = -√(m1 m2) √(2/k) P̂(ξ, Y),   Y = (m2 l/ρ2)²
-    P̂ = 2i√π e^{iπ/4} Σ_p R_p A_p exp{...} H_p(Y),   H_p the height gain, launch factor to the power Y/(1 + Y)
+    P̂ = 2i√π e^{iπ/4} Σ_p R_p A_p exp{...} H_p(Y),   H_p the height gain, its end factor to the power Y/(1 + Y)
 
 Near the body the leading order is Fock's integral of the same modes, which holds down to ξ = 0. Farther off the modes
 add up by themselves but for a last ξ, where UTD's form stands, with X = k l ξ²/(2 m1 m2),
@@ -9,6 +9,8 @@ add up by themselves but for a last ξ, where UTD's form stands, with X = k l ξ
     P̂ = P(ξ) + (e^{iπ/4}/(2√π ξ)) [1 - F_t(X)].
 
 N counts zeros of J on (0, s) and of J + l' J' on (0, l).
+
+Sources: [LK59], [P79], [KP74] for F_t; Derivations, F3 and F8. The power Y/(1 + Y) was found by trial.
 """
 
 import numpy as np
@@ -70,7 +72,7 @@ def near_field(
 
     Returns
     -------
-    complex, (...)
+    complex, (...), in units of the incident wave
         All rays through each point summed, 0 where none passes; grows without bound towards a caustic, and has no
         meaning on one.
 
@@ -78,6 +80,17 @@ def near_field(
     ------
     InvalidInputError
         On points inside the body or not finite, a bad wavenumber, boundary or order, and for a weighted body.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=24)
+    >>> u = cr.near_field(fan, [(0.3, 0.0, 1.5)], wavenumber=30.0, boundary="soft")
+    >>> u.shape, round(float(abs(u[0])), 2)
+    ((1,), 0.04)
     """
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
@@ -114,7 +127,7 @@ def _height(fan: RayFan, points: FloatArray) -> FloatArray:
 
 
 def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray (n,) at the distance l = reach (n,) along its tangent; 0 where it has ended."""
+    """Contribution of each ray (n,) to u at l = reach (n,), L, along its tangent; 0 where the ray has ended."""
     if not np.all(rays.alive):
         out = np.zeros(rays.time.shape, dtype=complex)
         out[rays.alive] = shed_waves(rays[rays.alive], reach[rays.alive], wavenumber, boundary, order)

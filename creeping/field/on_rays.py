@@ -4,6 +4,8 @@ First order of `creeping.field.surface`, with ξ = (k/2)^(1/3) A and A the fan's
 
     |u| = (ρ1/ρ2)^(1/6) |J|^(-1/2) |g(ξ)|          hard, impedance
     |du/dn|/k = the same with |F(ξ)|/m2             soft
+
+Sources: Derivations, F3.
 """
 
 import numpy as np

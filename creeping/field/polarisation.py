@@ -5,6 +5,8 @@
 
 n is the normal where the wave lands, n' where it leaves: both s and h are carried by the ray (b → b, n → n), with no
 exchange between them [PBM80]. Components are those of θ̂ and φ̂ at the directions of travel d and r.
+
+Sources: Derivations, F14.
 """
 
 import numpy as np

@@ -11,6 +11,8 @@ plane, and each negative principal curvature turns the phase by -π/2.
 The bracket is what the next order of the reflected field's series adds to that of P: Λ, from third and fourth
 derivatives of the surface (`creeping.rays.specular.shape_term`), is 1/(2a) on a sphere, where the bracket is 1, and
 3/(16a) on a cylinder, where κ_b = 0. It comes from Green's formula with the field on the surface to the same order.
+
+Sources: [KLS56] for the series, [P79] for P; Derivations, F13.
 """
 
 import numpy as np
@@ -31,7 +33,7 @@ UNRESOLVED = 0.25
 def reflection(
     cosine: FloatArray, along: FloatArray, across: FloatArray, wavenumber: float, boundary: Boundary, order: int
 ) -> ComplexArray:
-    """Coefficient R (n,) from cos θᵢ and the curvatures in and across the plane of incidence (n,)."""
+    """Coefficient R (n,) from cos θᵢ (n,) and curvatures (n,), 1/L, in and across the plane of incidence; k in 1/L."""
     m = fock_scale(wavenumber, along)
     curved = np.isfinite(m) & (2 * m * cosine < -FARTHEST) & (cosine > 1e-12)
     out = plane_reflection(cosine, boundary)
@@ -53,14 +55,14 @@ def reflection(
 
 
 def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
-    """R of a plane: -1 soft, +1 hard, (cos θᵢ - η)/(cos θᵢ + η)."""
+    """R of a plane (n,), without unit: -1 soft, +1 hard, (cos θᵢ - η)/(cos θᵢ + η)."""
     if boundary.kind == "impedance":
         return np.asarray((cosine - boundary.eta) / (cosine + boundary.eta))
     return np.full(cosine.shape, -1.0 if boundary.kind.endswith("soft") else 1.0, dtype=complex)
 
 
 def curvatures(specular: SpecularPoints) -> tuple[FloatArray, FloatArray]:
-    """Normal curvatures along the plane of incidence and across it (n,).
+    """Normal curvatures, 1/L, along the plane of incidence and across it (n,).
 
     At normal incidence there is no such plane: both are the mean curvature.
     """

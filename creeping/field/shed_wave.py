@@ -7,6 +7,8 @@ At small ξ the corrected series diverges. There each power of τ is read as one
 a derivative of P, and M0 = dτ/dq as a change of q; both forms are the same series. For an impedance q varies along the
 ray: τ_p is taken at the mean of q weighted by κₙ^(2/3), so that its first-order variation is exact, and R_p at the
 geometric mean of both ends.
+
+Sources: Derivations, F4 to F7.
 """
 
 import numpy as np
@@ -23,24 +25,30 @@ SECOND_ORDER = (0.5, 0.9)
 
 
 def smoothstep(x: FloatArray, start: float, end: float) -> FloatArray:
-    """0 below start, 1 above end, cubic between."""
+    """0 below start, 1 above end, cubic between: (...) -> (...), all of one unit.
+
+    Examples
+    --------
+    >>> smoothstep(np.array([0.0, 0.5, 2.0]), 0.0, 1.0)
+    array([0. , 0.5, 1. ])
+    """
     t = np.clip((x - start) / (end - start), 0.0, 1.0)
     return np.asarray(t * t * (3 - 2 * t))
 
 
 def fock_parameter(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """ξ (...)."""
+    """Fock parameter ξ (...), without unit; k in 1/L."""
     return np.asarray(np.cbrt(wavenumber / 2) * rays.integrals[..., 1])
 
 
 def scales(rays: RayPoints, wavenumber: float) -> tuple[FloatArray, FloatArray]:
-    """m at attachment and launch (...)."""
+    """m at the attachment and the shedding point (...), without unit; k in 1/L."""
     first, last = rays.curvature
     return fock_scale(wavenumber, first), fock_scale(wavenumber, last)
 
 
 def mean_scale(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """Mean of m along the ray, weighted by κₙ^(2/3) (...); m at the launch point where the ray has no length."""
+    """Mean of m along the ray, weighted by κₙ^(2/3) (...); m at attachment where the ray has no length."""
     some = rays.integrals[..., 1] > 0
     mean = np.divide(rays.integrals[..., 0], rays.integrals[..., 1], out=np.zeros(some.shape), where=some)
     return np.asarray(np.where(some, np.cbrt(wavenumber / 2) * mean, scales(rays, wavenumber)[0]))
@@ -64,8 +72,8 @@ def mode_waves(
 ) -> ComplexArray:
     """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
 
-    ``launch_share`` (...) is the power of the launch factor: 0 on the body, 1 far away; None leaves both ends out. The
-    correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
+    ``launch_share`` (...) is the power of the factor of shedding: 0 on the body, 1 far away; None leaves both ends out.
+    The correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
     down.
     """
     leading = fock_parameter(rays, wavenumber)[..., None] * modes.tau
@@ -106,7 +114,7 @@ def _ends(rays: RayPoints, wavenumber: float) -> list[tuple[FloatArray, FloatArr
 
 
 def transverse_ratios(rays: RayPoints) -> tuple[FloatArray, FloatArray]:
-    """R = ρ κ_t at attachment and launch (...)."""
+    """r = ρ κ_t at the attachment and the shedding point (...), without unit."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = [t / c for t, c in zip(rays.transverse, rays.curvature, strict=True)]
     return np.nan_to_num(ratios[0]), np.nan_to_num(ratios[1])

@@ -11,6 +11,8 @@ both ends:
 
 from the expansions of Hankel functions in the transition region [AS64, sec. 9.3] for the circular cylinder
 and the sphere; the decay c and the attachment factor exp{-i τ² ρ1'/(12 m1)} are those of `creeping.field.boundary`.
+
+Sources: [F46], [LK59]; Derivations, F3 and F9.
 """
 
 import numpy as np
@@ -70,6 +72,17 @@ def surface_field(
     ------
     InvalidInputError
         On bad points, wavenumber, boundary or order, and for a weighted body.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=1.5, n_rays=16)
+    >>> u = cr.surface_field(fan, wavenumber=30.0, boundary="hard")
+    >>> u.shape == fan.spreading.shape, bool(abs(u[0, -1]) < abs(u[0, 0]))
+    (True, True)
     """
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
@@ -100,7 +113,7 @@ def scalar_boundary(boundary: BoundaryLike) -> Boundary:
 
 
 def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray at its point (...), 0 where the creeping ray has ended."""
+    """Contribution of each ray at its point (...), u or du/dn in 1/L, 0 where the creeping ray has ended."""
     if not np.all(rays.alive):
         out = np.zeros(rays.time.shape, dtype=complex)
         out[rays.alive] = surface_waves(rays[rays.alive], wavenumber, boundary, order)
@@ -152,7 +165,7 @@ def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) ->
 
 
 def surface_amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary) -> ComplexArray:
-    """Second-order amplitude of each mode (..., n)."""
+    """Second-order amplitude of each mode (..., n), without unit."""
     m1, m2 = scales(rays, wavenumber)
     first, last = transverse_ratios(rays)
     r: FloatArray = 0.5 * (first + last)[..., None]

@@ -33,6 +33,15 @@ def far_field_uncertainty(
     ------
     InvalidInputError
         As `far_field`.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> fan = cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, direction=(0, 0, 1)), length=0.5, n_rays=8)
+    >>> cr.far_field_uncertainty(fan, [(0, 0, -1)], wavenumber=30.0) is None    # a sphere is known exactly
+    True
     """
     other = coarser_fan(fan)
     if other is None:

@@ -6,6 +6,8 @@ kappa_n is smooth, its power is not. Over one leap of a map g = c^(3/2) kappa_n 
 the power is taken of the polynomial through them, at Gauss times. Of a traced ray g is known at the Gauss times
 themselves, from the polynomial of the ray (`hermite`), and at both ends of an interval: these are the nodes there. In
 the interval that ends at a zero t1, t = t1 (1 - s^3) makes g^(2/3) dt smooth again, since g goes like t1 - t.
+
+Sources: Derivations, R13.
 """
 
 from collections.abc import Callable

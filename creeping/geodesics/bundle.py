@@ -1,6 +1,8 @@
 """Points (x, p) of the unit tangent bundle T1Q = {F(x) = 0, p.grad F(x) = 0, |p| = 1}.
 
 Projection: x <- x - F grad F/|grad F|^2 until |F| is at rounding level, p <- its tangential part, normalised.
+
+Sources: [YC06b]; Derivations, R1.
 """
 
 import numpy as np
@@ -15,7 +17,7 @@ OFF_BODY = 1e-3
 
 
 def project_bundle(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Bring (x, p) onto T1Q: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    """Bring points, L, and directions onto T1Q: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
     points = project(body, points)
     n = normal(body, points)
     tangent = directions - np.sum(directions * n, axis=-1, keepdims=True) * n
@@ -90,7 +92,7 @@ def as_points(points: ArrayLike) -> FloatArray:
 
 
 def on_body(body: Surface, points: FloatArray) -> FloatArray:
-    """Put points within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
+    """Put points, L, within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
 
     Raises
     ------

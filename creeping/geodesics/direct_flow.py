@@ -29,6 +29,21 @@ class DirectFlow(Shown):
         Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
     error : MapError, optional
         At the end of rays, if `choose_flow` has measured it.
+
+    Raises
+    ------
+    InvalidInputError
+        If rtol is not between 1e-14 and 1e-2, or the horizon or the step is not a positive finite number.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> flow = cr.DirectFlow(sc.Sphere(), rtol=1e-10, horizon=np.pi / 2)
+    >>> x, p = flow.apply((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))     # a quarter of a great circle
+    >>> (x.round(6) + 0.0).tolist(), (p.round(6) + 0.0).tolist()
+    ([0.0, 1.0, 0.0], [-1.0, 0.0, 0.0])
     """
 
     body: Surface
@@ -53,17 +68,34 @@ class DirectFlow(Shown):
         )
 
     def apply(self, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Advance by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+        """Advance points, L, and directions by one horizon: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
         return self.flow(points, directions, self.horizon)
 
     def flow(self, points: ArrayLike, directions: ArrayLike, times: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Advance to times >= 0; same shapes as `trace`."""
+        """Advance to times >= 0.
+
+        Parameters
+        ----------
+        points : (..., 3), L
+        directions : (..., 3)
+        times : scalar or (m,), L (travel time for a weighted body)
+            Ascending.
+
+        Returns
+        -------
+        points, directions : (..., 3) for a scalar time, (..., m, 3) else
+
+        Raises
+        ------
+        InvalidInputError
+            On bad points, directions or times.
+        """
         values, scalar = as_times(times)
         x, p = bundle_points(self.body, points, directions)
         return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same); see `PhaseMap.transport`."""
+        """Advance states (n, 6, 10 or 12) to ascending times (m,), L: (n, m, the same); see `PhaseMap.transport`."""
         if states.shape[1] > 10:
             return with_attenuation(self.body, states, times, rtol=self.rtol, step=self.step)
         return trace_states(self.body, states, times, rtol=self.rtol if self.step is None else 0.0, step=self.step)

@@ -12,6 +12,8 @@ J = c I and I'' + G I = 0; G is the Gaussian curvature of that metric,
 
 Lap the Laplacian on Q, Lap c = tr(P Hess c) - (kappa_1 + kappa_2) n.grad c with P = 1 - n n^T.
 Normal curvature kappa_n = p.Hp/|grad F| is positive where the body is convex along p.
+
+Sources: [YC06b], [C76], [G05]; Derivations, R1 to R4.
 """
 
 import numpy as np
@@ -61,7 +63,7 @@ def metric_curvature(body: Surface, points: FloatArray) -> FloatArray:
 
 
 def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Right-hand sides (x', p') of the flow: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    """Right-hand sides (x', p') of the flow at points, L, and unit tangents: twice (..., 3) -> twice (..., 3)."""
     g, h = body.gradient(points), body.hessian(points)
     bent = np.einsum("...i,...ij,...j->...", directions, h, directions)
     turning = -(bent / np.sum(g * g, axis=-1))[..., None] * g

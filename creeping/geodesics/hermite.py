@@ -11,6 +11,8 @@ l_j the Lagrange polynomials and c_ji the Taylor coefficients of l_j^-3 at t_j:
 
 Fine times are 0, the outputs and, where these lie further apart than a spacing, times between them; knots are fine
 times not too close to each other. H_jd depends on the times only, not on the ray.
+
+Sources: Derivations, R14.
 """
 
 from typing import NamedTuple

@@ -73,6 +73,13 @@ def check_surface(body: Surface) -> SurfaceReport:
     ------
     SurfaceError
         If F = 0 cannot be triangulated at all: empty, open, not finite, or not smooth.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> report = check_surface(sc.Torus())
+    >>> report.ok, report.genus
+    (True, 1)
     """
     mesh = triangulate(body.level, body.gradient, body.bounds)
     points = mesh.vertices

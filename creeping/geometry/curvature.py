@@ -4,6 +4,8 @@ With g = grad F, H the Hessian of F and p, b unit tangents:
 
     kappa_n = p.Hp/|g|          normal curvature along p, positive where the body is convex along p
     K = (g.adj(H) g)/|g|^4      Gaussian curvature
+
+Sources: [G05]; Derivations, R1.
 """
 
 import numpy as np
@@ -13,13 +15,27 @@ from creeping.geometry.surface import Surface
 
 
 def normal_curvature(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:
-    """kappa_n = p.Hp/|grad F| along unit tangents p, 1/L: (..., 3), (..., 3) -> (...)."""
+    """kappa_n = p.Hp/|grad F| along unit tangents p, 1/L: (..., 3), (..., 3) -> (...).
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> float(normal_curvature(sc.Sphere(radius=2.0), np.array([2.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])))
+    0.5
+    """
     bent = np.einsum("...i,...ij,...j->...", directions, body.hessian(points), directions)
     return np.asarray(bent / np.linalg.norm(body.gradient(points), axis=-1))
 
 
 def gaussian_curvature(body: Surface, points: FloatArray) -> FloatArray:
-    """K = (g.adj(H) g)/|g|^4 with g = grad F, 1/L^2: (..., 3) -> (...)."""
+    """K = (g.adj(H) g)/|g|^4 with g = grad F, 1/L^2: (..., 3) -> (...).
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> gaussian_curvature(sc.Torus(R=1.0, r=0.5), np.array([[1.5, 0.0, 0.0], [0.5, 0.0, 0.0]])).round(6)
+    array([ 1.333333, -4.      ])
+    """
     g, h = body.gradient(points), body.hessian(points)
     # the columns of the adjugate of a symmetric matrix are cross products of its rows
     adjugate = np.stack([np.cross(h[..., (k + 1) % 3, :], h[..., (k + 2) % 3, :]) for k in range(3)], axis=-2)
@@ -27,7 +43,7 @@ def gaussian_curvature(body: Surface, points: FloatArray) -> FloatArray:
 
 
 def principal_curvature_bound(body: Surface, points: FloatArray) -> float:
-    """Largest |kappa_1| or |kappa_2| over the points, 1/L."""
+    """Largest |kappa_1| or |kappa_2| over points (..., 3), L, of the body, 1/L."""
     g, h = body.gradient(points), body.hessian(points)
     norm = np.linalg.norm(g, axis=-1)
     n = g / norm[..., None]

@@ -1,7 +1,9 @@
 """Orthonormal frames of tangent planes.
 
-The isometric frame of a chart with tangents T = [x_u, x_v] (3 x 2) is the orthogonal polar factor
+The polar frame of a chart with tangents T = [x_u, x_v] (3 x 2) is the orthogonal polar factor
 E = T (T^T T)^(-1/2): orthonormal, tangent, and nearest to T.
+
+Sources: [H86]; Derivations, B2.
 """
 
 import numpy as np
@@ -10,9 +12,16 @@ from creeping._typing import FloatArray
 
 
 def polar_frame(tangents: FloatArray) -> FloatArray:
-    """Isometric frame E = T (T^T T)^(-1/2) of chart tangents: (..., 3, 2) -> (..., 3, 2).
+    """Polar frame E = T (T^T T)^(-1/2) of chart tangents, of any unit: (..., 3, 2) -> (..., 3, 2).
 
     The 2 x 2 root is closed: G^(1/2) = (G + s)/t with s = sqrt(det G), t = sqrt(tr G + 2 s).
+
+    Examples
+    --------
+    >>> polar_frame(np.array([[2.0, 1.0], [0.0, 1.0], [0.0, 0.0]])).round(4)
+    array([[ 0.9487,  0.3162],
+           [-0.3162,  0.9487],
+           [ 0.    ,  0.    ]])
     """
     gram = np.swapaxes(tangents, -1, -2) @ tangents
     p, q, r = gram[..., 0, 0], gram[..., 0, 1], gram[..., 1, 1]

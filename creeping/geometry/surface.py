@@ -2,8 +2,10 @@
 
 The body is Q = {x : F(x) = 0}, F > 0 outside, with outward normal n = grad F/|grad F| and Hessian H.
 A chart is a map (u, v) -> x; its part used for look-ups is the unit square, its grid reaches beyond
-it by the margin of the spline. The isometric frame of a chart with tangents T = [x_u, x_v] (3 x 2) is
+it by the margin of the spline. The polar frame of a chart with tangents T = [x_u, x_v] (3 x 2) is
 the orthogonal polar factor E = T (T^T T)^(-1/2): orthonormal, tangent, and nearest to T.
+
+Sources: Derivations, R1 and B2.
 """
 
 import hashlib
@@ -28,7 +30,7 @@ class Compiled(Protocol):
 
     @property
     def parameters(self) -> FloatArray:
-        """Its parameters (k,)."""
+        """Its parameters (k,), in the units of its body."""
         ...
 
 
@@ -66,11 +68,11 @@ class Speed(Protocol):
     """Speed c(x) > 0 of the weighted flow; an optional ``hessian`` (..., 3, 3) spares differencing."""
 
     def value(self, points: FloatArray) -> FloatArray:
-        """Speed: (..., 3) -> (...)."""
+        """Speed, L over time: points (..., 3), L, to (...)."""
         ...
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of the speed: (..., 3) -> (..., 3)."""
+        """Gradient of the speed, 1/time: points (..., 3), L, to (..., 3)."""
         ...
 
 
@@ -96,15 +98,15 @@ class Surface(Protocol):
         ...
 
     def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: (..., 3) -> (...)."""
+        """F, of any unit, positive outside: points (..., 3), L, to (...)."""
         ...
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: (..., 3) -> (..., 3)."""
+        """Gradient of F, unit of F over L: points (..., 3), L, to (..., 3)."""
         ...
 
     def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        """Hessian of F, unit of F over L^2: points (..., 3), L, to (..., 3, 3)."""
         ...
 
     def parameters(self, points: FloatArray) -> FloatArray:
@@ -113,21 +115,47 @@ class Surface(Protocol):
 
 
 def size(body: Surface) -> float:
-    """Half the diagonal of the body's box, the length that absolute tolerances refer to."""
+    """Half the diagonal of the body's box, L: the length that absolute tolerances refer to.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> round(size(sc.Ellipsoid(2.0, 2.0, 1.0)), 12)
+    3.0
+    """
     box = np.asarray(body.bounds, dtype=float)
     return float(0.5 * np.linalg.norm(box[1] - box[0]))
 
 
 def normal(body: Surface, points: FloatArray) -> FloatArray:
-    """Outward unit normal n = grad F/|grad F|: (..., 3) -> (..., 3)."""
+    """Outward unit normal n = grad F/|grad F|: points (..., 3), L, to (..., 3).
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> normal(sc.Torus(), np.array([0.5, 0.0, 0.0]))
+    array([-1., -0.,  0.])
+    """
     gradient = body.gradient(points)
     return np.asarray(gradient / np.linalg.norm(gradient, axis=-1, keepdims=True))
 
 
 def project(body: Surface, points: FloatArray, *, iterations: int = 8) -> FloatArray:
-    """Newton steps x <- x - F grad F/|grad F|^2 until |F| is at rounding level: (..., 3) -> (..., 3).
+    """Points brought onto the body by Newton steps x <- x - F grad F/|grad F|^2: (..., 3) -> (..., 3), L.
 
-    Each point stops by itself: it does not depend on the others.
+    Parameters
+    ----------
+    body : Surface
+    points : (..., 3), L
+        Near the body.
+    iterations : int
+        Most steps; each point ends where its |F|/|grad F| is at rounding level, whatever the others do.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> project(sc.Sphere(), np.array([0.0, 0.0, 1.1])).round(12)
+    array([0., 0., 1.])
     """
     points = np.array(points, dtype=float)
     close = 1e-15 * size(body)

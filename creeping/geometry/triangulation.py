@@ -3,6 +3,8 @@
 Every cell of the grid with corners of both signs gives one vertex, every grid edge whose ends differ in sign one
 quadrilateral between the four cells around it; vertices are then brought onto F = 0. The mesh is closed and
 oriented by construction and follows the topology of F at the grid's resolution, whatever the genus.
+
+Sources: [G98], [JLSW02]; Derivations, B8.
 """
 
 from collections.abc import Callable
@@ -82,6 +84,14 @@ def triangulate(
     ------
     SurfaceError
         If F has no zero in the box, reaches its faces, or no grid of at most MAX_POINTS resolves its topology.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> ring = sc.Torus()
+    >>> mesh = triangulate(ring.level, ring.gradient, ring.bounds, cells=24)
+    >>> mesh.euler_characteristic, mesh.components
+    (0, 1)
     """
     box = np.asarray(bounds, dtype=float)
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):

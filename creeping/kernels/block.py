@@ -1,4 +1,4 @@
-"""What kernels share: blocks of rays, memory that vectors like, the compiler's options.
+"""What kernels share: blocks of rays, aligned memory, the compiler's options.
 
 Rays go in blocks of BLOCK, stored component by component, so that the loops over a block vectorise.
 """

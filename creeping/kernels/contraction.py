@@ -1,11 +1,13 @@
 """Contraction of a spline's stencil in explicit vector instructions.
 
-sum_ijk wu_i wv_j wa_k c[i, j, k, :] with the angle and the lanes of a coefficient contiguous: rows along them are
+sum_ijk wu_i wv_j wa_k c[i, j, k, :] with the angle and the components of a coefficient contiguous: rows along them are
 accumulated over (i, j) first and weighted by wa last, which leaves one multiply-add per coefficient. A compiler does
 not find this from loops: 16 to 36 rows of run-time length cost it four times the arithmetic in bookkeeping.
 Tables may be float32: products over j are then summed in float32, eight at a time, all other sums in float64, which
 keeps the error of a sum below that of the stored coefficients.
-The twin in plain numpy is `creeping.phaseflow.splines.evaluate`.
+The twin in plain numpy is in tests/oracles.
+
+Sources: Derivations, B7.
 """
 
 from typing import Any

@@ -14,7 +14,13 @@ CHUNK = 64
 
 
 def thread_count() -> int:
-    """Threads to use: $CREEPING_THREADS, or the cores this process may run on."""
+    """Threads to use: $CREEPING_THREADS, or the cores this process may run on.
+
+    Raises
+    ------
+    InvalidInputError
+        If $CREEPING_THREADS is not a whole number >= 1.
+    """
     named = os.environ.get("CREEPING_THREADS")
     if named is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)

@@ -2,6 +2,8 @@
 
 A row of the tableau has few nonzero weights, and one pass over memory that keeps the sum in a register is bounded by
 the loads of the k_r. A compiler does not find this from a loop over stages: it stores and reloads z once a stage.
+
+Sources: [HNW93].
 """
 
 from functools import cache

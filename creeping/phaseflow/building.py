@@ -2,8 +2,8 @@
 
 Tower [YC06a, Algorithm 1]: with B = (T0/tau)^(1/S) an integer, g_tau is one Runge-Kutta step of order 4 at every
 node, and g_(B^k tau) = (g_(B^(k-1) tau))^(B) at the nodes is interpolated again, k = 1..S. Direct: every node is traced
-to T0/2^d by the order-8 pair, and the map is composed with itself at the nodes d times; d > 0 pays where F is dear. The
-error is C (tau^4 + h^(p+1)) and C h^(p+1) respectively.
+to T0/2^d by the order-8 pair, and the map is composed with itself at the nodes d times; d > 0 pays where F is
+expensive. The error is C (tau^4 + h^(p+1)) and C h^(p+1) respectively.
 """
 
 from collections.abc import Callable
@@ -219,7 +219,7 @@ def settled(sample: Callable[[int], FloatArray], count: int, most: int, *, colum
 
 
 def upper_bound(errors: FloatArray) -> float:
-    """Rms of errors (n,), two standard errors of their squares above it."""
+    """Rms of errors (n,), of any unit, two standard errors of their squares above it."""
     square = errors**2
     return float(np.sqrt(np.mean(square) + 2 * np.std(square) / np.sqrt(len(square))))
 

@@ -44,6 +44,18 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     ------
     StoredMapError
         If the folder is no map, is damaged, of another version or of another body.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> pm = cr.build_phase_map(ball, horizon=0.5, grid=(16, 16), order=3, cache=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     stored = pm.save(f"{folder}/map")
+    ...     cr.load_phase_map(stored, ball).horizon
+    0.5
     """
     folder = Path(folder)
     content = read_manifest(folder)

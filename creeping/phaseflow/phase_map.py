@@ -38,6 +38,13 @@ class Growth:
     bound : float
         Of the rms at the last length, two standard errors of its square above it: where few rays carry most of the
         error, as beside an unstable geodesic, samples scatter.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> growth = cr.Growth(lengths=(1.0, 2.0, 4.0), rms=(1e-9, 2e-9, 8e-9), max=(3e-9, 6e-9, 2e-8), bound=9e-9)
+    >>> f"{growth.rms_after(2.0):.0e}"
+    '2e-09'
     """
 
     lengths: tuple[float, ...]
@@ -46,7 +53,7 @@ class Growth:
     bound: float
 
     def rms_after(self, length: float) -> float:
-        """Rms error after a length, by interpolation in logarithms; beyond the last one by its last slope."""
+        """Rms error after a length, L, by interpolation in logarithms; beyond the last one by its last slope."""
         if length <= self.lengths[0]:
             return self.rms[0]
         t, e = np.log(self.lengths), np.log(np.maximum(self.rms, 1e-300))
@@ -58,7 +65,7 @@ class Growth:
         return float(np.exp(np.interp(at, t, e)))
 
     def trusted_length(self, tolerance: float) -> float:
-        """Longest measured or extrapolated length, at most twice the measured, whose rms error meets the tolerance."""
+        """Longest length, L, at most twice the measured one, whose rms error, extrapolated, meets the tolerance."""
         ends = np.linspace(self.lengths[0], 2 * self.lengths[-1], 2001)
         good = np.array([self.rms_after(float(t)) <= tolerance for t in ends])
         return float(ends[np.argmin(good) - 1]) if good[0] and not good.all() else float(ends[-1] if good[0] else 0.0)
@@ -82,6 +89,16 @@ class PhaseMap(Drawn):
         Error after longer and longer rays.
     parameters : dict
         How the map was built.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> pm = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), order=3, cache=False)
+    >>> x, p = pm.flow((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), np.pi)                     # half a great circle
+    >>> bool(np.allclose(x, [-1, 0, 0])), pm.error.rms < 1e-9
+    (True, True)
     """
 
     body: Surface
@@ -131,6 +148,11 @@ class PhaseMap(Drawn):
         Returns
         -------
         points, directions : (..., 3), (..., 3)
+
+        Raises
+        ------
+        InvalidInputError
+            On bad points or directions.
         """
         x, p = bundle_points(self.body, points, directions)
         states = self.leap(pack(x, p), 1)
@@ -141,23 +163,30 @@ class PhaseMap(Drawn):
 
         Parameters
         ----------
-        points, directions : (..., 3)
+        points : (..., 3), L
+        directions : (..., 3)
         times : scalar or (m,), L (travel time for a weighted body)
             Ascending.
 
         Returns
         -------
         points, directions : (..., 3) for a scalar time, (..., m, 3) else
+
+        Raises
+        ------
+        InvalidInputError
+            On bad points, directions or times.
         """
         values, scalar = as_times(times)
         x, p = bundle_points(self.body, points, directions)
         return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6, 10 or 12) to the ascending times (m,): (n, m, the same).
+        """Advance states (n, 6, 10 or 12) to the ascending times (m,), L: (n, m, the same).
 
-        Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c, 10 and 11 the attenuation integral and the
-        time of detachment (`attenuation`; inf before).
+        Components 0 to 5 are x, L, and p; 6 to 9 the columns of the Jacobi matrix of the metric ds/c, whose M12 is a
+        time and M21 1/time; 10 and 11 the attenuation integral, L^(1/3), and the time of detachment (`attenuation`; inf
+        before).
 
         Raises
         ------
@@ -214,7 +243,13 @@ class PhaseMap(Drawn):
         return float(np.clip(1e-3 * self.error.rms, 1e-12, 1e-9)) if np.isfinite(self.error.rms) else 1e-12
 
     def leap(self, states: FloatArray, count: int, level: Leap | None = None) -> FloatArray:
-        """Compose one map (g_T0 by default) ``count`` times on states (n, 6 or 10)."""
+        """Compose one map (g_T0 by default) ``count`` times on states (n, 6 or 10), units as of `transport`.
+
+        Raises
+        ------
+        InvalidInputError
+            If ``count`` is negative, or the states carry more than the map does.
+        """
         if count < 0:
             raise InvalidInputError(f"cannot compose a map {count} times")
         states = np.array(states, dtype=float, order="C")

@@ -3,6 +3,8 @@
 Along an axis with nodes 0..n-1 the spline is sum_j c_j N_p(t - j) with the uniform B-spline N_p of degree p: not-a-knot
 ends where the axis is a chart variable (n + p - 1 coefficients), period n where it is periodic (n, continued by p).
 A not-a-knot spline has fewer knots than the uniform basis, so it is contained in it and nothing is lost.
+
+Sources: [B78]; Derivations, B7.
 """
 
 from functools import cache
@@ -48,6 +50,11 @@ def uniform_weights(t: FloatArray, degree: int) -> FloatArray:
     """Weights of the p + 1 B-splines that do not vanish at fraction t of a cell: (...) -> (..., p + 1).
 
     Cox-de Boor on uniform knots: w_j <- ((t + d - j) w_(j-1) + (j + 1 - t) w_j)/d for d = 1..p.
+
+    Examples
+    --------
+    >>> (6 * uniform_weights(np.array(0.0), 3)).round(12)
+    array([1., 4., 1., 0.])
     """
     t = np.asarray(t, dtype=float)
     w = np.zeros((*t.shape, degree + 1))

@@ -3,6 +3,8 @@
 Shown is |u|, or |du/dn|/k where u = 0. On the lit side it is Fock's surface function at ξ = m n.d < 0, which is
 geometrical optics away from the shadow line: 2, 2|n.d| if soft, 2 cos θ/(cos θ + η) on an impedance. On a sphere at
 ka = 30 it is within 0.4 dB of the series, where geometrical optics alone is 3 dB off, 20 if soft.
+
+Sources: [F46], [F65]; Derivations, F3.
 """
 
 import os

@@ -7,6 +7,8 @@ Ray sigma starts at x0(sigma) with p = d; on a plain body t is arclength. Neighb
 M the Jacobi matrix that the flow carries along, sigma measured across the ray, J(0) = 1 and J'(0) as in
 `creeping.geodesics.equations.launch_spreading`. Every zero of J passed is a caustic. A creeping ray needs kappa_n > 0:
 where kappa_n first falls to 0 it is detached; its geometry goes on, its field does not.
+
+Sources: Derivations, R3 and R4.
 """
 
 from dataclasses import dataclass, replace

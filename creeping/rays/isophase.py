@@ -2,6 +2,8 @@
 
 Ray sigma meets the level at t(sigma) = level, or level - d.x0(sigma). Between two steps the ray is the quintic
 polynomial with the positions, velocities x' and accelerations x'' of both ends, put back on the body.
+
+Sources: [YC06b]; Derivations, R14.
 """
 
 from collections.abc import Iterable

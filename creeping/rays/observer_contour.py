@@ -3,6 +3,8 @@
 On a ray, (n.r)' = κₙ p.r + τ b.r. A fan integral takes every crossing with p.r > 0; the shadow half of the forward
 integral takes the first one of each ray that starts with n.r < 0. Its lit half runs over the mid-horizon
 n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to both d and r, the joints.
+
+Sources: Derivations, R12, F10 and F11.
 """
 
 from collections.abc import Sequence

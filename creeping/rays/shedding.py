@@ -6,6 +6,8 @@
 
 In each case two functions on the strip vanish together, n.v and b.v with v = r or y - x (on the body: y - x along two
 tangents at y). Cells in which both change sign start Newton's method on the strip's splines.
+
+Sources: Derivations, R12.
 """
 
 from collections.abc import Callable

@@ -4,6 +4,8 @@
 
 The shape operator S = dn/dx turns a step on the body into one of its normal. Seeds are the triangles of a mesh whose
 normals surround the one that is wanted.
+
+Sources: Derivations, F13.
 """
 
 from dataclasses import dataclass

@@ -3,6 +3,8 @@
     J = c I,  I(t) = I(0) M11(t) + I'(0) M12(t),  I(0) = 1/c,  I'(0) = (J'(0) - (p.grad c))/c,
 
 M the Jacobi matrix that the flow carries along; J(0), J'(0) of `creeping.geodesics.equations.launch_spreading`.
+
+Sources: Derivations, R3 to R5.
 """
 
 import numpy as np

@@ -6,6 +6,8 @@ With S the shape operator and d_T the tangential part of d, the gradient of h = 
 
 Apart from n = +-d it vanishes only where K = 0 and d_T is the null direction. A critical point with h = 0 is a crossing
 or an isolated point of the shadow line; a small |h| there is a near-crossing, a small loop or a gap.
+
+Sources: Derivations, R6 and R11.
 """
 
 from dataclasses import dataclass

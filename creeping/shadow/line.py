@@ -1,5 +1,7 @@
 """The shadow line of an incidence: the closed curves n.d = 0 on the body, and what part of them launches rays.
 
+Sources: Derivations, R6.
+
     F(x) = 0,   grad F(x).d = 0,   T = grad F x Hd / |.|,   kappa_n(d) = d.Hd/|grad F|
 
 Seen from outside, the lit side (n.d < 0) is on the left of T. The line is that of `creeping.shadow.many`, the same to

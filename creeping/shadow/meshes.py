@@ -4,6 +4,8 @@ The gradient of n.d along the body is S d with S the shape operator. On n.d = 0 
 the null direction a of S there: those directions are singular, and form curves on the sphere. They bound the regions
 in which the number of curves of the line is constant; to first order v = |n.d| at a critical point is the angle to
 them.
+
+Sources: Derivations, R11.
 """
 
 from functools import cached_property

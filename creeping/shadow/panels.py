@@ -7,6 +7,8 @@ On the panel from a to b with chord c = b - a, the curve is a graph over the cho
 
 x and ds/du are polynomials through Gauss points of u; panels are halved until the polynomials are exact to rounding, so
 they shrink where the curve turns fast and the length needs no resampling.
+
+Sources: Derivations, R7.
 """
 
 from dataclasses import dataclass

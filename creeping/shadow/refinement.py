@@ -8,6 +8,8 @@ body, and e its longest edge,
 
 Curves leave a triangle by the edge whose sign falls in counter-clockwise order, so they come out closed, with the lit
 side (h < 0) on the left seen from outside: along T = grad F x Hd/|.|.
+
+Sources: Derivations, R9.
 """
 
 import numpy as np

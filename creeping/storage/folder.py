@@ -58,7 +58,13 @@ def write_folder(folder: str | Path, content: dict[str, Any], arrays: dict[str, 
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Content of a folder's manifest, its own digest checked."""
+    """Content of a folder's manifest, its own digest checked.
+
+    Raises
+    ------
+    StoredMapError
+        If there is none, it is damaged, or of another version.
+    """
     path = folder / MANIFEST
     try:
         if path.stat().st_size > _MAX_MANIFEST:
@@ -86,7 +92,13 @@ def verify_files(folder: Path) -> dict[str, Any]:
 
 
 def open_array(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
-    """Map one array after checking size, digest, header and shape."""
+    """Map one array after checking size, digest, header and shape.
+
+    Raises
+    ------
+    StoredMapError
+        If the file is missing, damaged, or holds another array than the manifest says.
+    """
     path, entry = folder / name, content["files"][name]
     shape = tuple(int(n) for n in entry["shape"])
     kind = {"float32": np.float32, "float64": np.float64}[entry["type"]]

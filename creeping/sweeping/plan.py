@@ -218,7 +218,13 @@ def describe_flow(flow: Flow) -> dict[str, Any]:
 
 
 def save_flow(flow: Flow, folder: Path) -> None:
-    """Write what `open_flow` needs beside the description: the tables of a map."""
+    """Write what `open_flow` needs beside the description: the tables of a map.
+
+    Raises
+    ------
+    InvalidInputError
+        If the flow is neither a phase map nor a direct flow.
+    """
     if isinstance(flow, PhaseMap):
         flow.save(folder / "map")
     elif not isinstance(flow, DirectFlow):
@@ -226,7 +232,13 @@ def save_flow(flow: Flow, folder: Path) -> None:
 
 
 def open_flow(content: dict[str, Any], folder: Path, body: Surface) -> PhaseMap | DirectFlow:
-    """Make the flow of a description; a map from its folder, its tables mapped from the files."""
+    """Make the flow of a description; a map from its folder, its tables mapped from the files.
+
+    Raises
+    ------
+    CreepingError
+        If the description is of another kind of flow, or the map cannot be opened.
+    """
     if content["kind"] == "map":
         return load_phase_map(folder / "map", body)
     if content["kind"] == "direct":

@@ -137,7 +137,13 @@ def sweep_directions(
 
 
 def in_memory(plan: SweepPlan, progress: Progress | None = None) -> "xarray.Dataset":
-    """Dataset of a plan, computed in this process and kept in memory."""
+    """Dataset of a plan, computed in this process and kept in memory.
+
+    Raises
+    ------
+    InvalidInputError
+        If the results do not fit into memory.
+    """
     count = len(plan.incidences)
     if bytes_of(plan.request) * count > IN_MEMORY:
         raise InvalidInputError(
@@ -161,7 +167,13 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> "xarray.Data
 
 
 def open_store(plan: SweepPlan, folder: str | Path, *, resume: bool) -> SweepStore:
-    """Store of a plan: made, or opened if ``resume`` and it exists."""
+    """Store of a plan: made, or opened if ``resume`` and it exists.
+
+    Raises
+    ------
+    InvalidInputError
+        If the folder exists and ``resume`` is false, or holds another study.
+    """
     if resume and Path(folder).exists():
         store = SweepStore.open(folder)
         store.require_same(plan)

@@ -6,6 +6,8 @@ largest component is s_a; with (a, b, c) cyclic and sign = +-1,
     s = (sign, sign tan xi, tan eta)/|.| in the order (a, b, c),  xi = (u - 1/2) pi/2,  eta = (v - 1/2) pi/2,
 
 so the unit squares of (u, v) tile the sphere, and every point finds the chart in which it is farthest from the edge.
+
+The equiangular cubed sphere is that of [RIP96]; Derivations, B1.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,15 +26,15 @@ class SphereMap(Protocol):
     """A diffeomorphism psi from the unit sphere to the body, with its 3 x 3 derivative."""
 
     def forward(self, s: FloatArray) -> FloatArray:
-        """Body point of a sphere point: (..., 3) -> (..., 3)."""
+        """Body point, L, of a unit vector: (..., 3) -> (..., 3)."""
         ...
 
     def derivative(self, s: FloatArray) -> FloatArray:
-        """Derivative of psi as a map of space: (..., 3) -> (..., 3, 3)."""
+        """Derivative of psi as a map of space, L: (..., 3) -> (..., 3, 3)."""
         ...
 
     def inverse(self, points: FloatArray) -> FloatArray:
-        """Sphere point of a body point, up to its length: (..., 3) -> (..., 3)."""
+        """Sphere point of a body point, L, up to its length: (..., 3) -> (..., 3)."""
         ...
 
     @property

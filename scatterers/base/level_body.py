@@ -71,19 +71,19 @@ class LevelBody(Body):
         return self._map is not None
 
     def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: (..., 3) -> (...)."""
+        """F, positive outside: points (..., 3), L, to (...)."""
         return evaluated(self.compiled, points)[0]
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: (..., 3) -> (..., 3)."""
+        """Gradient of F, unit of F over L: points (..., 3), L, to (..., 3)."""
         return evaluated(self.compiled, points)[1]
 
     def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        """Hessian of F, unit of F over L^2: points (..., 3), L, to (..., 3, 3)."""
         return evaluated(self.compiled, points)[2][..., SYMMETRIC]
 
     def rough(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Whether points (..., 3) lie where the body is not smooth enough for creeping rays: (...)."""
+        """Whether points (..., 3), L, lie where the body is not smooth enough for creeping rays: (...)."""
         points = np.asarray(points, dtype=float)
         found = np.zeros(points.shape[:-1], dtype=bool)
         if len(self._rough):
@@ -99,7 +99,7 @@ class LevelBody(Body):
         return cKDTree(self._rough)
 
     def parameters(self, points: FloatArray) -> FloatArray:
-        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi]: (..., 3) -> (..., 2).
+        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi], radians: (..., 3) -> (..., 2).
 
         Of psi^-1(x) on a star-shaped body; else of x as seen from the middle of the box, where several points of the
         body may share their angles.
@@ -117,7 +117,13 @@ class LevelBody(Body):
 
     @cached_property
     def atlas(self) -> "CubeSphereAtlas | MongeAtlas":
-        """Six charts over the sphere map, or Monge charts."""
+        """Six charts over the sphere map, or Monge charts.
+
+        Raises
+        ------
+        ValueError
+            If the body is too thin, or too sharply curved, for charts.
+        """
         if self._map is not None:
             return CubeSphereAtlas(self._map, self._map.compiled_locator)
         from scatterers.atlas.monge.atlas import MongeAtlas

@@ -35,13 +35,13 @@ class BentEllipsoid(Body):
         return np.stack([-half, half])
 
     def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: (..., 3) -> (...)."""
+        """F, without unit, positive outside: points (..., 3), L, to (...)."""
         a, b, c, d = self._shape()
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         return np.asarray((x / a) ** 2 + ((y - d * np.cos(np.pi * z)) / b) ** 2 + (z / c) ** 2 - 1)
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: (..., 3) -> (..., 3)."""
+        """Gradient of F, 1/L: points (..., 3), L, to (..., 3)."""
         a, b, c, d = self._shape()
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         bent = 2 * (y - d * np.cos(np.pi * z)) / b**2
@@ -49,7 +49,7 @@ class BentEllipsoid(Body):
         return np.stack([2 * x / a**2, bent, 2 * z / c**2 + bent * slope], axis=-1)
 
     def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        """Hessian of F, 1/L^2: points (..., 3), L, to (..., 3, 3)."""
         a, b, c, d = self._shape()
         _, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         bend = d * np.cos(np.pi * z)
@@ -62,13 +62,13 @@ class BentEllipsoid(Body):
         return h
 
     def forward(self, s: FloatArray) -> FloatArray:
-        """psi(s): (..., 3) -> (..., 3)."""
+        """psi(s), L: unit vectors (..., 3) to (..., 3)."""
         a, b, c, d = self._shape()
         z = c * s[..., 2]
         return np.stack([a * s[..., 0], b * s[..., 1] + d * np.cos(np.pi * z), z], axis=-1)
 
     def derivative(self, s: FloatArray) -> FloatArray:
-        """Derivative of psi: (..., 3) -> (..., 3, 3)."""
+        """Derivative of psi, L: unit vectors (..., 3) to (..., 3, 3)."""
         a, b, c, d = self._shape()
         jacobian = np.zeros((*np.shape(s)[:-1], 3, 3))
         jacobian[..., 0, 0], jacobian[..., 1, 1], jacobian[..., 2, 2] = a, b, c
@@ -76,13 +76,13 @@ class BentEllipsoid(Body):
         return jacobian
 
     def inverse(self, points: FloatArray) -> FloatArray:
-        """psi^-1(x), of unit length on the body: (..., 3) -> (..., 3)."""
+        """psi^-1(x), of unit length on the body: points (..., 3), L, to (..., 3)."""
         a, b, c, d = self._shape()
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         return np.stack([x / a, (y - d * np.cos(np.pi * z)) / b, z / c], axis=-1)
 
     def parameters(self, points: FloatArray) -> FloatArray:
-        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi] of psi^-1(x): (..., 3) -> (..., 2)."""
+        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi] of psi^-1(x), radians: (..., 3) -> (..., 2)."""
         s = self.inverse(points)
         theta = np.arctan2(np.hypot(s[..., 0], s[..., 1]), s[..., 2])
         return np.stack([theta, np.arctan2(s[..., 1], s[..., 0])], axis=-1)
@@ -160,7 +160,7 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
 
 
 def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame."""
+    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame."""
     a, b, c, d = parameters[0], parameters[1], parameters[2], parameters[3]
     for i in range(points.shape[1]):
         z = points[2, i]

@@ -27,7 +27,13 @@ def samples_of(space: ExpressionSpace, box: FloatArray, nodes: int) -> Samples:
 
 
 def found_box(space: ExpressionSpace) -> FloatArray:
-    """Box around the one body, from the smallest cube about the origin that holds it."""
+    """Box (2, 3), L, around the one body, from the smallest cube about the origin that holds it.
+
+    Raises
+    ------
+    ValueError
+        If there is no body, it is open, or no cube of a known size holds it alone.
+    """
     open_cubes = 0
     for k, half in enumerate(SIZES):
         samples = samples_of(space, np.array([[-half] * 3, [half] * 3]), COARSE)
@@ -63,7 +69,7 @@ def _beyond(samples: Samples, half: float) -> bool:
 
 
 def tightened(space: ExpressionSpace, samples: Samples) -> FloatArray:
-    """Box around the nodes inside, sampled anew until it fits."""
+    """Box (2, 3), L, around the nodes inside, sampled anew until it fits."""
     for _ in range(4):
         low, high = samples.inside
         reach = SLACK * 0.5 * (high - low) + 1.5 * samples.spacing

@@ -20,7 +20,13 @@ SHARPEST = 1e8
 
 
 def singular_points(compiled: Compiled, points: FloatArray, size: float) -> FloatArray:
-    """Points (m, 3) of the body to which Newton steps on grad F = 0 lead, from where |grad F| is smallest."""
+    """Points (m, 3) of the body to which Newton steps on grad F = 0 lead, from where |grad F| is smallest.
+
+    Raises
+    ------
+    ValueError
+        If grad F vanishes or is not finite all over F = 0.
+    """
     for _ in range(4):
         value, gradient, _ = evaluated(compiled, points)
         with np.errstate(all="ignore"):

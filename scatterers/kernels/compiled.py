@@ -2,7 +2,7 @@
 
 A *level evaluator* fills, for a block of n points, F, grad F and the six Hessian entries
 (xx, yy, zz, yz, xz, xy); a *locator* is given the points with grad F there, and fills chart number, chart
-variables and the isometric frame (rows e1x, e1y, e1z, e2x, e2y, e2z). Of a sphere map x = psi(s), a *forward*
+variables and the polar frame (rows e1x, e1y, e1z, e2x, e2y, e2z). Of a sphere map x = psi(s), a *forward*
 function fills x and the nine entries of d psi/ds by rows (xx, xy, xz, yx, ...), an *inverse* function fills s,
 of unit length.
 Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.

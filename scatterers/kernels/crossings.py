@@ -1,4 +1,7 @@
-"""Compiled sweep and triangle test of `scatterers.triangles.crossings`. Importing this module imports numba."""
+"""Compiled sweep and triangle test of `scatterers.triangles.crossings`. Importing this module imports numba.
+
+Sources: Derivations, B10.
+"""
 
 from pathlib import Path
 

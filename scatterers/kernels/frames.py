@@ -1,4 +1,4 @@
-"""Parts of compiled locators: chart variables and tangents of the cube sphere, and the isometric frame.
+"""Parts of compiled locators: chart variables and tangents of the cube sphere, and the polar frame.
 
 With t = tan xi, t' = tan eta of the face (see `scatterers.atlas.charts`) and a common factor left out, which no frame
 sees,
@@ -6,6 +6,8 @@ sees,
     s_u = (-p, du - t p, -t' p) in (a, b, c) up to signs,  p = t du/(1 + t^2 + t'^2),  du = 1 + t^2,
 
 and s_v likewise. The frame of tangents T is T (T^T T)^(-1/2), by the closed root of a 2 x 2 matrix.
+
+Sources: Derivations, B1 and B2.
 """
 
 import math
@@ -48,7 +50,7 @@ def cube_tangents(
 def fill_frame(
     frame: NDArray[np.float64], i: int, tx: float, ty: float, tz: float, wx: float, wy: float, wz: float
 ) -> None:
-    """Write the isometric frame of two tangents into column i of frame (6, n)."""
+    """Write the polar frame of two tangents into column i of frame (6, n)."""
     g11 = tx * tx + ty * ty + tz * tz
     g12 = tx * wx + ty * wy + tz * wz
     g22 = wx * wx + wy * wy + wz * wz

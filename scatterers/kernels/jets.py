@@ -2,6 +2,8 @@
 
 One modified Gram-Schmidt orthogonalisation, with columns ordered by degree, gives the jets of degree 2, 4 and 6: the
 leading columns span the lower ones.
+
+Sources: [CP05]; Derivations, B5.
 """
 
 import math

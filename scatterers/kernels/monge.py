@@ -3,6 +3,8 @@
 A chart grows over a graph of points of the body from its centre, in the order of rho = max(|q.E1|, |q.E2|),
 q = x - x0, so that it never leaps to another sheet over the same square. It ends before the first point with
 n.N < ``least``, or rho > ``longest``, or rho max|kappa| > ``most`` with the largest curvature of the points passed.
+
+Sources: Derivations, B3.
 """
 
 import heapq
@@ -32,7 +34,7 @@ def _bounded(t, beyond):  # type: ignore[no-untyped-def]
 
 
 def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and isometric frame of a block; the compiled twin of locate and polar_frame.
+    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame.
 
     Where no chart is valid, the one with the least max(|u - 1/2|, |v - 1/2|), else chart 0, with bounded u and v.
     """
@@ -66,7 +68,7 @@ def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-
             if score < best:
                 best, s, t, number = score, a, b, int(parameters[k])
         chart[i], uv[0, i], uv[1, i] = number, _bounded(s, beyond), _bounded(t, beyond)
-        # the isometric frame of a chart over its tangent plane: the least rotation that takes N to n
+        # the polar frame of a chart over its tangent plane: the least rotation that takes N to n
         row = FIRST + CHART * number
         ex, ey, ez = parameters[row + 3], parameters[row + 4], parameters[row + 5]
         fx, fy, fz = parameters[row + 6], parameters[row + 7], parameters[row + 8]

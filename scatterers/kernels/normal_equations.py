@@ -1,4 +1,7 @@
-"""Compiled normal equations of a quintic tensor-product B-spline; importing this module imports numba."""
+"""Compiled normal equations of a quintic tensor-product B-spline; importing this module imports numba.
+
+Sources: Derivations, B6.
+"""
 
 from numba import njit
 

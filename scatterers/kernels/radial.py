@@ -1,6 +1,8 @@
 """Compiled twins of `scatterers.sphere_map.radial.RadialMap`; importing this module imports numba.
 
 Parameters are those of the spline, `scatterers.kernels.spline_constants` says where.
+
+Sources: Derivations, B4.
 """
 
 import math
@@ -167,7 +169,7 @@ def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
 
 
 def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and isometric frame of points on the body; the compiled twin of locate and polar_frame.
+    """Chart, chart variables and polar frame of points on the body; the compiled twin of locate and polar_frame.
 
     The frame does not see the factor r of d psi/ds, nor the length of y, so w - c serves for y.
     """

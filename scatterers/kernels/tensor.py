@@ -4,6 +4,8 @@ For each a: S_p = sum_b w^(p)_b C[a, b, :] for p = 0..order; then T_op = sum_a w
 derivatives are T_op . w^(q), q = order - o - p at most. Weights are Horner sums of constant vectors (`POWERS`), so a
 point costs 36 loads and, for order 2, 144 multiply-adds before the ten dot products. Importing this module imports
 numba.
+
+Sources: [B78]; Derivations, B7.
 """
 
 from typing import Any

@@ -2,6 +2,8 @@
 
 z = k + r with k the nearest integer, |r| <= 1/2 exactly; cos(pi z) = (-1)^k sum_j (-1)^j (pi r)^(2j)/(2j)!, the sine
 likewise. The Taylor sums end where (pi/2)^m/m! < 2e-17, so rounding, some 2e-16, is all that is left.
+
+The series are those of [AS64, sec. 4.3].
 """
 
 import math

@@ -9,6 +9,8 @@ an upright body has T = 1. With y = A s and g = DT^T grad F(x): d psi/ds = r DT 
 psi^-1(x) = A^-1 (w - c)/|A^-1 (w - c)|, w = T^-1(x). Every ray meets the body once where g.(w - c) > 0 on all of it.
 The root is found by Newton steps from r = 1, halved into the bracket when they leave it; beyond the grid counts as
 outside the body. `scatterers.kernels.radial` is the compiled twin.
+
+Sources: Derivations, B4.
 """
 
 from collections.abc import Callable, Mapping
@@ -72,12 +74,12 @@ class Spine:
         return not np.any(self.shifts)
 
     def shift(self, points: FloatArray) -> FloatArray:
-        """T(w) - w = x - T^-1(x): (..., 3) -> (..., 3)."""
+        """T(w) - w = x - T^-1(x), L: (..., 3) -> (..., 3)."""
         t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
         return np.moveaxis(np.asarray(polynomial.polyval(t.clip(-REACH, REACH), self.shifts)), 0, -1)
 
     def slope(self, points: FloatArray) -> FloatArray:
-        """Derivative of the shift along the axis: (..., 3) -> (..., 3)."""
+        """Derivative of the shift along the axis, without unit: (..., 3) -> (..., 3)."""
         t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
         found = polynomial.polyval(t.clip(-REACH, REACH), polynomial.polyder(self.shifts)) / self.half
         return np.moveaxis(np.where(np.abs(t) > REACH, 0.0, found), 0, -1)
@@ -186,12 +188,12 @@ class RadialMap:
         return np.asarray(np.sum(self.spine.pulled(points, gradient) * y, axis=-1))
 
     def forward(self, s: FloatArray) -> FloatArray:
-        """psi(s): (..., 3) -> (..., 3)."""
+        """psi(s), L: unit vectors (..., 3) to (..., 3)."""
         w = self.centre + self.radius(s)[..., None] * self.half_axes * s
         return np.asarray(w + self.spine.shift(w))
 
     def derivative(self, s: FloatArray) -> FloatArray:
-        """Derivative of psi: (..., 3) -> (..., 3, 3)."""
+        """Derivative of psi, L: unit vectors (..., 3) to (..., 3, 3)."""
         r, y = self.radius(s), self.half_axes * s
         w = self.centre + r[..., None] * y
         _, gradient, _ = evaluated(self.compiled_level, w + self.spine.shift(w))
@@ -201,7 +203,7 @@ class RadialMap:
         return np.asarray(inner + self.spine.slope(w)[..., :, None] * inner[..., None, self.spine.axis, :])
 
     def inverse(self, points: FloatArray) -> FloatArray:
-        """psi^-1(x), of unit length: (..., 3) -> (..., 3)."""
+        """psi^-1(x), of unit length: points (..., 3), L, to (..., 3)."""
         points = np.asarray(points, dtype=float)
         s = (points - self.spine.shift(points) - self.centre) / self.half_axes
         return np.asarray(s / np.linalg.norm(s, axis=-1, keepdims=True))

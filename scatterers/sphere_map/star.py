@@ -1,4 +1,7 @@
-"""Whether a body is star-shaped, upright or along a bent spine, and the sphere map that follows."""
+"""Whether a body is star-shaped, upright or along a bent spine, and the sphere map that follows.
+
+Sources: Derivations, B4.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -3,6 +3,8 @@
 An edge from node a to node b with F of both signs gives x = a + F(a)/(F(a) - F(b)) (b - a); then Newton steps
 x <- x - F grad F/|grad F|^2, none longer than a cell. Edges that meet near one node give points close together, of
 which one a voxel of half a cell is kept. Their number goes with 1/spacing^2: a first grid tells which one to take.
+
+Sources: Derivations, B8.
 """
 
 from collections.abc import Callable
@@ -64,7 +66,7 @@ def body_cloud(level: Field, gradient: Field, box: FloatArray, count: int) -> Fl
 
 
 def sign_changes(values: FloatArray, origin: FloatArray, spacing: FloatArray) -> FloatArray:
-    """Points (n, 3) where F changes sign on a grid of samples (n0, n1, n2), one in each voxel of half a cell."""
+    """Points (n, 3), L, where F changes sign on a grid of samples (n0, n1, n2), one in each voxel of half a cell."""
     index = edge_crossings(values)
     voxel = np.floor(2 * index).astype(np.int64)
     shape = 2 * np.array(values.shape, dtype=np.int64)
@@ -73,7 +75,7 @@ def sign_changes(values: FloatArray, origin: FloatArray, spacing: FloatArray) ->
 
 
 def onto(level: Field, gradient: Field, points: FloatArray, reach: float) -> FloatArray:
-    """Points (n, 3) brought onto F = 0 by Newton steps of at most ``reach`` each.
+    """Points (n, 3), L, brought onto F = 0 by Newton steps of at most ``reach`` each, L.
 
     Raises
     ------

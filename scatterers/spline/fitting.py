@@ -12,6 +12,8 @@ conjugate gradients, preconditioned by S D^-1 S: S = B^-1 takes coefficients to 
 B-splines at the nodes), in which the equations are nearly diagonal, D is the density of the samples about each node,
 raised by a floor. Steps are few if they start from a good distance: those left to the end change what the samples
 hardly see.
+
+Weights are set by trial; Derivations, B6.
 """
 
 from collections.abc import Callable

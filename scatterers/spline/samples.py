@@ -56,7 +56,7 @@ class Samples:
         return int(label(self.values >= 0)[1]) > 1
 
     def crossings(self) -> FloatArray:
-        """Points (n, 3) where edges of the grid cross the body, by linear interpolation."""
+        """Points (n, 3), L, where edges of the grid cross the body, by linear interpolation."""
         return np.asarray(self.origin + edge_crossings(self.values) * self.spacing)
 
 

@@ -7,6 +7,8 @@ With g = (x - origin)/spacing, cell k = floor(g) and fraction t = g - k, axis by
 n nodes carrying n + 4 coefficients. Ends are not-a-knot, so quintics are reproduced and F converges as h^6. Beyond
 the grid the outermost cell's polynomial goes on for one cell; from there on t is held. A NaN stays one.
 `scatterers.kernels.tensor` is the compiled twin.
+
+Sources: [B78]; Derivations, B7.
 """
 
 from collections.abc import Callable
@@ -109,20 +111,20 @@ class TensorSpline:
         return out.reshape(*points.shape[:-1], *out.shape[1:])
 
     def value(self, points: FloatArray) -> FloatArray:
-        """F: (..., 3) -> (...)."""
+        """F: points (..., 3), L, to (...)."""
         return self._derivatives(points, 0)[..., 0, 0, 0]
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: (..., 3) -> (..., 3)."""
+        """Gradient of F, unit of F over L: points (..., 3), L, to (..., 3)."""
         return self.value_and_gradient(points)[1]
 
     def value_and_gradient(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """F (...) and its gradient (..., 3)."""
+        """F (...) and its gradient (..., 3) at points (..., 3), L."""
         d = self._derivatives(points, 1)
         return d[..., 0, 0, 0], np.stack([d[..., 1, 0, 0], d[..., 0, 1, 0], d[..., 0, 0, 1]], axis=-1)
 
     def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: (..., 3) -> (..., 3, 3)."""
+        """Hessian of F, unit of F over L^2: points (..., 3), L, to (..., 3, 3)."""
         d = self._derivatives(points, 2)
         xx, yy, zz = d[..., 2, 0, 0], d[..., 0, 2, 0], d[..., 0, 0, 2]
         yz, xz, xy = d[..., 0, 1, 1], d[..., 1, 0, 1], d[..., 1, 1, 0]

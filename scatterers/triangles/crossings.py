@@ -4,6 +4,8 @@ A segment pq crosses the triangle abc where the volumes [a b c p] and [a b c q] 
 [p q b c], [p q c a] do not; triangles cross if an edge of one crosses the other. Pairs that share a vertex are tried
 with the edges opposite to it, pairs that share an edge only for being folded onto each other. Candidates come from a
 sweep along one axis. Touching is no crossing, and overlapping parts of one plane are seen only by the edges around.
+
+Sources: Derivations, B10.
 """
 
 import numpy as np
@@ -22,6 +24,13 @@ def crossings(vertices: FloatArray, triangles: IntArray) -> tuple[int, IntArray]
     ----------
     vertices : (n, 3), near the origin
     triangles : (m, 3)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.5, 0.5, 1], [3, 3, 0]])
+    >>> crossings(corners, np.array([[0, 1, 2], [3, 4, 5]]))[0]
+    1
     """
     from scatterers.kernels.crossings import sweep
 

@@ -3,6 +3,8 @@
 Of the three jets w = h_i(u, v) the mean of (w_i - h_i(u_i, v_i))/W_i is nearly the distance from the body; its zero
 nearest to a triangle's centroid is found by Newton steps. By degree 6 these points are off by O(e^7). The distance of a
 point from the body is that from the jet of the nearest vertex.
+
+Sources: Derivations, B5.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 """Osculating jets: normals and curvatures at the vertices of a mesh, without any use of its triangles' shapes.
 
 In a frame (e1, e2, n) at a vertex the surface is w = h(u, v) = sum c_ab u^a v^b, 1 <= a + b <= d, fitted by weighted
-least squares to the nearest vertices of the same sheet [Cazals and Pouget, Estimating differential quantities using
-polynomial fitting of osculating jets, CAGD 22 (2005) 121-146]; the jet of degree d errs by O(e^d) in the normal and
-O(e^(d-1)) in the curvatures. With W^2 = 1 + h_u^2 + h_v^2, and signs such that a convex body has kappa > 0,
+least squares to the nearest vertices of the same sheet [CP05]; the jet of degree d errs by O(e^d) in the normal and
+O(e^(d-1)) in the curvatures; Derivations, B5. With W^2 = 1 + h_u^2 + h_v^2, and signs such that a convex body has
+kappa > 0,
 
     n = (-h_u, -h_v, 1) / W,    K = (h_uu h_vv - h_uv^2) / W^4,
     H = -((1 + h_v^2) h_uu - 2 h_u h_v h_uv + (1 + h_u^2) h_vv) / (2 W^3),    kappa = H +- sqrt(H^2 - K).
@@ -87,6 +87,15 @@ def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
     vertices : (n, 3), L
     triangles : (m, 3)
         Counter-clockwise seen from outside; they give first normals, and the mean edge, only.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import trimesh
+    >>> ball = trimesh.creation.icosphere(subdivisions=3)
+    >>> jets = osculating_jets(ball.vertices, ball.faces)
+    >>> bool(np.all(abs(jets.gaussian - 1) < 1e-3))
+    True
     """
     from scatterers.kernels.jets import TERMS, fit
 
@@ -108,7 +117,16 @@ def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
 
 
 def angle_weighted_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
-    """Outward unit normals (n, 3): face normals weighted by the angles at the vertex."""
+    """Outward unit normals (n, 3): face normals weighted by the angles at the vertex [TW98].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> angle_weighted_normals(corners, faces)[0].round(6)
+    array([-0.57735, -0.57735, -0.57735])
+    """
     corners = vertices[triangles]
     ahead = np.roll(corners, -1, axis=1) - corners
     length = np.linalg.norm(ahead, axis=-1)

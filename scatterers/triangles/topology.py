@@ -56,6 +56,11 @@ def cleaned(
     """Merge vertices, drop degenerate and double triangles and unused vertices.
 
     ``note_equal`` is told of exactly equal vertices, which a format without vertex numbers has anyway.
+
+    Raises
+    ------
+    ValueError
+        If no triangle is left.
     """
     used = np.unique(triangles)
     # -0.0 and 0.0 are the same place

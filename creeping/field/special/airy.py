@@ -4,7 +4,10 @@
     w₁'(τ) = q w₁(τ),  q = 0 hard, q = ∞ soft, q = i m η impedance;   dτ/dq = 1/(τ - q²)
 
 Roots of the soft and hard problem lie on the ray of angle π/3 at the zeros of Ai and Ai'. Those of an impedance are
-continued from the hard ones, q growing from 0 along its ray, so that root p stays root p while q varies.
+continued from the hard ones, q growing from 0 along its ray, so that root p stays root p while q varies. All arguments
+and values are without unit.
+
+Sources: [F65], [L59]; Derivations, F1.
 """
 
 from dataclasses import dataclass
@@ -75,7 +78,13 @@ class Modes:
 
 @cache
 def soft_modes(n: int = MODES) -> Modes:
-    """Modes of the soft boundary, q = ∞: (n,)."""
+    """Modes of the soft boundary, q = ∞: (n,).
+
+    Examples
+    --------
+    >>> abs(soft_modes(3).tau).round(6)                           # zeros of Ai
+    array([2.338107, 4.087949, 5.52056 ])
+    """
     zeros, _, _, _ = ai_zeros(n)
     return _constants(-zeros * np.exp(1j * np.pi / 3), soft=True)
 
@@ -99,6 +108,11 @@ def impedance_modes(q: ArrayLike, n: int = MODES) -> Modes:
     ----------
     q : (...) complex
         All of one argument (q = i m η at various m).
+
+    Examples
+    --------
+    >>> impedance_modes(1j, 2).tau.round(6)
+    array([0.997899+1.319562j, 1.853539+2.974507j])
     """
     q = np.asarray(q, dtype=complex)
     if q.size > MANY:

@@ -10,7 +10,9 @@ these integrals lose digits; there, in one, over the line of steepest descent th
     P(ξ) = (e^{iπ/4}/2i√π) ∫ W e^{iξt} dt = -S e^{-iξ³/12}/√(-4/ξ),
 
 S the reflection coefficient, which tends to that of a plane boundary. A ``power`` n stands for t^n under each integral,
-which is (-i d/dξ)^n of the function and τ^n in its residue series.
+which is (-i d/dξ)^n of the function and τ^n in its residue series. All arguments and values are without unit.
+
+Sources: [F65], [P79], [PBM80], [KP74] for F_t; Derivations, F2 and F8.
 """
 
 from functools import cache
@@ -133,6 +135,11 @@ def pekeris_star(xi: ArrayLike, q: ComplexArray | float | None, power: int = 0) 
     q : None for soft, 0 for hard, else complex, broadcast with xi, of one argument
     power : int
         (-i d/dξ)^power of it.
+
+    Examples
+    --------
+    >>> pekeris_star([0.0, 1.0], None).round(6)                   # soft
+    array([0.306629-0.177032j, 0.224205-0.060714j])
     """
     return _evaluate("pekeris", np.asarray(xi, dtype=float), q, power)
 
@@ -155,7 +162,13 @@ def pekeris_slope(xi: ArrayLike, q: ComplexArray | float, power: int = 0) -> Com
 
 
 def surface_function(xi: ArrayLike, q: ComplexArray | float | None, power: int = 0) -> ComplexArray:
-    """(-i d/dξ)^power of Fock's surface function g(ξ) of u, or F(ξ) of du/dn if soft: (...) -> (...)."""
+    """(-i d/dξ)^power of Fock's surface function g(ξ) of u, or F(ξ) of du/dn if soft: (...) -> (...).
+
+    Examples
+    --------
+    >>> round(float(surface_function(0.0, 0.0).real), 6)          # hard, on the shadow line
+    1.399376
+    """
     return _evaluate("surface", np.asarray(xi, dtype=float), q, power)
 
 
@@ -262,7 +275,13 @@ def _tabulated(which: str, xi: FloatArray, q: complex | None, power: int) -> Com
 
 
 def transition(X: ArrayLike) -> ComplexArray:
-    """UTD transition function F_t(X) = -2i √X e^{-iX} ∫_√X^∞ e^{it²} dt, X >= 0; tends to 1: (...) -> (...)."""
+    """UTD transition function F_t(X) = -2i √X e^{-iX} ∫_√X^∞ e^{it²} dt, X >= 0; tends to 1: (...) -> (...).
+
+    Examples
+    --------
+    >>> complex(transition(1.0).round(6))
+    (0.809525-0.232199j)
+    """
     root = np.sqrt(np.asarray(X, dtype=float))
     return np.asarray(-1j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * root * wofz(np.exp(0.25j * np.pi) * root))
 

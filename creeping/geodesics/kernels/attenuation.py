@@ -1,4 +1,7 @@
-"""Compiled twins of `attenuation`: curvatures, and the attenuation integral over one leap or along a traced ray."""
+"""Compiled twins of `attenuation`: curvatures, and the attenuation integral over one leap or along a traced ray.
+
+Sources: Derivations, R13.
+"""
 
 import math
 

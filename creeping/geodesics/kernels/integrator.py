@@ -1,11 +1,13 @@
-"""Compiled Runge-Kutta tracer; the numpy twin is `tracing.trace_numpy`.
+"""Compiled Runge-Kutta tracer; its twin in plain numpy is in tests/oracles.
 
 Rays go in blocks of BLOCK, stored component by component, so that the loops over a block vectorise; a body enters as
 the address of its block evaluator (see `creeping.geometry.surface.Compiled`), so the kernel compiles once for all
-bodies. Lanes of a ray: x (3), p (3); with the ride-along the columns (M11, M21), (M12, M22) of its Jacobi matrix M(t) =
-[[I_1, I_2], [I_1', I_2']] with I'' + G I = 0, M(0) = 1, det M = 1; and last the attenuation integral A with
+bodies. Components of a ray: x (3), p (3); where they are carried, the columns (M11, M21), (M12, M22) of its Jacobi
+matrix M(t) = [[I_1, I_2], [I_1', I_2']] with I'' + G I = 0, M(0) = 1, det M = 1; and last the attenuation integral A,
 
     A' = c max(kappa_n, 0)^(2/3),  kappa_n = p.Hp/|grad F|.
+
+Sources: [HNW93, sec. II.10]; Derivations, R3 and R13.
 """
 
 import math
@@ -36,7 +38,7 @@ def _add_stages(terms, weights, index, k, y, z):
 
 @njit(**options)
 def right_hand_side(level, level_par, speed, speed_par, weighted, y, k, geometry, weight):
-    """Fill k with the derivative of y (lanes, BLOCK).
+    """Fill k with the derivative of y (components, BLOCK).
 
     ``geometry`` (10, BLOCK) keeps F, grad F and the Hessian of the block, ``weight`` those of the speed. Loops run over
     flat arrays with constant row offsets: only then does the compiler see that rows do not overlap, and vectorise.

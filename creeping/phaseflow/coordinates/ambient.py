@@ -2,6 +2,8 @@
 
 p = E (cos angle, sin angle) with E(u, v) the isometric frame of the chart (`creeping.geometry.frames.polar_frame`). A
 leap ends off T1Q by the error of the map and is put back.
+
+Sources: [YC06b]; Derivations, B2.
 """
 
 from dataclasses import dataclass

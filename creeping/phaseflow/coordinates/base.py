@@ -8,6 +8,8 @@ A model says where a ray lies on the grid, what displacement is stored there, an
     AngleModel      one doubly periodic chart: (u, v, angle) in turns. Stored: their differences.
 
 The last three stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
+
+Sources: Derivations, R15.
 """
 
 from typing import Protocol

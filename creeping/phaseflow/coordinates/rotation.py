@@ -1,6 +1,8 @@
 """Maps stored as displacements of rotations or of angles: what their kernels need, and the plain numpy twins.
 
 Formulas are those of `phaseflow.kernels.rotation` and `phaseflow.kernels.angles`.
+
+Sources: Derivations, R15.
 """
 
 from functools import cached_property

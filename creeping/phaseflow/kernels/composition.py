@@ -1,4 +1,4 @@
-"""Compiled composition of phase maps in the model coordinates of a body; the numpy twins are in `compiled_models`.
+"""Compiled composition of phase maps in the model coordinates of a body; twins in plain numpy are in tests/oracles.
 
 Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`rotation`), and ANGLES, turns (`angles`). A map
 is a table of their displacement; a ray enters the model once, is composed there, and leaves it for an output. FOLDED

@@ -1,8 +1,8 @@
 """Compiled composition of maps on bodies x = psi(s), s on the unit sphere.
 
-The numpy twin is `compiled_models.RotationModel`.
+The twin in plain numpy is in tests/oracles.
 
-The state of a ray is the unit quaternion r = (w, x, y, z) of the rotation R = [s, q, s x q], q the isometric direction
+The state of a ray is the unit quaternion r = (w, x, y, z) of the rotation R = [s, q, s x q], q the direction
 
     A = d psi [e1, e2],  G = A^T A,   q = [e1, e2] G^(-1/2) A^T p,   p = A G^(-1/2) [e1, e2]^T q
 
@@ -10,6 +10,8 @@ for any orthonormal basis e1, e2 of the plane across s. A map stores the displac
 six stereographic charts: with (a, b, c) cyclic, a the largest component of s, (s_a, s_b) both multiplied by its sign,
 
     u = s_b/(1 + s_a),  v = s_c/(1 + s_a),   angle = atan2(q_c - v q_a, q_b - u q_a),   |u|, |v| <= sqrt(2) - 1.
+
+Sources: Derivations, R15.
 """
 
 import math

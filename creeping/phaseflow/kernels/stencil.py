@@ -6,6 +6,8 @@ Weights of the uniform B-splines of degree p at fraction t of a cell, w_j = N_p(
     p = 5   120 w = (1-t)^5, 26 - 50 t + 20 t^2 + 20 t^3 - 20 t^4 + 5 t^5, 66 - 60 t^2 + 30 t^4 - 10 t^5, mirror images
 
 Loops run over a whole block on flat arrays, so that they vectorise; the sums are explicit vector code.
+
+Sources: [B78]; Derivations, B7.
 """
 
 import math

@@ -1,7 +1,9 @@
-"""Compiled look-up of x(u, v) and its tangents on a chart, for bodies whose own map psi is dear to evaluate.
+"""Compiled look-up of x(u, v) and its tangents on a chart, for bodies whose own map psi is expensive to evaluate.
 
 x, x_u and x_v are sums over one stencil of a quintic spline: for each row i, S = sum_j wv_j c_ij and
 S' = sum_j wv'_j c_ij; then x = sum_i wu_i S, x_u = sum_i wu'_i S, x_v = sum_i wu_i S'.
+
+Sources: Derivations, B7.
 """
 
 from typing import Any

@@ -3,6 +3,8 @@
 With T = [x_u, x_v] and G = T^T T, and the stereographic charts being conformal,
 
     p = T G^(-1/2) (along, across),   (along, across) = G^(-1/2) T^T p,   q = along e_u + across e_v.
+
+Sources: Derivations, R15.
 """
 
 import math

@@ -88,6 +88,14 @@ def build_phase_map(
         On parameters that contradict each other.
     ToleranceError
         If no map within the limits reaches the tolerance; says what was reached and how to go on.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> pm = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), order=3, cache=False)
+    >>> pm.horizon, pm.error.rms < 1e-9
+    (0.5, True)
     """
     if tolerance is None and grid is None:
         tolerance = 1e-6
@@ -175,7 +183,13 @@ class Request:
         }
 
     def build(self, say: Progress) -> PhaseMap:
-        """Build with the parameters given, choosing the missing ones."""
+        """Build with the parameters given, choosing the missing ones.
+
+        Raises
+        ------
+        ToleranceError
+            If the map that was built misses the tolerance.
+        """
         require_checked(self.body)
         if self.nodes is None:
             return tuned_map(self, say)

@@ -8,6 +8,8 @@ the ray by the Jacobi matrices: G(T0)^2 = sum_k |M(L) M(k T0)^-1|^2/2, geometric
 
 Of all candidates the one that is cheapest for the rays to come, its build included, is built, measured at the end of
 rays, and refined until it meets the tolerance; three at most in turn.
+
+Sources: Derivations, R16.
 """
 
 from dataclasses import dataclass, replace
@@ -84,7 +86,13 @@ class Candidate:
 
 
 def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None = None) -> PhaseMap:
-    """Build the fastest map that meets the request's tolerance, of the candidates if these are known already."""
+    """Build the fastest map that meets the request's tolerance, of the candidates if these are known already.
+
+    Raises
+    ------
+    ToleranceError
+        If no map within the limits meets the tolerance; with the best that was reached.
+    """
     body, tolerance = request.body, request.tolerance
     assert tolerance is not None
     model = model_of(body)
@@ -142,7 +150,7 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
 
 
 def _measured(built: PhaseMap, request: "Request", cost: float) -> PhaseMap:
-    """The map with its errors; where F is dear on fewer rays, and against a reference only so much better."""
+    """The map with its errors; where F is expensive on fewer rays, and against a reference only so much better."""
     length = request.length or built.horizon
     assert request.tolerance is not None
     budget = _budget(request, cost)

@@ -3,6 +3,8 @@
 The ray is given at equal steps, GUARD of them before its launch point and beyond its end. On each step a polynomial of
 degree 7 through eight steps, four on either side, stands for x, p, J, J' and the curvatures; its derivatives are
 those along the ray, and powers of curvature are taken after interpolation.
+
+Sources: Derivations, R1 and R5.
 """
 
 import math

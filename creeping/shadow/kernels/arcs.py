@@ -3,6 +3,8 @@
 The state is constant between breaks, so one point decides an arc: kappa_n(d) <= 0 is concave; the outermost points of
 the line seen along d are lit; for the rest F is sampled along the backward ray x - t d, which enters the body where F
 is negative at a sample or at a minimum between samples. Two more rays of the arc must agree.
+
+Sources: Derivations, R10.
 """
 
 import math

@@ -3,6 +3,8 @@
 Seen along d the line is a plane curve. It has a cusp where kappa_n(d) = 0, since T is along d there, and
 visibility changes only at cusps and, where two of its pieces cross, on the one behind (the larger x.d). Positions are
 node numbers with fractions, u, within a component of equally spaced nodes.
+
+Sources: [K84]; Derivations, R10.
 """
 
 import math

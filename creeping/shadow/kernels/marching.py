@@ -2,6 +2,8 @@
 
 s = n.d at the vertices. A triangle with vertices of both signs has one edge that goes from + to - counter-clockwise:
 leaving by it keeps the lit side on the left, and ends where it began, so components come out closed and oriented.
+
+Sources: Derivations, R6.
 """
 
 from numba import njit

@@ -1,5 +1,7 @@
 """Compiled nodes of a shadow line: Newton steps onto it, equal arclength, and its length.
 
+Sources: Derivations, R6 and R8.
+
     F = 0, G = grad F.d = 0;   W = grad F x Hd,   T = W/|W|,   dx = -[F (Hd x W) + G (W x grad F)]/|W|^2
 
 dx is the Newton step of least norm. Between neighbours x_0, x_1 with chord c and tangents T the curve is a cubic; its

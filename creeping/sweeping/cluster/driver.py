@@ -2,7 +2,7 @@
 
 Workers get the recipe of the sweep once, by a plugin that restarted workers get too; a phase map they open from the
 store, mapped from its files. They return a record; the driver marks the task. A task whose worker dies again and again
-is put aside until all others are done, and then done in this process's hands: one incidence after the other, alone.
+is put aside until all others are done, and is then done one incidence after the other, alone.
 """
 
 import os
@@ -92,7 +92,13 @@ def fill_on(
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
-    """Client of the scheduler at an address."""
+    """Client of the scheduler at an address.
+
+    Raises
+    ------
+    CreepingError
+        If no scheduler answers there.
+    """
     try:
         client = distributed.Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

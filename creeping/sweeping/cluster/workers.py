@@ -32,7 +32,13 @@ class Recipe:
     own: threading.local = field(default_factory=threading.local, repr=False)
 
     def tools(self) -> tuple[Any, SweepStore]:
-        """Sweeper and store of this thread, made when first asked for."""
+        """Sweeper and store of this thread, made when first asked for.
+
+        Raises
+        ------
+        CreepingError
+            If the worker does not see the folder of the store.
+        """
         if not hasattr(self.own, "tools"):
             if not Path(self.folder).is_dir():
                 raise CreepingError(f"the worker on {process()[0]} does not see {self.folder}; give a shared folder")

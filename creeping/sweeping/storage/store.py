@@ -124,7 +124,13 @@ class SweepStore:
             raise CreepingError(f"{self.folder} lacks {error} of its flow; compute the sweep anew") from error
 
     def require_same(self, plan: SweepPlan) -> None:
-        """Refuse to go on with another study than the one that the store was begun with."""
+        """Refuse to go on with another study than the one that the store was begun with.
+
+        Raises
+        ------
+        InvalidInputError
+            If the studies differ; with the entries in which they do.
+        """
         names = differing(self.key, plan.key)
         if names:
             raise InvalidInputError(
@@ -172,7 +178,13 @@ class SweepStore:
         return [int(task) for task in np.flatnonzero(self.status() != DONE)]
 
     def write_task(self, task: int, arrays: Arrays, errors: dict[int, str]) -> None:
-        """Write all chunks of a task; `commit` marks it afterwards."""
+        """Write all chunks of a task; `commit` marks it afterwards.
+
+        Raises
+        ------
+        CreepingError
+            If an array has not the shape that the layout says.
+        """
         rows = self.rows(task)
         if self._array(STATUS)[task] != UNDONE:
             # a task that is tried again is not whole until it is marked again

@@ -1,10 +1,12 @@
 """Atlas of Monge charts for a smooth closed body of any genus (`scatterers.atlas.monge.charts`).
 
 A point belongs to the chart for which max(|2u - 1|, |2v - 1|) is least, (2u - 1, 2v - 1) = (E1, E2).(x - x0)/w, among
-those listed for its voxel with n.N >= VALID and the height within bounds. The isometric frame of such a chart is the
+those listed for its voxel with n.N >= VALID and the height within bounds. The polar frame of such a chart is the
 least rotation that takes N to n,
 
     t_i = E_i - (E_i.n)(n + N)/(1 + n.N).
+
+Sources: Derivations, B3.
 """
 
 import hashlib

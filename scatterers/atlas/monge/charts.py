@@ -7,6 +7,8 @@ With x0 on the body, N = n(x0), E1 and E2 tangent, E1 x E2 = N, w the half width
 
 h is followed from the centre of the square: over s q, s in STEPS, Newton steps h <- h - F/(g.N) start from the Taylor
 series of the place before, dh/ds = -(g.q)/(g.N).
+
+Sources: Derivations, B3.
 """
 
 from collections.abc import Callable
@@ -51,7 +53,7 @@ class MongeCharts:
         return MongeCharts(self.level, self.gradient, *parts)
 
     def points(self, uv: FloatArray) -> FloatArray:
-        """Points of the body over (u, v) (..., 2), broadcast against the charts: (..., 3)."""
+        """Points of the body, L, over (u, v) (..., 2), broadcast against the charts: (..., 3)."""
         e1, e2, n = np.moveaxis(self.axes, -2, 0)
         s = 2 * uv - 1
         half = self.half[..., None]

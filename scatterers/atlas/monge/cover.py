@@ -4,6 +4,8 @@ With S the shape operator P H P/|grad F| and kappa the larger |eigenvalue|, a ch
 wide as n.N >= LEAST and w max(kappa) <= BENT allow on its square widened by the margin. It covers the points with
 n.N >= FACING and |q.E1|, |q.E2| <= w - gap, ``gap`` being how far other points of the body may be from a point of the
 cloud: so what lies between is covered too. Gaps are measured by `probes`, points between those of the cloud.
+
+The greedy rule is that of [C79]; Derivations, B3.
 """
 
 from dataclasses import dataclass
@@ -52,7 +54,7 @@ class Cover:
 
 
 def probes(level: Field, gradient: Field, cloud: FloatArray, *, seed: int) -> FloatArray:
-    """Points of the body about those of a cloud, four for each: (4 n, 3)."""
+    """Points of the body about those of a cloud (n, 3), L, four for each: (4 n, 3)."""
     rng = np.random.default_rng(seed)
     n = gradient(cloud)
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
@@ -283,7 +285,13 @@ class _Candidates:
 
 
 def covered_by(level: Field, gradient: Field, hessian: Field, points: FloatArray, margin: float) -> Cover:
-    """Choose charts that cover the body and all its cloud of points (n, 3)."""
+    """Choose charts that cover the body and all its cloud of points (n, 3), L.
+
+    Raises
+    ------
+    ValueError
+        If no cover is found; with how much is left.
+    """
     cloud = _Cloud.of(level, gradient, hessian, points)
     candidates = _Candidates(cloud, margin)
     fresh, before = cloud.spread(np.arange(len(points)), APART), len(points)
