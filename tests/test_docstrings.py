@@ -17,32 +17,10 @@ PUBLIC = {
     for name in package.__all__
     if not name.startswith("_") and hasattr(package, name)
 }
-WITHOUT_EXAMPLE = {
-    "creeping.BodyError",
-    "creeping.FarField",
-    "creeping.IsoPhaseCurve",
-    "creeping.MapError",
-    "creeping.RayFan",
-    "creeping.RayStatus",
-    "creeping.ShadowLine",
-    "creeping.body_error",
-    "creeping.far_field",
-    "creeping.iso_phase_curves",
-    "creeping.launch",
-    "creeping.shadow_line",
-    "creeping.trace",
-}
+WITHOUT_EXAMPLE: set[str] = set()
 """Public objects that have no example yet; names leave this set, none is added."""
 NO_SOURCE_NEEDED = {"creeping/files/ffe.py"}
 """Modules whose equations are conversions of units, or conventions of a file format."""
-REWRITTEN = {
-    "creeping.PhaseMap.leap_numpy",
-    "creeping/rays/kernels/shed_search.py",
-    "creeping/rays/quantities.py",
-    "creeping/rays/single.py",
-    "creeping/shadow/occlusion.py",
-}
-"""What the rewrite of the shadow line, the rays and the flows replaces."""
 _KEY = re.compile(r"\[[A-Z]{1,4}\d{2}[a-z]?(?:, [^\]]*)?\]")
 _SECTIONS = re.compile(r"[Dd]erivations?(?:,|:) ((?:[RFB]\d+(?:, | and | to )?)+)")
 _EQUATION = re.compile(r"^ {4,}.*(?:=|<-|<=)", re.MULTILINE)
@@ -95,7 +73,7 @@ def test_modules_with_equations_name_their_source():
         text = head(path)
         if _EQUATION.search(text) and not (_KEY.search(text) or _SECTIONS.search(text)):
             bare.append(name_of(path))
-    bare = sorted(set(bare) - NO_SOURCE_NEEDED - REWRITTEN)
+    bare = sorted(set(bare) - NO_SOURCE_NEEDED)
     assert not bare, f"give a [KEY] or 'Derivations, R1' below the equations of {bare}"
 
 
@@ -134,7 +112,7 @@ def test_public_functions_of_arrays_state_shapes_and_units():
     bare = [
         f"{name} ({what})"
         for name, function, text in public_functions()
-        if takes_arrays(function) and name not in REWRITTEN
+        if takes_arrays(function)
         for what, pattern in (("shape", _SHAPE), ("unit", _UNIT))
         if not pattern.search(text)
     ]

@@ -61,6 +61,18 @@ class FarField(Drawn):
     wavenumber : float, 1/L
     boundary : str
     order : int
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> ff = cr.far_field(fan, [(0, 1, 0)], wavenumber=30.0, boundary="soft")
+    >>> bool(abs(ff.cross_section[0] / np.pi - 1) < 0.05), ff.method.tolist()       # about pi radius^2
+    (True, ['rays'])
     """
 
     directions: FloatArray
@@ -123,6 +135,17 @@ def far_field(
     ------
     InvalidInputError
         On bad directions, wavenumber, boundary or order, and for a weighted body.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> ff = cr.far_field(fan, [(0, 1, 0)], wavenumber=30.0, boundary="soft")
+    >>> round(float(abs(ff.total[0])), 3)                                           # about radius/2
+    0.504
     """
     scalar_boundaries(boundary)
     k = checked(wavenumber, order)

@@ -40,7 +40,7 @@ def reflection(
     shifted = order == 2 and boundary.kind not in ("soft", "electric hard")
     if shifted and boundary.kind != "impedance":
         with np.errstate(divide="ignore", invalid="ignore"):
-            out = out * np.nan_to_num(1 - 1j * across / (wavenumber * cosine))
+            out = np.nan_to_num(1 - 1j * across / (wavenumber * cosine)) * out
     if np.any(curved):
         xi = -2 * m[curved] * cosine[curved]
         q = boundary.q(m[curved])
@@ -48,8 +48,8 @@ def reflection(
         if shifted:
             # a soft wave has no q: the hard one's relative change stands for it
             of = 0.0 if q is None else q
-            change = np.exp(0.25j * np.pi) * pekeris_slope(xi, of) / (pekeris(xi, of) if q is None else wave)
-            wave = wave * (1 - 0.25 * across[curved] / along[curved] / m[curved] ** 2 * change)
+            change = pekeris_slope(xi, of) * np.exp(0.25j * np.pi) / (pekeris(xi, of) if q is None else wave)
+            wave = (1 - 0.25 * across[curved] / along[curved] / m[curved] ** 2 * change) * wave
         out[curved] = -np.sqrt(-4 / xi) * np.exp(1j * xi**3 / 12) * wave
     return out
 
@@ -94,7 +94,7 @@ def reflected_amplitude(
     f = spread * R * np.exp(1j * wavenumber * path - 0.5j * np.pi * turns)
     size = next_order(specular, wavenumber)
     if order == 2:
-        f = f * (1 + limited(np.asarray(1j * size, dtype=np.complex128), 0.5))
+        f = (1 + limited(np.asarray(1j * size, dtype=np.complex128), 0.5)) * f
     # towards a flat point the term grows like κ^-3: f, like κ^-1/2, stops growing where the term is not small
     with np.errstate(over="ignore"):
         excess = np.minimum(np.abs(size) / UNRESOLVED, 1e60)

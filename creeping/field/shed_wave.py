@@ -126,10 +126,15 @@ def mode_sum(
     """P by its residue series (...)."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber))
     residue = end_residue(rays, wavenumber, boundary, "residue")
-    terms = residue * mode_waves(rays, modes, wavenumber, boundary, order)
+    # named before they are multiplied: numpy works in place in a large temporary, and swaps the factors if it is the
+    # second, which changes the last digit of a complex product; a ray's field would depend on how many others there are
+    waves = mode_waves(rays, modes, wavenumber, boundary, order)
+    terms = residue * waves
     if order == 2:
-        terms = terms * amplitude_factor(rays, modes, wavenumber, boundary, transverse_weight)
-    return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))
+        amplitude = amplitude_factor(rays, modes, wavenumber, boundary, transverse_weight)
+        terms = terms * amplitude
+    total = np.sum(terms, axis=-1)
+    return np.asarray(total * (2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi)))
 
 
 def end_residue(rays: RayPoints, wavenumber: float, boundary: Boundary, name: str, n: int = MODES) -> ComplexArray:
@@ -182,12 +187,10 @@ def shed_wave(
             total[early] += (1 - weight[early]) * limited(change, 0.5 * np.abs(pekeris_star(xi[early], q_early)))
         if np.any(late):
             some = rays[late]
-            change = np.exp(-0.25j * np.pi) * (
-                mode_sum(some, wavenumber, boundary, 2, transverse_weight)
-                - mode_sum(some, wavenumber, boundary, 1, transverse_weight)
-            )
+            second = mode_sum(some, wavenumber, boundary, 2, transverse_weight)
+            change = (second - mode_sum(some, wavenumber, boundary, 1, transverse_weight)) * np.exp(-0.25j * np.pi)
             squared, linear = pole_operator(some, wavenumber, transverse_weight)
-            change += (1 - share[late]) * (squared * pole(xi[late], 2) + linear * pole(xi[late], 1))
+            change += (1 - share[late]) * (pole(xi[late], 2) * squared + linear * pole(xi[late], 1))
             total[late] += weight[late] * change
     return np.asarray(np.exp(0.25j * np.pi) * total)
 
@@ -223,7 +226,7 @@ def early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary, tra
     m1, m2 = scales(rays, wavenumber)
     q = boundary.q(np.sqrt(m1 * m2))
     squared, linear = pole_operator(rays, wavenumber, transverse_weight)
-    total = squared * pekeris_star(xi, q, 2) + linear * pekeris_star(xi, q, 1)
+    total = pekeris_star(xi, q, 2) * squared + linear * pekeris_star(xi, q, 1)
     if q is not None:
         shift = sum(
             ((bend / 60 - 0.1 - 0.25 * boundary.sign * r) / (2 * m**2))[..., 0]

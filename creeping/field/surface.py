@@ -142,7 +142,7 @@ def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) 
     terms = end_residue(rays, wavenumber, boundary, "surface") * waves
     if order == 2:
         terms = terms * surface_amplitude(rays, modes, wavenumber, boundary)
-    return np.asarray(2j * np.sqrt(np.pi) * np.sum(terms, axis=-1))
+    return np.asarray(np.sum(terms, axis=-1) * (2j * np.sqrt(np.pi)))
 
 
 def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) -> ComplexArray:

@@ -31,6 +31,12 @@ class MapError:
         Of |(x, p) - (x, p)_traced|, the norm in R^6, over the samples.
     samples : int
         Random points of T1Q.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> cr.MapError(rms=1e-9, max=4e-9, samples=100).samples
+    100
     """
 
     rms: float
@@ -122,6 +128,15 @@ def trace(
         On bad points, directions, times or tolerance.
     IntegrationError
         If a ray does not reach its end.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> x, p = cr.trace(sc.Sphere(), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), np.pi)       # half a great circle
+    >>> bool(np.allclose(x, [-1, 0, 0])), bool(np.allclose(p, [0, -1, 0]))
+    (True, True)
     """
     if not 1e-14 <= rtol <= 1e-2:
         raise InvalidInputError(f"rtol = {rtol!r} is not between 1e-14 and 1e-2")

@@ -5,6 +5,8 @@
     locator    x, grad F (3, n) -> chart, (u, v), isometric frame of the chart (rows e1, e2)
 
 A body with numpy methods only goes through the same kernels as a compiled one, a hundred times slower.
+
+Sources: Derivations, R1.
 """
 
 from collections.abc import Callable, Iterator

@@ -38,6 +38,12 @@ class BodyError:
         Rms difference of the attenuation integral, L^(1/3).
     rays : int
         Traced; those that are no creeping rays, or end early on either body, are left out.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> cr.BodyError(points=1e-6, spreading=1e-5, attenuation=2e-6, rays=16).rays
+    16
     """
 
     points: float
@@ -64,6 +70,16 @@ def body_error(fan: RayFan, *, rays: int = RAYS) -> BodyError | None:
     ------
     InvalidInputError
         If ``rays`` is not a positive whole number.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=0.5, n_rays=8)
+    >>> cr.body_error(fan) is None                                 # a sphere is known exactly
+    True
     """
     if isinstance(rays, bool) or not isinstance(rays, (int, np.integer)) or rays < 1:
         raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")

@@ -42,7 +42,14 @@ CHECKED_RAYS = 16
 
 
 class RayStatus(IntEnum):
-    """What became of a ray."""
+    """What became of a ray.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> cr.RayStatus.OK.name, int(cr.RayStatus.OK)
+    ('OK', 0)
+    """
 
     OK = 0
     DETACHED = 1
@@ -96,6 +103,17 @@ class RayFan(DrawnOnBody):
         Of (x, p) at the end, measured on some rays against direct integration.
     flow : PhaseMap or DirectFlow
         What carried the rays.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> bool(abs(fan.spreading[:, -1] - np.cos(2.0)).max() < 1e-6), list(fan.status_counts)    # J = cos s
+    (True, ['OK'])
     """
 
     body: Surface
@@ -185,6 +203,16 @@ def launch(
     ------
     InvalidInputError
         If the flow is of another body, or a number is out of range.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> len(fan.points) >= 16, fan.error.rms < 1e-6             # rays are inserted where neighbours are far apart
+    (True, True)
     """
     body = line.body
     if flow.body is not body and fingerprint(flow.body) != fingerprint(body):

@@ -37,6 +37,17 @@ class IsoPhaseCurve(DrawnOnBody):
         (theta, phi) of the points, radians; not unwrapped.
     rays : (m,)
         The ray of the fan that each point lies on.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> curve, = cr.iso_phase_curves(fan, 1.0)
+    >>> curve.level, curve.of, curve.closed
+    (1.0, 'travel_time', True)
     """
 
     level: float
@@ -89,6 +100,18 @@ def iso_phase_curves(
     ------
     InvalidInputError
         On an unknown quantity or a level that is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> curve, = cr.iso_phase_curves(fan, 1.0)
+    >>> bool(abs(curve.points[:, 2] - np.sin(1.0)).max() < 1e-6)                    # a circle of latitude
+    True
     """
     if of not in ("travel_time", "eikonal"):
         raise InvalidInputError(f"of = {of!r} is neither 'travel_time' nor 'eikonal'")

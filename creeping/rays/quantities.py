@@ -8,6 +8,8 @@ With n the normal, p the ray's tangent, b = n × p, H the Hessian of F:
 
 Polynomials of degree 7 along the ray give κₙ' and κₙ'' (`creeping.rays.kernels.quantities`). Powers are taken after
 interpolation, and the integrals end where κₙ first falls to 0: there the creeping ray ends.
+
+Sources: Derivations, R1, R5 and F4.
 """
 
 from collections.abc import Sequence

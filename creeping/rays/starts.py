@@ -1,6 +1,8 @@
 """Where the rays of one fan start: the launch points of the line, and further ones between them.
 
 A position is an arclength that grows along its arc, beyond the curve's length where the arc comes round.
+
+Sources: Derivations, R4.
 """
 
 from typing import NamedTuple

@@ -8,6 +8,8 @@ Rays that leave towards r are found by Newton's method on p(σ, s) = r, with p a
 
 Rays go by equal steps, in which the most curved part of the body turns them by TURN: what comes out of one does not
 depend on the others that are traced with it.
+
+Sources: Derivations, R4 and R12.
 """
 
 from collections.abc import Sequence

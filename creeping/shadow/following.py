@@ -1,6 +1,8 @@
 """A shadow line followed by itself: critical points of n.d, a mesh refined until the signs decide, panels to rounding.
 
 The last resort, some tenths of a second a line; what comes out is a `LineNodes` like any other.
+
+Sources: Derivations, R9.
 """
 
 import numpy as np

@@ -137,6 +137,14 @@ class ShadowLine(DrawnOnBody):
         order, the angle from d to the next direction whose shadow line crosses itself.
     nodes : LineNodes
         What the line was found by.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> line = cr.shadow_line(sc.Sphere(radius=0.5), direction=(1, 1, 1))
+    >>> round(line.length, 6), len(line.curves), round(line.fractions["attached"], 6)
+    (3.141593, 1, 1.0)
     """
 
     body: Surface
@@ -210,6 +218,14 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
         If F = 0 has no closed triangulation in its bounds.
     SingularIncidenceError
         If the line crosses itself, or so nearly that its curves cannot be told apart.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> line = cr.shadow_line(sc.Torus(), direction=(0, 0, 1))
+    >>> [round(curve.length, 6) for curve in line.curves]          # outer and inner equator
+    [9.424778, 3.141593]
     """
     d = unit_direction(direction)
     if isinstance(n_points, bool) or not isinstance(n_points, (int, np.integer)) or n_points < 16:

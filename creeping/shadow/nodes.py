@@ -2,6 +2,8 @@
 
 Where no mesh is sure, or next to a singular direction, the line is followed with its topology proven (`following`) and
 the same kernels finish it.
+
+Sources: Derivations, R6 and R8.
 """
 
 from dataclasses import dataclass

@@ -2,6 +2,8 @@
 
 F starts there with F = 0, F' = 0, F'' = d.Hd at a point of the shadow line, so behind a convex point it first rises;
 the ray enters the body where F is negative at a sample, or at a minimum between samples.
+
+Sources: [K84]; Derivations, R10.
 """
 
 import numpy as np

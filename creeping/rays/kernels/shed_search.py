@@ -6,6 +6,8 @@ Between the carried states x and J are quintics through value, slope and second 
 
 close enough to tell cells apart; what is found there is refined on rays traced for it. A fan is sampled once for all
 observers of its incidence.
+
+Sources: Derivations, R12 and R14.
 """
 
 import math

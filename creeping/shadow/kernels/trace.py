@@ -2,6 +2,8 @@
 
 A line is sought on one mesh; a step that is not sure of it says so, and so does its length if it is not certain to
 SETTLED. `creeping.shadow.many` goes on to finer meshes.
+
+Sources: Derivations, R11.
 """
 
 import numpy as np
