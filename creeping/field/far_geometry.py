@@ -96,7 +96,6 @@ def launched_by(fan: RayFan) -> LaunchPoints:
     rows: tuple[Any, ...] = (
         x,
         fan.arclength[mine],
-        np.sum(x * fan.line.direction, axis=1),
         fan.curve_index[mine],
         arc.astype(float),
         fan.spacing[mine],
@@ -300,8 +299,9 @@ class FarGeometry:
             for incidence in np.unique(self.incidence[wanted]):
                 rows = np.flatnonzero(wanted & (self.incidence == incidence))
                 line, strips = self._forward(int(incidence))
-                # at r = d every ray meets the horizon where it starts; the lobe is flat there to second order
-                r = off_axis(self.directions, line.direction)
+                # at r = d every ray meets the horizon where it starts, at r = -d the bisector contour is no curve;
+                # the lobe is flat at both to second order
+                r = off_axis(off_axis(self.directions, line.direction), -line.direction)
                 reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
                 counts = (48 + 1.5 * reach).astype(np.int64)
                 parts.append(forward_nodes(strips, line, rows, r, counts))

@@ -20,6 +20,7 @@ import numpy as np
 from creeping._presenting import DrawnOnBody, brief
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.integrator import MapError, trace_states
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, P, X, pack
@@ -324,16 +325,22 @@ def fan_of(flow: Flow, line: ShadowLine, launch: LaunchPoints, states: FloatArra
     rays = ray_arrays(body, launch, states[None], times)
     points, directions = states[..., X].copy(), states[..., P].copy()
     arc = launch.arc_index[0].astype(np.int64)
+    # of a weighted body the kernel gives c^(3/2) times it
+    curvature = (
+        curvature_values(body, states.reshape(-1, WHOLE)).reshape(states.shape[:2])
+        if speed_of(body) is None
+        else normal_curvature(body, points, directions)
+    )
     return RayFan(
         body=body,
         line=line,
         points=points,
         directions=directions,
         travel_time=times,
-        eikonal=(points[:, 0] @ line.direction)[:, None] + times,
+        eikonal=launch.phase[0][:, None] + times,
         spreading=rays.spreading[0],
         spreading_rate=rays.spreading_rate[0],
-        curvature=normal_curvature(body, points, directions),
+        curvature=curvature,
         attenuation=states[..., ATTENUATION].copy(),
         caustic_index=zeros_passed(rays.spreading[0]),
         status=rays.status[0],
@@ -354,6 +361,9 @@ def end_error(fan: RayFan) -> MapError:
         return MapError(0.0, 0.0, 0)
     chosen = np.unique(np.linspace(0, len(fan.points) - 1, CHECKED_RAYS).astype(int))
     first = pack(fan.points[chosen, 0], fan.directions[chosen, 0])
-    exact = trace_states(fan.body, first, np.array([fan.length]), rtol=1e-12)[:, 0]
+    # a thousandth of what is to be measured
+    rms = np.nan if fan.flow.error is None else fan.flow.error.rms
+    rtol = float(np.clip(1e-3 * rms, 1e-12, 1e-9)) if np.isfinite(rms) and rms > 0 else 1e-12
+    exact = trace_states(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
     error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
     return MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))

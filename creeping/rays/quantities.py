@@ -6,7 +6,7 @@ With n the normal, p the ray's tangent, b = n × p, H the Hessian of F:
     integrals over s of  κₙ^(1/3),  κₙ^(2/3),  κₙ^(4/3),  κₙ^(1/3) κ_t,  κₙ^(4/3) (ρρ'' - (2/3) ρ'²)
     tan φ = -L J'/J, φ(0) = 0, L the body's size: floor(φ/π + 1/2) zeros of J are behind, and 1 + floor(φ/π) of J'
 
-Polynomials of degree 7 along the ray give κₙ' and κₙ'' (`creeping.rays.kernels.quantities`). Powers are taken after
+Polynomials of degree 9 along the ray give κₙ' and κₙ'' (`creeping.rays.kernels.quantities`). Powers are taken after
 interpolation, and the integrals end where κₙ first falls to 0: there the creeping ray ends.
 
 Sources: Derivations, R1, R5 and F4.
@@ -25,7 +25,7 @@ START_LANES = 9
 """d.x0, dσ⊥/dσ, κₙ, κₙ', κₙ'', κ_t and n at the launch point."""
 GAUSS = 4
 """Gauss points of a step."""
-GUARD = 4
+GUARD = 5
 """Steps traced beyond both ends, so that derivatives are central there too."""
 STEEPEST, SHARPEST = 4.0, 20.0
 """Bounds of |ρ'| and of |ρρ''|, |ρρ'' - (2/3) ρ'²|: where curvature varies faster, as it does before a ray detaches,

@@ -58,7 +58,7 @@ def shed_far(strips: tuple[Strip, ...], body: Surface, directions: FloatArray) -
     """Rays shed in the unit directions r (m, 3)."""
 
     def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
-        return some @ n, some @ b, some @ p > 0
+        return some @ n, some @ b, lambda row, at: np.sum(some[row] * p[:, at].T, axis=1) > 0
 
     def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
         residual = target - at.directions
@@ -75,8 +75,8 @@ def shed_near(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> S
     scale = size(body)
 
     def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
-        across, aside, along = (some @ v - np.sum(x * v, axis=0) for v in (n, b, p))
-        return across, aside, along > 0
+        across, aside = (some @ v - np.sum(x * v, axis=0) for v in (n, b))
+        return across, aside, lambda row, at: np.sum((some[row] - x[:, at].T) * p[:, at].T, axis=1) > 0
 
     def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
         away = target - at.points
@@ -105,7 +105,7 @@ def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> She
         return (
             e @ x - np.sum(e * y, axis=1, keepdims=True),
             f @ x - np.sum(f * y, axis=1, keepdims=True),
-            outward @ n > 0,
+            lambda row, at: np.sum(outward[row] * n[:, at].T, axis=1) > 0,
         )
 
     def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -119,7 +119,7 @@ def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> She
     return ShedRays(*found, np.zeros(len(found[0])))
 
 
-_Functions = tuple[FloatArray, FloatArray, BoolArray]
+_Functions = tuple[FloatArray, FloatArray, Callable[[IntArray, IntArray], BoolArray]]
 _Step = Callable[[RayPoints, tuple[FloatArray, FloatArray], FloatArray], tuple[FloatArray, FloatArray]]
 
 
@@ -157,10 +157,10 @@ def _seeds(
     block = max(1, BLOCK // max(1, len(x)))
     for first in range(0, len(targets), block):
         f, g, ahead = functions(targets[first : first + block], *fields)
-        both = _changes(f.reshape(-1, *shape)) & _changes(g.reshape(-1, *shape))
-        ahead = ahead.reshape(-1, *shape)
-        both &= ahead[:, :-1, :-1] | ahead[:, 1:, 1:]
-        row, ray, column = np.nonzero(both)
+        row, ray, column = np.nonzero(_changes(f.reshape(-1, *shape)) & _changes(g.reshape(-1, *shape)))
+        corner = ray * shape[1] + column
+        forward = ahead(row, corner) | ahead(row, corner + shape[1] + 1)
+        row, ray, column = row[forward], ray[forward], column[forward]
         found.append(
             (
                 row + first,
@@ -174,9 +174,10 @@ def _seeds(
 def _changes(values: FloatArray) -> BoolArray:
     """Cells (..., rays - 1, steps - 1) whose corners have not all one sign."""
     positive = values > 0
-    some = positive[:, :-1, :-1] | positive[:, 1:, :-1] | positive[:, :-1, 1:] | positive[:, 1:, 1:]
-    every = positive[:, :-1, :-1] & positive[:, 1:, :-1] & positive[:, :-1, 1:] & positive[:, 1:, 1:]
-    return np.asarray(some & ~every)
+    first = positive[:, :-1, :-1]
+    return np.asarray(
+        (first != positive[:, 1:, :-1]) | (first != positive[:, :-1, 1:]) | (first != positive[:, 1:, 1:])
+    )
 
 
 def _newton(

@@ -26,8 +26,8 @@ class Starts(NamedTuple):
     points : (n, 3), L
     state : (n,)
         Codes of `creeping.shadow.status.STATUSES`.
-    spacing : (n,), L
-        Length of the line that each stands for.
+    spacing, arclength : (n,), L
+        Length of the line that each stands for, and the position modulo the length of its curve.
     """
 
     arcs: list[Arc]
@@ -36,6 +36,7 @@ class Starts(NamedTuple):
     points: FloatArray
     state: IntArray
     spacing: FloatArray
+    arclength: FloatArray
 
     @classmethod
     def of(cls, line: ShadowLine, n_rays: int | None, launch_from: str) -> "Starts":
@@ -57,7 +58,9 @@ class Starts(NamedTuple):
             begin = float(position[mine[0]]) - (0.0 if closed else 0.5 * float(spacing[0]))
             found.append(Arc(curve, begin, begin + float(np.sum(spacing)), closed))
         state = launch.state[0, there].astype(np.int64)
-        return cls(found, arc, position, launch.points[0, there], state, launch.spacing[0, there])
+        return cls(
+            found, arc, position, launch.points[0, there], state, launch.spacing[0, there], launch.arclength[0, there]
+        )
 
     @classmethod
     def at(cls, line: ShadowLine, arcs: list[Arc], arc: IntArray, position: FloatArray) -> "Starts":
@@ -67,7 +70,8 @@ class Starts(NamedTuple):
             mine = np.flatnonzero(arc == number)
             points[mine] = line.curves[one.curve].at(position[mine])
             state[mine] = line.curves[one.curve].state_at(position[mine])
-        return cls(arcs, arc, position, points, state, np.full(len(arc), np.nan))
+        lengths = np.array([line.curves[one.curve].length for one in arcs])
+        return cls(arcs, arc, position, points, state, np.full(len(arc), np.nan), position % lengths[arc])
 
     def joined(self, more: "Starts") -> tuple["Starts", IntArray]:
         """Both in order, and where each comes from in the one followed by the other."""
@@ -81,16 +85,15 @@ class Starts(NamedTuple):
             # half the way to either neighbour
             ends = [s[-1] - long, *s, s[0] + long] if one.closed else [2 * one.start - s[0], *s, 2 * one.end - s[-1]]
             spacing[mine] = 0.5 * (np.array(ends[2:]) - np.array(ends[:-2]))
-        return Starts(self.arcs, arc, position, points[order], state[order], spacing), order
+        arclength = np.concatenate([self.arclength, more.arclength])[order]
+        return Starts(self.arcs, arc, position, points[order], state[order], spacing, arclength), order
 
     def launch_points(self, line: ShadowLine) -> LaunchPoints:
         """As launch points of one incidence."""
-        lengths = np.array([curve.length for curve in line.curves])
         curve = np.array([self.arcs[k].curve for k in self.arc], dtype=np.int64)
         rows: tuple[Any, ...] = (
             self.points,
-            self.position % lengths[curve] if len(curve) else self.position,
-            np.sum(self.points * line.direction, axis=1),
+            self.arclength,
             curve,
             self.arc.astype(float),
             self.spacing,

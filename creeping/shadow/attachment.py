@@ -33,8 +33,8 @@ class LaunchPoints:
         Unit vectors d.
     points : (n, rays, 3), L
         NaN where there is no ray, as below.
-    arclength, phase : (n, rays), L
-        Along the curve, and d.x0.
+    arclength : (n, rays), L
+        Along the curve.
     curve_index : (n, rays)
         The longest curve is 0; NO_RAY where there is no ray.
     arc_index, spacing, closed : (n, rays)
@@ -46,7 +46,6 @@ class LaunchPoints:
     directions: FloatArray
     points: FloatArray
     arclength: FloatArray
-    phase: FloatArray
     curve_index: IntArray
     arc_index: FloatArray
     spacing: FloatArray
@@ -56,12 +55,17 @@ class LaunchPoints:
     @classmethod
     def unpacked(cls, directions: FloatArray, launched: FloatArray, places: Any) -> "LaunchPoints":
         """From what the kernels fill, (n, rays, LAUNCHED) and (n, rays)."""
-        from creeping.shadow.kernels.trace import ARC, ARCLENGTH, CLOSED, PHASE, SPACING, STATE
+        from creeping.shadow.kernels.trace import ARC, ARCLENGTH, CLOSED, SPACING, STATE
 
-        arclength, phase = launched[..., ARCLENGTH], launched[..., PHASE]
-        arc, spacing, closed = launched[..., ARC], launched[..., SPACING], launched[..., CLOSED]
+        arclength, arc = launched[..., ARCLENGTH], launched[..., ARC]
+        spacing, closed = launched[..., SPACING], launched[..., CLOSED]
         state = launched[..., STATE]
-        return cls(directions, launched[..., :3], arclength, phase, places, arc, spacing, closed, state)
+        return cls(directions, launched[..., :3], arclength, places, arc, spacing, closed, state)
+
+    @property
+    def phase(self) -> FloatArray:
+        """d.x0 (n, rays), L."""
+        return np.asarray(np.sum(self.points * self.directions[:, None], axis=-1))
 
     @property
     def there(self) -> BoolArray:

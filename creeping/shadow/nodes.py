@@ -50,7 +50,8 @@ class LineNodes:
     @property
     def length(self) -> float:
         """Length of all curves, L."""
-        return float(np.sum(self.spacing * np.diff(self.starts)))
+        # one after the other, as the kernels add them
+        return float(sum(self.spacing * np.diff(self.starts)))
 
 
 @dataclass(frozen=True, eq=False)

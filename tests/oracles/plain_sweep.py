@@ -54,8 +54,7 @@ class PlainSweeper:
         out["incidence_status"][row] = OK
         out["curves"][row] = len(line.curves)
         out["line_length"][row] = line.length
-        # panels are exact to rounding
-        out["line_error"][row] = 1e-12
+        out["line_error"][row] = line.nodes.error
         for name, share in line.fractions.items():
             out[name][row] = share
         out["singular_distance"][row] = line.singular_distance

@@ -9,7 +9,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project, size
 from creeping.rays.body_uncertainty import body_error
-from creeping.rays.fan import ROUGH_SPACING
+from creeping.rays.nonsmooth import ROUGH_SPACING
 
 EXACT = sc.Ellipsoid(1.0, 0.8, 0.6)
 INCIDENCE = (0.3, 0.5, 0.81)

@@ -33,7 +33,7 @@ def test_spreading_is_the_distance_of_neighbouring_rays(body, direction, phase_m
     fan = cr.launch(phase_map(body), cr.shadow_line(body, direction), length=1.5, n_rays=24, n_steps=16, max_gap=np.inf)
     expected = across_difference(fan, 1e-4)
     # next to a caustic a relative error means nothing
-    before_caustic = (fan.caustic_index == 0) & (np.abs(fan.spreading) > 0.05)
+    before_caustic = (fan.caustic_index == 0) & (np.abs(fan.spreading) > 0.1)
     error = np.abs(fan.spreading - expected)[before_caustic] / np.abs(expected[before_caustic])
     assert before_caustic.sum() > 100
     assert error.max() < SPREADING
@@ -154,7 +154,7 @@ def test_stalled_rays_are_marked_not_silent(phase_map):
     [
         ({"length": 0.0}, "length"),
         ({"length": float("nan")}, "length"),
-        ({"length": 1.0, "status": "lit"}, "status"),
+        ({"length": 1.0, "launch_from": "lit"}, "launch_from"),
         ({"length": 1.0, "n_rays": 0}, "n_rays"),
         ({"length": 1.0, "n_steps": 1.5}, "n_steps"),
         ({"length": 1.0, "max_gap": 0.0}, "max_gap"),

@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal
-from creeping.rays.observer_contour import HorizonGrid, forward_nodes, joints
+from creeping.rays.observer_contour import forward_nodes, joints
 from creeping.rays.strips import strips_of
 
 D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
@@ -26,45 +26,6 @@ def fans():
 
 def directions_at(*angles):
     return np.array([np.cos(a) * D + np.sin(a) * E for a in angles])
-
-
-def test_crossings_of_the_sphere_in_closed_form(fans):
-    theta = np.array([0.5, 1.2, 2.5])
-    r = directions_at(*theta)
-    strips = strips_of(fans["sphere"])
-    grid = HorizonGrid(strips, SPHERE, 0.05)
-    nodes = grid.crossings(np.arange(3), r)
-    for k in range(3):
-        mine = nodes.observer == k
-        # x = a (cos(s/a) u + sin(s/a) d), n.r = 0: tan(s/a) = -tan θ cos α; each ray has one with p.r > 0 in 2πa
-        x0 = nodes.rays.first_normal[mine]
-        t = nodes.rays.time[mine] / RADIUS
-        height = np.cos(t) * (x0 @ r[k]) + np.sin(t) * (D @ r[k])
-        np.testing.assert_allclose(height, 0, atol=1e-8)
-        assert np.all(-np.sin(t) * (x0 @ r[k]) + np.cos(t) * (D @ r[k]) > 0)
-        # rays 4 in units of a are shorter than 2π: the root lies within them or not
-        sigma, _, _, step = grid.parts[0]
-        first = strips[0].first_normals(sigma)
-        root = np.mod(-np.arctan2(first @ r[k], D @ r[k]), 2 * np.pi)
-        assert np.sum(mine) == np.sum(root < 8.0 / RADIUS)
-        np.testing.assert_allclose(nodes.weight[mine], step, rtol=1e-6)
-
-
-def test_only_wanted_observers_are_served(fans):
-    r = directions_at(0.5, 1.2, 2.5)
-    nodes = HorizonGrid(strips_of(fans["sphere"]), SPHERE, 0.1).crossings(np.array([2]), r)
-    assert set(nodes.observer) == {2}
-    none = HorizonGrid(strips_of(fans["sphere"]), SPHERE, 0.1).crossings(np.zeros(0, dtype=int), r)
-    assert len(none.observer) == 0
-
-
-def test_crossings_of_the_ellipsoid_lie_on_the_horizon(fans):
-    r = directions_at(0.4, 1.0, 1.9, 3.0)
-    nodes = HorizonGrid(strips_of(fans["triaxial"]), TRIAXIAL, 0.05).crossings(np.arange(4), r)
-    n = normal(TRIAXIAL, nodes.rays.points)
-    np.testing.assert_allclose(np.sum(n * r[nodes.observer], axis=1), 0, atol=1e-7)
-    assert np.all(np.sum(nodes.rays.directions * r[nodes.observer], axis=1) > 0)
-    assert np.all(nodes.weight > 0)
 
 
 def test_joints_of_the_sphere_are_across_both_directions(fans):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oracles.quantities import ray_points as oracle
 from scipy.integrate import solve_ivp
 from tolerances import ALONG_RAY, CURVATURE_BEND
 
@@ -9,9 +10,11 @@ import creeping as cr
 import scatterers as sc
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.surface import normal
-from creeping.rays.quantities import GUARD, substeps
-from creeping.rays.quantities import ray_points as points_of
+from creeping.rays.tracer import RayTracer
+from creeping.rays.tracer import ray_points as points_of
 
+LANES_ALIKE = [(slice(0, 9), 1e-6), ([9, 12], 1e-6), (10, 1e-4), (11, 1e-2), (slice(13, 17), 1e-6), (17, 5e-3)]
+"""Lanes, and how well polynomials of degree 9 and splines know them: each derivative costs digits."""
 INCIDENCE = (0.3, 0.5, 0.81)
 TRIAXIAL = sc.Ellipsoid(1.0, 0.8, 0.6)
 
@@ -70,7 +73,7 @@ def curvatures_along(body, x0, d, length, step):
 
 def test_ellipsoid_against_a_direct_trace():
     fan = launched(TRIAXIAL, length=2.0)
-    s, rays = points_of(fan)
+    s, rays = points_of(fan, np.linspace(0.0, 2.0, 49))
     step = 2.0 / 1920
     for ray in (1, 6):
         t, kappa, across = curvatures_along(TRIAXIAL, fan.points[ray, 0], fan.directions[ray, 0], 2.0, step)
@@ -173,14 +176,41 @@ def test_rays_that_the_wave_does_not_launch_are_not_alive():
     assert not np.any(rays.alive[idle])
 
 
-def test_steps_are_no_coarser_than_those_of_the_fan():
+def test_times_of_the_fan_itself():
     for n_steps in (2, 5, 40, 300):
         fan = launched(TRIAXIAL, n_steps=n_steps, n_rays=3)
-        s, rays = points_of(fan)
-        parts = substeps(fan)
-        np.testing.assert_allclose(s[::parts], fan.travel_time, atol=1e-12)
-        np.testing.assert_allclose(rays.points[:, ::parts], fan.points, atol=1e-9)
-        assert len(s) > 2 * GUARD
+        s, rays = points_of(fan, fan.travel_time)
+        np.testing.assert_array_equal(s, fan.travel_time)
+        np.testing.assert_allclose(rays.points, fan.points, atol=1e-9)
+        np.testing.assert_allclose(rays.spreading, fan.spreading, atol=1e-8)
+
+
+@pytest.mark.parametrize("body", [TRIAXIAL, sc.TwistedEllipsoid(), sc.Torus()])
+def test_quantities_are_those_of_splines_along_the_rays(body):
+    fan = launched(body, (1, 1, 1), n_rays=24, n_steps=60)
+    times, plain = oracle(fan)
+    _, found = points_of(fan, times)
+    # next to a detachment the spline smears what the polynomial through eight steps does not
+    clear = (fan.detachment[:, None] > times + 0.2) | (fan.detachment[:, None] < times - 0.2)
+    assert np.mean(clear) > 0.5
+    for lanes, tolerance in LANES_ALIKE:
+        some, exact = found.lanes[clear & plain.alive][:, lanes], plain.lanes[clear & plain.alive][:, lanes]
+        np.testing.assert_allclose(some, exact, rtol=0, atol=tolerance * max(1.0, float(np.max(np.abs(exact)))))
+    known = [0, 1, 2, 5, 6, 7, 8]
+    np.testing.assert_allclose(found.starts[..., known], plain.starts[..., known], atol=1e-8)
+    np.testing.assert_array_equal(found.alive[clear], plain.alive[clear])
+
+
+def test_a_ray_does_not_depend_on_those_it_is_traced_with(rng):
+    fan = launched(sc.TwistedEllipsoid(), n_rays=300)
+    tracer, d = RayTracer(fan.body, 3.0), np.broadcast_to(fan.line.direction, (len(fan.points), 3))
+    starts, tangents = tracer.onto_line(fan.points[:, 0], d)
+    times = rng.uniform(0, 3, len(starts))
+    whole = tracer.at(d, starts, tangents, times).rays
+    for row in (0, 17, 250):
+        one = tracer.at(d[row : row + 1], starts[row : row + 1], tangents[row : row + 1], times[row : row + 1]).rays
+        np.testing.assert_array_equal(one.lanes[0], whole.lanes[row])
+        np.testing.assert_array_equal(one.starts[0], whole.starts[row])
 
 
 def test_an_index_keeps_the_lanes_together():

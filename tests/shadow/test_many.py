@@ -6,8 +6,10 @@ from tolerances import FRACTION, LINE_LENGTH
 
 import creeping as cr
 import scatterers as sc
-from creeping.shadow.many import prepared, shadow_lines
-from creeping.shadow.meshes import line_meshes, neighbours_of
+from creeping.shadow.following import followed
+from creeping.shadow.many import shadow_lines
+from creeping.shadow.meshes import LineMeshes, neighbours_of
+from creeping.shadow.nodes import finished, prepared
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
 
 BODIES = {
@@ -31,18 +33,22 @@ def directions(n, rng):
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_agrees_with_panels(name, rng):
+def test_is_the_shadow_line_of_each_and_that_of_panels(name, rng):
     body = BODIES[name]
     d = directions(12, rng)
     lines = shadow_lines(body, d, 64)
     for row in np.flatnonzero(lines.status == OK):
         line = cr.shadow_line(body, d[row])
         assert lines.curves[row] == len(line.curves)
-        assert lines.length[row] == pytest.approx(line.length, rel=3 * LINE_LENGTH)
+        assert lines.length[row] == pytest.approx(line.length, rel=1e-14)
         for status in STATUSES:
-            assert getattr(lines, status)[row] == pytest.approx(line.fractions[status], abs=FRACTION)
-        if np.isfinite(lines.singular_distance[row]):
-            assert lines.singular_distance[row] == pytest.approx(line.singular_distance, abs=2e-3)
+            assert getattr(lines, status)[row] == pytest.approx(line.fractions[status], abs=1e-14)
+        np.testing.assert_array_equal(line.launch_points(64).points[0], lines.launch.points[row])
+        nodes, panels, distance = followed(body, line.direction)
+        assert line.length == pytest.approx(sum(curve.length for curve in panels), rel=1e-10)
+        shares = finished(body, line.direction, nodes, 0).shares
+        assert list(line.fractions.values()) == pytest.approx(list(shares), abs=1e-8)
+        assert lines.singular_distance[row] == pytest.approx(distance, abs=2e-3)
     assert np.mean(lines.status == OK) > 0.8
 
 
@@ -67,28 +73,28 @@ def test_published_lines(name, direction, length, shares):
 def test_rays_start_on_the_attached_line(rng):
     body = BODIES["torus"]
     lines = shadow_lines(body, directions(20, rng), 96)
-    there = lines.curve_index != NO_RAY
+    there = lines.launch.curve_index != NO_RAY
     assert there.all()
-    x = lines.launch_points
+    x = lines.launch.points
     normals = body.gradient(x)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     assert np.max(np.abs(body.level(x))) < 1e-9
     assert np.max(np.abs(np.einsum("nri,ni->nr", normals, lines.directions))) < 1e-9
     kappa = np.einsum("nri,nrij,nj->nr", lines.directions[:, None] + 0 * x, body.hessian(x), lines.directions)
     assert np.all(kappa > 0)
-    np.testing.assert_allclose(np.einsum("nri,ni->nr", x, lines.directions), lines.launch_phase, atol=1e-14)
+    np.testing.assert_allclose(np.einsum("nri,ni->nr", x, lines.directions), lines.launch.phase, atol=1e-14)
     # every arc's rays stand for its length
     attached = lines.attached * lines.length
-    np.testing.assert_allclose(np.sum(lines.spacing, axis=1), attached, rtol=1e-12)
-    assert np.all(lines.curve_index[:, 0] == 0)
+    np.testing.assert_allclose(np.sum(lines.launch.spacing, axis=1), attached, rtol=1e-12)
+    assert np.all(lines.launch.curve_index[:, 0] == 0)
 
 
 def test_neighbouring_rays_are_a_spacing_apart(rng):
     lines = shadow_lines(BODIES["twisted"], directions(10, rng), 256)
-    gap = np.linalg.norm(np.diff(lines.launch_points, axis=1), axis=2)
-    same = np.diff(lines.arc_index, axis=1) == 0
+    gap = np.linalg.norm(np.diff(lines.launch.points, axis=1), axis=2)
+    same = np.diff(lines.launch.arc_index, axis=1) == 0
     # chords are shorter than arcs, by 20 degrees of turning at most here
-    assert np.all(np.abs(gap / lines.spacing[:, 1:] - 1)[same] < 1e-2)
+    assert np.all(np.abs(gap / lines.launch.spacing[:, 1:] - 1)[same] < 1e-2)
 
 
 def test_singular_incidences_are_refused_and_those_near_reported():
@@ -96,7 +102,7 @@ def test_singular_incidences_are_refused_and_those_near_reported():
     near = [unit(1, 0, v) for v in (1e-8, 1e-5, 1e-3, 0.3)]
     lines = shadow_lines(body, np.array(near), 32)
     assert lines.status[0] == SINGULAR
-    assert np.isnan(lines.length[0]) and np.all(lines.curve_index[0] == NO_RAY)
+    assert np.isnan(lines.length[0]) and np.all(lines.launch.curve_index[0] == NO_RAY)
     assert lines.status[1] in (SINGULAR, NEAR_SINGULAR, FOLLOWED)
     assert lines.status[3] == OK
     np.testing.assert_allclose(lines.singular_distance[2:], [1e-3, unit(1, 0, 0.3)[2]], rtol=1e-3)
@@ -112,14 +118,14 @@ def test_what_the_meshes_do_not_resolve_is_followed():
     assert lines.status[0] in (FOLLOWED, NEAR_SINGULAR)
     assert lines.curves[0] == len(line.curves) == 2
     assert lines.length[0] == pytest.approx(line.length, rel=1e-6)
-    assert np.sum(lines.spacing[0]) == pytest.approx(line.length * line.fractions["attached"], rel=1e-6)
+    assert np.sum(lines.launch.spacing[0]) == pytest.approx(line.length * line.fractions["attached"], rel=1e-6)
 
 
 def test_an_incidence_does_not_depend_on_its_company(rng):
     body = BODIES["peanut"]
     d = directions(40, rng)
     whole, one = shadow_lines(body, d, 64), shadow_lines(body, d[17:18], 64)
-    np.testing.assert_array_equal(whole.launch_points[17], one.launch_points[0])
+    np.testing.assert_array_equal(whole.launch.points[17], one.launch.points[0])
     assert whole.length[17] == one.length[0]
 
 
@@ -133,9 +139,10 @@ def test_singular_directions_of_the_torus():
 
 
 def test_meshes_are_closed_and_turn_less_and_less():
-    meshes = line_meshes(BODIES["twisted"])
-    assert np.all(np.diff(meshes.turns) < 0)
-    for vertices, _, triangles, neighbours, *_ in meshes.meshes:
+    body = BODIES["twisted"]
+    meshes = LineMeshes(body)
+    assert np.all(np.diff([meshes.turn(tier) for tier in range(meshes.count)]) < 0)
+    for vertices, _, triangles, neighbours, *_ in map(meshes.packed, range(meshes.count)):
         assert vertices.shape[1] - len(triangles) // 2 == 2
         t = np.arange(len(triangles))
         for edge in range(3):
@@ -153,11 +160,8 @@ def test_thousand_directions_against_the_finest_mesh(name, monkeypatch):
     body = BODIES[name]
     d = cr.fibonacci_directions(1000)
     found = shadow_lines(body, d, 32)
-    from creeping.shadow import many as module
-
-    lines = prepared(body)
-    finest = type(lines)((lines.meshes[2],) * 3, lines.critical, lines.coarsest)
-    monkeypatch.setitem(module._PREPARED, id(body), finest)
+    meshes = prepared(body)
+    monkeypatch.setattr(meshes, "_packed", {tier: meshes.packed(2) for tier in range(meshes.count)})
     exact = shadow_lines(body, d, 32)
     sure = (found.status == OK) & (exact.status == OK)
     assert np.mean(sure) > 0.98

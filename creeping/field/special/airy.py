@@ -20,8 +20,12 @@ from creeping._typing import ArrayLike, ComplexArray, FloatArray
 
 MODES = 10
 """Modes summed; with them the series holds to 4e-4 at xi = 0.7 and to 1e-7 at xi = 1.3."""
-FAR = 500.0
-"""|z| beyond which the expansion of Ai is used: its next term is 1e-12 there."""
+FAR, TERMS = 9.0, 17
+"""|z| beyond which the expansion of Ai is used, and its terms: the next one is 2e-13 there,"""
+SECTOR = 2.1
+"""within this angle of the positive axis, where the other exponential is small against it,"""
+FARTHEST = 500.0
+"""and |z| beyond which it is used everywhere, for library routines give up."""
 SMALLEST = 1e-9
 """Step in q below which roots are taken as they are: q lies on a branch point, where two of them are one."""
 MANY, CHEBYSHEV = 500, 40
@@ -40,17 +44,39 @@ def w1(t: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
 
 
 def scaled_ai(z: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Ai and Ai' without their factor e^{-ζ}, and ζ = (2/3) z^(3/2), principal branch, any shape."""
+    """Ai and Ai' without their factor e^{-ζ}, and ζ = (2/3) z^(3/2), principal branch, any shape.
+
+    Beyond |z| = FAR, away from the negative axis, by their expansions [AS64, sec. 10.4]: a tenth of the library's time.
+    """
     z = np.asarray(z, dtype=complex)
-    zeta = 2 / 3 * z * np.sqrt(z)
-    value, slope, _, _ = airye(z)
-    far = np.abs(z) > FAR
-    if np.any(far):
-        # library routines give up at large |z|; three terms of the expansion are exact there
-        root, inverse = np.sqrt(np.sqrt(z[far])), 1 / zeta[far]
-        value[far] = (1 - inverse * 5 / 72 + inverse**2 * 385 / 10368) / (2 * np.sqrt(np.pi) * root)
-        slope[far] = -(1 + inverse * 7 / 72 - inverse**2 * 455 / 10368) * root / (2 * np.sqrt(np.pi))
+    root = np.sqrt(z)
+    zeta = 2 / 3 * z * root
+    far = (np.abs(z) > FAR) & ((np.abs(np.angle(z)) < SECTOR) | (np.abs(z) > FARTHEST))
+    if not np.any(far):
+        value, slope, _, _ = airye(z)
+        return value, slope, zeta
+    value, slope = np.empty_like(z), np.empty_like(z)
+    value[~far], slope[~far] = airye(z[~far])[:2]
+    inverse, quarter = 1 / zeta[far], np.sqrt(root[far])
+    u, v = _expansion()
+    even, odd = np.full_like(inverse, u[-1]), np.full_like(inverse, v[-1])
+    for a, b in zip(u[-2::-1], v[-2::-1], strict=True):
+        even = even * inverse + a
+        odd = odd * inverse + b
+    value[far] = even / (2 * np.sqrt(np.pi) * quarter)
+    slope[far] = odd * quarter / (-2 * np.sqrt(np.pi))
     return value, slope, zeta
+
+
+@cache
+def _expansion() -> tuple[FloatArray, FloatArray]:
+    """Coefficients of powers of -1/ζ, signs included, in the expansions of Ai and Ai'."""
+    u = [1.0]
+    for k in range(1, TERMS):
+        u.append(u[-1] * (6 * k - 5) * (6 * k - 3) * (6 * k - 1) / (216 * k * (2 * k - 1)))
+    number = np.arange(TERMS)
+    sign = (-1.0) ** number
+    return sign * np.array(u), -sign * np.array(u) * (6 * number + 1) / (6 * number - 1)
 
 
 @dataclass(frozen=True)

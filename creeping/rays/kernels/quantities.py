@@ -1,7 +1,7 @@
 """Compiled twin of `creeping.rays.quantities` at one point of each ray: what the wave needs to know there.
 
 The ray is given at equal steps, GUARD of them before its launch point and beyond its end. On each step a polynomial of
-degree 7 through eight steps, four on either side, stands for x, p, J, J' and the curvatures; its derivatives are
+degree 9 through ten steps, five on either side, stands for x, p, J, J' and the curvatures; its derivatives are
 those along the ray, and powers of curvature are taken after interpolation.
 
 Sources: Derivations, R1 and R5.
@@ -19,9 +19,14 @@ WIDTH = 2 * GUARD
 
 
 def polynomial_matrix() -> np.ndarray:
-    """Coefficients of powers of u of the polynomials through the places -3 ... 4: (powers, places)."""
-    places = np.arange(WIDTH) - (GUARD - 1.0)
-    return np.ascontiguousarray(np.linalg.inv(np.vander(places, WIDTH, increasing=True)))
+    """Coefficients of powers of u of the Lagrange polynomials of the places 1 - GUARD ... GUARD: (powers, places)."""
+    places = np.arange(1.0 - GUARD, GUARD + 1.0)
+    columns = []
+    for place in places:
+        # products of whole numbers: exact, where an inverse of their powers loses seven digits
+        others = places[places != place]
+        columns.append(np.polynomial.polynomial.polyfromroots(others) / np.prod(place - others))
+    return np.ascontiguousarray(np.stack(columns, axis=1))
 
 
 @njit(**options)
@@ -38,7 +43,7 @@ def _weights(matrix, u, step, w):
 
 @njit(**options)
 def _applied(w, row, values, k):
-    """Product of a row of weights with eight values around step k."""
+    """Product of a row of weights with the values around step k."""
     total = 0.0
     for j in range(WIDTH):
         total += w[row, j] * values[k + j - GUARD + 1]
@@ -119,7 +124,8 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
         i = k + GUARD
         totals[k + 1] = totals[k]
         positive = good[k]
-        for q in range(GAUSS):
+        # where the creeping ray has ended, the integrals stay
+        for q in range(GAUSS if positive else 0):
             curved = _applied(weights[q], 0, kappa, i)
             positive &= curved > 0.0
             _add(
@@ -220,7 +226,7 @@ def quantities_at(
             lanes[point, 8] = _turned(angles[last], lanes[point, 6], lanes[point, 7], scale)
             positive = good[last]
             total[:] = totals[last]
-            for q in range(GAUSS if part > 0.0 else 0):
+            for q in range(GAUSS if part > 0.0 and positive else 0):
                 _weights(matrix, part * nodes[q], step, w)
                 curved = _applied(w, 0, kappa, i)
                 positive &= curved > 0.0

@@ -30,10 +30,10 @@ from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY
 CURVES, LENGTH, ERROR, SHARES = 0, 1, 2, 3
 """Components of what is known of a line: curves, length, its relative error, shares of the three states; SUMMARY."""
 SUMMARY = 6
-ARCLENGTH, PHASE, ARC, SPACING, CLOSED, STATE = 3, 4, 5, 6, 7, 8
-"""Components of a launch point beside x0: arclength, d.x0, number of its arc, spacing of its rays, 1 if the arc is a
+ARCLENGTH, ARC, SPACING, CLOSED, STATE = 3, 4, 5, 6, 7
+"""Components of a launch point beside x0: arclength, number of its arc, spacing of its rays, 1 if the arc is a
 whole curve, state of the line; LAUNCHED in all."""
-LAUNCHED = 9
+LAUNCHED = 8
 COMPONENTS = 16
 """Curves of a line at most."""
 COARSE_STEP = 0.22
@@ -42,9 +42,9 @@ REACH, MORE = 0.5, 4
 """Longest step of a node, in edges, and steps more that a flagged line takes."""
 APART = 0.45
 """Least distance of kept nodes, in edges."""
-LOST, UNSETTLED, SETTLED = 1e-3, 1e-6, 2e-6
+LOST, UNSETTLED, SETTLED, PRECISE = 1e-3, 1e-6, 2e-6, 1e-7
 """Last step of the final nodes, in body sizes, that flags a line and that sends it to the next mesh; relative error of
-its length that does."""
+its length by orders 4 and 8 that does."""
 
 
 @njit(**options)
@@ -220,12 +220,12 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
             if own == FAILED:
                 return nothing
             spacing[c] = own / size
-            length, error, rough = length + own, error + off, rough + coarse
+            length, error, rough = length + spacing[c] * size, error + off, rough + coarse
             if again == 0:
                 equalise(y, slopes, starts[c], size, own, h)
         if again == 0 and not newton(level, level_par, d, y, reach, scratch, U, kappa) < LOST * extent:
             return nothing
-    sure &= rough < SETTLED * length
+    sure &= rough < SETTLED * length and error < PRECISE * length
     return True, sure, components, length, error / length
 
 
@@ -282,10 +282,8 @@ def finish(
     for m in range(filled):
         c = places[m]
         place = launched[m, ARCLENGTH] / spacing[c]
-        launched[m, PHASE] = 0.0
         for axis in range(3):
             launched[m, axis] = points[axis, m]
-            launched[m, PHASE] += d[axis] * points[axis, m]
         if every:
             # rounding may leave a place between two arcs: a concave point launches no creeping ray
             launched[m, STATE] = CONCAVE

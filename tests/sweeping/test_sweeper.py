@@ -1,0 +1,144 @@
+"""Fields of many incidences: `far_field` one by one to the last bit, reciprocity, and the exact sphere."""
+
+import numpy as np
+import pytest
+from oracles.plain_sweep import PlainSweeper
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.far_geometry import FarGeometry
+from creeping.rays.tracer import RayTracer
+from creeping.shadow.many import shadow_lines
+from creeping.sweeping.request import sweep_request
+from creeping.sweeping.sweeper import Sweeper
+from studies.reference import sphere
+
+TRIAXIAL, TWISTED = sc.Ellipsoid(1.2, 0.8, 0.6), sc.TwistedEllipsoid()
+DIRECTIONS = np.array([[0.3, 0.5, 0.812], [-0.7, 0.2, 0.4], [0.1, -0.8, 0.5]])
+DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
+
+
+def geometry_of(flow, d, n_rays, length):
+    launch = shadow_lines(flow.body, d, n_rays).launch
+    return FarGeometry(flow, launch, RayTracer(flow.body, length), -d[:, None], lambda _: pytest.fail("no lobe here"))
+
+
+@pytest.mark.parametrize("body", [TRIAXIAL, TWISTED, sc.Torus()])
+@pytest.mark.parametrize("quantity", ["monostatic", "bistatic"])
+def test_a_sweep_is_far_field_one_by_one_to_the_last_bit(quantity, body):
+    seen = {"observation": cr.fibonacci_directions(7)} if quantity == "bistatic" else {}
+    options = {"length": 3.0, "n_rays": 64, "wavenumbers": [15.0, 60.0], "boundary": ["soft", "hard", "pec"]}
+    request = sweep_request(quantity, **options, **seen)
+    flow = cr.DirectFlow(body, rtol=1e-8)
+    found, plain = Sweeper(flow, request)(DIRECTIONS), PlainSweeper(flow, request)(DIRECTIONS)
+    for name in found:
+        np.testing.assert_array_equal(found[name], plain[name], err_msg=name)
+
+
+def test_a_body_with_numpy_methods_only_sweeps(rng):
+    exact = sc.Ellipsoid(1.2, 0.8, 0.6)
+    names = ("level", "gradient", "hessian", "bounds", "parameters")
+    plain = type("Plain", (), {})()
+    for name in names:
+        setattr(plain, name, getattr(exact, name))
+    plain.atlas = type("Atlas", (), {"charts": exact.atlas.charts, "locate": exact.atlas.locate})()
+    request = sweep_request("monostatic", length=3.0, n_rays=64, wavenumbers=[20.0], boundary="hard")
+    one, other = (Sweeper(cr.DirectFlow(body, rtol=1e-8), request)(DIRECTIONS) for body in (exact, plain))
+    np.testing.assert_allclose(one["line_length"], other["line_length"], rtol=1e-11)
+    for name in ("creeping", "reflected"):
+        np.testing.assert_allclose(one[name], other[name], rtol=1e-4)
+
+
+def test_rays_there_and_back_are_one():
+    # every ray shed towards r = -d, reversed, is another one
+    geometry = geometry_of(cr.DirectFlow(TWISTED, rtol=1e-8), DIRECTIONS, 256, 4.0)
+    rays = geometry.shed.rays
+    for row in range(3):
+        mine = np.flatnonzero(geometry.shed.observer == row)
+        assert len(mine) >= 4 and len(mine) % 2 == 0
+        order = np.argsort(rays.time[mine])
+        pairs = mine[order].reshape(-1, 2)
+        np.testing.assert_allclose(rays.time[pairs[:, 0]], rays.time[pairs[:, 1]], atol=1e-4)
+        alive = rays.alive[pairs].all(axis=1)
+        # J' and the integrals are the same both ways, curvature at one end is that at the other
+        one, two = pairs[alive].T
+        np.testing.assert_allclose(rays.spreading_rate[one], rays.spreading_rate[two], rtol=1e-3)
+        np.testing.assert_allclose(rays.integrals[one, :4], rays.integrals[two, :4], rtol=1e-4)
+        np.testing.assert_allclose(rays.curvature[0][one], rays.curvature[1][two], rtol=1e-3)
+
+
+def test_shed_rays_leave_backwards():
+    geometry = geometry_of(cr.DirectFlow(TRIAXIAL, rtol=1e-8), DIRECTIONS, 128, 4.0)
+    shed = geometry.shed
+    np.testing.assert_allclose(shed.rays.directions, -DIRECTIONS[shed.observer], atol=3e-5)
+    n = geometry.shed_normals
+    assert np.max(np.abs(np.sum(n * DIRECTIONS[shed.observer], axis=1))) < 3e-5
+    # an ellipsoid has two pairs
+    assert np.bincount(shed.observer).tolist() == [4, 4, 4]
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
+def test_sphere_backscatter(boundary):
+    ka = np.array([10.0, 20.0, 40.0])
+    request = sweep_request("monostatic", length=4.5, wavenumbers=ka, boundary=boundary)
+    found = Sweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-9), request)(np.array([[0.0, 0.6, 0.8]]))
+    exact = np.array([sphere.far_field(k, 1.0, np.array([-1.0]), boundary)[0] for k in ka])
+    total = (found["creeping"] + found["reflected"])[0, 0]
+    assert np.all(np.abs(total - exact) < 0.02 * np.abs(exact))
+
+
+def test_a_body_smaller_than_a_wavelength_has_its_forward_lobe_all_round():
+    body = sc.Sphere(0.01)
+    request = sweep_request("monostatic", length=0.04, wavenumbers=[1.0], boundary="soft", n_rays=32)
+    flow = cr.DirectFlow(body, rtol=1e-8)
+    found, plain = (route(flow, request)(DIRECTIONS[:1]) for route in (Sweeper, PlainSweeper))
+    np.testing.assert_array_equal(found["creeping"], plain["creeping"])
+    np.testing.assert_array_equal(found["reflected"], plain["reflected"])
+
+
+@pytest.mark.parametrize("semiaxes", [(1.2, 0.8, 0.8), (1.0, 0.7, 0.5)])
+def test_no_ray_is_counted_twice_or_lost(semiaxes):
+    # found 2026-11-21: two searches for one ray, 1e-6 apart, made two; rays next to the box's faces counted as hidden
+    body = sc.Ellipsoid(*semiaxes)
+    d = np.concatenate([cr.fibonacci_directions(200), np.eye(3)])
+    for flow in (cr.DirectFlow(body, rtol=1e-8), cr.build_phase_map(body, tolerance=3e-5, length=4.5, outputs=9)):
+        geometry = geometry_of(flow, d, 128, 4.5)
+        shed = geometry.shed
+        assert np.all(geometry.leaves)
+        for row in range(200):
+            mine = np.flatnonzero(shed.observer == row)
+            # a way there and its way back
+            assert len(mine) % 2 == 0
+            x = shed.rays.points[mine]
+            apart = np.linalg.norm(x[:, None] - x, axis=-1) + 10 * np.eye(len(mine))
+            assert np.min(apart, initial=10) > 1e-3
+
+
+def test_backscatter_has_no_plane_of_incidence():
+    # found 2026-11-21: any tangent was taken, and which one depended on rounding
+    body = sc.Ellipsoid(1, 0.7, 0.5)
+    d = np.array([[0.5 - 1e-7, 0.5, 0.9], [0.5 + 1e-7, 0.5, 0.9]])
+    request = sweep_request("monostatic", length=4.0, n_rays=64, wavenumbers=[20.0], boundary=["soft", "hard", "pec"])
+    found = Sweeper(cr.DirectFlow(body, rtol=1e-8), request)(d / np.linalg.norm(d, axis=1, keepdims=True))
+    for name in ("reflected", "reflected_pec"):
+        np.testing.assert_allclose(found[name][0], found[name][1], rtol=1e-4, atol=1e-6)
+    ball = Sweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-8), request)(d[:1] / np.linalg.norm(d[0]))
+    whole = (ball["creeping_pec"] + ball["reflected_pec"])[0, 0]
+    np.testing.assert_allclose(whole[0, 0], -whole[1, 1], rtol=1e-6)
+
+
+def test_flat_ground_is_unresolved_not_nan():
+    body = sc.Torus()
+    request = sweep_request("monostatic", length=4.0, n_rays=64, wavenumbers=[20.0], boundary=["soft", "hard"])
+    found = Sweeper(cr.DirectFlow(body, rtol=1e-8), request)(np.array([[0, 0, 1.0]]))
+    assert np.all(np.isfinite(found["reflected"])) and np.all(found["unresolved"])
+
+
+def test_very_long_rays_of_a_sphere():
+    # found 2026-11-21: each crossing of the horizon wants room
+    request = sweep_request("monostatic", length=60.0, n_rays=16, wavenumbers=[20.0], boundary="soft")
+    found = Sweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-8), request)(DIRECTIONS[:1])
+    short = sweep_request("monostatic", length=4.5, n_rays=64, wavenumbers=[20.0], boundary="soft")
+    once = Sweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-8), short)(DIRECTIONS[:1])
+    # the second time round the wave is gone
+    np.testing.assert_allclose(found["creeping"], once["creeping"], rtol=1e-3)
