@@ -192,7 +192,7 @@ def test_check_passes(name):
 
 def test_phase_map_in_space(rng):
     body = covered("ellipsoid")
-    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(16, 24), order=5, method="direct", cache=False)
+    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(16, 24), degree=5, method="direct", cache=False)
     print(f"rms {flow.error.rms:.1e}, max {flow.error.max:.1e}")
     # 1.3e-8 measured
     assert flow.error.rms < 1e-7

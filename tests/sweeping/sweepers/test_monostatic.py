@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from creeping.field.backscatter import BackscatterGeometry
+from creeping.rays.single import SingleRayTracer
+from creeping.sweeping.sweepers.compiled import CompiledSweeper
+from creeping.sweeping.sweepers.plain import PlainSweeper
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.backscatter import BackscatterGeometry
 from creeping.rays.quantities import ray_points
-from creeping.rays.single import SingleRayTracer
 from creeping.shadow.many import shadow_lines
 from creeping.sweeping.request import sweep_request
-from creeping.sweeping.sweepers.compiled import CompiledSweeper
-from creeping.sweeping.sweepers.plain import PlainSweeper
 from studies.reference import sphere
 
 TRIAXIAL, TWISTED = sc.Ellipsoid(1.2, 0.8, 0.6), sc.TwistedEllipsoid()
@@ -114,7 +114,7 @@ def test_no_ray_is_counted_twice_or_lost(semiaxes):
     body = sc.Ellipsoid(*semiaxes)
     d = np.concatenate([cr.fibonacci_directions(200), np.eye(3)])
     tracer = SingleRayTracer(body, 4.5)
-    for flow in (cr.DirectFlow(body, rtol=1e-8), cr.build_phase_map(body, tolerance=3e-5, length=4.5, outputs=9)):
+    for flow in (cr.DirectFlow(body, rtol=1e-8), cr.build_phase_map(body, tolerance=3e-5, length=4.5, n_steps=9)):
         geometry = BackscatterGeometry(flow, shadow_lines(body, d, 128), tracer, 20.0)
         shed = geometry.shed
         assert np.all(geometry.leaves)
