@@ -107,7 +107,7 @@ def scipy_flow(
         Ascending, > 0 at the end.
     rtol : float
         Tolerance per step, relative and absolute.
-    riding : bool
+    carry_jacobi : bool
         Carry J, J' and A too.
 
     Returns
@@ -154,7 +154,7 @@ class HeyokaFlow:
     body : Ellipsoid, Torus or TwistedEllipsoid, without speed
     tolerance : float
         Sets the order of the series, ceil(1 - log(tolerance)/2); steps follow from the series alone.
-    riding : bool
+    carry_jacobi : bool
         Carry J, J' and, where kappa_n > 0 everywhere, A too.
     batch : int
         Rays that advance together; 8 is ``heyoka.recommended_simd_size()`` with AVX-512.

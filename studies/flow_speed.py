@@ -76,8 +76,8 @@ def fans(names: tuple[str, ...] = BODIES, count: int = 4096, samples: int = 4000
         exact = trace_states(shape, few[:, :6].copy(), times[-1:], rtol=1e-13)[:, 0]
         direct = cases.direct_at(name, sample(name, samples).error(flow), FAN_OUTPUTS)
         order8 = partial(trace_states, shape, few, times, rtol=0.0, step=direct.step)
-        riding = np.pad(fan, ((0, 0), (0, 1)), constant_values=np.inf)
-        mine = 1e6 * seconds_each(flow, riding, FAN_OUTPUTS)
+        with_attenuation = np.pad(fan, ((0, 0), (0, 1)), constant_values=np.inf)
+        mine = 1e6 * seconds_each(flow, with_attenuation, FAN_OUTPUTS)
         full = 1e6 * seconds_of(order8, 3) / len(few)
         row = {"body": name, "map": mine, "order 8": full}
         row["map, no att."] = 1e6 * seconds_each(flow, fan[:, :10], FAN_OUTPUTS)

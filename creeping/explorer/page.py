@@ -40,7 +40,7 @@ class LocalServer(viser.ViserServer):  # type: ignore[misc]
     """A quiet server for this machine alone."""
 
     def __init__(self, port: int) -> None:
-        # the address is told by whoever starts it
+        # the address is shown by whoever starts it
         with redirect_stdout(StringIO()):
             super().__init__(HOST, port, label="creeping", verbose=False)
         # viser offers no door before the scene is sent but this one
@@ -112,7 +112,7 @@ class Explorer:
         return f"http://{HOST}:{self.server.get_port()}"
 
     def ask(self, **values: Any) -> bool:
-        """Change the request; what is out of range is told on the page and changes nothing."""
+        """Change the request; what is out of range is named on the page and changes nothing."""
         with self._asking:
             try:
                 self.request = self.request.changed(**values)
@@ -196,7 +196,7 @@ class Explorer:
             except Exception as error:
                 self.status.content = error_text(error)
             if frame is not None:
-                # after a request that failed the last frame is still the one on the page, and may settle
+                # after a request that failed the last frame is still the one on the page, and may be refined
                 self._frames.put((frame, number))
 
     def _refine(self) -> None:

@@ -151,6 +151,6 @@ def make_html(sources: Path, folder: Path, doctrees: Path) -> None:
             app.build(force_all=True)
     except SphinxError as error:
         raise CreepingError(f"the pages cannot be built: {error}") from error
-    told = [line for line in warnings.getvalue().splitlines() if line.strip()]
-    if told or app.statuscode:
-        raise CreepingError(f"{len(told)} warnings of the pages, which must have none:\n  " + "\n  ".join(told))
+    lines = [line for line in warnings.getvalue().splitlines() if line.strip()]
+    if lines or app.statuscode:
+        raise CreepingError(f"{len(lines)} warnings of the pages, which must have none:\n  " + "\n  ".join(lines))

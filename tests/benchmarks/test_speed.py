@@ -79,8 +79,8 @@ def test_leap_on_a_body_given_by_samples(benchmark):
 
 def test_fan_of_64_outputs(benchmark, states, tuned):
     body, points = states
-    riding = pack(points[:4096, :3], points[:4096, 3:], jacobi=True)
-    benchmark(tuned(body, 64).transport, riding, LENGTH * np.arange(1, 65) / 64)
+    with_jacobi = pack(points[:4096, :3], points[:4096, 3:], jacobi=True)
+    benchmark(tuned(body, 64).transport, with_jacobi, LENGTH * np.arange(1, 65) / 64)
 
 
 def test_opening_a_stored_map(benchmark, states, tuned, tmp_path):

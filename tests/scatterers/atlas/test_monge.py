@@ -138,7 +138,7 @@ def test_charts_reach_beyond_their_squares(rng, name):
 
 
 @every
-def test_isometric_frame_is_the_least_rotation(rng, name):
+def test_polar_frame_is_the_least_rotation(rng, name):
     body = covered(name)
     for chart in body.atlas.charts[:3]:
         uv = rng.uniform(-0.3, 1.3, (50, 2))
