@@ -8,7 +8,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project, size
-from creeping.rays.fan import NON_SMOOTH_SPACING
+from creeping.rays.nonsmooth import NON_SMOOTH_SPACING
 from creeping.rays.uncertain_body import body_uncertainty
 
 EXACT = sc.Ellipsoid(1.0, 0.8, 0.6)
