@@ -37,7 +37,7 @@ class Cad(FittedBody):
     points : int
         Points of the body that are fitted; more for bodies with fine detail.
     allow_rough : bool
-        Take a body that is not smooth everywhere; `rough` says where, and rays that come there end.
+        Take a body that is not smooth everywhere; `non_smooth` says where, and rays that come there end.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -50,7 +50,7 @@ class Cad(FittedBody):
     quality : MeshQuality
         Of the points.
     fit : FitReport
-    coarser : SplineBody
+    coarse_fit : SplineBody
         The same body fitted on a coarser grid: what differs on it is uncertain.
     edges : tuple of str
         Edges and tips at which the faces do not join smoothly.
@@ -82,7 +82,7 @@ class Cad(FittedBody):
         if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or not 500 <= points <= 200_000:
             raise ValueError(f"points = {points!r}; give a whole number from 500 to 200000")
         points = int(points)
-        say = checked_options(units, allow_rough, cache, progress)
+        report = checked_options(units, allow_rough, cache, progress)
         try:
             # before all of it is read
             kind_of(Path(path))
@@ -90,28 +90,28 @@ class Cad(FittedBody):
         except (TypeError, OSError) as error:
             raise ValueError(f"{path} cannot be read: {error}") from None
         key = key_of("cad", content, units=units, points=points, allow_rough=allow_rough)
-        self._open(key, cache, speed, lambda: self._points(Path(path), units, points, allow_rough, say), say)
+        self._open(key, cache, speed, lambda: self._points(Path(path), units, points, allow_rough, report), report)
         self.edges = tuple(self._text["edges"])
 
     def _points(
-        self, path: Path, units: str | None, points: int, allow_rough: bool, say: Callable[[str], None]
+        self, path: Path, units: str | None, points: int, allow_rough: bool, progress: Callable[[str], None]
     ) -> PointCloud:
-        say("reading the CAD file")
-        found = read_cad(path, units, points, say=say)
+        progress("reading the CAD file")
+        found = read_cad(path, units, points, progress=progress)
         jets = osculating_jets(found.mesh.vertices, found.mesh.triangles)
         quality = assess(found.mesh, jets)
         if found.edges and not allow_rough:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
         if quality.verdict != "smooth" and not allow_rough:
             raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
-        rough = np.concatenate([found.mesh.vertices[quality.bad], found.rough])
+        non_smooth = np.concatenate([found.mesh.vertices[quality.bad], found.non_smooth])
         return PointCloud(
             found.mesh.vertices,
             np.where(np.isfinite(found.normals), found.normals, jets.normals),
             edge=quality.edge_mean,
             spacing=SPACING * quality.edge_mean,
             noise=0.0,
-            rough=rough,
+            non_smooth=non_smooth,
             distance=partial(signed_distance, found.mesh.vertices, jets),
             mean_curvature=np.where(jets.fitted & ~quality.bad, jets.mean, np.nan),
             quality=quality,

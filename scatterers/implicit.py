@@ -21,9 +21,9 @@ from scatterers.spline.samples import Samples
 FloatArray = NDArray[np.float64]
 MOST_TIPS = 8
 BUMP = 2.4
-"""Reach of the rough place in widths of the bump, exp(-r^4), that rounds a tip off: beyond, it is below rounding."""
+"""Reach of a non-smooth place in widths of the bump, exp(-r^4), that rounds a tip off: beyond, below rounding."""
 TIP = 0.025
-"""Distance from a singular point within which the body counts as rough, in diagonals of its box."""
+"""Distance from a singular point within which the body counts as non-smooth, in diagonals of its box."""
 
 
 class Implicit(LevelBody):
@@ -41,7 +41,7 @@ class Implicit(LevelBody):
         Point that sees the whole body from within, L; only star-shaped bodies have one.
     allow_rough : bool
         Take a body with tips, points where grad F = 0. They are rounded off within a fortieth of the box's diagonal;
-        `rough` says where, and rays that come there end.
+        `non_smooth` says where, and rays that come there end.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
@@ -89,7 +89,7 @@ class Implicit(LevelBody):
             raise ValueError(
                 f"F = 0 is not smooth: grad F = 0 at {len(found)} of its points, first {tuple(found[0].tolist())}; "
                 "a tip, an edge or a crossing there has no creeping rays: "
-                "round it off, or allow rough places, where rays end"
+                "round it off, or allow non-smooth places, where rays end"
             )
         if len(found):
             self._round(found, samples, given)
@@ -104,13 +104,13 @@ class Implicit(LevelBody):
         self._place(space, samples, sphere_map)
 
     def _round(self, tips: FloatArray, samples: Samples, centre: FloatArray | None) -> None:
-        """Add a bump to F at each tip, so that a smooth cap, within the rough place, stands for it."""
+        """Add a bump to F at each tip, so that a smooth cap, within the non-smooth place, stands for it."""
         if len(tips) > MOST_TIPS:
             raise ValueError(
                 f"F = 0 is not smooth: grad F = 0 at {len(tips)} of its points, more than the {MOST_TIPS} tips that "
                 "are rounded off; an edge, or F that does not change sign linearly: write it otherwise"
             )
-        self._rough, self._reach = tips, TIP * self._diagonal
+        self._non_smooth, self._reach = tips, TIP * self._diagonal
         width, expression = self._reach / BUMP, self.expression
         sphere = np.random.default_rng(0).normal(size=(2000, 3))
         sphere *= 0.5 * width / np.linalg.norm(sphere, axis=1, keepdims=True)

@@ -47,7 +47,7 @@ class Mesh(FittedBody):
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
     allow_rough : bool
-        Take a mesh that is not smooth everywhere; `rough` says where, and rays that come there end.
+        Take a mesh that is not smooth everywhere; `non_smooth` says where, and rays that come there end.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -59,7 +59,7 @@ class Mesh(FittedBody):
     ----------
     quality : MeshQuality
     fit : FitReport
-    coarser : SplineBody
+    coarse_fit : SplineBody
         The same body fitted on a coarser grid: what differs on it is uncertain.
     repairs : tuple of str
         What was changed in the mesh.
@@ -91,12 +91,12 @@ class Mesh(FittedBody):
         speed: Any = None,
         progress: Callable[[str], None] | None = None,
     ) -> None:
-        say = checked_options(units, allow_rough, cache, progress)
+        report = checked_options(units, allow_rough, cache, progress)
         key = key_of("mesh", _content(source), units=units, allow_rough=allow_rough)
-        self._open(key, cache, speed, lambda: self._points(source, units, allow_rough, say), say)
+        self._open(key, cache, speed, lambda: self._points(source, units, allow_rough, report), report)
 
-    def _points(self, source: Any, units: str | None, allow_rough: bool, say: Callable[[str], None]) -> PointCloud:
-        mesh, jets, quality = _examined(source, units, say)
+    def _points(self, source: Any, units: str | None, allow_rough: bool, progress: Callable[[str], None]) -> PointCloud:
+        mesh, jets, quality = _examined(source, units, progress)
         if quality.verdict not in ("smooth", "noisy") and not allow_rough:
             raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
         if quality.bad.any() and quality.verdict != "noisy":
@@ -105,7 +105,7 @@ class Mesh(FittedBody):
             normals = np.where(quality.bad[:, None], usual, jets.normals)
             jets = replace(jets, fitted=jets.fitted & ~quality.bad, normals=normals)
         # noise is everywhere, and smoothed away
-        rough = mesh.vertices[quality.bad & (quality.verdict != "noisy")]
+        non_smooth = mesh.vertices[quality.bad & (quality.verdict != "noisy")]
         points, normals, edge = mesh.vertices, jets.normals, quality.edge_mean
         mean = np.where(jets.fitted, jets.mean, np.nan)
         noisy, wide = quality.noise >= NOISE, spacing_of(points, GRID)
@@ -125,7 +125,7 @@ class Mesh(FittedBody):
             edge=edge,
             spacing=spacing,
             noise=quality.noise * edge if noisy else 0.0,
-            rough=rough,
+            non_smooth=non_smooth,
             distance=partial(signed_distance, mesh.vertices, jets),
             mean_curvature=None if noisy else mean,
             quality=quality,
@@ -167,10 +167,12 @@ def examined_mesh(source: Any, units: str | None = None) -> tuple[TriangleMesh, 
     return mesh, quality
 
 
-def _examined(source: Any, units: str | None, say: Callable[[str], None]) -> tuple[TriangleMesh, Jets, MeshQuality]:
-    say("reading the mesh")
-    mesh = read_mesh(source, units, say=say)
-    say(f"normals of {len(mesh.vertices)} vertices")
+def _examined(
+    source: Any, units: str | None, progress: Callable[[str], None]
+) -> tuple[TriangleMesh, Jets, MeshQuality]:
+    progress("reading the mesh")
+    mesh = read_mesh(source, units, progress=progress)
+    progress(f"normals of {len(mesh.vertices)} vertices")
     jets = osculating_jets(mesh.vertices, mesh.triangles)
     return mesh, jets, assess(mesh, jets)
 

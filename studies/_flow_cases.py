@@ -19,13 +19,13 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal
 from creeping.phaseflow.tuning.flow_choice import tuned_direct
-from creeping.phaseflow.tuning.request import Request
-from studies._peers import heyoka_at_error, measured, scipy_flow
+from creeping.phaseflow.tuning.request import MapSpec
+from studies._peers import heyoka_at_error, scipy_flow, seconds_of
 
 Row = dict[str, Any]
 """One line of a table: headings with their values."""
 BODIES = ("ellipsoid", "torus", "twisted", "gridded")
-DEAR = ("gridded",)
+EXPENSIVE = ("gridded",)
 """Bodies whose F takes a microsecond: fewer rays are integrated directly."""
 LENGTH = 8.0
 TOLERANCE = 1e-6
@@ -111,14 +111,14 @@ class Sample:
 @cache
 def sample(name: str, count: int, seed: int = 11) -> Sample:
     """Fresh random rays, traced at 1e-13; at most 400 where F is expensive."""
-    states = random_rays(body(name), min(count, 400) if name in DEAR else count, seed)
+    states = random_rays(body(name), min(count, 400) if name in EXPENSIVE else count, seed)
     return Sample(body(name), states, trace_states(body(name), states, np.array([LENGTH]), rtol=1e-13)[:, 0])
 
 
-def seconds_each(flow: Any, states: FloatArray, outputs: int = 1, repeats: int = REPEATS) -> float:
+def seconds_each(flow: Any, states: FloatArray, n_steps: int = 1, repeats: int = REPEATS) -> float:
     """Processor time of one ray of LENGTH, s: the least of several measurements."""
-    times = LENGTH * np.arange(1, outputs + 1) / outputs
-    return measured(lambda: flow.transport(states, times), repeats) / len(states)
+    times = LENGTH * np.arange(1, n_steps + 1) / n_steps
+    return seconds_of(lambda: flow.transport(states, times), repeats) / len(states)
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class Build:
 
 
 @cache
-def built(name: str, rays: float = 1e6, outputs: int = 1, tolerance: float = TOLERANCE) -> Build:
+def built(name: str, rays: float = 1e6, n_steps: int = 1, tolerance: float = TOLERANCE) -> Build:
     """Map for rays of LENGTH, with the Jacobi matrix if there are outputs in between; kernels compiled before.
 
     Raises
@@ -149,29 +149,30 @@ def built(name: str, rays: float = 1e6, outputs: int = 1, tolerance: float = TOL
         If there is none.
     """
     shape = body(name)
-    _compile(name, outputs > 1)
-    request = Request(shape, tolerance, LENGTH, outputs, None, None, None, None, outputs > 1, "direct", None, None)
-    request.rays = int(rays)
+    _compile(name, n_steps > 1)
+    spec = MapSpec(
+        body=shape, tolerance=tolerance, length=LENGTH, n_steps=n_steps, n_rays=int(rays), carry_jacobi=n_steps > 1
+    )
     started = time.process_time()
-    flow = request.build(lambda _: None)
+    flow = spec.build(lambda _: None)
     return Build(rays, flow, time.process_time() - started)
 
 
 @cache
-def _compile(name: str, ride_along: bool) -> None:
+def _compile(name: str, carry_jacobi: bool) -> None:
     """Compile the kernels of every kind of table by maps that cost little."""
-    for order in (3, 5):
+    for degree in (3, 5):
         for precision in ("single", "double"):
             cr.build_phase_map(
-                body(name), tolerance=1e-2, length=2.0, order=order, precision=precision, ride_along=ride_along,
+                body(name), tolerance=1e-2, length=2.0, degree=degree, precision=precision, carry_jacobi=carry_jacobi,
                 cache=False,
             )  # fmt: skip
 
 
 @cache
-def direct_at(name: str, tolerance: float, outputs: int = 1) -> cr.DirectFlow:
+def direct_at(name: str, tolerance: float, n_steps: int = 1) -> cr.DirectFlow:
     """Order-8 integration with the longest equal steps that meet the tolerance."""
-    return tuned_direct(body(name), LENGTH, outputs, tolerance, outputs > 1)[0]
+    return tuned_direct(body(name), LENGTH, n_steps, tolerance, n_steps > 1)[0]
 
 
 def peers(name: str, target: float, count: int, samples: int) -> dict[str, float]:
@@ -186,7 +187,7 @@ def peers(name: str, target: float, count: int, samples: int) -> dict[str, float
         pass
     else:
         found["heyoka error"] = rms(series.flow(fresh.states, times)[:, -1], fresh.exact)
-        found["heyoka"] = measured(lambda: series.flow(states, times), 2) / len(states)
+        found["heyoka"] = seconds_of(lambda: series.flow(states, times), 2) / len(states)
     found["scipy"], found["scipy error"] = _scipy_at_error(fresh.few(SCIPY_RAYS), target)
     return found
 
@@ -204,7 +205,7 @@ def _scipy_at_error(fresh: Sample, target: float) -> tuple[float, float]:
             fine = middle
         else:
             loose = middle
-    return measured(lambda: run(fine), 1) / len(fresh.states), rms(run(fine), fresh.exact)
+    return seconds_of(lambda: run(fine), 1) / len(fresh.states), rms(run(fine), fresh.exact)
 
 
 @contextmanager
@@ -233,25 +234,25 @@ def wall_by_threads(call: Callable[[], object], counts: tuple[int, ...]) -> list
     return least
 
 
-def attempted(name: str, rays: float = 1e6, outputs: int = 1, tolerance: float = TOLERANCE) -> Build | str:
+def attempted(name: str, rays: float = 1e6, n_steps: int = 1, tolerance: float = TOLERANCE) -> Build | str:
     """The map, or why there is none."""
     try:
-        return built(name, rays, outputs, tolerance)
+        return built(name, rays, n_steps, tolerance)
     except cr.ToleranceError as error:
         return str(error)
 
 
-def variants(name: str, tuned: tuple[float, ...], outputs: int, count: int) -> list[tuple[Build, float]]:
+def variants(name: str, tuned: tuple[float, ...], n_steps: int, count: int) -> list[tuple[Build, float]]:
     """Maps tuned for several numbers of rays, fewer where a build is expensive, with the seconds of a ray."""
-    rays = starts(name, count, outputs)
-    found = [attempted(name, n, outputs) for n in (tuned[::2] if name in DEAR else tuned)]
-    return [(one, seconds_each(one.flow, rays, outputs)) for one in found if isinstance(one, Build)]
+    rays = starts(name, count, n_steps)
+    found = [attempted(name, n, n_steps) for n in (tuned[::2] if name in EXPENSIVE else tuned)]
+    return [(one, seconds_each(one.flow, rays, n_steps)) for one in found if isinstance(one, Build)]
 
 
-def starts(name: str, count: int, outputs: int) -> FloatArray:
+def starts(name: str, count: int, n_steps: int) -> FloatArray:
     """Random rays, with the Jacobi matrix if there are outputs in between."""
     x, p = random_bundle_points(body(name), count, rng=np.random.default_rng(11))
-    return pack(x, p, jacobi=outputs > 1)
+    return pack(x, p, jacobi=n_steps > 1)
 
 
 def card(flow: cr.PhaseMap) -> Row:

@@ -1,6 +1,6 @@
 """The peers that the engine is measured against: scipy's DOP853 ray by ray, and heyoka's Taylor series in batches.
 
-Both integrate the plain flow from one closed form per body, and with ``riding`` what a ray carries along:
+Both integrate the plain flow from one closed form per body, and with ``carry_jacobi`` what a ray carries along:
 
     J'' = -K J,  J(0) = 1,  J'(0) = 0    how neighbours part
     A' = max(kappa_n, 0)^(2/3)           the decay of a creeping wave
@@ -93,7 +93,9 @@ def _twisted(body: TwistedEllipsoid, functions: Any) -> Equations:
     return terms
 
 
-def scipy_flow(body: Any, states: FloatArray, times: FloatArray, *, rtol: float, riding: bool = False) -> FloatArray:
+def scipy_flow(
+    body: Any, states: FloatArray, times: FloatArray, *, rtol: float, carry_jacobi: bool = False
+) -> FloatArray:
     """Flow ray by ray with scipy's DOP853, right-hand side in plain floats.
 
     Parameters
@@ -105,7 +107,7 @@ def scipy_flow(body: Any, states: FloatArray, times: FloatArray, *, rtol: float,
         Ascending, > 0 at the end.
     rtol : float
         Tolerance per step, relative and absolute.
-    riding : bool
+    carry_jacobi : bool
         Carry J, J' and A too.
 
     Returns
@@ -127,9 +129,9 @@ def scipy_flow(body: Any, states: FloatArray, times: FloatArray, *, rtol: float,
         decay = (-bent * turn) ** (1 / 3) if bent > 0 else 0.0
         return [u, v, w, turn * gx, turn * gy, turn * gz, dj, -gauss * j, decay]
 
-    start = _start(states, 9 if riding else 6)
+    start = _start(states, 9 if carry_jacobi else 6)
     out = np.empty((len(start), len(times), start.shape[1]))
-    rates, span = carrying if riding else plain, (0.0, float(times[-1]))
+    rates, span = carrying if carry_jacobi else plain, (0.0, float(times[-1]))
     # the end of the last step needs no dense output, which costs three more evaluations
     outputs = None if len(times) == 1 else times
     for ray, state in enumerate(start):
@@ -143,7 +145,7 @@ def scipy_flow(body: Any, states: FloatArray, times: FloatArray, *, rtol: float,
 class HeyokaFlow:
     """The flow by heyoka's adaptive Taylor series, eight rays at a time in the lanes of AVX-512.
 
-    Lanes with ``riding`` are x, p, J, J' and, on the convex ellipsoid, A. On the other bodies A is left out, to
+    Lanes with ``carry_jacobi`` are x, p, J, J' and, on the convex ellipsoid, A. On the other bodies A is left out, to
     heyoka's advantage: with ``heyoka.select`` its series step over the kink of max(kappa_n, 0)^(2/3) without seeing
     it, and A is off by up to 5e-2 at t = 8 whatever the tolerance.
 
@@ -152,20 +154,20 @@ class HeyokaFlow:
     body : Ellipsoid, Torus or TwistedEllipsoid, without speed
     tolerance : float
         Sets the order of the series, ceil(1 - log(tolerance)/2); steps follow from the series alone.
-    riding : bool
+    carry_jacobi : bool
         Carry J, J' and, where kappa_n > 0 everywhere, A too.
     batch : int
         Rays that advance together; 8 is ``heyoka.recommended_simd_size()`` with AVX-512.
     """
 
-    def __init__(self, body: Any, *, tolerance: float, riding: bool = False, batch: int = 8) -> None:
+    def __init__(self, body: Any, *, tolerance: float, carry_jacobi: bool = False, batch: int = 8) -> None:
         heyoka = import_module("heyoka")
         self.tolerance, self.batch = tolerance, batch
         x, y, z, u, v, w, j, dj, _a = lanes = heyoka.make_vars("x", "y", "z", "u", "v", "w", "j", "dj", "a")
         gx, gy, gz, bent, square, gauss = equations(body, heyoka)(x, y, z, u, v, w)
         turn = bent / square
         rates = [u, v, w, -turn * gx, -turn * gy, -turn * gz]
-        if riding:
+        if carry_jacobi:
             rates += [dj, -gauss * j]
             if isinstance(body, Ellipsoid):
                 rates.append((bent * turn) ** (1 / 3))
@@ -206,7 +208,7 @@ class HeyokaFlow:
 
 
 def heyoka_at_error(
-    body: Any, states: FloatArray, times: FloatArray, exact: FloatArray, target: float, riding: bool
+    body: Any, states: FloatArray, times: FloatArray, exact: FloatArray, target: float, carry_jacobi: bool
 ) -> HeyokaFlow:
     """HeyokaFlow of the lowest order whose rms error of (x, p) at the last time, against exact, is <= target.
 
@@ -219,7 +221,7 @@ def heyoka_at_error(
     while low <= high:
         order = (low + high) // 2
         # steps depend on the tolerance through the order only: one tolerance per order says all
-        flow = HeyokaFlow(body, tolerance=math.exp(2.5 - 2 * order), riding=riding)
+        flow = HeyokaFlow(body, tolerance=math.exp(2.5 - 2 * order), carry_jacobi=carry_jacobi)
         gap = flow.flow(states, times[-1:])[:, -1, :6] - exact[:, -1, :6]
         if float(np.sqrt(np.mean(np.sum(gap * gap, axis=1)))) <= target:
             high, best = order - 1, flow
@@ -230,7 +232,7 @@ def heyoka_at_error(
     return best
 
 
-def measured(call: Callable[[], object], repeats: int) -> float:
+def seconds_of(call: Callable[[], object], repeats: int) -> float:
     """Least processor time of the calls after one for warming up, s."""
     call()
     least = math.inf

@@ -69,7 +69,7 @@ def creeping_rays(fan: RayFan, k: float, boundary: Any, order: int) -> float:
     kind = scalar_boundaries(boundary)[0]
     found = np.zeros(len(theta), dtype=complex)
     np.add.at(found, geometry.shed.observer, isolated_rays(geometry, k, kind, order))
-    reference: Any = boundary if isinstance(boundary, str) else boundary.eta
+    reference: Any = boundary if isinstance(boundary, str) else boundary.admittance
     return worst(found, watson.far_field(k, 1.0, theta, reference, modes=12 if k < 20 else 8))
 
 

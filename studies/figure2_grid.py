@@ -91,7 +91,7 @@ def draw(path: Path, quick: bool) -> dict[str, Any]:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    flow = cr.build_phase_map(BODY, horizon=1 / 8, time_step=2**-10, stages=7, grid=(16, 64), order=3, method="tower")
+    flow = cr.build_phase_map(BODY, horizon=1 / 8, time_step=2**-10, stages=7, grid=(16, 64), degree=3, method="tower")
     x, p = random_bundle_points(BODY, 16 if quick else 64, rng=np.random.default_rng(2))
     error = end_error(flow, x, p, np.concatenate(flow.flow(x, p, TIME), axis=-1), TIME)
     figure = Figure(figsize=(7.2, 3.4), facecolor="white")

@@ -5,8 +5,8 @@ From one point y, 1024 rays (y, p(alpha)) are carried by the phase map; the geod
     alpha -> x(t; y, p(alpha))
 
 Past the conjugate locus, where the reduced length M12(t, alpha) vanishes for the first time, the circles have cusps on
-it and cross themselves. M12 rides along the rays (M12(0) = 0, M12'(0) = 1); its zero is found on the cubic between two
-times. The source is at (0.8, 0.4, 0.45) before scaling by the half-axes, brought to the unit sphere.
+it and cross themselves. M12 is carried along the rays (M12(0) = 0, M12'(0) = 1); its zero is found on the cubic between
+two times. The source is at (0.8, 0.4, 0.45) before scaling by the half-axes, brought to the unit sphere.
 """
 
 from pathlib import Path

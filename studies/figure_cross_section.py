@@ -44,14 +44,14 @@ def cross_sections(found: Any) -> dict[str, FloatArray]:
     }
 
 
-def doubtful(found: Any) -> dict[str, BoolArray]:
+def unresolved_of(found: Any) -> dict[str, BoolArray]:
     """Directions in which an expansion fails or nothing is known, by boundary (n,)."""
-    lost = found["incidence_status"].values >= SINGULAR
+    missing = found["incidence_status"].values >= SINGULAR
     scalar = found["unresolved"].values[:, :, 0]
     return {
-        "soft": lost | scalar[:, 0],
-        "hard": lost | scalar[:, 1],
-        "pec": lost | found["unresolved_pec"].values[:, 0],
+        "soft": missing | scalar[:, 0],
+        "hard": missing | scalar[:, 1],
+        "pec": missing | found["unresolved_pec"].values[:, 0],
     }
 
 
@@ -59,7 +59,7 @@ def agreement(found: Any, flow: Any, length: float, n_rays: int) -> dict[str, fl
     """Largest differences, dB, to one incidence at a time by `shadow_line`, `launch`, `far_field`, where resolved."""
     rows = np.linspace(0, found.sizes["incidence"] - 1, CHECKED).astype(int)
     worst: dict[str, float] = dict.fromkeys(BOUNDARIES, 0.0)
-    levels, bad = cross_sections(found), doubtful(found)
+    levels, bad = cross_sections(found), unresolved_of(found)
     for row in rows:
         d = found["direction"].values[row]
         fan = cr.launch(flow, cr.shadow_line(flow.body, d), length=length, n_rays=n_rays)
@@ -113,7 +113,7 @@ def draw(path: Path, quick: bool) -> dict[str, Any]:
     for name, body in BODIES.items():
         flow = cr.DirectFlow(body, rtol=1e-6)
         found = cr.sweep_directions(flow, directions, wavenumbers=K, boundary=BOUNDARIES, n_rays=256)
-        levels, bad = cross_sections(found), doubtful(found)
+        levels, bad = cross_sections(found), unresolved_of(found)
         near = found["incidence_status"].values == NEAR_SINGULAR
         maps[name] = levels, bad, near
         cards[name] = {

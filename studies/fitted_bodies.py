@@ -145,7 +145,7 @@ def chain_rows(count: int) -> list[dict[str, Any]]:
         fan = fan_of(body)
         line = abs(fan.line.curves[0].length - reference.line.curves[0].length)
         row: dict[str, Any] = {"body": name, "line": line}
-        known = cr.body_error(fan)
+        known = cr.body_uncertainty(fan)
         if known is not None:
             row |= {"points, said": known.points, "J, said": known.spreading, "A, said": known.attenuation}
         row |= _against(exact, fan)

@@ -21,8 +21,20 @@ from creeping._typing import Any
 from creeping.geodesics.integrator import trace_states
 from creeping.phaseflow.tuning.flow_choice import tuned_direct
 from studies import _flow_cases as cases
-from studies._flow_cases import BODIES, DEAR, FAN_OUTPUTS, LENGTH, TOLERANCE, Row, body, rms, sample, seconds_each, show
-from studies._peers import measured
+from studies._flow_cases import (
+    BODIES,
+    EXPENSIVE,
+    FAN_OUTPUTS,
+    LENGTH,
+    TOLERANCE,
+    Row,
+    body,
+    rms,
+    sample,
+    seconds_each,
+    show,
+)
+from studies._peers import seconds_of
 
 NS = 1e9 / LENGTH
 TUNED = (1e4, 3e4, 1e5, 3e5, 1e6)
@@ -39,7 +51,7 @@ def long_leaps(names: tuple[str, ...] = BODIES, count: int = 65_536, samples: in
         error = fresh.error(flow)
         direct = cases.direct_at(name, error)
         random = NS * seconds_each(flow, rays)
-        order8 = NS * seconds_each(direct, rays[: min(count, 1024)] if name in DEAR else rays, repeats=3)
+        order8 = NS * seconds_each(direct, rays[: min(count, 1024)] if name in EXPENSIVE else rays, repeats=3)
         others = cases.peers(name, error, min(count, 4096), samples)
         heyoka, scipy = NS * others.pop("heyoka"), NS * others.pop("scipy")
         row = {"body": name, "map": random, "pencils": NS * seconds_each(flow, cases.pencils(body(name), count))}
@@ -58,15 +70,15 @@ def fans(names: tuple[str, ...] = BODIES, count: int = 4096, samples: int = 4000
     rows, times = [], LENGTH * np.arange(1, FAN_OUTPUTS + 1) / FAN_OUTPUTS
     for name in names:
         shape = body(name)
-        flow = cases.built(name, outputs=FAN_OUTPUTS).flow
+        flow = cases.built(name, n_steps=FAN_OUTPUTS).flow
         fan = cases.fan_rays(shape, count)
-        few = fan[:: max(1, count // 256)] if name in DEAR else fan
+        few = fan[:: max(1, count // 256)] if name in EXPENSIVE else fan
         exact = trace_states(shape, few[:, :6].copy(), times[-1:], rtol=1e-13)[:, 0]
         direct = cases.direct_at(name, sample(name, samples).error(flow), FAN_OUTPUTS)
         order8 = partial(trace_states, shape, few, times, rtol=0.0, step=direct.step)
-        riding = np.pad(fan, ((0, 0), (0, 1)), constant_values=np.inf)
-        mine = 1e6 * seconds_each(flow, riding, FAN_OUTPUTS)
-        full = 1e6 * measured(order8, 3) / len(few)
+        with_attenuation = np.pad(fan, ((0, 0), (0, 1)), constant_values=np.inf)
+        mine = 1e6 * seconds_each(flow, with_attenuation, FAN_OUTPUTS)
+        full = 1e6 * seconds_of(order8, 3) / len(few)
         row = {"body": name, "map": mine, "order 8": full}
         row["map, no att."] = 1e6 * seconds_each(flow, fan[:, :10], FAN_OUTPUTS)
         row["order 8, no att."] = 1e6 * seconds_each(direct, few[:, :10], FAN_OUTPUTS, 3)
@@ -81,7 +93,7 @@ def break_even(names: tuple[str, ...] = BODIES, tuned: tuple[float, ...] = TUNED
     rows = []
     for name in names:
         mine: list[Row] = []
-        few = cases.random_rays(body(name), min(count, 1024) if name in DEAR else count)
+        few = cases.random_rays(body(name), min(count, 1024) if name in EXPENSIVE else count)
         for one, composed in cases.variants(name, tuned, 1, count):
             error = sample(name, 4000).error(one.flow)
             direct = cases.direct_at(name, error)
@@ -109,15 +121,15 @@ def choices(
     """
     rows = []
     for name in names:
-        for outputs in (1, FAN_OUTPUTS):
-            known = cases.variants(name, tuned, outputs, min(count, 1024) if outputs > 1 else count)
-            few = cases.starts(name, 256 if name in DEAR else 1024, outputs)
+        for n_steps in (1, FAN_OUTPUTS):
+            known = cases.variants(name, tuned, n_steps, min(count, 1024) if n_steps > 1 else count)
+            few = cases.starts(name, 256 if name in EXPENSIVE else 1024, n_steps)
             started = time.process_time()
-            direct = tuned_direct(body(name), LENGTH, outputs, TOLERANCE, outputs > 1)[0]
+            direct = tuned_direct(body(name), LENGTH, n_steps, TOLERANCE, n_steps > 1)[0]
             tuning = time.process_time() - started
-            order8 = seconds_each(direct, few, outputs, 3)
+            order8 = seconds_each(direct, few, n_steps, 3)
             for rays in numbers:
-                row = {"body": name, "outputs": outputs, **_choice(name, rays, outputs, count)}
+                row = {"body": name, "outputs": n_steps, **_choice(name, rays, n_steps, count)}
                 best = min((one.seconds + rays * each for one, each in known), default=math.inf)
                 better, bare = min(best, tuning + rays * order8), min(best, rays * order8)
                 row |= {"with a map": best, "order 8": rays * order8, "its tuning": tuning}
@@ -127,16 +139,22 @@ def choices(
     return rows
 
 
-def _choice(name: str, rays: int, outputs: int, count: int) -> Row:
+def _choice(name: str, rays: int, n_steps: int, count: int) -> Row:
     started = time.process_time()
     flow = cr.choose_flow(
-        body(name), rays=rays, length=LENGTH, tolerance=TOLERANCE, outputs=outputs, ride_along=outputs > 1, cache=False
+        body(name),
+        n_rays=rays,
+        length=LENGTH,
+        tolerance=TOLERANCE,
+        n_steps=n_steps,
+        carry_jacobi=n_steps > 1,
+        cache=False,
     )
     spent = time.process_time() - started
     composed = isinstance(flow, cr.PhaseMap)
     # the better of both has been measured with as many rays
-    few = 256 if name in DEAR and not composed else min(count, 1024) if outputs > 1 or not composed else count
-    each = seconds_each(flow, cases.starts(name, few, outputs), outputs, 3)
+    few = 256 if name in EXPENSIVE and not composed else min(count, 1024) if n_steps > 1 or not composed else count
+    each = seconds_each(flow, cases.starts(name, few, n_steps), n_steps, 3)
     kind = "map" if composed else "order 8"
     return {"rays": rays, "choice": kind, "choosing": spent, "us": 1e6 * each, "total": spent + rays * each}
 
@@ -150,7 +168,7 @@ def requested(
     """
     rows = []
     for name in names:
-        others = () if name in DEAR else (21, 22, 23, 24)
+        others = () if name in EXPENSIVE else (21, 22, 23, 24)
         for exponent in exponents:
             wanted = 10.0**-exponent
             one = cases.attempted(name, tolerance=wanted)
@@ -186,7 +204,7 @@ def sizes(
     rays = [n * seconds_each(flow, cases.random_rays(shape, n)) for n in numbers]
     errors, builds, totals = [], [], []
     for n in nodes:
-        grid: Any = {"grid": (n, 2 * n), "horizon": 1.0, "order": 5, "precision": "double", "ride_along": False}
+        grid: Any = {"grid": (n, 2 * n), "horizon": 1.0, "degree": 5, "precision": "double", "carry_jacobi": False}
         started = time.process_time()
         one = cr.build_phase_map(shape, cache=False, **grid)
         builds.append(time.process_time() - started)

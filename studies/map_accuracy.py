@@ -41,7 +41,7 @@ def rows() -> list[tuple[str, cr.PhaseMap, float]]:
 
         def tower(body: Any = body, grid: Any = grid) -> cr.PhaseMap:
             return cr.build_phase_map(
-                body, horizon=1 / 8, time_step=2**-10, stages=7, grid=grid, order=3, method="tower", cache=False
+                body, horizon=1 / 8, time_step=2**-10, stages=7, grid=grid, degree=3, method="tower", cache=False
             )
 
         found.append((name, *timed(tower)))

@@ -20,10 +20,10 @@ from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.evaluators import evaluators
 from creeping.shadow.many import shadow_lines
 from creeping.shadow.meshes import LineMeshes
-from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, prepared, settled
+from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, judged, prepared
 from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
 from studies._flow_cases import Row, show, threads
-from studies._peers import measured
+from studies._peers import seconds_of
 
 BODIES: dict[str, Any] = {
     "ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8),
@@ -52,12 +52,12 @@ def on_mesh(body: Any, directions: FloatArray, tier: int) -> Lines:
     from creeping.shadow.kernels.trace import LAUNCHED, SUMMARY, trace_lines
 
     n, lines = len(directions), prepared(body)
-    summary, sure = np.empty((n, SUMMARY)), np.empty(n, bool)
+    summary, certain = np.empty((n, SUMMARY)), np.empty(n, bool)
     launched, places = np.empty((n, RAYS, LAUNCHED)), np.empty((n, RAYS), np.int16)
     with evaluators(body) as parts:
-        trace_lines(*parts[:2], box_of(body), lines.packed(tier), directions, False, summary, sure, launched, places)
+        trace_lines(*parts[:2], box_of(body), lines.packed(tier), directions, False, summary, certain, launched, places)
     v = critical_distances(body, directions)
-    _, status = settled(v, sure, lines.turn(tier), LineMeshes.count - 2)
+    _, status = judged(v, certain, lines.turn(tier), LineMeshes.count - 2)
     status[v < FORBIDDEN] = SINGULAR
     return Lines(status, summary[:, 0], summary[:, 1], summary[:, 3:6], v)
 
@@ -106,7 +106,7 @@ def measure(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     body, directions = BODIES[name], fibonacci_directions(count)
     found = swept(body, directions)
     seconds, meshes = (
-        measured(call, REPEATS) / count
+        seconds_of(call, REPEATS) / count
         for call in (partial(swept, body, directions), partial(on_mesh, body, directions, 0))
     )
     second = int(np.sum(on_mesh(body, directions, 0).status != OK))
@@ -119,7 +119,7 @@ def measure(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
     first |= {"curves seen": " ".join(map(str, counts)), "least v": float(least) if np.isfinite(least) else np.nan}
     finest = on_mesh(body, directions, 2)
-    # what even the finest mesh is not sure of is no reference
+    # what even the finest mesh is not certain of is no reference
     finest.length[finest.status == FOLLOWED] = np.nan
     panels, each = independent(body, directions[::every])
     few = Lines(*(values[::every] for values in found))

@@ -23,7 +23,7 @@ from creeping.shadow.status import SINGULAR
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
 from studies._flow_cases import Row, body, closed_form, show, threads
-from studies._peers import measured, scipy_flow
+from studies._peers import scipy_flow, seconds_of
 
 LENGTH, RAYS = 4.0, 256
 REPEATS = 3
@@ -39,7 +39,7 @@ def flow_of(name: str, tolerance: float, direct: bool = False) -> Any:
     """Map tuned for a sweep, or order 8 with the longest equal steps that meet the tolerance."""
     if direct:
         return tuned_direct(body(name), LENGTH, 1, tolerance, True)[0]
-    return cr.build_phase_map(body(name), tolerance=tolerance, length=LENGTH, outputs=1, rays=10**8)
+    return cr.build_phase_map(body(name), tolerance=tolerance, length=LENGTH, n_steps=1, n_rays=10**8)
 
 
 def errors_of_rays(name: str, flow: Any, incidences: FloatArray, n_rays: int) -> Row:
@@ -69,9 +69,9 @@ def _parts(name: str, flow: Any, incidences: FloatArray, n_rays: int) -> Row:
     """Incidences a second, and us an incidence for line and rays."""
     n = len(incidences)
     sweeper = Sweeper(flow, sweep_request("rays", length=LENGTH, n_rays=n_rays))
-    whole = measured(lambda: sweeper(incidences), REPEATS) / n
+    whole = seconds_of(lambda: sweeper(incidences), REPEATS) / n
     # as the sweeper calls it: a batch at a time
-    line = measured(lambda: [shadow_lines(body(name), part, n_rays) for part in _batches(incidences)], REPEATS) / n
+    line = seconds_of(lambda: [shadow_lines(body(name), part, n_rays) for part in _batches(incidences)], REPEATS) / n
     return {"per s": 1 / whole, "line us": 1e6 * line, "rays us": 1e6 * (whole - line)}
 
 
@@ -107,7 +107,7 @@ def fields(names: tuple[str, ...] = BODIES, count: int = 256, checked: int = 4) 
         reference: Any = None
         for direct in (True, False):
             sweeper = Sweeper(flow_of(name, TOLERANCES[0], direct), request)
-            seconds = measured(partial(sweeper, incidences), REPEATS) / count
+            seconds = seconds_of(partial(sweeper, incidences), REPEATS) / count
             found = sweeper(incidences)
             reference = found if direct else reference
             row = {"body": name, "flow": "order 8" if direct else "map", "per s": 1 / seconds, "us": 1e6 * seconds}
@@ -157,18 +157,18 @@ def against_scipy(names: tuple[str, ...] = BODIES, count: int = 512, lines: int 
         error = errors_of_rays(name, flow, incidences[:: count // 8], RAYS)["points"]
         few = incidences[count // 3 :: count // 3][:lines]
         shape, form = body(name), closed_form(name)
-        line = measured(partial(_lines_one_by_one, shape, few), 1) / len(few)
+        line = seconds_of(partial(_lines_one_by_one, shape, few), 1) / len(few)
         found = shadow_lines(shape, few, rays)
         states = pack(found.launch.points.reshape(-1, 3), np.repeat(found.directions, rays, axis=0), lanes=12)
         states = states[np.isfinite(states[:, 0])]
         times = np.array([LENGTH])
         exact = cr.DirectFlow(shape, rtol=1e-12).transport(states, times)[:, 0]
         for rtol in STEPS_OF_SCIPY:
-            ends = scipy_flow(form, states, times, rtol=rtol, riding=True)[:, 0]
+            ends = scipy_flow(form, states, times, rtol=rtol, carry_jacobi=True)[:, 0]
             gap = float(np.sqrt(np.mean(np.sum((ends[:, :3] - exact[:, :3]) ** 2, axis=1))))
             if gap <= error:
                 break
-        ray = measured(partial(scipy_flow, form, states, times, rtol=rtol, riding=True), 1)
+        ray = seconds_of(partial(scipy_flow, form, states, times, rtol=rtol, carry_jacobi=True), 1)
         theirs = line + RAYS * ray / len(states)
         row = {"body": name, "sweep ms": 1e3 * mine, "line ms": 1e3 * line, "scipy ms": 1e3 * theirs}
         row |= {"rtol": rtol, "error": error, "scipy error": gap, "ratio": theirs / mine}
@@ -191,7 +191,7 @@ def growth(
 
     def run(d: FloatArray, **options: Any) -> float:
         sweeper = Sweeper(flow, sweep_request(length=LENGTH, **options))
-        return measured(lambda: sweeper(d), REPEATS)
+        return seconds_of(lambda: sweeper(d), REPEATS)
 
     by_number = [run(fibonacci_directions(n), quantity="rays", n_rays=64) for n in numbers]
     by_rays = [run(incidences, quantity="rays", n_rays=n) for n in rays]

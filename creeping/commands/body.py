@@ -15,7 +15,7 @@ BODIES = {
 }
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-Say = Callable[[str], None]
+Progress = Callable[[str], None]
 
 Body = Annotated[
     str,
@@ -29,7 +29,7 @@ Units = Annotated[
     Parameter(help="Unit of a file's numbers: m, mm, cm, um, in, ft or km; lengths are metres from there on."),
 ]
 AllowRough = Annotated[
-    bool, Parameter(negative="", help="Take a body with tips or other rough places: rays end there.")
+    bool, Parameter(negative="", help="Take a body with tips or other non-smooth places: rays end there.")
 ]
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
 
@@ -41,7 +41,7 @@ def parse_body(
     units: str | None = None,
     allow_rough: bool = False,
     cache: bool = True,
-    say: Say | None = None,
+    progress: Progress | None = None,
 ) -> Any:
     """Make a body from ``name``, ``name:key=value,...``, a file's name or an expression.
 
@@ -68,13 +68,13 @@ def parse_body(
     try:
         if is_file:
             kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
-            shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=say)
-            return _with_charts(shape, say)
+            shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=progress)
+            return _with_charts(shape, progress)
         if name in BODIES:
             return _named(name, rest, speed)
-        if say:
-            say("examining the expression")
-        return _with_charts(scatterers.Implicit(text, allow_rough=allow_rough, speed=speed), say)
+        if progress:
+            progress("examining the expression")
+        return _with_charts(scatterers.Implicit(text, allow_rough=allow_rough, speed=speed), progress)
     except InvalidInputError:
         raise
     except (TypeError, ValueError) as error:
@@ -84,10 +84,10 @@ def parse_body(
         raise InvalidInputError(f"{use} needs {error.name}: pip install 'creeping[{extra}]'") from error
 
 
-def _with_charts(shape: Any, say: Say | None) -> Any:
+def _with_charts(shape: Any, progress: Progress | None) -> Any:
     """Body whose charts are made: every flow needs them, and of thin or sharp parts there may be none."""
-    if say:
-        say("charts")
+    if progress:
+        progress("charts")
     _ = shape.atlas
     return shape
 

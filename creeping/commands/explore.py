@@ -38,11 +38,11 @@ def explore(
 ) -> int:
     """Turn the incidence by hand, and watch shadow line, rays, iso-phase curves and field follow."""
     from creeping.errors import CreepingError, InvalidInputError
-    from creeping.explorer.request import Wish, angles
+    from creeping.explorer.request import ViewRequest, angles
     from creeping.geometry.directions import unit_direction
     from creeping.geometry.surface import size
 
-    def say(text: str) -> None:
+    def progress(text: str) -> None:
         print(f"creeping: {text}", file=sys.stderr)
 
     if not 1 <= port <= 65535:
@@ -51,40 +51,40 @@ def explore(
         import viser  # noqa: F401
     except ImportError as error:
         raise CreepingError(f"the page needs viser ({error}); pip install 'creeping[web]'") from error
-    shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, say=say)
+    shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
     extent = size(shape)
     theta, phi = angles(unit_direction(direction))
     far = _round(1.5 * extent) if length is None else length
     gap = _round(far / 8) if spacing is None else spacing
     k = _round(40 / extent) if wavenumber is None else wavenumber
     # the cut runs through the direction of the wave
-    wish = Wish(theta, phi, rays, far, gap, k, boundary, cut=float(round(phi)))
-    flow = _flow(shape, wish, MOVES if export is None else 1, tolerance, cache, say)
+    request = ViewRequest(theta, phi, rays, far, gap, k, boundary, cut=float(round(phi)))
+    flow = _flow(shape, request, MOVES if export is None else 1, tolerance, cache, progress)
     if export is not None:
         from creeping.explorer.export import export_page
 
-        found = export_page(export, flow, wish)
+        found = export_page(export, flow, request)
         megabytes, rms = export.stat().st_size / 1e6, found.fan.error.rms
         print(f"{export}  {megabytes:.1f} MB  {len(found.fan.points)} rays, rms {rms:.1e}")
         return 0
-    return _serve(flow, wish, port, browser, say)
+    return _serve(flow, request, port, browser, progress)
 
 
-def _flow(body: Any, wish: Any, moves: int, tolerance: float, cache: bool, say: Any) -> Any:
+def _flow(body: Any, request: Any, moves: int, tolerance: float, cache: bool, progress: Any) -> Any:
     """What carries the rays at the steps of the page."""
     import creeping as cr
     from creeping.explorer.preview import step_of, steps_of
 
-    steps, step = steps_of(wish.length, step_of(body))
-    say(f"choosing what carries {moves} incidence{'s' * (moves != 1)} of {wish.rays} rays")
+    steps, step = steps_of(request.length, step_of(body))
+    progress(f"choosing what carries {moves} incidence{'s' * (moves != 1)} of {request.rays} rays")
     return cr.choose_flow(
         body,
-        rays=moves * wish.rays,
+        n_rays=moves * request.rays,
         length=steps * step,
-        outputs=steps,
+        n_steps=steps,
         tolerance=tolerance,
         cache=cache,
-        progress=say,
+        progress=progress,
     )
 
 
@@ -93,22 +93,22 @@ def _round(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def _serve(flow: Any, wish: Any, port: int, browser: bool, say: Any) -> int:
+def _serve(flow: Any, request: Any, port: int, browser: bool, progress: Any) -> int:
     import webbrowser
 
     from creeping.explorer.page import Explorer
 
-    say("preparing the page; kernels are compiled once, which takes about a minute")
-    page = Explorer(flow, wish, port=port)
+    progress("preparing the page; kernels are compiled once, which takes about a minute")
+    page = Explorer(flow, request, port=port)
     try:
         if not page.address.endswith(f":{port}"):
-            say(f"port {port} is in use")
-        say(f"{page.address} (Ctrl+C ends it)")
+            progress(f"port {port} is in use")
+        progress(f"{page.address} (Ctrl+C ends it)")
         if browser:
             webbrowser.open(page.address)
         page.server.sleep_forever()
     except KeyboardInterrupt:
-        say("the page is closed")
+        progress("the page is closed")
     finally:
         page.close()
     return 0

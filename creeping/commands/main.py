@@ -111,22 +111,22 @@ def run(
         if value is not None and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
     job = _field_run.job(wavenumber, boundary, observe, direction, weighted=speed is not None)
-    with _Progress(quiet=json_) as say:
-        shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, say=say)
-        say("shadow line")
+    with _Progress(quiet=json_) as progress:
+        shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
+        progress("shadow line")
         line = cr.shadow_line(shape, direction)
         length = length or (3 if job else 1.5) * size(shape)
-        say("flow")
-        carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, say)
-        say("creeping rays")
+        progress("flow")
+        carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, progress)
+        progress("creeping rays")
         fan = cr.launch(carrier, line, length=length, n_rays=rays, n_steps=steps, launch_from=launch_from)
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
         summary = _run_results.summary_of(body, speed, line, carrier, fan, curves)
         if job:
-            say("field")
+            progress("field")
             far, field_seconds = job.far_field(fan)
-        say("pictures and files")
+        progress("pictures and files")
         summary["files"], summary["drawn_by"] = _run_results.write_results(output, line, fan, curves, backend)
         if job:
             summary["field"], names = job.write(far, fan, output, backend)
@@ -163,7 +163,7 @@ def levels_of(fan: Any, step: float, of: str) -> Any:
 
 
 def _carrier(
-    flow: str, shape: Any, line: Any, rays: int, length: float, tolerance: float, cache: bool, say: Any
+    flow: str, shape: Any, line: Any, rays: int, length: float, tolerance: float, cache: bool, progress: Any
 ) -> tuple[Any, int]:
     """Flow that carries the fan, and the number of its steps."""
     import creeping as cr
@@ -173,11 +173,11 @@ def _carrier(
     if flow == "direct":
         # errors of the steps add up and grow along the rays
         return cr.DirectFlow(shape, rtol=min(max(1e-4 * tolerance, 1e-13), 1e-8)), steps
-    asked = {"length": length, "outputs": steps, "tolerance": tolerance, "cache": cache, "progress": say}
+    asked = {"length": length, "n_steps": steps, "tolerance": tolerance, "cache": cache, "progress": progress}
     if flow == "map":
         return cr.build_phase_map(shape, **asked), steps
     # rays are inserted where neighbours part
-    return cr.choose_flow(shape, rays=2 * rays, **asked), steps
+    return cr.choose_flow(shape, n_rays=2 * rays, **asked), steps
 
 
 @app.command
@@ -203,9 +203,9 @@ def figure(
     if name is not None and name not in studies.FIGURES:
         raise InvalidInputError(f"unknown figure {name!r}; figures are {', '.join(studies.FIGURES)}")
     cards = []
-    with _Progress(quiet=json_) as say:
+    with _Progress(quiet=json_) as progress:
         for key in studies.FIGURES if name is None else [name]:
-            say(f"figure {key}")
+            progress(f"figure {key}")
             cards.append(studies.draw(key, output, quick=quick))
     if json_:
         print(json.dumps(cards, indent=1))
@@ -237,9 +237,9 @@ class _Progress:
 
             self._status = Console(stderr=True).status("starting")
             self._status.start()
-        return self.say
+        return self.progress
 
-    def say(self, text: str) -> None:
+    def progress(self, text: str) -> None:
         """Show what is being done now."""
         if self._status is not None:
             self._status.update(text)

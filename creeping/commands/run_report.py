@@ -48,12 +48,12 @@ def _of_the_body(fan: Any) -> dict[str, Any]:
     """How well a body from a file is known, and what that does to its rays; nothing for other bodies."""
     from dataclasses import asdict
 
-    from creeping.rays.body_uncertainty import body_error
+    from creeping.rays.uncertain_body import body_uncertainty
 
     fit = getattr(fan.body, "fit", None)
     if fit is None:
         return {}
-    error = body_error(fan)
+    error = body_uncertainty(fan)
     return {
         "fit": fit.to_json(),
         "verdict": fan.body.quality.verdict,

@@ -77,23 +77,23 @@ def sweep(
     if scheduler is None and workers is None:
         workers = read.workers
     with _Meter(quiet=json_) as meter:
-        plan, store = _prepared(read, folder, resume, cache, meter.say)
+        plan, store = _prepared(read, folder, resume, cache, meter.show)
         again = ["creeping", "sweep", str(study), "--resume", "-o", str(folder)]
         again += ["--scheduler", scheduler] if scheduler else []
         again += ["--workers", str(workers)] if workers else []
         # one lock for all: nobody slips in between
         with store.locked():
             if verify:
-                meter.say("verifying")
+                meter.show("verifying")
                 for task, reason in store.verify(repair=True):
-                    meter.say(f"task {task} is computed anew: {reason}")
+                    meter.show(f"task {task} is computed anew: {reason}")
             missing = sum(plan.rows(task).stop - plan.rows(task).start for task in store.missing())
             meter.begin(len(plan.incidences) - missing, len(plan.incidences))
             running = time.perf_counter()
             try:
                 complete, done = _run(plan, store, scheduler, workers, meter)
             except BaseException:
-                meter.tell(f"what is done is kept; to go on: {shlex.join(again)}")
+                meter.message(f"what is done is kept; to go on: {shlex.join(again)}")
                 raise
         now = time.perf_counter()
     summary = _summary(plan, store, complete)
@@ -108,7 +108,7 @@ def sweep(
     return PARTIAL if failed or not complete else 0
 
 
-def _prepared(read: Any, folder: Path, resume: bool, cache: bool, say: Any) -> tuple[Any, Any]:
+def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any) -> tuple[Any, Any]:
     """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
     from creeping.sweeping.plan import SweepPlan, task_size
     from creeping.sweeping.results import require
@@ -119,16 +119,16 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, say: Any) -> t
         require(package)
     is_file = Path(read.body).suffix.lower() in MESHES + CAD
     text = str(read.folder / read.body) if is_file else read.body
-    say("body")
-    body = parse_body(text, read.speed, units=read.units, allow_rough=read.allow_rough, cache=cache, say=say)
+    progress("body")
+    body = parse_body(text, read.speed, units=read.units, allow_rough=read.allow_rough, cache=cache, progress=progress)
     request = read.request_for(body)
-    say("flow")
+    progress("flow")
     if resume and folder.exists():
         store = SweepStore.open(folder)
         # the size of its tasks is the store's, whatever the study says now
         flow, chunk = store.flow(body), store.chunk
     else:
-        flow, chunk = _flow(read, body, request, cache, say), task_size(request, len(read.incidences), read.chunk)
+        flow, chunk = _flow(read, body, request, cache, progress), task_size(request, len(read.incidences), read.chunk)
     plan = SweepPlan(
         flow,
         request,
@@ -140,7 +140,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, say: Any) -> t
     return plan, open_store(plan, folder, resume=resume)
 
 
-def _flow(read: Any, body: Any, request: Any, cache: bool, say: Any) -> Any:
+def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
     import creeping as cr
 
     if read.flow == "direct":
@@ -148,8 +148,8 @@ def _flow(read: Any, body: Any, request: Any, cache: bool, say: Any) -> Any:
         return cr.DirectFlow(body, rtol=min(max(1e-4 * read.tolerance, 1e-13), 1e-8))
     from creeping.sweeping.sweeper import outputs_of
 
-    asked = {"length": request.length, "outputs": outputs_of(body, request), "tolerance": read.tolerance}
-    asked |= {"rays": len(read.incidences) * request.n_rays, "cache": cache, "progress": say}
+    asked = {"length": request.length, "n_steps": outputs_of(body, request), "tolerance": read.tolerance}
+    asked |= {"n_rays": len(read.incidences) * request.n_rays, "cache": cache, "progress": progress}
     return cr.build_phase_map(body, **asked) if read.flow == "map" else cr.choose_flow(body, **asked)
 
 
@@ -166,14 +166,14 @@ def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, mete
             if complete or asked.is_set() or meter.left() < LARGE or thread_count() == 1:
                 return complete or fill(plan, store, **options), meter.done_now
             workers = thread_count()
-            meter.say(f"about {meter.left():.0f} s are left: sharing them among {workers} worker processes")
+            meter.show(f"about {meter.left():.0f} s are left: sharing them among {workers} worker processes")
         if workers is not None:
             from creeping.sweeping.results import require
 
             require("distributed")
             from creeping.sweeping.cluster.driver import local_client
 
-            meter.say(f"starting {workers} worker processes")
+            meter.show(f"starting {workers} worker processes")
             with local_client(workers) as client:
                 return fill(plan, store, client=client, **options), meter.done_now
         return fill(plan, store, client=scheduler, **options), meter.done_now
@@ -190,7 +190,7 @@ def _stopping(meter: "_Meter") -> Iterator[Any]:
         if asked.is_set():
             raise KeyboardInterrupt
         asked.set()
-        meter.say("finishing the tasks that have begun; interrupt again to stop at once")
+        meter.show("finishing the tasks that have begun; interrupt again to stop at once")
 
     if threading.current_thread() is not threading.main_thread():
         yield asked
@@ -268,13 +268,13 @@ class _Meter:
     def __exit__(self, *details: Any) -> None:
         self._bars.__exit__(*details)
 
-    def say(self, text: str) -> None:
-        """Say what is being done now."""
+    def show(self, text: str) -> None:
+        """Show what is being done now."""
         if not self.quiet:
-            self.tell(text)
+            self.message(text)
 
-    def tell(self, text: str) -> None:
-        """Say what must be known, quiet or not."""
+    def message(self, text: str) -> None:
+        """Show what must be known, quiet or not."""
         if self._bar is not None:
             self._bars.console.print(f"creeping: {text}", highlight=False, markup=False, soft_wrap=True)
         else:
@@ -300,7 +300,7 @@ class _Meter:
             self._bars.update(self._bar, description="sweep", completed=done, total=total, left=left)
         elif now - self._shown > QUIET or done == total:
             self._shown = now
-            self.say(f"{done} of {total} incidences" + (f", {left}" if left else ""))
+            self.show(f"{done} of {total} incidences" + (f", {left}" if left else ""))
 
     def left(self) -> float:
         """Seconds left, by what came after the first task."""

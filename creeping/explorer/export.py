@@ -6,12 +6,12 @@ from pathlib import Path
 
 from creeping.explorer.colours import RANGE
 from creeping.explorer.page import LocalServer
-from creeping.explorer.preview import moving_frame, step_of
-from creeping.explorer.refined import Settled, settled
-from creeping.explorer.request import Wish
-from creeping.explorer.scene import Model, Stage
+from creeping.explorer.preview import preview_of, step_of
+from creeping.explorer.refined import Refined, refined_view
+from creeping.explorer.request import ViewRequest
+from creeping.explorer.scene import DrawnBody, Scene
 from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import colour_bar, settled_text
+from creeping.explorer.text import colour_bar, refined_text
 from creeping.files import write_text
 from creeping.rays.transport import Flow
 
@@ -22,7 +22,7 @@ background:rgba(255,255,255,.92);font:12px/1.4 sans-serif;color:#222;z-index:10}
 """
 
 
-def export_page(path: str | os.PathLike[str], flow: Flow, wish: Wish) -> Settled:
+def export_page(path: str | os.PathLike[str], flow: Flow, request: ViewRequest) -> Refined:
     """Write a self-contained page of one incidence.
 
     Parameters
@@ -30,11 +30,11 @@ def export_page(path: str | os.PathLike[str], flow: Flow, wish: Wish) -> Settled
     path : str or path
         HTML file to write.
     flow : PhaseMap or DirectFlow
-    wish : Wish
+    request : ViewRequest
 
     Returns
     -------
-    Settled
+    Refined
         What the page shows.
 
     Raises
@@ -44,17 +44,17 @@ def export_page(path: str | os.PathLike[str], flow: Flow, wish: Wish) -> Settled
     CreepingError
         If the file cannot be written.
     """
-    model = Model.of(flow.body)
-    frame = moving_frame(flow, wish, step_of(flow.body))
-    found = settled(flow, frame, model.mesh.vertices)
+    model = DrawnBody.of(flow.body)
+    frame = preview_of(flow, request, step_of(flow.body))
+    found = refined_view(flow, frame, model.mesh.vertices)
     assert found is not None
     server = LocalServer(8400)
     try:
-        stage = Stage(server, model, still=True)
-        stage.look(wish.direction)
-        stage.turn(wish.direction)
-        stage.show(frame)
-        stage.settle(found, stage.painted_mesh(found))
+        scene = Scene(server, model, still=True)
+        scene.look(request.direction)
+        scene.turn(request.direction)
+        scene.show(frame)
+        scene.refine(found, scene.painted_mesh(found))
         page = server.scene.as_html()
     finally:
         server.stop()
@@ -62,11 +62,11 @@ def export_page(path: str | os.PathLike[str], flow: Flow, wish: Wish) -> Settled
     return found
 
 
-def with_panel(page: str, title: str, found: Settled) -> str:
+def with_panel(page: str, title: str, found: Refined) -> str:
     """The page of a scene with the numbers and plane pictures beside it."""
-    bar = "" if found.body_levels is None else colour_bar(RANGE, found.wish.boundary)
-    text = "".join(f"<p>{html.escape(part)}</p>" for part in settled_text(found).split("\n\n"))
-    angles = f"theta {found.wish.theta:.1f}, phi {found.wish.phi:.1f} degrees"
+    bar = "" if found.body_levels is None else colour_bar(RANGE, found.request.boundary)
+    text = "".join(f"<p>{html.escape(part)}</p>" for part in refined_text(found).split("\n\n"))
+    angles = f"theta {found.request.theta:.1f}, phi {found.request.phi:.1f} degrees"
     panel = (
         f'<style>{STYLE}</style><aside id="creeping"><h1>{html.escape(title)}</h1><p>{angles}</p>{text}'
         f"{bar}{plane_svg(found)}{cut_svg(found)}</aside>"

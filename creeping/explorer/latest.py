@@ -1,4 +1,4 @@
-"""The latest wish and nothing else: a queue of one place, so that work does not pile up behind a hand that drags."""
+"""The latest request and nothing else: a queue of one place, so that work does not pile up behind a hand that drags."""
 
 from threading import Condition
 from typing import Generic, TypeVar
@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class Newest(Generic[T]):
+class Latest(Generic[T]):
     """Hands the latest value put in to one reader; values it had no time for are dropped."""
 
     def __init__(self) -> None:

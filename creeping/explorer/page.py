@@ -1,6 +1,6 @@
 """The page itself: controls, two workers, and what the server lets in.
 
-One worker follows the hand, from the latest wish to the moving frame; another follows up when no newer wish has come.
+One worker follows the hand, from the latest request to the preview; another follows up when no newer request has come.
 The server listens on the loopback address, and turns away connections that a page of another site opens.
 """
 
@@ -20,13 +20,13 @@ import viser
 from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.explorer.colours import RANGE
-from creeping.explorer.latest import Newest
-from creeping.explorer.preview import MovingFrame, moving_frame, step_of
-from creeping.explorer.refined import settled
-from creeping.explorer.request import BOUNDARIES, RAYS, Wish, angles
-from creeping.explorer.scene import Model, Stage, turned
+from creeping.explorer.latest import Latest
+from creeping.explorer.preview import Preview, preview_of, step_of
+from creeping.explorer.refined import refined_view
+from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles
+from creeping.explorer.scene import DrawnBody, Scene, turned
 from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import colour_bar, moving_text, settled_text
+from creeping.explorer.text import colour_bar, preview_text, refined_text
 from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
 
@@ -40,7 +40,7 @@ class LocalServer(viser.ViserServer):  # type: ignore[misc]
     """A quiet server for this machine alone."""
 
     def __init__(self, port: int) -> None:
-        # the address is told by whoever starts it
+        # the address is shown by whoever starts it
         with redirect_stdout(StringIO()):
             super().__init__(HOST, port, label="creeping", verbose=False)
         # viser offers no door before the scene is sent but this one
@@ -70,7 +70,7 @@ class Explorer:
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
-    wish : Wish
+    request : ViewRequest
         What is shown first.
     port : int
         The next free one is taken if it is in use.
@@ -78,33 +78,33 @@ class Explorer:
     Attributes
     ----------
     seconds : deque of float
-        What the last frames took, from the wish to the message.
+        What the last frames took, from the request to the message.
     """
 
-    def __init__(self, flow: Flow, wish: Wish, *, port: int = 8080) -> None:
-        self.flow, self.wish = flow, wish
-        self.model = Model.of(flow.body)
+    def __init__(self, flow: Flow, request: ViewRequest, *, port: int = 8080) -> None:
+        self.flow, self.request = flow, request
+        self.model = DrawnBody.of(flow.body)
         self.step = step_of(flow.body)
         # meshes of the line are made and kernels loaded before anybody looks
         with suppress(CreepingError):
-            moving_frame(flow, wish, self.step)
+            preview_of(flow, request, self.step)
         self.seconds: deque[float] = deque(maxlen=1000)
         self._asking, self._drawing = RLock(), RLock()
-        self._wishes: Newest[Wish] = Newest()
-        self._frames: Newest[tuple[MovingFrame, int]] = Newest()
+        self._requests: Latest[ViewRequest] = Latest()
+        self._frames: Latest[tuple[Preview, int]] = Latest()
         self.server = LocalServer(port)
         try:
-            self.stage = Stage(self.server, self.model)
+            self.scene = Scene(self.server, self.model)
             self._controls()
-            self.stage.look(wish.direction)
-            self.stage.turn(wish.direction)
+            self.scene.look(request.direction)
+            self.scene.turn(request.direction)
         except BaseException:
             self.server.stop()
             raise
-        self._workers = [Thread(target=work, daemon=True) for work in (self._move, self._settle)]
+        self._workers = [Thread(target=work, daemon=True) for work in (self._preview, self._refine)]
         for worker in self._workers:
             worker.start()
-        self._wishes.put(wish)
+        self._requests.put(request)
 
     @property
     def address(self) -> str:
@@ -112,43 +112,45 @@ class Explorer:
         return f"http://{HOST}:{self.server.get_port()}"
 
     def ask(self, **values: Any) -> bool:
-        """Change the wish; what is out of range is told on the page and changes nothing."""
+        """Change the request; what is out of range is named on the page and changes nothing."""
         with self._asking:
             try:
-                self.wish = self.wish.changed(**values)
+                self.request = self.request.changed(**values)
             except CreepingError as error:
-                self.status.content = told(error)
+                self.status.content = error_text(error)
                 return False
-            self._wishes.put(self.wish)
+            self._requests.put(self.request)
             return True
 
     def close(self) -> None:
         """Stop the workers and the server."""
-        self._wishes.close()
+        self._requests.close()
         self._frames.close()
         for worker in self._workers:
             worker.join(timeout=5.0)
         self.server.stop()
 
     def _controls(self) -> None:
-        gui, wish, extent = self.server.gui, self.wish, size(self.flow.body)
+        gui, request, extent = self.server.gui, self.request, size(self.flow.body)
         gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         sliders = {
-            "theta": gui.add_slider("theta (degrees)", 0.0, 180.0, 0.1, wish.theta, hint="Where the wave travels"),
-            "phi": gui.add_slider("phi (degrees)", -180.0, 180.0, 0.1, wish.phi),
+            "theta": gui.add_slider("theta (degrees)", 0.0, 180.0, 0.1, request.theta, hint="Where the wave travels"),
+            "phi": gui.add_slider("phi (degrees)", -180.0, 180.0, 0.1, request.phi),
             "wavenumber": gui.add_slider(
-                "wavenumber (1/L)", *_range(5 / extent, 400 / extent, wish.wavenumber), wish.wavenumber
+                "wavenumber (1/L)", *_range(5 / extent, 400 / extent, request.wavenumber), request.wavenumber
             ),
-            "boundary": gui.add_dropdown("boundary", BOUNDARIES, initial_value=wish.boundary),
-            "length": gui.add_slider("length of rays", *_range(0.2 * extent, 6 * extent, wish.length), wish.length),
-            "rays": gui.add_slider("rays", RAYS[0], RAYS[1], 16, wish.rays),
-            "spacing": gui.add_slider("iso-phase spacing", *_range(0.0, extent, wish.spacing), wish.spacing),
-            "cut": gui.add_slider("far-field cut, phi (degrees)", -180.0, 180.0, 1.0, wish.cut),
+            "boundary": gui.add_dropdown("boundary", BOUNDARIES, initial_value=request.boundary),
+            "length": gui.add_slider(
+                "length of rays", *_range(0.2 * extent, 6 * extent, request.length), request.length
+            ),
+            "rays": gui.add_slider("rays", RAYS[0], RAYS[1], 16, request.rays),
+            "spacing": gui.add_slider("iso-phase spacing", *_range(0.0, extent, request.spacing), request.spacing),
+            "cut": gui.add_slider("far-field cut, phi (degrees)", -180.0, 180.0, 1.0, request.cut),
         }
         self.sliders = sliders
         for name, handle in sliders.items():
             handle.on_update(lambda event, name=name: self._slid(name, event))
-        self.stage.incidence.on_update(self._dragged)
+        self.scene.incidence.on_update(self._dragged)
         self.status = gui.add_markdown("")
         self.found = gui.add_markdown("")
         self.bar = gui.add_html("")
@@ -156,15 +158,15 @@ class Explorer:
         self.cut = gui.add_html("")
 
     def _slid(self, name: str, event: Any) -> None:
-        # a value that the program sets, after the arrow was turned, is no new wish
+        # a value that the program sets, after the arrow was turned, is no new request
         if event.client is None:
             return
         with self._asking:
             value = event.target.value
             if not self.ask(**{name: int(value) if name == "rays" else value}):
-                event.target.value = getattr(self.wish, name)
+                event.target.value = getattr(self.request, name)
             elif name in ("theta", "phi"):
-                self.stage.turn(self.wish.direction)
+                self.scene.turn(self.request.direction)
 
     def _dragged(self, event: Any) -> None:
         if event.client is None:
@@ -177,49 +179,49 @@ class Explorer:
             if self.ask(theta=theta, phi=phi):
                 self.sliders["theta"].value, self.sliders["phi"].value = theta, phi
 
-    def _move(self) -> None:
+    def _preview(self) -> None:
         """Follow the hand."""
         frame = None
-        while (taken := self._wishes.take()) is not None:
-            wish, number = taken
+        while (taken := self._requests.take()) is not None:
+            request, number = taken
             began = time.perf_counter()
             try:
-                frame = moving_frame(self.flow, wish, self.step)
+                frame = preview_of(self.flow, request, self.step)
                 with self._drawing:
-                    self.stage.show(frame)
+                    self.scene.show(frame)
                     self.found.content = ""
                 self.seconds.append(time.perf_counter() - began)
-                self.bar.content = "" if frame.levels is None else colour_bar(RANGE, wish.boundary)
-                self.status.content = moving_text(frame, self.seconds[-1], RANGE)
+                self.bar.content = "" if frame.levels is None else colour_bar(RANGE, request.boundary)
+                self.status.content = preview_text(frame, self.seconds[-1], RANGE)
             except Exception as error:
-                self.status.content = told(error)
+                self.status.content = error_text(error)
             if frame is not None:
-                # after a wish that failed the last frame is still the one on the page, and may settle
+                # after a request that failed the last frame is still the one on the page, and may be refined
                 self._frames.put((frame, number))
 
-    def _settle(self) -> None:
+    def _refine(self) -> None:
         """Follow up when the hand rests."""
         while (taken := self._frames.take()) is not None:
             (frame, number), _ = taken
 
             def stale(number: int = number) -> bool:
-                return self._wishes.closed or self._wishes.number != number
+                return self._requests.closed or self._requests.number != number
 
             time.sleep(REST)
             try:
-                found = None if stale() else settled(self.flow, frame, self.model.mesh.vertices, stale)
+                found = None if stale() else refined_view(self.flow, frame, self.model.mesh.vertices, stale)
                 if found is None:
                     continue
-                text, plane, cut = settled_text(found), plane_svg(found), cut_svg(found)
-                paint = self.stage.painted_mesh(found)
+                text, plane, cut = refined_text(found), plane_svg(found), cut_svg(found)
+                paint = self.scene.painted_mesh(found)
                 with self._drawing:
                     # a frame that was shown meanwhile is newer than this
                     if not stale():
-                        self.stage.settle(found, paint)
+                        self.scene.refine(found, paint)
                         self.found.content, self.plane.content, self.cut.content = text, plane, cut
             except Exception as error:
                 with self._drawing:
-                    self.found.content, self.plane.content, self.cut.content = told(error), "", ""
+                    self.found.content, self.plane.content, self.cut.content = error_text(error), "", ""
 
 
 def local(address: str) -> bool:
@@ -230,7 +232,7 @@ def local(address: str) -> bool:
         return False
 
 
-def told(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Words of an error for the page; one that is not ours goes to the terminal in full, and the page lives on."""
     if not isinstance(error, CreepingError):
         traceback.print_exception(error, file=sys.stderr)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from creeping.explorer.request import Wish
+from creeping.explorer.request import ViewRequest
 from creeping.field.decibels import decibels
 from creeping.field.on_rays import ray_magnitude
 from creeping.geodesics.equations import natural_horizon
@@ -28,17 +28,17 @@ NOTHING: FloatArray = np.zeros((0, 2, 3), dtype=np.float32)
 
 
 @dataclass(frozen=True, eq=False)
-class MovingFrame:
-    """The fan of a wish and what is drawn of it at once.
+class Preview:
+    """The fan of a request and what is drawn of it at once.
 
     Attributes
     ----------
-    wish : Wish
+    request : ViewRequest
     fan : RayFan
         Its error is not measured.
     """
 
-    wish: Wish
+    request: ViewRequest
     fan: RayFan
 
     @cached_property
@@ -49,7 +49,7 @@ class MovingFrame:
         """
         if speed_of(self.fan.body) is not None:
             return None
-        return decibels(ray_magnitude(self.fan, wavenumber=self.wish.wavenumber, boundary=self.wish.boundary))
+        return decibels(ray_magnitude(self.fan, wavenumber=self.request.wavenumber, boundary=self.request.boundary))
 
     @cached_property
     def ray_segments(self) -> FloatArray:
@@ -59,7 +59,7 @@ class MovingFrame:
     @cached_property
     def level_segments(self) -> tuple[FloatArray, FloatArray]:
         """Segments of the iso-phase curves (m, 2, 3), and the level of each (m,)."""
-        curves = wished_curves(self.wish, self.fan)
+        curves = requested_curves(self.request, self.fan)
         pieces = [segments(c.points[None], closed=c.closed) for c in curves]
         return joined(pieces), np.concatenate(
             [np.zeros(0), *(np.full(len(p), c.level) for p, c in zip(pieces, curves, strict=True))]
@@ -73,13 +73,13 @@ class MovingFrame:
         return joined([segments(start[a][None], closed=c) for a, c in zip(arcs, fan.closed_arcs, strict=True)])
 
 
-def moving_frame(flow: Flow, wish: Wish, step: float) -> MovingFrame:
-    """The fan of a wish, its length rounded to whole steps.
+def preview_of(flow: Flow, request: ViewRequest, step: float) -> Preview:
+    """The fan of a request, its length rounded to whole steps.
 
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
-    wish : Wish
+    request : ViewRequest
     step : float, L
         Travel time between the points of a ray: one that the flow takes at once.
 
@@ -88,10 +88,10 @@ def moving_frame(flow: Flow, wish: Wish, step: float) -> MovingFrame:
     SingularIncidenceError
         If the shadow line crosses itself.
     """
-    count, step = steps_of(wish.length, step)
-    line = shadow_line(flow.body, wish.direction, n_points=16)
-    fan = launch(flow, line, length=count * step, n_rays=wish.rays, n_steps=count, max_gap=np.inf, measured=False)
-    return MovingFrame(wish, fan)
+    count, step = steps_of(request.length, step)
+    line = shadow_line(flow.body, request.direction, n_points=16)
+    fan = launch(flow, line, length=count * step, n_rays=request.rays, n_steps=count, max_gap=np.inf, measured=False)
+    return Preview(request, fan)
 
 
 def steps_of(length: float, step: float) -> tuple[int, float]:
@@ -105,9 +105,9 @@ def step_of(body: Surface) -> float:
     return natural_horizon(body) / 4
 
 
-def wished_curves(wish: Wish, fan: RayFan) -> list[IsoPhaseCurve]:
+def requested_curves(request: ViewRequest, fan: RayFan) -> list[IsoPhaseCurve]:
     """Iso-phase curves of a fan at the levels that its rays reach."""
-    return iso_phase_curves(fan, wish.levels[wish.levels <= fan.length])
+    return iso_phase_curves(fan, request.levels[request.levels <= fan.length])
 
 
 def joined(pieces: list[FloatArray]) -> FloatArray:

@@ -1,6 +1,6 @@
 """What follows when the incidence rests: the line to rounding, a fan with its error, the field on the body and afar.
 
-Each step asks before it starts whether the wish still stands, so that a newer one does not wait for long.
+Each step asks before it starts whether the request still stands, so that a newer one does not wait for long.
 """
 
 from collections.abc import Callable
@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.explorer.preview import MovingFrame
-from creeping.explorer.request import Wish
+from creeping.explorer.preview import Preview
+from creeping.explorer.request import ViewRequest
 from creeping.field.far import FarField, far_field
 from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.speed import speed_of
@@ -22,17 +22,17 @@ from creeping.shadow.line import ShadowLine, shadow_line
 CUT_STEP = 2.0
 """Of the far-field cut, degrees."""
 BLOCK = 512
-"""Points of the body at a time: a newer wish waits for no more."""
-Tell = Callable[[], bool]
+"""Points of the body at a time: a newer request waits for no more."""
+IsStale = Callable[[], bool]
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class Refined:
     """Everything that takes seconds.
 
     Attributes
     ----------
-    wish : Wish
+    request : ViewRequest
     drawn : RayFan
         The fan on the page, its error now measured.
     line : ShadowLine
@@ -41,11 +41,11 @@ class Settled:
     body_levels : (n,) or None
         20 log10 of the total field on the vertices of the mesh; NaN where no ray passes, None on a weighted body.
     cut_angles : (m,), degrees
-        Theta of the cut, from -180 to 180 through the directions of azimuth ``wish.cut`` and its opposite.
+        Theta of the cut, from -180 to 180 through the directions of azimuth ``request.cut`` and its opposite.
     far : FarField or None
     """
 
-    wish: Wish
+    request: ViewRequest
     drawn: RayFan
     line: ShadowLine
     fan: RayFan
@@ -54,33 +54,33 @@ class Settled:
     far: FarField | None
 
 
-def settled(flow: Flow, frame: MovingFrame, vertices: FloatArray, stale: Tell = lambda: False) -> Settled | None:
-    """Follow up a moving frame; None as soon as ``stale()`` says that nobody waits for it any more.
+def refined_view(flow: Flow, frame: Preview, vertices: FloatArray, stale: IsStale = lambda: False) -> Refined | None:
+    """Follow up a preview; None as soon as ``stale()`` says that nobody waits for it any more.
 
     Raises
     ------
     SingularIncidenceError
         If the shadow line crosses itself.
     """
-    wish, body = frame.wish, flow.body
-    line, drawn = shadow_line(body, wish.direction), replace(frame.fan, error=end_error(frame.fan))
+    request, body = frame.request, flow.body
+    line, drawn = shadow_line(body, request.direction), replace(frame.fan, error=end_error(frame.fan))
     if stale():
         return None
     steps = len(frame.fan.travel_time) - 1
-    fan = launch(flow, line, length=frame.fan.length, n_rays=wish.rays, n_steps=steps)
+    fan = launch(flow, line, length=frame.fan.length, n_rays=request.rays, n_steps=steps)
     if stale():
         return None
     angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
     if speed_of(body) is not None:
-        return Settled(wish, drawn, line, fan, None, angles, None)
+        return Refined(request, drawn, line, fan, None, angles, None)
     levels = np.empty(len(vertices))
     for first in range(0, len(vertices), BLOCK):
         part = slice(first, first + BLOCK)
-        levels[part] = surface_levels(fan, vertices[part], wavenumber=wish.wavenumber, boundary=wish.boundary)
+        levels[part] = surface_levels(fan, vertices[part], wavenumber=request.wavenumber, boundary=request.boundary)
         if stale():
             return None
-    far = far_field(fan, cut_directions(angles, wish.cut), wavenumber=wish.wavenumber, boundary=wish.boundary)
-    return Settled(wish, drawn, line, fan, levels, angles, far)
+    far = far_field(fan, cut_directions(angles, request.cut), wavenumber=request.wavenumber, boundary=request.boundary)
+    return Refined(request, drawn, line, fan, levels, angles, far)
 
 
 def cut_directions(angles: FloatArray, azimuth: float) -> FloatArray:

@@ -21,7 +21,7 @@ LEVELS = 400
 
 
 @dataclass(frozen=True)
-class Wish:
+class ViewRequest:
     """What to show; every number is checked, as it may come over a wire.
 
     Attributes
@@ -78,8 +78,8 @@ class Wish:
             return np.zeros(0)
         return np.asarray(self.spacing * np.arange(1, int(self.length / self.spacing + 1e-9) + 1))
 
-    def changed(self, **values: Any) -> "Wish":
-        """The wish with other values."""
+    def changed(self, **values: Any) -> "ViewRequest":
+        """The request with other values."""
         return replace(self, **values)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.explorer.colours import ENDED, LEVEL_COLOURS, field_colours
-from creeping.explorer.preview import NOTHING, MovingFrame, joined, outline, segments
-from creeping.explorer.refined import Settled
+from creeping.explorer.preview import NOTHING, Preview, joined, outline, segments
+from creeping.explorer.refined import Refined
 from creeping.field.on_rays import creeps
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import Triangulation, triangulate
@@ -29,7 +29,7 @@ WIDTHS = {"rays": 1.0, "levels": 2.0, "line": 4.0, "outline": 1.5}
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class DrawnBody:
     """A body as it is drawn.
 
     Attributes
@@ -49,7 +49,7 @@ class Model:
     centre: FloatArray
 
     @classmethod
-    def of(cls, body: Surface) -> "Model":
+    def of(cls, body: Surface) -> "DrawnBody":
         """Triangulate a body."""
         mesh = triangulate(body.level, body.gradient, body.bounds, cells=CELLS)
         box = np.asarray(body.bounds, dtype=float)
@@ -61,18 +61,18 @@ class Model:
         return np.asarray(self.mesh.vertices - INSET * size(self.body) * self.normals)
 
 
-class Stage:
+class Scene:
     """The scene of one server.
 
     Parameters
     ----------
     server : viser.ViserServer
-    model : Model
+    model : DrawnBody
     still : bool
         Whether there is nobody to turn the incidence.
     """
 
-    def __init__(self, server: Any, model: Model, *, still: bool = False) -> None:
+    def __init__(self, server: Any, model: DrawnBody, *, still: bool = False) -> None:
         self.server, self.model, self.scene = server, model, server.scene
         self.scene.set_up_direction("+z")
         self.scene.configure_default_lights(enabled=True, cast_shadow=False)
@@ -115,7 +115,7 @@ class Stage:
         """Turn the arrow of the incidence."""
         self.incidence.wxyz = quaternion(direction)
 
-    def show(self, frame: MovingFrame) -> None:
+    def show(self, frame: Preview) -> None:
         """Draw what follows at once; the field on the body is hidden until it is known again."""
         levels = frame.levels
         if levels is None:
@@ -132,12 +132,12 @@ class Stage:
             self.plain.visible = True
             self._line("rays", frame.ray_segments, pairs)
             self._line("levels", curves, shades)
-            self._line("outline", outline(self.model.mesh, self.model.normals, frame.wish.direction), RAY_COLOUR)
+            self._line("outline", outline(self.model.mesh, self.model.normals, frame.request.direction), RAY_COLOUR)
             self._line("line/attached", frame.launch_segments, STATUS_COLOURS["attached"])
             for status in ("occluded", "concave"):
                 self._line(f"line/{status}", NOTHING, STATUS_COLOURS[status])
 
-    def painted_mesh(self, found: Settled) -> Any:
+    def painted_mesh(self, found: Refined) -> Any:
         """The body in the colours of the field on it, None without a field."""
         import trimesh
 
@@ -151,7 +151,7 @@ class Stage:
             process=False,
         )
 
-    def settle(self, found: Settled, paint: Any) -> None:
+    def refine(self, found: Refined, paint: Any) -> None:
         """Draw what takes longer, with what `painted_mesh` has made."""
         with self.server.atomic():
             for status, colour in STATUS_COLOURS.items():

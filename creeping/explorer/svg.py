@@ -9,8 +9,8 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.explorer.colours import LEVEL_COLOURS
-from creeping.explorer.preview import wished_curves
-from creeping.explorer.refined import Settled
+from creeping.explorer.preview import requested_curves
+from creeping.explorer.refined import Refined
 from creeping.field.decibels import cross_section_decibels, shown_range
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, status_pieces
 from creeping.plotting.far_cuts import COLOURS
@@ -68,14 +68,14 @@ class _Axes:
         return "".join(out)
 
 
-def plane_svg(found: Settled) -> str:
+def plane_svg(found: Refined) -> str:
     """Shadow line, rays and iso-phase curves over (phi, theta), degrees."""
     line, fan, body = found.line, found.fan, found.line.body
     torus = is_torus(line)
     axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
     chosen = np.unique(np.linspace(0, len(fan.points) - 1, min(DRAWN, len(fan.points))).astype(int))
     parts = [axes.lines(_flat(body.parameters(fan.points[k]) for k in chosen), RAY_COLOUR, 0.5, 0.6)]
-    for curve in wished_curves(found.wish, fan):
+    for curve in requested_curves(found.request, fan):
         pieces = [np.degrees(piece[:, ::-1]) for piece in curve.parameter_pieces]
         parts.append(axes.lines(pieces, LEVEL_COLOURS.hexadecimal(curve.level / fan.length), 0.9))
     for status, colour in STATUS_COLOURS.items():
@@ -86,7 +86,7 @@ def plane_svg(found: Settled) -> str:
     return _picture("plane", axes.height, [*parts, frame])
 
 
-def cut_svg(found: Settled) -> str:
+def cut_svg(found: Refined) -> str:
     """Far field in dB over theta, unresolved directions as circles; empty for a weighted body."""
     if found.far is None:
         return ""
@@ -117,7 +117,7 @@ def cut_svg(found: Settled) -> str:
         parts.append(f'<text {label} fill="{colour}">{name}</text>')
     ticks = np.arange(low, high + 1, 20.0 if high - low > 40 else 10.0)
     frame = axes.frame(
-        range(-180, 181, 60), ticks.tolist(), f"theta (degrees), phi = {found.wish.cut:g}", "dB of 4π|f|²"
+        range(-180, 181, 60), ticks.tolist(), f"theta (degrees), phi = {found.request.cut:g}", "dB of 4π|f|²"
     )
     return _picture("cut", axes.height, [*parts, frame])
 

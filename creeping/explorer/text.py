@@ -4,22 +4,23 @@ import numpy as np
 
 from creeping._version import __version__
 from creeping.explorer.colours import FIELD_COLOURS
-from creeping.explorer.preview import MovingFrame
-from creeping.explorer.refined import Settled
+from creeping.explorer.preview import Preview
+from creeping.explorer.refined import Refined
 from creeping.rays.fan import RayFan
 
 
-def moving_text(frame: MovingFrame, seconds: float, span: tuple[float, float]) -> str:
+def preview_text(frame: Preview, seconds: float, span: tuple[float, float]) -> str:
     """The fan in a few words, with the range of its colours in dB."""
-    wish, fan = frame.wish, frame.fan
-    kind = "" if frame.levels is None else f"; colours: {span[0]:g} to {span[1]:g} dB, {field_name(wish.boundary)}"
+    request, fan = frame.request, frame.fan
+    at = f"theta {request.theta:.1f}, phi {request.phi:.1f} degrees"
+    kind = "" if frame.levels is None else f"; colours: {span[0]:g} to {span[1]:g} dB, {field_name(request.boundary)}"
     return (
-        f"d = ({', '.join(f'{c:.4f}' for c in wish.direction)}), theta {wish.theta:.1f}, phi {wish.phi:.1f} degrees\n\n"
+        f"d = ({', '.join(f'{c:.4f}' for c in request.direction)}), {at}\n\n"
         f"{_counts(fan)}; length {fan.length:.3g}; {1e3 * seconds:.0f} ms{kind}"
     )
 
 
-def settled_text(found: Settled) -> str:
+def refined_text(found: Refined) -> str:
     """Line, errors and what the far field leaves open."""
     line, drawn = found.line, found.drawn
     shares = ", ".join(f"{share:.3g} {name}" for name, share in line.fractions.items() if share)
@@ -30,10 +31,10 @@ def settled_text(found: Settled) -> str:
         f"max {drawn.error.max:.1e} ({drawn.error.samples} traced)",
     ]
     if found.far is not None:
-        doubt, fan, wish = int(np.sum(found.far.unresolved)), found.fan, found.wish
+        doubt, fan, request = int(np.sum(found.far.unresolved)), found.fan, found.request
         lines.append(
-            f"fields of {len(fan.points)} rays, rms {fan.error.rms:.1e}: k = {wish.wavenumber:g} 1/L, {wish.boundary}; "
-            f"{doubt} of {len(found.cut_angles)} directions of the cut unresolved"
+            f"fields of {len(fan.points)} rays, rms {fan.error.rms:.1e}: k = {request.wavenumber:g} 1/L, "
+            f"{request.boundary}; {doubt} of {len(found.cut_angles)} directions of the cut unresolved"
         )
     else:
         lines.append("a weighted body has no field here: only its rays")

@@ -20,42 +20,44 @@ from creeping.errors import InvalidInputError
 
 
 @dataclass(frozen=True)
-class Impedance:
+class ImpedanceBoundary:
     """Impedance boundary du/dn + i k eta u = 0.
 
     Parameters
     ----------
-    eta : complex
-        Relative admittance, without unit: 0 is hard, infinite is soft, 1 absorbs at normal incidence; Re eta >= 0 is
-        passive.
+    admittance : complex
+        Relative admittance eta, without unit: 0 is hard, infinite is soft, 1 absorbs at normal incidence; passive
+        if the real part is not negative.
 
     Raises
     ------
     InvalidInputError
-        If eta is not a finite number, or Re eta < 0.
+        If the admittance is not a finite number, or its real part is negative.
 
     Examples
     --------
     >>> import creeping as cr
-    >>> cr.Impedance(0.5 + 0.2j)
-    Impedance(eta=(0.5+0.2j))
+    >>> cr.ImpedanceBoundary(0.5 + 0.2j)
+    ImpedanceBoundary(admittance=(0.5+0.2j))
     """
 
-    eta: complex
+    admittance: complex
 
     def __post_init__(self) -> None:
         try:
-            eta = complex(self.eta)
+            admittance = complex(self.admittance)
         except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"eta = {self.eta!r} is not a complex number") from error
-        if not np.isfinite(eta):
-            raise InvalidInputError(f"eta = {self.eta!r} is not finite; for an infinite one use 'soft'")
-        if eta.real < 0:
-            raise InvalidInputError(f"eta = {self.eta!r} gives energy off (Re eta < 0); give Re eta >= 0")
-        object.__setattr__(self, "eta", eta)
+            raise InvalidInputError(f"admittance = {self.admittance!r} is not a complex number") from error
+        if not np.isfinite(admittance):
+            raise InvalidInputError(f"admittance = {self.admittance!r} is not finite; for an infinite one use 'soft'")
+        if admittance.real < 0:
+            raise InvalidInputError(
+                f"admittance = {self.admittance!r} gives energy off (negative real part); give one >= 0"
+            )
+        object.__setattr__(self, "admittance", admittance)
 
 
-BoundaryLike = Literal["soft", "hard", "pec"] | Impedance
+BoundaryLike = Literal["soft", "hard", "pec"] | ImpedanceBoundary
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Boundary:
     """One scalar boundary: ``kind`` is "soft", "hard", "impedance", "electric soft" or "electric hard"."""
 
     kind: str
-    eta: complex = 0j
+    admittance: complex = 0j
 
     @property
     def sign(self) -> float:
@@ -73,7 +75,7 @@ class Boundary:
     def q(self, m: FloatArray) -> ComplexArray | float | None:
         """Parameter q of the Airy functions at a Fock scale m (...): None if soft, 0 if hard, else (...)."""
         if self.kind == "impedance":
-            return np.asarray(1j * m * self.eta)
+            return np.asarray(1j * m * self.admittance)
         return None if self.kind.endswith("soft") else 0.0
 
 
@@ -89,14 +91,14 @@ def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
     InvalidInputError
         If it is none of those known.
     """
-    if isinstance(boundary, Impedance):
-        if boundary.eta == 0:
+    if isinstance(boundary, ImpedanceBoundary):
+        if boundary.admittance == 0:
             return (HARD,)
-        return (Boundary("impedance", boundary.eta),)
+        return (Boundary("impedance", boundary.admittance),)
     known = {"soft": (SOFT,), "hard": (HARD,), "pec": (ELECTRIC_SOFT, ELECTRIC_HARD)}
     if isinstance(boundary, str) and boundary in known:
         return known[boundary]
-    raise InvalidInputError(f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or Impedance(eta)")
+    raise InvalidInputError(f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or ImpedanceBoundary(admittance)")
 
 
 def parse_boundary(text: str) -> BoundaryLike:
@@ -105,7 +107,7 @@ def parse_boundary(text: str) -> BoundaryLike:
     Raises
     ------
     InvalidInputError
-        If it is none of these, or ETA is not a complex number with Re ETA >= 0.
+        If it is none of these, or ETA is not a complex number whose real part is not negative.
     """
     scalar: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard", "pec": "pec"}
     if text in scalar:
@@ -114,9 +116,9 @@ def parse_boundary(text: str) -> BoundaryLike:
     if name != "impedance":
         raise InvalidInputError(f"boundary {text!r} is not soft, hard, pec or impedance:ETA, e.g. impedance:0.5+0.2j")
     try:
-        eta = complex(number.replace(" ", ""))
+        admittance = complex(number.replace(" ", ""))
     except ValueError:
         raise InvalidInputError(
             f"boundary {text!r}: {number!r} is not a complex number such as 1 or 0.5+0.2j"
         ) from None
-    return Impedance(eta)
+    return ImpedanceBoundary(admittance)

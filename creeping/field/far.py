@@ -56,8 +56,8 @@ class FarField(Drawn):
         What served the creeping part: "forward", "rays", "fan", or several joined by "+".
     unresolved : (m,) of bool
         Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
-        fan integral does not cover, a caustic of the reflected field (a specular point on nearly flat ground), or a
-        forward lobe with no mid-horizon (concave ground) or with a rim that the body hides in part.
+        fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
+        forward lobe with no mid-horizon (a concave region) or with a rim that the body hides in part.
     wavenumber : float, 1/L
     boundary : str
     order : int
@@ -101,12 +101,12 @@ class FarField(Drawn):
         size = np.abs(self.total)
         finite = np.isfinite(size)
         largest = np.max(size, initial=0.0, where=finite)
-        lost = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
+        missing = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
         return (
             f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
             f"order {self.order})\n"
             f"  {served or 'none'}\n"
-            f"  |f| up to {largest:.4g} L; {int(self.unresolved.sum())} unresolved{lost}"
+            f"  |f| up to {largest:.4g} L; {int(self.unresolved.sum())} unresolved{missing}"
         )
 
 
@@ -122,7 +122,7 @@ def far_field(
     observation : (..., 3)
         Directions r from the body to the observers; need not be unit. Flattened to (m, 3).
     wavenumber : float, 1/L
-    boundary : "soft", "hard", "pec" or Impedance
+    boundary : "soft", "hard", "pec" or ImpedanceBoundary
     order : 2 or 1
         Second-order creeping waves, or the leading order.
 
@@ -166,7 +166,7 @@ def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
         method=_methods(parts.in_forward, parts.in_fan),
         unresolved=parts.unresolved(),
         wavenumber=k,
-        boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.eta:g}",
+        boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.admittance:g}",
         order=order,
     )
 
@@ -203,7 +203,7 @@ def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, 
 def passed_fold(geometry: FarGeometry) -> BoolArray:
     """Whether a shed ray is past the fold J' = 0 of its launch point (n,): φ outside [0, π/2], or turned back.
 
-    Over ground with K < 0, φ may come back to 0.
+    Over regions with K < 0, φ may come back to 0.
     """
     rays = geometry.shed.rays
     turned = geometry.angle[geometry.shed.observer] > np.pi / 2
@@ -242,7 +242,7 @@ class _Parts:
         self.creeping, self.reflected, self.forward = (
             np.zeros((m, 2, 2) if self.vector else m, dtype=complex) for _ in range(3)
         )
-        self.doubtful, self.lost = np.zeros(m), np.zeros(m, dtype=bool)
+        self.failing_size, self.missing = np.zeros(m), np.zeros(m, dtype=bool)
         theta = geometry.angle
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
         self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
@@ -254,11 +254,11 @@ class _Parts:
         """Directions in which an expansion fails for what matters there (m,)."""
         total = np.abs(self.creeping + self.reflected + self.forward)
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
-        return np.asarray((self.lost & (self.in_forward > 0)) | (self.doubtful > MATTERS * largest))
+        return np.asarray((self.missing & (self.in_forward > 0)) | (self.failing_size > MATTERS * largest))
 
-    def _doubt(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
+    def _note_failing(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
         """Note the size of contributions (n,) whose expansion fails."""
-        np.add.at(self.doubtful, observer, np.where(failing, np.abs(wave), 0.0))
+        np.add.at(self.failing_size, observer, np.where(failing, np.abs(wave), 0.0))
 
     def add(self, number: int, kind: Boundary) -> None:
         """Add every part of one scalar problem."""
@@ -268,7 +268,7 @@ class _Parts:
         wave = _weighted(share, isolated_rays(g, k, kind, order))
         # the first zero of J' is the launch point itself, where the forward lobe serves
         merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
-        self._doubt(shed.observer, wave, merged)
+        self._note_failing(shed.observer, wave, merged)
         n0, n = shed.rays.first_normal, g.shed_normals
         self._sum(self.creeping, number, shed.observer, wave, n0, n)
         fan = g.fan_nodes(k, self.in_fan > 0)
@@ -282,7 +282,7 @@ class _Parts:
             other = reflected_amplitude(s, g.directions, incident, k, CROSSED[kind][1], order)
             wave = wave - 0.5 * (1 - smoothstep(s.sine, *NORMAL)) * (wave + other)
         wave = _weighted((1 - w)[s.observer], wave)
-        self._doubt(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
+        self._note_failing(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
         self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
         if np.any(w > 0):
             self._add_forward(number, kind)
@@ -290,8 +290,8 @@ class _Parts:
     def _add_forward(self, number: int, kind: Boundary) -> None:
         """Add the forward lobes."""
         g, k, order, w = self.geometry, self.wavenumber, self.order, self.in_forward
-        shadow, lit, lost = g.forward_nodes(k, w > 0)
-        self.lost[lost] = True
+        shadow, lit, missing = g.forward_nodes(k, w > 0)
+        self.missing[missing] = True
         wave = shadow_half(shadow, g.directions, self.incident, k, kind, order, self.beyond_axis[shadow.observer])
         wave = _weighted(w[shadow.observer], wave)
         self._sum(
@@ -301,7 +301,7 @@ class _Parts:
         self._sum(self.forward, number, lit.observer, _weighted(w[lit.observer], wave), lit.normals, lit.normals)
         for incidence in np.unique(g.incidence[w > 0]):
             here, line = (g.incidence == incidence) & (w > 0), g.line_of(int(incidence))
-            self.lost[here] |= line.fractions["occluded"] > HIDDEN
+            self.missing[here] |= line.fractions["occluded"] > HIDDEN
             ahead = np.flatnonzero(here & (self.beyond_axis < 1))
             wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(line, g.directions[ahead], k)
             # any normal of the plane of d and r will do, and any vector across d where they are one

@@ -86,7 +86,7 @@ def launched_by(fan: RayFan) -> LaunchPoints:
 
     Each run of neighbours among them is an arc of its own, closed if it is a whole closed arc of the fan.
     """
-    creeping = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.ROUGH))
+    creeping = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
     mine = np.flatnonzero(creeping)
     starts = fan.arc_index[mine[1:]] != fan.arc_index[mine[:-1]]
     arc = np.cumsum(np.concatenate([[0], starts | (np.diff(mine) > 1)])) if len(mine) else np.zeros(0)
@@ -305,8 +305,8 @@ class FarGeometry:
                 reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
                 counts = (48 + 1.5 * reach).astype(np.int64)
                 parts.append(forward_nodes(strips, line, rows, r, counts))
-            shadow, lit, lost = zip(*parts, strict=True)
-            self._lobes[key] = HorizonRays.joined(shadow), MidHorizon.joined(lit), np.concatenate(lost)
+            shadow, lit, missing = zip(*parts, strict=True)
+            self._lobes[key] = HorizonRays.joined(shadow), MidHorizon.joined(lit), np.concatenate(missing)
         return self._lobes[key]
 
     def line_of(self, incidence: int) -> ShadowLine:

@@ -67,7 +67,7 @@ def near_field(
     points : (..., 3), L
         Outside the body or on it.
     wavenumber : float, 1/L
-    boundary : "soft", "hard" or Impedance
+    boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
 
     Returns
@@ -210,7 +210,7 @@ def _series(
     """Sum of modes with height gain (n,); ``ends`` with the factors of varying curvature at both ends."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber), n)
     share = height[..., 0] / (1 + height[..., 0])
-    waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=share if ends else None)
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=share if ends else None)
     terms = end_residue(rays, wavenumber, boundary, "residue", n) * waves
     if order == 2:
         # from the amplitude on the body to that far away

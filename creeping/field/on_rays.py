@@ -28,7 +28,7 @@ def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "s
     ----------
     fan : RayFan
     wavenumber : float, 1/L
-    boundary : "soft", "hard" or Impedance
+    boundary : "soft", "hard" or ImpedanceBoundary
 
     Returns
     -------
@@ -58,5 +58,5 @@ def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "s
 
 def creeps(fan: RayFan) -> BoolArray:
     """Whether each ray is a creeping ray at its steps: launched by the wave and not detached before (rays, steps)."""
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.ROUGH))
+    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
     return np.asarray(launched[:, None] & (fan.travel_time < fan.detachment[:, None]) & (fan.curvature > 0))

@@ -57,7 +57,7 @@ def reflection(
 def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
     """R of a plane (n,), without unit: -1 soft, +1 hard, (cos θᵢ - η)/(cos θᵢ + η)."""
     if boundary.kind == "impedance":
-        return np.asarray((cosine - boundary.eta) / (cosine + boundary.eta))
+        return np.asarray((cosine - boundary.admittance) / (cosine + boundary.admittance))
     return np.full(cosine.shape, -1.0 if boundary.kind.endswith("soft") else 1.0, dtype=complex)
 
 

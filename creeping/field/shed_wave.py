@@ -68,11 +68,11 @@ def mode_waves(
     boundary: Boundary,
     order: int,
     *,
-    launch_share: FloatArray | float | None = 1.0,
+    shed_share: FloatArray | float | None = 1.0,
 ) -> ComplexArray:
     """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
 
-    ``launch_share`` (...) is the power of the factor of shedding: 0 on the body, 1 far away; None leaves both ends out.
+    ``shed_share`` (...) is the power of the factor of shedding: 0 on the body, 1 far away; None leaves both ends out.
     The correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
     down.
     """
@@ -82,9 +82,9 @@ def mode_waves(
     plain, across, varying = decay_terms(modes, boundary.sign)
     i = rays.integrals[..., None]
     change = np.cbrt(2 / wavenumber) * (plain * i[..., 2, :] + across * i[..., 3, :] + varying * i[..., 4, :])
-    if launch_share is not None:
+    if shed_share is not None:
         (rate1, rate2), (m1, m2) = rays.radius_rate, scales(rays, wavenumber)
-        change = change + modes.tau**2 * ((launch_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
+        change = change + modes.tau**2 * ((shed_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
     return np.asarray(np.exp(1j * (leading + limited(change, 0.5 * leading))))
 
 

@@ -59,7 +59,7 @@ def surface_field(
     points : (..., 3), L, optional
         Points on the body, in the shadow.
     wavenumber : float, 1/L
-    boundary : "soft", "hard" or Impedance
+    boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
 
     Returns
@@ -107,7 +107,7 @@ def scalar_boundary(boundary: BoundaryLike) -> Boundary:
     kinds = scalar_boundaries(boundary)
     if len(kinds) > 1:
         raise InvalidInputError(
-            "boundary 'pec' is for the far field; on and near the body give 'soft', 'hard' or Impedance"
+            "boundary 'pec' is for the far field; on and near the body give 'soft', 'hard' or ImpedanceBoundary"
         )
     return kinds[0]
 
@@ -138,7 +138,7 @@ def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order:
 def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """g or F by its residues (...)."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber))
-    waves = mode_waves(rays, modes, wavenumber, boundary, order, launch_share=0.0)
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=0.0)
     terms = end_residue(rays, wavenumber, boundary, "surface") * waves
     if order == 2:
         terms = terms * surface_amplitude(rays, modes, wavenumber, boundary)

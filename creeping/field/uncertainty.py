@@ -5,8 +5,8 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.field.boundary import BoundaryLike
 from creeping.field.far import far_field
-from creeping.rays.body_uncertainty import coarser_fan
 from creeping.rays.fan import RayFan
+from creeping.rays.uncertain_body import coarse_fan
 
 
 def far_field_uncertainty(
@@ -14,20 +14,20 @@ def far_field_uncertainty(
 ) -> FloatArray | None:
     """Change of the far field when the body is replaced by its coarser fit, the shadow line and rays anew.
 
-    It is about the error of the coarser body's field, two to four times that of the fan's own where grids resolve the
+    It is about the error of the coarser fit's field, two to four times that of the fan's own where grids resolve the
     body. Nothing is said of the error of the asymptotic method.
 
     Parameters
     ----------
     fan : RayFan
-        Of a body from a file; see `creeping.rays.body_uncertainty`.
+        Of a body from a file; see `creeping.rays.uncertain_body`.
     observation, wavenumber, boundary, order
         As of `far_field`.
 
     Returns
     -------
     (m,) or (m, 2, 2), L, or None
-        |f - f on the coarser body|; None for a body that is known exactly.
+        |f - f on the coarser fit|; None for a body that is known exactly.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def far_field_uncertainty(
     >>> cr.far_field_uncertainty(fan, [(0, 0, -1)], wavenumber=30.0) is None    # a sphere is known exactly
     True
     """
-    other = coarser_fan(fan)
+    other = coarse_fan(fan)
     if other is None:
         return None
     mine, its = (

@@ -78,7 +78,7 @@ class Polylines:
         arrays = {name: getattr(fan, name) for name in (*RAY_ARRAYS, "caustic_index")} | {"travel_time": times}
         status, detachment = np.asarray(fan.status)[:, None], np.asarray(fan.detachment)[:, None]
         # these come on the way, other trouble is there from the start
-        met = np.isin(status, (RayStatus.DETACHED, RayStatus.ROUGH))
+        met = np.isin(status, (RayStatus.DETACHED, RayStatus.NON_SMOOTH))
         arrays["ray_status"] = np.where(met & (times <= detachment), RayStatus.OK, status)
         numbers = {"ray": range(len(status)), "status": fan.status, "curve_index": fan.curve_index}
         self._add("ray", fan.points, False, arrays, **numbers)

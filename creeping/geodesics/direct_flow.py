@@ -9,7 +9,7 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_points
-from creeping.geodesics.integrator import MapError, as_times, trace_states
+from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
 from creeping.geodesics.states import pack, unpack
 from creeping.geometry.surface import Surface
 
@@ -27,7 +27,7 @@ class DirectFlow(Shown):
         Time of one `apply`.
     step : float, optional, L (travel time for a weighted body)
         Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
-    error : MapError, optional
+    error : ErrorEstimate, optional
         At the end of rays, if `choose_flow` has measured it.
 
     Raises
@@ -50,7 +50,7 @@ class DirectFlow(Shown):
     rtol: float = 1e-10
     horizon: float = 1.0
     step: float | None = None
-    error: MapError | None = None
+    error: ErrorEstimate | None = None
 
     def __post_init__(self) -> None:
         if not 1e-14 <= self.rtol <= 1e-2:

@@ -22,7 +22,7 @@ MAX_STEPS = 100_000
 
 
 @dataclass(frozen=True)
-class MapError:
+class ErrorEstimate:
     """Error of a flow against direct integration.
 
     Attributes
@@ -35,7 +35,7 @@ class MapError:
     Examples
     --------
     >>> import creeping as cr
-    >>> cr.MapError(rms=1e-9, max=4e-9, samples=100).samples
+    >>> cr.ErrorEstimate(rms=1e-9, max=4e-9, samples=100).samples
     100
     """
 

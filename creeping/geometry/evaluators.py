@@ -2,7 +2,7 @@
 
     level      x (3, n) -> F, grad F, Hessian (xx, yy, zz, yz, xz, xy)
     speed      x (3, n) -> c, grad c, Hessian of c, in the same order
-    locator    x, grad F (3, n) -> chart, (u, v), isometric frame of the chart (rows e1, e2)
+    locator    x, grad F (3, n) -> chart, (u, v), polar frame of the chart (rows e1, e2)
 
 A body with numpy methods only goes through the same kernels as a compiled one, a hundred times slower.
 

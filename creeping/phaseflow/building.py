@@ -17,7 +17,7 @@ from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import NODES, chebyshev_times, curvature_values
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.integrator import MapError, runge_kutta_4, trace_states
+from creeping.geodesics.integrator import ErrorEstimate, runge_kutta_4, trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.checks import check_surface
 from creeping.geometry.surface import Surface, fingerprint
@@ -25,7 +25,7 @@ from creeping.phaseflow.coordinates.ambient import AmbientModel
 from creeping.phaseflow.coordinates.base import Model, nodes_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
 from creeping.phaseflow.grid import Grid, Leap
-from creeping.phaseflow.phase_map import Growth, PhaseMap
+from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
 from creeping.phaseflow.splines import prefilter
 
 Progress = Callable[[str], None]
@@ -33,7 +33,7 @@ SAMPLES = 2000
 """Random points of T1Q at which a finished map is measured: one ray in a hundred may carry most of the error."""
 CHUNK = 65_536
 """Nodes traced at a time."""
-UNMEASURED = MapError(float("nan"), float("nan"), 0)
+UNMEASURED = ErrorEstimate(float("nan"), float("nan"), 0)
 
 
 RESOLVED = 1e-7
@@ -50,19 +50,19 @@ class Plan:
     grid : Grid
     single : bool
         Store float32.
-    ride_along : bool
+    carry_jacobi : bool
     doublings : int
         d: nodes are traced to T0/2^d only.
     least_cells : int
         Along u and v, if the grid is refined or thinned.
     reach : float
-        Longest horizon over which curvatures ride along, in natural ones; see `curvature_reach`.
+        Longest horizon over which curvatures are carried, in natural ones; see `curvature_reach`.
     """
 
     horizon: float
     grid: Grid
     single: bool = False
-    ride_along: bool = True
+    carry_jacobi: bool = True
     doublings: int = 0
     least_cells: int = 1
     reach: float = 1.0
@@ -76,19 +76,19 @@ def curvature_reach(tolerance: float) -> float:
     return float(max(1.0, (tolerance / RESOLVED) ** (1 / 8)))
 
 
-def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol: float) -> PhaseMap:
+def build_direct(body: Surface, model: Model, plan: Plan, progress: Progress, *, rtol: float) -> PhaseMap:
     """Trace every node to T0/2^d, interpolate, and double d times."""
     start = clock()
     nodes = nodes_of(model, plan.grid)
     doublings = plan.doublings if isinstance(model, CompiledModel) else 0
     now = plan.horizon / 2**doublings
-    say(f"tracing {len(nodes)} nodes to {now:g}")
+    progress(f"tracing {len(nodes)} nodes to {now:g}")
     curved = isinstance(model, CompiledModel) and plan.horizon <= 1.01 * plan.reach * natural_horizon(body)
-    values = _traced(body, model, nodes, now, plan.ride_along, curved, rtol)
+    values = _traced(body, model, nodes, now, plan.carry_jacobi, curved, rtol)
     leap = _leap(values, plan.grid, now, model, single=plan.single and doublings == 0)
     for k in range(doublings):
         assert isinstance(model, CompiledModel)
-        say(f"doubling to {2 * now:g}")
+        progress(f"doubling to {2 * now:g}")
         values = model.doubled(plan.grid, leap, nodes)
         now *= 2
         leap = _leap(values, plan.grid, now, model, single=plan.single and k == doublings - 1)
@@ -97,17 +97,17 @@ def build_direct(body: Surface, model: Model, plan: Plan, say: Progress, *, rtol
 
 
 def _traced(
-    body: Surface, model: Model, nodes: FloatArray, time: float, ride_along: bool, curved: bool, rtol: float
+    body: Surface, model: Model, nodes: FloatArray, time: float, carry_jacobi: bool, curved: bool, rtol: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Displacements (n, lanes), Jacobi matrices (n or 0, 4) and curvatures (n or 0, 8) at the nodes."""
     values = np.empty((len(nodes), model.lanes))
-    matrices = np.empty((len(nodes) if ride_along else 0, 4))
-    curvatures = np.empty((len(nodes) if ride_along and curved else 0, NODES))
+    matrices = np.empty((len(nodes) if carry_jacobi else 0, 4))
+    curvatures = np.empty((len(nodes) if carry_jacobi and curved else 0, NODES))
     steps = 1
     for first in range(0, len(nodes), CHUNK):
         part = slice(first, first + CHUNK)
         states = model.states(nodes[part])
-        if ride_along:
+        if carry_jacobi:
             states = pack(states[:, :3], states[:, 3:], jacobi=True)
         while True:
             times = time * np.arange(1, steps + 1) / steps
@@ -123,7 +123,7 @@ def _traced(
                 steps *= 2
                 continue
             break
-        if ride_along:
+        if carry_jacobi:
             matrices[part] = traced[:, -1, 6:]
         if len(curvatures):
             inside = traced[:, np.searchsorted(times, time * chebyshev_times())]
@@ -131,18 +131,18 @@ def _traced(
     return values, matrices, curvatures
 
 
-def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: int, say: Progress) -> PhaseMap:
+def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: int, progress: Progress) -> PhaseMap:
     """Algorithm 1: burn-in by one Runge-Kutta step, then B compositions a level."""
     model = AmbientModel(body)
     nodes = nodes_of(model, grid)
     states = pack(nodes[:, :3], nodes[:, 3:], jacobi=True)
-    say(f"burn-in of {len(nodes)} nodes by tau = {time_step:g}")
+    progress(f"burn-in of {len(nodes)} nodes by tau = {time_step:g}")
     start = clock()
     reached = trace_states(body, states, np.array([time_step]), rtol=0.0, step=time_step, tableau=runge_kutta_4())
     leaps: list[Leap] = []
     for level in range(stages + 1):
         if level:
-            say(f"level {level} of {stages}")
+            progress(f"level {level} of {stages}")
             reached = PhaseMap(body, model, grid, tuple(leaps), UNMEASURED).leap(states, base)[:, None]
         now = time_step * base**level
         values = model.displacement(nodes, reached, np.array([now]))
@@ -180,13 +180,13 @@ def _leap(
     return Leap(time, fitted(values - centre), centre, fitted(matrices - matrix), matrix, fitted(curvatures))
 
 
-def measure(flow: PhaseMap, *, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> MapError:
+def measure(flow: PhaseMap, *, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> ErrorEstimate:
     """Error of one g_T0 against `trace` at 1e-12, over random points of T1Q (seed 0 without ``rng``)."""
     errors = _errors(flow, np.array([flow.horizon]), samples, rng or np.random.default_rng(0), 1e-12)[:, 0]
-    return MapError(float(np.sqrt(np.mean(errors**2))), float(errors.max()), samples)
+    return ErrorEstimate(float(np.sqrt(np.mean(errors**2))), float(errors.max()), samples)
 
 
-def measured(
+def with_errors(
     flow: PhaseMap, length: float | None = None, *, samples: int = SAMPLES, rtol: float = 1e-12, most: int = 1
 ) -> PhaseMap:
     """The map with its error of one g_T0 and of rays up to ``length``, 8 horizons if not given.
@@ -200,16 +200,20 @@ def measured(
         times[-1] = length
     rng = np.random.default_rng(0)
     # what the tolerance is asked for: the ends of rays, or one g_T0
-    errors = settled(lambda number: _errors(flow, times, number, rng, rtol), samples, most, column=-1 if length else 0)
+    errors = sampled_errors(
+        lambda number: _errors(flow, times, number, rng, rtol), samples, most, column=-1 if length else 0
+    )
     rms, largest = np.sqrt(np.mean(errors**2, axis=0)), errors.max(axis=0)
-    growth = Growth(tuple(times.tolist()), tuple(rms.tolist()), tuple(largest.tolist()), upper_bound(errors[:, -1]))
-    first = MapError(float(rms[0]), float(largest[0]), len(errors))
+    growth = ErrorGrowth(
+        tuple(times.tolist()), tuple(rms.tolist()), tuple(largest.tolist()), upper_bound(errors[:, -1])
+    )
+    first = ErrorEstimate(float(rms[0]), float(largest[0]), len(errors))
     if times[0] != flow.horizon:
         first = measure(flow, samples=samples)
     return replace(flow, error=first, growth=growth)
 
 
-def settled(sample: Callable[[int], FloatArray], count: int, most: int, *, column: int = -1) -> FloatArray:
+def sampled_errors(sample: Callable[[int], FloatArray], count: int, most: int, *, column: int = -1) -> FloatArray:
     """Errors (n, m) of so many random rays, doubled up to ``most`` times that while the rms of a column scatters."""
     errors = sample(count)
     limit = count * most

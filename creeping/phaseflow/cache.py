@@ -10,11 +10,11 @@ import numpy as np
 from creeping._typing import Any
 from creeping._version import __version__
 from creeping.errors import CreepingError, StoredMapError
-from creeping.geodesics.integrator import MapError
+from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import Grid, Leap
-from creeping.phaseflow.phase_map import Growth, PhaseMap
+from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
 from creeping.storage.folder import SCHEMA, content_digest, open_array, read_manifest
 
 
@@ -51,7 +51,7 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     >>> import creeping as cr
     >>> import scatterers as sc
     >>> ball = sc.Sphere()
-    >>> pm = cr.build_phase_map(ball, horizon=0.5, grid=(16, 16), order=3, cache=False)
+    >>> pm = cr.build_phase_map(ball, horizon=0.5, grid=(16, 16), degree=3, cache=False)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     stored = pm.save(f"{folder}/map")
     ...     cr.load_phase_map(stored, ball).horizon
@@ -63,9 +63,9 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
         raise StoredMapError(f"{folder} is a map of {content['body']}, not of {fingerprint(body)}; rebuild it")
     try:
         grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
-        error = MapError(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
+        error = ErrorEstimate(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
         rows = content["growth"] and [tuple(map(float, row)) for row in content["growth"]]
-        growth = Growth(rows[0], rows[1], rows[2], rows[3][0]) if rows else None
+        growth = ErrorGrowth(rows[0], rows[1], rows[2], rows[3][0]) if rows else None
         leaps = tuple(
             Leap(
                 float(time),

@@ -74,13 +74,13 @@ class Leap:
             table.flags.writeable = False
 
     @property
-    def rides(self) -> bool:
-        """Whether the Jacobi matrix rides along."""
+    def has_jacobi(self) -> bool:
+        """Whether it carries the Jacobi matrix."""
         return len(self.jacobi) > 0
 
     @property
-    def attenuates(self) -> bool:
-        """Whether the curvatures ride along too."""
+    def has_curvature(self) -> bool:
+        """Whether it carries the curvatures too."""
         return len(self.curvature) > 0
 
     @property

@@ -17,7 +17,7 @@ from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_points
-from creeping.geodesics.integrator import MapError, as_times, trace_states
+from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
 from creeping.geodesics.states import pack, unpack
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model
@@ -26,7 +26,7 @@ from creeping.storage.folder import write_folder
 
 
 @dataclass(frozen=True)
-class Growth:
+class ErrorGrowth:
     """Error of composed maps against the length of the ray, measured against direct integration.
 
     Attributes
@@ -34,7 +34,7 @@ class Growth:
     lengths : tuple of float, L (travel time for a weighted body)
         Ascending.
     rms, max : tuple of float
-        As in `MapError`, at each length.
+        As in `ErrorEstimate`, at each length.
     bound : float
         Of the rms at the last length, two standard errors of its square above it: where few rays carry most of the
         error, as beside an unstable geodesic, samples scatter.
@@ -42,7 +42,7 @@ class Growth:
     Examples
     --------
     >>> import creeping as cr
-    >>> growth = cr.Growth(lengths=(1.0, 2.0, 4.0), rms=(1e-9, 2e-9, 8e-9), max=(3e-9, 6e-9, 2e-8), bound=9e-9)
+    >>> growth = cr.ErrorGrowth(lengths=(1.0, 2.0, 4.0), rms=(1e-9, 2e-9, 8e-9), max=(3e-9, 6e-9, 2e-8), bound=9e-9)
     >>> f"{growth.rms_after(2.0):.0e}"
     '2e-09'
     """
@@ -83,9 +83,9 @@ class PhaseMap(Drawn):
     grid : Grid
     leaps : tuple of Leap
         Maps by ascending time, the last is g_T0; more than one only for ``method="tower"``.
-    error : MapError
+    error : ErrorEstimate
         Of one g_T0, measured when the map was built.
-    growth : Growth or None
+    growth : ErrorGrowth or None
         Error after longer and longer rays.
     parameters : dict
         How the map was built.
@@ -95,7 +95,7 @@ class PhaseMap(Drawn):
     >>> import numpy as np
     >>> import creeping as cr
     >>> import scatterers as sc
-    >>> pm = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), order=3, cache=False)
+    >>> pm = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), degree=3, cache=False)
     >>> x, p = pm.flow((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), np.pi)                     # half a great circle
     >>> bool(np.allclose(x, [-1, 0, 0])), pm.error.rms < 1e-9
     (True, True)
@@ -105,8 +105,8 @@ class PhaseMap(Drawn):
     model: Model
     grid: Grid
     leaps: tuple[Leap, ...]
-    error: MapError
-    growth: Growth | None = None
+    error: ErrorEstimate
+    growth: ErrorGrowth | None = None
     parameters: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -120,9 +120,9 @@ class PhaseMap(Drawn):
         return sum(leap.nbytes for leap in self.leaps)
 
     @property
-    def rides(self) -> bool:
-        """Whether the Jacobi matrix rides along, as fans need it to."""
-        return self.leaps[-1].rides
+    def has_jacobi(self) -> bool:
+        """Whether it carries the Jacobi matrix, as fans need it to."""
+        return self.leaps[-1].has_jacobi
 
     def __repr__(self) -> str:
         leap = self.leaps[-1]
@@ -219,7 +219,7 @@ class PhaseMap(Drawn):
     def _attenuates_at(self, times: FloatArray) -> bool:
         """Whether the map itself carries the attenuation to the times: multiples of its horizon."""
         leaps = times / self.horizon
-        return self.leaps[-1].attenuates and bool(np.all(np.abs(leaps - np.round(leaps)) < 1e-11 * (1 + leaps)))
+        return self.leaps[-1].has_curvature and bool(np.all(np.abs(leaps - np.round(leaps)) < 1e-11 * (1 + leaps)))
 
     def _remainder(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance by times below the horizon: down the tower, then by direct integration."""
@@ -258,9 +258,9 @@ class PhaseMap(Drawn):
         return self._composed(states, level or self.leaps[-1], np.array([count]))[:, 0]
 
     def _composed(self, states: FloatArray, level: Leap, counts: IntArray) -> FloatArray:
-        if states.shape[1] > 6 and not level.rides:
-            raise InvalidInputError("this map carries no Jacobi matrix; build it with ride_along=True")
-        if states.shape[1] > 10 and not level.attenuates:
+        if states.shape[1] > 6 and not level.has_jacobi:
+            raise InvalidInputError("this map carries no Jacobi matrix; build it with carry_jacobi=True")
+        if states.shape[1] > 10 and not level.has_curvature:
             raise InvalidInputError("this map carries no curvatures over a leap; use transport, which traces for them")
         return self.model.flow(self.grid, level, states, counts)
 

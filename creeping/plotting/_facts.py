@@ -13,7 +13,7 @@ from creeping.files.far_table import angles_of
 if TYPE_CHECKING:
     from creeping.field.far import FarField
     from creeping.geodesics.direct_flow import DirectFlow
-    from creeping.geodesics.integrator import MapError
+    from creeping.geodesics.integrator import ErrorEstimate
     from creeping.phaseflow.phase_map import PhaseMap
     from creeping.rays.fan import RayFan
     from creeping.rays.isophase import IsoPhaseCurve
@@ -121,7 +121,7 @@ def of_map(flow: "PhaseMap") -> Facts:
     yield "degree", str(flow.grid.degree)
     yield "maps", str(len(flow.leaps))
     yield "numbers", f"{leap.state.dtype}, {flow.nbytes / 1e6:.1f} MB"
-    yield "rides along", "Jacobi matrix" * flow.rides + " and curvatures" * leap.attenuates or "nothing"
+    yield "carries", "Jacobi matrix" * flow.has_jacobi + " and curvatures" * leap.has_curvature or "nothing"
     yield "error of one g_T0", _error(flow.error, "samples")
     if growth is not None:
         for length, rms, largest in zip(growth.lengths, growth.rms, growth.max, strict=True):
@@ -159,12 +159,14 @@ def _range(values: FloatArray, unit: str) -> str:
 
 
 def _lost(values: Any) -> Facts:
-    lost = len(values) - int(np.all(np.isfinite(values.reshape(len(values), -1)), axis=1).sum()) if len(values) else 0
-    if lost:
-        yield "not finite", str(lost)
+    missing = (
+        len(values) - int(np.all(np.isfinite(values.reshape(len(values), -1)), axis=1).sum()) if len(values) else 0
+    )
+    if missing:
+        yield "not finite", str(missing)
 
 
-def _error(error: "MapError | None", of: str) -> str:
+def _error(error: "ErrorEstimate | None", of: str) -> str:
     if error is None or not error.samples:
         return "not measured"
     return f"rms {error.rms:.1e}, max {error.max:.1e} ({error.samples} {of})"

@@ -59,7 +59,7 @@ def surface_field_picture(
     fan : RayFan
         Long enough to cover the shadow; where no ray passes the body is grey.
     wavenumber : float, 1/L
-    boundary : "soft", "hard" or Impedance
+    boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
     backend : str
         "pyvista", "matplotlib" or "auto".
@@ -161,7 +161,7 @@ def _lit_magnitude(fan: RayFan, points: FloatArray, wavenumber: float, kind: Bou
         out = 2 * cosine
         out[near] = np.abs(surface_function(-m[near] * cosine[near], None)) / m[near]
         return np.asarray(out)
-    out = np.abs(2 * cosine / (cosine + kind.eta))
+    out = np.abs(2 * cosine / (cosine + kind.admittance))
     out[near] = np.abs(surface_function(-m[near] * cosine[near], kind.q(m[near])))
     return np.asarray(out)
 
@@ -186,7 +186,7 @@ def decay_picture(
     path : str or path
     fan : RayFan
     wavenumber : float, 1/L
-    boundary : "soft", "hard" or Impedance
+    boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
     rays : int
         Rays drawn at most.
@@ -261,4 +261,4 @@ def _name(kind: Boundary) -> str:
 
 
 def _boundary_name(kind: Boundary) -> str:
-    return f"impedance η = {kind.eta:g}" if kind.kind == "impedance" else kind.kind
+    return f"impedance η = {kind.admittance:g}" if kind.kind == "impedance" else kind.kind

@@ -22,13 +22,13 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
-from creeping.geodesics.integrator import MapError, trace_states
+from creeping.geodesics.integrator import ErrorEstimate, trace_states
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, P, X, pack
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
-from creeping.rays.nonsmooth import rough_from
+from creeping.rays.nonsmooth import non_smooth_from
 from creeping.rays.spreading import spread, zeros_passed
 from creeping.rays.starts import Starts
 from creeping.rays.transport import Flow, carried
@@ -61,7 +61,7 @@ class RayStatus(IntEnum):
     """Launched on request from a point where kappa_n(d) <= 0: no creeping ray."""
     STALLED = 4
     """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
-    ROUGH = 5
+    NON_SMOOTH = 5
     """Came at ``RayFan.detachment`` to where the body is not smooth enough, by its own word; the field ends there."""
 
 
@@ -93,14 +93,14 @@ class RayFan(DrawnOnBody):
     status : (rays,)
         Codes of `RayStatus`.
     detachment : (rays,), L
-        Travel time at which kappa_n first falls to 0 or the ray comes to rough ground, inf if neither happens.
+        Travel time at which kappa_n first falls to 0 or the ray comes to a non-smooth region, inf if neither happens.
     curve_index, arc_index : (rays,)
         Curve of the shadow line, and arc: rays of one arc are neighbours; with ``launch_from="all"`` an arc is a curve.
     arclength, spacing : (rays,), L
         Of the launch point along its curve, and the share of the curve that the ray stands for.
     closed_arcs : tuple of bool
         Whether the first and last ray of each arc are neighbours too.
-    error : MapError
+    error : ErrorEstimate
         Of (x, p) at the end, measured on some rays against direct integration.
     flow : PhaseMap or DirectFlow
         What carried the rays.
@@ -135,11 +135,11 @@ class RayFan(DrawnOnBody):
     arclength: FloatArray
     spacing: FloatArray
     closed_arcs: tuple[bool, ...]
-    error: MapError
+    error: ErrorEstimate
     flow: Flow
 
     @property
-    def flow_error(self) -> MapError | None:
+    def flow_error(self) -> ErrorEstimate | None:
         """Error of one step of the map that carried the rays; None for direct integration."""
         return self.flow.error
 
@@ -299,11 +299,13 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
     status = np.array([LINE_STATUS[k] for k in sorted(LINE_STATUS)])[launch.state[there].astype(int)]
     # a ray that never was a creeping ray keeps the reason
     status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
-    rough = np.full(len(points), np.inf)
-    if hasattr(body, "rough"):
+    non_smooth = np.full(len(points), np.inf)
+    if hasattr(body, "non_smooth"):
         begun = np.concatenate([points[:, None], path[..., X]], axis=1) if times[0] > 0 else path[..., X]
-        rough = rough_from(body, begun, np.concatenate([[0.0], times]) if times[0] > 0 else times)
-    status[((status == RayStatus.OK) | (status == RayStatus.DETACHED)) & (rough < detachment)] = RayStatus.ROUGH
+        non_smooth = non_smooth_from(body, begun, np.concatenate([[0.0], times]) if times[0] > 0 else times)
+    status[((status == RayStatus.OK) | (status == RayStatus.DETACHED)) & (non_smooth < detachment)] = (
+        RayStatus.NON_SMOOTH
+    )
     status[stalled] = RayStatus.STALLED
 
     def placed(values: Any, fill: float) -> Any:
@@ -315,7 +317,10 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
         return out
 
     return RayArrays(
-        placed(J, np.nan), placed(rate, np.nan), placed(status, NO_RAY), placed(np.minimum(detachment, rough), np.nan)
+        placed(J, np.nan),
+        placed(rate, np.nan),
+        placed(status, NO_RAY),
+        placed(np.minimum(detachment, non_smooth), np.nan),
     )
 
 
@@ -350,15 +355,15 @@ def fan_of(flow: Flow, line: ShadowLine, launch: LaunchPoints, states: FloatArra
         arclength=launch.arclength[0],
         spacing=launch.spacing[0],
         closed_arcs=tuple(bool(launch.closed[0, arc == k][0]) for k in range(int(arc.max(initial=-1)) + 1)),
-        error=MapError(0.0, 0.0, 0),
+        error=ErrorEstimate(0.0, 0.0, 0),
         flow=flow,
     )
 
 
-def end_error(fan: RayFan) -> MapError:
+def end_error(fan: RayFan) -> ErrorEstimate:
     """Error of (x, p) at the end of a fan, against direct integration of evenly chosen rays from their start."""
     if not len(fan.points):
-        return MapError(0.0, 0.0, 0)
+        return ErrorEstimate(0.0, 0.0, 0)
     chosen = np.unique(np.linspace(0, len(fan.points) - 1, CHECKED_RAYS).astype(int))
     first = pack(fan.points[chosen, 0], fan.directions[chosen, 0])
     # a thousandth of what is to be measured
@@ -366,4 +371,4 @@ def end_error(fan: RayFan) -> MapError:
     rtol = float(np.clip(1e-3 * rms, 1e-12, 1e-9)) if np.isfinite(rms) and rms > 0 else 1e-12
     exact = trace_states(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
     error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
-    return MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))
+    return ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))

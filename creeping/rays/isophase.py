@@ -70,10 +70,10 @@ class IsoPhaseCurve(DrawnOnBody):
 
     def __repr__(self) -> str:
         shape = "closed" if self.closed else "open"
-        lost = int(np.sum(~np.all(np.isfinite(self.points), axis=1)))
+        missing = int(np.sum(~np.all(np.isfinite(self.points), axis=1)))
         return (
             f"IsoPhaseCurve({self.of} = {self.level:g}, {len(self.points)} points, {shape}, length {self.length:.4g} L"
-            f"{f'; {lost} points not finite' * (lost > 0)})"
+            f"{f'; {missing} points not finite' * (missing > 0)})"
         )
 
 

@@ -2,7 +2,7 @@
 
 On a ray, (n.r)' = κₙ p.r + τ b.r. A fan integral takes every crossing with p.r > 0; the shadow half of the forward
 integral takes the first one of each ray that starts with n.r < 0. Its lit half runs over the mid-horizon
-n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to both d and r, the joints.
+n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to both d and r.
 
 Sources: Derivations, R12, F10 and F11.
 """
@@ -106,7 +106,7 @@ def _polish(strips: tuple[Strip, ...], body: Surface, seeds: _Seeds, directions:
     return HorizonRays(seeds.observer, rays, seeds.weight * rays.width)
 
 
-def joints(strip: Strip, r: FloatArray) -> list[tuple[float, float, bool]]:
+def line_crossings(strip: Strip, r: FloatArray) -> list[tuple[float, float, bool]]:
     """Intervals (σ start, σ end, shadow) of a strip with n0.r of one sign, negative on the shadow half."""
     low, high = strip.span
     sigma = np.linspace(low, high, 4 * len(strip.positions) + 1)
@@ -146,14 +146,14 @@ def forward_nodes(
     directions : (m, 3)
         Unit directions of all observers, none of them d itself.
     counts : (w,)
-        Nodes on each interval between joints.
+        Nodes on each interval between crossings with the shadow line.
     """
-    shadow, lit, lost = [], [_MidSeeds.empty()], []
+    shadow, lit, missing = [], [_MidSeeds.empty()], []
     for row, count in zip(wanted, counts, strict=True):
         r = directions[row]
         nodes, weights = np.polynomial.legendre.leggauss(int(count))
         for k, strip in enumerate(strips):
-            for start, end, dark in joints(strip, r):
+            for start, end, dark in line_crossings(strip, r):
                 sigma, weight = start + (end - start) * (nodes + 1) / 2, (end - start) / 2 * weights
                 if dark:
                     s, found = _first_crossing(strip, line.body, sigma, r)
@@ -162,12 +162,12 @@ def forward_nodes(
                     x, across, found = _mid_horizon(strip, line, sigma, r)
                     lit.append(_MidSeeds(np.full(int(found.sum()), row), x[found], (weight * across)[found]))
                 if not np.all(found):
-                    lost.append(row)
+                    missing.append(row)
     nodes_lit = _MidSeeds(*(np.concatenate(columns) for columns in zip(*lit, strict=True)))
     return (
         _polish(strips, line.body, _Seeds.joined(shadow), directions),
         _mid_nodes(line, nodes_lit, directions),
-        np.unique(np.array(lost, dtype=np.int64)),
+        np.unique(np.array(missing, dtype=np.int64)),
     )
 
 
@@ -191,7 +191,7 @@ def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArra
     rises = np.asarray(heights > 0)
     first = np.argmax(rises, axis=1)
     found = np.asarray(rises.any(axis=1))
-    # a ray near a joint may rise within its first step: linear interpolation serves every start
+    # a ray near a crossing may rise within its first step: linear interpolation serves every start
     before = np.maximum(first - 1, 0)
     rows = np.arange(len(first))
     with np.errstate(divide="ignore", invalid="ignore"):

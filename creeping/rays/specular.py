@@ -94,7 +94,7 @@ def specular_points(
     along, across, mixed = (np.einsum("ni,nij,nj->n", v, H, w) for v, w in ((q, q), (b, b), (q, b)))
     matrix = np.stack([np.stack([along, mixed], axis=-1), np.stack([mixed, across], axis=-1)], axis=-2)
     principal, axes = np.linalg.eigh(matrix)
-    # on flat ground the field is not finite: large, and for its next term unresolved
+    # in flat regions the field is not finite: large, and for its next term unresolved
     principal = np.copysign(np.maximum(np.abs(principal), FLATTEST / size(body)), principal)
     frame = np.einsum("nak,nai->nki", axes, np.stack([q, b], axis=1))
     return SpecularPoints(

@@ -26,14 +26,14 @@ from creeping.geometry.evaluators import evaluators
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, size
 from creeping.rays.fan import RayFan, RayStatus
-from creeping.rays.nonsmooth import rough_from
+from creeping.rays.nonsmooth import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.panels import newton_step
 
-TURN, FINE_TURN = 0.12, 0.085
+TURN, FINE_TURN = 0.12, 0.08
 """Largest angle by which a ray turns in one step, of single rays and of whole fans: polynomials of degree 9 then err by
-about 1e-9 and 5e-11."""
+about 1e-9 and 3e-11."""
 CLOSE = 1e-6
 """Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
 ACCEPTED = 1e-4
@@ -221,15 +221,15 @@ class RayTracer:
         directions, starts, tangents = directions[owner], starts[owner], tangents[owner]
         first[:, 0] = np.sum(starts * directions, axis=1)
         first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
-        if whole and hasattr(self.body, "rough") and n:
-            alive &= times < self._rough(directions, starts, times)
+        if whole and hasattr(self.body, "non_smooth") and n:
+            alive &= times < self._non_smooth(directions, starts, times)
         return SingleRays(directions, starts, tangents, RayPoints(lanes, first, times, alive, scale), risen)
 
-    def _rough(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
+    def _non_smooth(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
         """Times (n,) at which rays come to where the body is not smooth enough, inf where they do not before theirs."""
         forward = self.step * np.arange(int(np.ceil(np.max(times) / self.step)) + 1, dtype=float)
         states = trace_states(self.body, pack(starts, directions), forward, rtol=0.0, step=self.step)
-        return rough_from(self.body, states[..., X], forward)
+        return non_smooth_from(self.body, states[..., X], forward)
 
     def towards(
         self, directions: FloatArray, observers: FloatArray, near: FloatArray, times: FloatArray, cell: FloatArray
@@ -252,14 +252,14 @@ class RayTracer:
             Their rows, and how far along the line they start from where the search began, in cells.
         """
         found, result, moved = self._sought(directions, observers, near, times, cell, LONG, NEARLY)
-        lost = np.setdiff1d(np.arange(len(times)), found)
-        if len(lost):
+        missing = np.setdiff1d(np.arange(len(times)), found)
+        if len(missing):
             # those that the quick search gave up, or ended too early
             again, more, further = self._sought(
-                directions[lost], observers[lost], near[lost], times[lost], cell[lost], 1, 0.0
+                directions[missing], observers[missing], near[missing], times[missing], cell[missing], 1, 0.0
             )
             result = SingleRays.joined([result, more])
-            found, moved = np.concatenate([found, lost[again]]), np.concatenate([moved, further])
+            found, moved = np.concatenate([found, missing[again]]), np.concatenate([moved, further])
             order = np.argsort(found)
             found, moved, result = found[order], moved[order], result[order]
         return result, found, moved
@@ -286,8 +286,8 @@ class RayTracer:
             lanes[active], first[active] = now.lanes, now.starts
             residual = _apart(now, observers[active])
             wanted[active] = residual <= max(CLOSE, nearly)
-            lost = (np.abs(moved[active]) > 3) | (np.abs(times[active] - begin[active]) > 3 * cell[active, 1])
-            last = active[(residual > CLOSE) & ~lost]
+            missing = (np.abs(moved[active]) > 3) | (np.abs(times[active] - begin[active]) > 3 * cell[active, 1])
+            last = active[(residual > CLOSE) & ~missing]
             if not len(last):
                 break
             along_line, later = self._newton(directions, observers, tangents, lanes, first, cell, last)
@@ -371,7 +371,7 @@ def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray
     tangents = line_tangents(fan.body, starts, d) if rays else np.zeros((0, 3))
     owner = np.repeat(np.arange(rays), steps)
     found = tracer.at(d, starts, tangents, np.tile(times, rays), owner).rays
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.ROUGH))
+    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
     alive = found.alive.reshape(rays, steps) & launched[:, None]
     return times, RayPoints(
         found.lanes.reshape(rays, steps, LANES),

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geodesics.integrator import MapError
+from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK
@@ -30,7 +30,7 @@ class Flow(Protocol):
         ...
 
     @property
-    def error(self) -> MapError | None:
+    def error(self) -> ErrorEstimate | None:
         """Measured error of one leap, None if direct."""
         ...
 

@@ -1,6 +1,6 @@
 """Shadow lines of many incidences at once, with the points that launch their rays.
 
-Each line is sought on the coarsest mesh, and again on the next where a step was not sure of it; what the finest does
+Each line is sought on the coarsest mesh, and again on the next where a step was not certain of it; what the finest does
 not resolve is followed by itself. `creeping.shadow.line` gives one of them with its points.
 """
 
@@ -16,7 +16,7 @@ from creeping.kernels.threads import in_threads
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.following import followed
 from creeping.shadow.meshes import LineMeshes
-from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, finished, prepared, settled
+from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, finished, judged, prepared
 from creeping.shadow.status import FOLLOWED, NO_RAY, SINGULAR
 
 LEAST = 8
@@ -100,8 +100,8 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
                 trace_lines(*parts[:2], box, mesh, some[part], every, *(values[part] for values in out))
 
             in_threads(run, len(rows), least=LEAST, multiple=1)
-        summary[rows], sure, launched[rows], places[rows] = out
-        onward, status[rows] = settled(v[rows], sure, meshes.turn(tier), tier)
+        summary[rows], certain, launched[rows], places[rows] = out
+        onward, status[rows] = judged(v[rows], certain, meshes.turn(tier), tier)
         rows = rows[onward]
     for row in np.flatnonzero(status == FOLLOWED):
         status[row], v[row] = _follow(body, directions[row], every, summary[row], launched[row], places[row])

@@ -1,7 +1,7 @@
-"""A shadow line as equally spaced nodes, on the coarsest mesh that is sure of it; its arcs and its launch points.
+"""A shadow line as equally spaced nodes, on the coarsest mesh that is certain of it; its arcs and its launch points.
 
-Where no mesh is sure, or next to a singular direction, the line is followed with its topology proven (`following`) and
-the same kernels finish it.
+Where no mesh is certain, or next to a singular direction, the line is followed with its topology proven (`following`)
+and the same kernels finish it.
 
 Sources: Derivations, R6 and R8.
 """
@@ -68,7 +68,7 @@ class Finished:
         Of the length, by state.
     launched : (rays, LAUNCHED), places : (rays,)
         See `creeping.shadow.kernels.trace`.
-    sure : bool
+    certain : bool
     """
 
     arcs: FloatArray
@@ -77,7 +77,7 @@ class Finished:
     shares: FloatArray
     launched: FloatArray
     places: np.ndarray[Any, np.dtype[np.int16]]
-    sure: bool
+    certain: bool
 
 
 def prepared(body: Surface) -> LineMeshes:
@@ -99,16 +99,16 @@ def critical_distances(body: Surface, directions: FloatArray) -> FloatArray:
     return least
 
 
-def settled(v: FloatArray, sure: BoolArray, turn: float, tier: int) -> tuple[BoolArray, IntArray]:
+def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[BoolArray, IntArray]:
     """Which lines go on to the next mesh, and the codes of the others.
 
-    A line is certain if every step was sure of it and the direction is so far from a singular one, v > e^2 with e the
-    mean angle between neighbouring normals, that the mesh cannot have missed a small loop.
+    A line is certain if every step was certain of it and the direction is so far from a singular one, v > e^2 with e
+    the mean angle between neighbouring normals, that the mesh cannot have missed a small loop.
     """
     far = v > turn * turn
     last = tier >= LineMeshes.count - 2
-    code = np.where(sure, np.where(far, OK, NEAR_SINGULAR), FOLLOWED)
-    onward = ~sure | (~far & (not last))
+    code = np.where(certain, np.where(far, OK, NEAR_SINGULAR), FOLLOWED)
+    onward = ~certain | (~far & (not last))
     return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
 
 
@@ -122,14 +122,14 @@ def line_nodes(body: Surface, direction: FloatArray) -> tuple[LineNodes | None, 
     box = box_of(body)
     for tier in range(LineMeshes.count):
         with evaluators(body) as parts:
-            found, sure, x, T, kappa, starts, spacing, _, error = trace_nodes(
+            found, certain, x, T, kappa, starts, spacing, _, error = trace_nodes(
                 *parts[:2], box, prepared(body).packed(tier), direction
             )
         nodes = LineNodes(x, T, kappa, starts, spacing, error) if found else None
-        sure = nodes is not None and sure and finished(body, direction, nodes, 0).sure
-        onward, code = settled(np.array([v]), np.array([sure]), prepared(body).turn(tier), tier)
+        certain = nodes is not None and certain and finished(body, direction, nodes, 0).certain
+        onward, code = judged(np.array([v]), np.array([certain]), prepared(body).turn(tier), tier)
         if not onward[0]:
-            return nodes if sure else None, int(code[0]), v
+            return nodes if certain else None, int(code[0]), v
     raise AssertionError("the last mesh sends no line on")
 
 
@@ -158,9 +158,9 @@ def finished(body: Surface, direction: FloatArray, nodes: LineNodes, n_rays: int
     which = np.empty((2, LIMIT + curves), np.int64)
     launched, places = np.full((n_rays, LAUNCHED), np.nan), np.full(n_rays, NO_RAY, np.int16)
     with evaluators(body) as parts:
-        sure, total = finish(
+        certain, total = finish(
             *parts[:2], box_of(body), direction, nodes.points, nodes.tangents, nodes.curvature, nodes.starts, curves,
             nodes.spacing, every, summary, launched, places, arcs, which,
         )  # fmt: skip
     shares = summary[SHARES : SHARES + 3]
-    return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, bool(sure))
+    return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, bool(certain))

@@ -16,7 +16,7 @@ from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.geodesics.direct_flow import DirectFlow
-from creeping.geodesics.integrator import MapError
+from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.cache import load_phase_map
 from creeping.phaseflow.phase_map import PhaseMap
@@ -170,11 +170,11 @@ def common_error(errors: dict[int, str], count: int) -> str:
     return texts.pop() if len(errors) == count and len(texts) == 1 else ""
 
 
-class Beginning:
+class FirstTaskGuard:
     """What the first task of a run came to: if all in it fail alike, so would the rest; one incidence is too few."""
 
     def __init__(self) -> None:
-        self._count, self._text, self._settled = 0, "", False
+        self._count, self._text, self._passed = 0, "", False
 
     def add(self, count: int, error: str) -> None:
         """Add a task: how many incidences it has, and their `common_error`.
@@ -185,9 +185,9 @@ class Beginning:
             If nothing would come of the rest.
         """
         if not error or self._text not in ("", error):
-            self._settled = True
+            self._passed = True
         self._count, self._text = self._count + count, error
-        if not self._settled and self._count > 1:
+        if not self._passed and self._count > 1:
             raise CreepingError(
                 f"the first {self._count} incidences failed, all with {error}; nothing would come of the rest",
                 incidences=self._count,
@@ -242,7 +242,7 @@ def open_flow(content: dict[str, Any], folder: Path, body: Surface) -> PhaseMap 
     if content["kind"] == "map":
         return load_phase_map(folder / "map", body)
     if content["kind"] == "direct":
-        error = content["error"] and MapError(*content["error"])
+        error = content["error"] and ErrorEstimate(*content["error"])
         return DirectFlow(body, content["rtol"], content["horizon"], content["step"], error)
     raise CreepingError(f"{folder} holds a flow of kind {content['kind']!r}, which is neither 'map' nor 'direct'")
 

@@ -44,7 +44,7 @@ LINE = {
     "line_error": Variable((), "float64", "1", "estimated relative error of the length"),
     "attached": Variable((), "float64", "1", "share of the length that launches rays"),
     "occluded": Variable((), "float64", "1", "share of the length that the wave does not reach"),
-    "concave": Variable((), "float64", "1", "share of the length on concave ground"),
+    "concave": Variable((), "float64", "1", "share of the length in concave regions"),
     "singular_distance": Variable((), "float64", "1", "least |n.d| at a critical point of n.d, n = +-d apart"),
 }
 RAYS = {
@@ -221,7 +221,7 @@ def sweep_request(
         n_steps=_plain(n_steps),
         wavenumbers=numbers,
         boundaries=tuple(
-            b if isinstance(b, str) else f"impedance:{b.eta}".replace("(", "").replace(")", "") for b in several
+            b if isinstance(b, str) else f"impedance:{b.admittance}".replace("(", "").replace(")", "") for b in several
         ),
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen),
         order=_plain(order),

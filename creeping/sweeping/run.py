@@ -10,11 +10,11 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike
 from creeping.errors import CreepingError, InvalidInputError
-from creeping.field.boundary import BoundaryLike, Impedance
+from creeping.field.boundary import BoundaryLike, ImpedanceBoundary
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
-from creeping.sweeping.plan import Arrays, Beginning, SweepPlan, bytes_of, common_error, compute, task_size
+from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, sweep_request
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.storage.layout import UNDONE
@@ -31,7 +31,7 @@ Progress = Callable[[int, int, float], None]
 
 def sweep_directions(
     flow: Flow,
-    incidences: ArrayLike,
+    directions: ArrayLike,
     *,
     wavenumbers: ArrayLike = (),
     quantity: Quantity = "monostatic",
@@ -47,13 +47,13 @@ def sweep_directions(
     chunk: int | None = None,
     progress: Progress | None = None,
 ) -> "xarray.Dataset":
-    """Creeping rays, or their field, for many incident directions.
+    """Creeping rays, or their field, for many directions of incidence.
 
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
-    incidences : (n, 3)
-        Where the waves travel; need not be unit.
+    directions : (n, 3)
+        Directions of incidence, where the waves travel; need not be unit.
     wavenumbers : float or (k,), 1/L
         Of the fields.
     quantity : {"monostatic", "bistatic", "rays"}
@@ -61,7 +61,7 @@ def sweep_directions(
         Every quantity has the shadow line: curves, length, shares.
     observation : (m, 3), optional
         Directions of "bistatic".
-    boundary : {"soft", "hard", "pec"}, Impedance or a list of them
+    boundary : {"soft", "hard", "pec"}, ImpedanceBoundary or a list of them
         "soft" if not given.
     length : float, optional, L (travel time for a weighted body)
         Of the rays, 3 body sizes if not given.
@@ -106,7 +106,7 @@ def sweep_directions(
     _refuse(flow, quantity, store, resume, client)
     if boundary is None:
         boundary = () if quantity == "rays" else "soft"
-    several = [boundary] if isinstance(boundary, (str, Impedance)) else list(boundary)
+    several = [boundary] if isinstance(boundary, (str, ImpedanceBoundary)) else list(boundary)
     request = sweep_request(
         quantity,
         length=3 * size(flow.body) if length is None else length,
@@ -117,18 +117,18 @@ def sweep_directions(
         observation=observation,
         order=order,
     )
-    directions = unit_directions(incidences, "incidences")
-    if directions.ndim != 2:
-        raise InvalidInputError(f"incidences have shape {directions.shape}; give rows of three numbers, shape (n, 3)")
+    unit = unit_directions(directions, "directions")
+    if unit.ndim != 2:
+        raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, (int, np.integer)) or chunk < 1):
         raise InvalidInputError(f"chunk = {chunk!r} is not a whole number >= 1")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (
         SweepStore.open(str(store)).chunk
         if going_on
-        else task_size(request, len(directions), chunk, shared=store is not None or client is not None)
+        else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
-    plan = SweepPlan(flow, request, directions, chunk)
+    plan = SweepPlan(flow, request, unit, chunk)
     if store is None:
         return in_memory(plan, progress)
     opened = open_store(plan, store, resume=resume)
@@ -153,14 +153,14 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> "xarray.Data
     sweeper = plan.make(plan.flow, plan.request)
     arrays: Arrays = plan.request.empty(count)
     errors: list[tuple[int, str]] = []
-    beginning = Beginning()
+    guard = FirstTaskGuard()
     for task in range(plan.tasks):
         rows = plan.rows(task)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():
             values[rows] = found[name]
         errors += [(rows.start + row, text) for row, text in failed.items()]
-        beginning.add(rows.stop - rows.start, common_error(failed, rows.stop - rows.start))
+        guard.add(rows.stop - rows.start, common_error(failed, rows.stop - rows.start))
         if progress:
             progress(rows.stop, count, time.perf_counter() - started)
     return as_dataset(plan, arrays, errors, time.perf_counter() - started)
@@ -224,7 +224,7 @@ def fill(
         missing = store.missing()
         done = len(plan.incidences) - sum(plan.rows(t).stop - plan.rows(t).start for t in missing)
 
-        def say(task: int) -> None:
+        def report(task: int) -> None:
             nonlocal done
             done += plan.rows(task).stop - plan.rows(task).start
             if progress:
@@ -235,14 +235,14 @@ def fill(
             if client is None:
                 for task in _here(plan, store, missing[:most], stop):
                     left -= 1
-                    say(task)
+                    report(task)
             elif missing:
                 require("distributed")
                 from creeping.sweeping.cluster.driver import fill_on
 
                 for task in fill_on(client, plan, store, missing, stop):
                     left -= 1
-                    say(task)
+                    report(task)
         except BaseException:
             # the first error is the one to tell
             with suppress(CreepingError):
@@ -255,7 +255,7 @@ def fill(
 def _here(plan: SweepPlan, store: SweepStore, tasks: list[int], stop: Callable[[], bool]) -> Any:
     """Compute tasks one after the other; yields each when it is committed."""
     sweeper = plan.make(plan.flow, plan.request) if tasks else None
-    status, beginning = store.status(), Beginning()
+    status, guard = store.status(), FirstTaskGuard()
     for task in tasks:
         if stop() or sweeper is None:
             return
@@ -266,7 +266,7 @@ def _here(plan: SweepPlan, store: SweepStore, tasks: list[int], stop: Callable[[
         # those that failed before may fail again
         if status[task] == UNDONE:
             count = store.rows(task).stop - store.rows(task).start
-            beginning.add(count, common_error(errors, count))
+            guard.add(count, common_error(errors, count))
 
 
 def _refuse(flow: Flow, quantity: str, store: Any, resume: bool, client: Any) -> None:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from scatterers.atlas.monge.atlas import MongeAtlas
 
 FloatArray = NDArray[np.float64]
-Say = Callable[[str], None]
-COARSER = 1.35
+Progress = Callable[[str], None]
+COARSENING = 1.35
 """Spacing of the second fit, in units of the first."""
 SMOOTHINGS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Tried in turn on noisy points, until the misfit exceeds the noise,"""
@@ -35,8 +35,8 @@ NORMAL_WEIGHT = 0.1
 SECOND = 0.4
 """Share of noisy points that the second fit sees."""
 CHARTS = "charts-"
-ROUGH = 2.0
-"""Edges about a rough point within which nothing is trusted."""
+DISTRUSTED = 2.0
+"""Edges about a non-smooth point within which nothing is trusted."""
 FEWEST = 0.1
 """Share of the points that has to be farther off, for a fit to mean anything."""
 SLOPES = (0.5, 1.6)
@@ -57,7 +57,7 @@ class PointCloud:
         Of the grid that the points determine, L.
     noise : float
         Rms distance of the points from a smooth body, L; 0 if it is less than the error of a fit.
-    rough : (m, 3), L
+    non_smooth : (m, 3), L
         Points of the source where it is not smooth.
     distance : callable
         Signed distance from the body, (k, 3) -> (k,); NaN where it is not known.
@@ -74,7 +74,7 @@ class PointCloud:
     edge: float
     spacing: float
     noise: float
-    rough: FloatArray
+    non_smooth: FloatArray
     distance: Callable[[FloatArray], FloatArray]
     mean_curvature: FloatArray | None
     quality: MeshQuality
@@ -82,15 +82,15 @@ class PointCloud:
 
     @property
     def reach(self) -> float:
-        """Distance from rough points within which nothing is trusted, L."""
-        return ROUGH * self.edge
+        """Distance from non-smooth points within which nothing is trusted, L."""
+        return DISTRUSTED * self.edge
 
     @cached_property
     def smooth(self) -> NDArray[np.bool_]:
-        """Points that are farther than that from rough ones: (n,)."""
+        """Points that are farther than that from non-smooth ones: (n,)."""
         from scipy.spatial import cKDTree
 
-        return np.asarray(np.isinf(cKDTree(self.rough).query(self.points, distance_upper_bound=self.reach)[0]))
+        return np.asarray(np.isinf(cKDTree(self.non_smooth).query(self.points, distance_upper_bound=self.reach)[0]))
 
 
 class SplineBody(LevelBody):
@@ -119,51 +119,53 @@ class FittedBody(SplineBody):
     ----------
     fit : FitReport
     quality : MeshQuality
-    coarser : SplineBody
+    coarse_fit : SplineBody
         The same body fitted on a coarser grid: what differs on it is uncertain.
     repairs : tuple of str
         What was changed in the source.
     """
 
-    def _open(self, key: str, cache: bool | str | Path, speed: Any, make: Callable[[], PointCloud], say: Say) -> None:
+    def _open(
+        self, key: str, cache: bool | str | Path, speed: Any, make: Callable[[], PointCloud], progress: Progress
+    ) -> None:
         """Take the fit from the cache, or make the points and fit them."""
         self.speed = speed
         # before the fit: it may take minutes
         self._set_speed()
         folder = _fit_cache.cache_folder() if cache is True else Path(str(cache)) if cache else None
         found = None if folder is None else _fit_cache.load(folder, key)
-        arrays, text = found or self._fitted(make(), say)
+        arrays, text = found or self._fitted(make(), progress)
         self.fit = FitReport.from_json(text["fit"])
         self.quality = MeshQuality.from_json(text["quality"], arrays["badness"])
         self.repairs = tuple(text["repairs"])
         self._text = text
-        self._rough, self._reach = arrays["rough"], float(text["reach"])
+        self._non_smooth, self._reach = arrays["rough"], float(text["reach"])
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(_unpacked(arrays, "fine"), key, speed)
-        self.coarser = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
-        self.coarser._rough, self.coarser._reach = self._rough, self._reach
+        self.coarse_fit = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
+        self.coarse_fit._non_smooth, self.coarse_fit._reach = self._non_smooth, self._reach
         if found is None and folder is not None:
             if not self.star_shaped:
-                say("charts")
+                progress("charts")
                 # a body without them can still be looked at; who needs them is told
                 with suppress(ValueError):
                     charts = cast("MongeAtlas", self.atlas).arrays()
                     arrays |= {CHARTS + name: array for name, array in charts.items()}
             if trouble := _fit_cache.store(folder, key, arrays, text):
-                say(trouble)
+                progress(trouble)
 
-    def _fitted(self, cloud: PointCloud, say: Say) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    def _fitted(self, cloud: PointCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
         """Arrays and text of the fits, checked."""
         _require_smooth_points(cloud)
-        fine, coarse, smoothing = fits(cloud, say)
+        fine, coarse, smoothing = fits(cloud, progress)
         report = compared(cloud, fine, coarse, smoothing)
-        if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.rough):
+        if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
             raise ValueError(
                 f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
                 "of 1; it is too thin or too curved for the distance of its points: refine the mesh there"
             )
         arrays = (
-            {"rough": cloud.rough, "badness": cloud.quality.badness}
+            {"rough": cloud.non_smooth, "badness": cloud.quality.badness}
             | _packed(fine.spline, "fine")
             | _packed(coarse.spline, "coarse")
         )
@@ -171,7 +173,7 @@ class FittedBody(SplineBody):
         return arrays, text | cloud.notes
 
 
-def checked_options(units: Any, allow_rough: Any, cache: Any, progress: Any) -> Say:
+def checked_options(units: Any, allow_rough: Any, cache: Any, progress: Any) -> Progress:
     """What to call with progress; ValueError or TypeError on options that are none."""
     if units is not None and not isinstance(units, str):
         raise ValueError(f'units = {units!r} is no text; give e.g. units="mm"')
@@ -184,7 +186,7 @@ def checked_options(units: Any, allow_rough: Any, cache: Any, progress: Any) -> 
     return progress or (lambda _: None)
 
 
-def fits(cloud: PointCloud, say: Say) -> tuple[Fitted, Fitted, float]:
+def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
     """The fit, one on a coarser grid, and the smoothing: the least that leaves the points off by their noise."""
 
     def fitted(spacing: float, smoothing: float, some: NDArray[np.bool_]) -> Fitted:
@@ -194,11 +196,11 @@ def fits(cloud: PointCloud, say: Say) -> tuple[Fitted, Fitted, float]:
             cloud.normals[some],
             spacing,
             distance=cloud.distance,
-            trusted=cloud.smooth[some] if len(cloud.rough) else None,
+            trusted=cloud.smooth[some] if len(cloud.non_smooth) else None,
             mean_curvature=None if cloud.mean_curvature is None else cloud.mean_curvature[some],
             smoothing=smoothing,
             normal_weight=weight,
-            say=say,
+            progress=progress,
         )
 
     every = np.ones(len(cloud.points), dtype=bool)
@@ -211,13 +213,13 @@ def fits(cloud: PointCloud, say: Say) -> tuple[Fitted, Fitted, float]:
         fine, smoothing = smoother, more
     # fits to the same noise err alike
     fewer = np.random.default_rng(0).random(len(cloud.points)) < SECOND
-    return fine, fitted(COARSER * cloud.spacing, smoothing, fewer if cloud.noise else every), smoothing
+    return fine, fitted(COARSENING * cloud.spacing, smoothing, fewer if cloud.noise else every), smoothing
 
 
 def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) -> FitReport:
-    """Curvatures of both fits at the points, those of rough places left out."""
+    """Curvatures of both fits at the points, those of non-smooth places left out."""
     points, normals = cloud.points, cloud.normals
-    if len(cloud.rough):
+    if len(cloud.non_smooth):
         points, normals = points[cloud.smooth], normals[cloud.smooth]
     along = tangents(normals)[0]
     found = [_curvatures(one.spline, points, along) for one in (fine, coarse)]
@@ -262,8 +264,8 @@ def _curvatures(
 
 
 def _require_smooth_points(cloud: PointCloud) -> None:
-    """ValueError if hardly a point is left when those about rough places are taken away."""
-    if not len(cloud.rough) or np.mean(cloud.smooth) >= FEWEST:
+    """ValueError if hardly a point is left when those about non-smooth places are taken away."""
+    if not len(cloud.non_smooth) or np.mean(cloud.smooth) >= FEWEST:
         return
     raise ValueError(
         f"{np.sum(~cloud.smooth)} of {len(cloud.points)} points lie within {cloud.reach:.3g} m of places where the "

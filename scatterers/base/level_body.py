@@ -37,7 +37,7 @@ class LevelBody(Body):
     _map: RadialMap | None
     _bounds: FloatArray
     # places where the body is not smooth, and how far from them rays are not trusted
-    _rough: FloatArray = np.zeros((0, 3))
+    _non_smooth: FloatArray = np.zeros((0, 3))
     _reach: float = 0.0
     # charts found before
     _charts: Mapping[str, FloatArray] = MappingProxyType({})
@@ -45,7 +45,7 @@ class LevelBody(Body):
     def _place(self, space: SpaceLevel, samples: Samples, sphere_map: RadialMap | None) -> None:
         """Take F, its samples and the sphere map, None for a body that has none."""
         self._space, self._map = space, sphere_map
-        for made in ("compiled", "atlas", "_rough_tree"):
+        for made in ("compiled", "atlas", "_non_smooth_tree"):
             self.__dict__.pop(made, None)
         low, high = samples.inside
         reach = np.stack([low - 1.5 * samples.spacing, high + 1.5 * samples.spacing])
@@ -82,21 +82,21 @@ class LevelBody(Body):
         """Hessian of F, unit of F over L^2: points (..., 3), L, to (..., 3, 3)."""
         return evaluated(self.compiled, points)[2][..., SYMMETRIC]
 
-    def rough(self, points: FloatArray) -> NDArray[np.bool_]:
+    def non_smooth(self, points: FloatArray) -> NDArray[np.bool_]:
         """Whether points (..., 3), L, lie where the body is not smooth enough for creeping rays: (...)."""
         points = np.asarray(points, dtype=float)
         found = np.zeros(points.shape[:-1], dtype=bool)
-        if len(self._rough):
+        if len(self._non_smooth):
             finite = np.all(np.isfinite(points), axis=-1)
-            distance, _ = self._rough_tree.query(points[finite], distance_upper_bound=self._reach)
+            distance, _ = self._non_smooth_tree.query(points[finite], distance_upper_bound=self._reach)
             found[finite] = np.isfinite(distance)
         return found
 
     @cached_property
-    def _rough_tree(self) -> Any:
+    def _non_smooth_tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        return cKDTree(self._rough)
+        return cKDTree(self._non_smooth)
 
     def parameters(self, points: FloatArray) -> FloatArray:
         """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi], radians: (..., 3) -> (..., 2).

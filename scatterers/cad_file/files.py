@@ -24,7 +24,7 @@ TIMEOUT = 600
 MILLIMETRE = 1e-3
 SHARP = 2.0
 """Degrees between the normals of two faces at a common point that make an edge."""
-DOUBTFUL = 20.0
+UNCERTAIN = 20.0
 """Degrees between the normal of a face and that of the triangles: at a pole of its parameters a face has none."""
 # what a STEP file may call its length unit
 PREFIXES = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".MICRO.": "um", ".KILO.": "km"}
@@ -43,17 +43,17 @@ class CadPoints:
         Outward; NaN where no face has one.
     edges : tuple of str
         Where faces do not join smoothly.
-    rough : (k, 3), m
+    non_smooth : (k, 3), m
         Vertices there.
     """
 
     mesh: TriangleMesh
     normals: FloatArray
     edges: tuple[str, ...]
-    rough: FloatArray
+    non_smooth: FloatArray
 
 
-def read_cad(path: Path, units: str | None, points: int, *, say: Callable[[str], None]) -> CadPoints:
+def read_cad(path: Path, units: str | None, points: int, *, progress: Callable[[str], None]) -> CadPoints:
     """Read a STEP, IGES or BREP file by gmsh.
 
     Raises
@@ -88,7 +88,7 @@ def read_cad(path: Path, units: str | None, points: int, *, say: Callable[[str],
     known = at >= 0
     normals, edges, sharp = _joined(mesh, at[known], found["face"][known], found["normals"][known])
     for line in repairs:
-        say(line)
+        progress(line)
     return CadPoints(mesh, normals, edges, mesh.vertices[sharp])
 
 
@@ -188,21 +188,21 @@ def _joined(
     """Outward normal of each vertex, the edges, and the vertices on them."""
     from scatterers.triangles.jets import angle_weighted_normals
 
-    rough_normals = angle_weighted_normals(mesh.vertices, mesh.triangles)
+    coarse_normals = angle_weighted_normals(mesh.vertices, mesh.triangles)
     length = np.linalg.norm(normals, axis=1)
     with np.errstate(invalid="ignore"):
         normals = normals / length[:, None]
     # a face's orientation is that of its parameters
     for tag in np.unique(face):
         mine = face == tag
-        if np.nanmedian(np.sum(normals[mine] * rough_normals[at[mine]], axis=1)) < 0:
+        if np.nanmedian(np.sum(normals[mine] * coarse_normals[at[mine]], axis=1)) < 0:
             normals[mine] *= -1
-    doubtful = ~(np.sum(normals * rough_normals[at], axis=1) > np.cos(np.radians(DOUBTFUL)))
+    uncertain = ~(np.sum(normals * coarse_normals[at], axis=1) > np.cos(np.radians(UNCERTAIN)))
     n = len(mesh.vertices)
     # at an edge all faces disagree with the triangles, and rightly
-    trusted = np.bincount(at[~doubtful], minlength=n)
+    trusted = np.bincount(at[~uncertain], minlength=n)
     alone = np.bincount(at, minlength=n) < 2
-    normals[doubtful & (alone | (trusted > 0))[at]] = np.nan
+    normals[uncertain & (alone | (trusted > 0))[at]] = np.nan
     total = np.zeros((n, 3))
     finite = np.all(np.isfinite(normals), axis=1)
     np.add.at(total, at[finite], normals[finite])

@@ -87,7 +87,7 @@ def fit(
     smoothing: float = SMOOTHING,
     normal_weight: float = 1.0,
     accuracy: float = 5e-5,
-    say: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Fitted:
     """Fit F to points (n, 3) of a closed body, L, and outward unit normals (n, 3) there.
 
@@ -108,7 +108,7 @@ def fit(
         Weight of grad f = n; less where points are noisy, and normals that come of them more so.
     accuracy : float
         Change of the curvatures over `CHECKED` iterations, relative to their rms, at which the solver stops.
-    say : callable
+    progress : callable
         Told what is being done.
 
     Raises
@@ -138,7 +138,7 @@ def fit(
         now = watch.curvatures(c)
         change = float(np.sqrt(np.mean((now - before) ** 2)))
         scale = float(np.sqrt(np.mean(now**2)))
-        say(f"fitting: {done} iterations, curvatures changing by {change / scale:.1e}")
+        progress(f"fitting: {done} iterations, curvatures changing by {change / scale:.1e}")
         before, off = now, watch.off(now)
         best = min(best, off)
         if off <= LOST * best:

@@ -72,7 +72,7 @@ class _Raw(NamedTuple):
     indexed: bool
 
 
-def read_mesh(source: Any, units: str | None = None, *, say: Callable[[str], None]) -> TriangleMesh:
+def read_mesh(source: Any, units: str | None = None, *, progress: Callable[[str], None]) -> TriangleMesh:
     """Read, check and repair the mesh of one body.
 
     Parameters
@@ -81,7 +81,7 @@ def read_mesh(source: Any, units: str | None = None, *, say: Callable[[str], Non
         STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
-    say : callable
+    progress : callable
         Is told each repair in a sentence.
 
     Returns
@@ -103,7 +103,7 @@ def read_mesh(source: Any, units: str | None = None, *, say: Callable[[str], Non
 
     def note(message: str) -> None:
         repairs.append(message)
-        say(message)
+        progress(message)
 
     vertices, triangles = cleaned(raw.name, raw.vertices, raw.triangles, note if raw.indexed else _silent, note)
     _check_size(raw.name, vertices, scale)

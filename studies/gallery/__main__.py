@@ -19,7 +19,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--quick", action="store_true", help="coarser figures, drawn faster")
     given = parser.parse_args(arguments)
     try:
-        page = build_site(given.folder, given.names, quick=given.quick, say=lambda text: print(text, file=sys.stderr))
+        page = build_site(
+            given.folder, given.names, quick=given.quick, progress=lambda text: print(text, file=sys.stderr)
+        )
     except CreepingError as error:
         print(f"studies.gallery: {error}", file=sys.stderr)
         raise SystemExit(3) from None

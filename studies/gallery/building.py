@@ -54,7 +54,11 @@ CONFIGURATION: dict[str, Any] = {
 
 
 def build_site(
-    folder: str | Path, names: Sequence[str] = (), *, quick: bool = False, say: Callable[[str], None] = lambda _: None
+    folder: str | Path,
+    names: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Path:
     """Draw figures and build the site of pages and gallery.
 
@@ -66,7 +70,7 @@ def build_site(
         Figures; all of `studies.FIGURES` if there are none.
     quick : bool
         Coarser figures, drawn faster.
-    say : callable
+    progress : callable
         Called with a line of text for each figure and before Sphinx starts.
 
     Returns
@@ -91,8 +95,8 @@ def build_site(
     cards = []
     for name in dict.fromkeys(names) or studies.FIGURES:
         cards.append(studies.draw(name, folder / "figures", quick=quick))
-        say(f"{name}  {cards[-1]['seconds']:.1f} s  {cards[-1]['headline']}")
-    say("pages")
+        progress(f"{name}  {cards[-1]['seconds']:.1f} s  {cards[-1]['headline']}")
+    progress("pages")
     with tempfile.TemporaryDirectory(prefix="creeping-site-") as work:
         sources = Path(work) / "sources"
         gather(sources, cards, folder / "figures")
@@ -147,6 +151,6 @@ def make_html(sources: Path, folder: Path, doctrees: Path) -> None:
             app.build(force_all=True)
     except SphinxError as error:
         raise CreepingError(f"the pages cannot be built: {error}") from error
-    told = [line for line in warnings.getvalue().splitlines() if line.strip()]
-    if told or app.statuscode:
-        raise CreepingError(f"{len(told)} warnings of the pages, which must have none:\n  " + "\n  ".join(told))
+    lines = [line for line in warnings.getvalue().splitlines() if line.strip()]
+    if lines or app.statuscode:
+        raise CreepingError(f"{len(lines)} warnings of the pages, which must have none:\n  " + "\n  ".join(lines))

@@ -25,11 +25,11 @@ def tuned():
     """Maps for rays of length 8 within 1e-6, built once: tuned(body, outputs)."""
     kept = {}
 
-    def get(body, outputs=1):
-        key = repr(body), outputs
+    def get(body, n_steps=1):
+        key = repr(body), n_steps
         if key not in kept:
             kept[key] = cr.build_phase_map(
-                body, tolerance=1e-6, length=LENGTH, outputs=outputs, ride_along=outputs > 1, cache=False
+                body, tolerance=1e-6, length=LENGTH, n_steps=n_steps, carry_jacobi=n_steps > 1, cache=False
             )
         return kept[key]
 
@@ -44,7 +44,7 @@ def states(request):
 
 @pytest.mark.parametrize("which, grid", [("ellipsoid", (16, 64)), ("twisted", (24, 96))])
 def test_build_of_the_tower(benchmark, which, grid):
-    options = {"horizon": 1 / 8, "time_step": 2**-10, "stages": 7, "order": 3, "method": "tower", "cache": False}
+    options = {"horizon": 1 / 8, "time_step": 2**-10, "stages": 7, "degree": 3, "method": "tower", "cache": False}
     benchmark.pedantic(cr.build_phase_map, (BODIES[which],), {"grid": grid, **options}, rounds=3, warmup_rounds=1)
 
 
@@ -72,15 +72,15 @@ def test_direct_integration_of_equal_error(benchmark, states, tuned):
 
 def test_leap_on_a_body_given_by_samples(benchmark):
     body = sc.Gridded.sampled(sc.TwistedEllipsoid(), 32)
-    flow = cr.build_phase_map(body, horizon=0.5, grid=(32, 48), ride_along=False, cache=False)
+    flow = cr.build_phase_map(body, horizon=0.5, grid=(32, 48), carry_jacobi=False, cache=False)
     points = pack(*random_bundle_points(body, 20_000, rng=np.random.default_rng(0)))
     benchmark(flow.leap, points, 1)
 
 
 def test_fan_of_64_outputs(benchmark, states, tuned):
     body, points = states
-    riding = pack(points[:4096, :3], points[:4096, 3:], jacobi=True)
-    benchmark(tuned(body, 64).transport, riding, LENGTH * np.arange(1, 65) / 64)
+    with_jacobi = pack(points[:4096, :3], points[:4096, 3:], jacobi=True)
+    benchmark(tuned(body, 64).transport, with_jacobi, LENGTH * np.arange(1, 65) / 64)
 
 
 def test_opening_a_stored_map(benchmark, states, tuned, tmp_path):
@@ -91,7 +91,7 @@ def test_opening_a_stored_map(benchmark, states, tuned, tmp_path):
 @pytest.mark.parametrize("rays", [1000, 1_000_000])
 @pytest.mark.parametrize("which", BODIES)
 def test_choice_of_a_flow(benchmark, which, rays):
-    options = {"rays": rays, "length": LENGTH, "ride_along": False, "cache": False}
+    options = {"n_rays": rays, "length": LENGTH, "carry_jacobi": False, "cache": False}
     benchmark.pedantic(cr.choose_flow, (BODIES[which],), options, rounds=3, warmup_rounds=1)
 
 

@@ -59,7 +59,7 @@ def test_run_with_a_mesh(ball, tmp_path, capsys):
     assert "reading the mesh" in err and "fitting" in err
     assert "body: a fit to 1922 points" in out and "because of it: points" in out
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["verdict"] == "smooth" and summary["ray_status"]["ROUGH"] == 0
+    assert summary["verdict"] == "smooth" and summary["ray_status"]["NON_SMOOTH"] == 0
     assert summary["fit"]["points"] == 642 + 1280
     assert summary["fit"]["normal_curvature"] == pytest.approx(1, rel=1e-3)
     # that corners of an STL file's triangles are joined is no repair

@@ -100,7 +100,7 @@ def test_a_field_needs_a_good_request():
     job = _field_run.job(20.0, None, None, (1.0, 1.0, 0.0))
     assert (job.boundary, [target.text for target in job.targets]) == ("soft", ["cut:45"])
     assert _field_run.job(None, None, None, (1.0, 0.0, 0.0)) is None
-    assert parse_boundary("impedance:0.5+0.2j").eta == 0.5 + 0.2j
+    assert parse_boundary("impedance:0.5+0.2j").admittance == 0.5 + 0.2j
     # a cut passes d, and goes on past the pole on the other side
     cut = job.targets[0]
     assert np.max(cut.directions @ np.array([1, 1, 0]) / np.sqrt(2)) == pytest.approx(1)

@@ -106,7 +106,7 @@ def test_weighted_bodies_are_refused(field):
         field(fan, wavenumber=10.0)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", cr.Impedance(0.5), "pec"])
+@pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(0.5), "pec"])
 def test_no_directions_give_an_empty_far_field(fan, boundary):
     far = cr.far_field(fan, np.zeros((0, 3)), wavenumber=10.0, boundary=boundary)
     assert far.total.shape == ((0, 2, 2) if boundary == "pec" else (0,))
@@ -143,7 +143,7 @@ def test_a_fan_without_rays_sheds_nothing():
 
 
 @pytest.mark.parametrize("n_rays", [1, 2, 3])
-@pytest.mark.parametrize("boundary", ["soft", cr.Impedance(1)])
+@pytest.mark.parametrize("boundary", ["soft", cr.ImpedanceBoundary(1)])
 def test_a_fan_of_few_rays_gives_finite_fields_or_says_so(n_rays, boundary):
     fan = launched(n_rays=n_rays)
     far = cr.far_field(fan, [[0.0, 0.6, -0.8], [0.6, 0.0, 0.8]], wavenumber=20.0, boundary=boundary)

@@ -8,26 +8,26 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.commands import main as cli
-from creeping.explorer.request import Wish
+from creeping.explorer.request import ViewRequest
 
 pytest.importorskip("viser")
 BODY = sc.Ellipsoid(1.2, 0.8, 0.6)
-WISH = Wish(theta=50.0, phi=40.0, rays=48, length=1.5, spacing=0.25, wavenumber=30.0, boundary="soft")
+REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=48, length=1.5, spacing=0.25, wavenumber=30.0, boundary="soft")
 
 
-def written(path, body=BODY, wish=WISH):
+def written(path, body=BODY, request=REQUEST):
     from creeping.explorer.export import export_page
 
-    return export_page(path, cr.DirectFlow(body, rtol=1e-9), wish)
+    return export_page(path, cr.DirectFlow(body, rtol=1e-9), request)
 
 
 def test_the_page_opens_from_its_file(tmp_path, browser):
-    from creeping.explorer.preview import moving_frame, step_of
+    from creeping.explorer.preview import preview_of, step_of
 
     path = tmp_path / "page.html"
     written(path)
     browser.open(path.as_uri())
-    frame = moving_frame(cr.DirectFlow(BODY, rtol=1e-9), WISH, step_of(BODY))
+    frame = preview_of(cr.DirectFlow(BODY, rtol=1e-9), REQUEST, step_of(BODY))
     held = browser.segments(len(frame.ray_segments))
     np.testing.assert_allclose(held, frame.ray_segments, rtol=0, atol=1e-6)
     assert browser.driver.find_element("id", "plane").rect["height"] > 50
@@ -54,7 +54,7 @@ def test_a_hostile_name_is_text(tmp_path):
 
 def test_trouble_writes_nothing(tmp_path):
     with pytest.raises(cr.SingularIncidenceError):
-        written(tmp_path / "page.html", sc.Torus(), WISH.changed(theta=90.0, phi=0.0))
+        written(tmp_path / "page.html", sc.Torus(), REQUEST.changed(theta=90.0, phi=0.0))
     with pytest.raises(cr.CreepingError):
         written(tmp_path / "no" / "such" / "folder" / "page.html")
     assert list(tmp_path.iterdir()) == []

@@ -8,22 +8,22 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.explorer.colours import ENDED, FIELD_COLOURS, RANGE, field_colours
-from creeping.explorer.preview import moving_frame, outline, segments, step_of, steps_of
-from creeping.explorer.refined import cut_directions, settled
-from creeping.explorer.request import Wish
+from creeping.explorer.preview import outline, preview_of, segments, step_of, steps_of
+from creeping.explorer.refined import cut_directions, refined_view
+from creeping.explorer.request import ViewRequest
 from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import colour_bar, moving_text, settled_text
+from creeping.explorer.text import colour_bar, preview_text, refined_text
 from creeping.geometry.surface import normal
 from creeping.geometry.triangulation import triangulate
 
-WISH = Wish(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
+REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
 
 
-def found_of(body, wish=WISH):
+def found_of(body, request=REQUEST):
     flow = cr.DirectFlow(body, rtol=1e-8)
-    frame = moving_frame(flow, wish, step_of(body))
+    frame = preview_of(flow, request, step_of(body))
     mesh = triangulate(body.level, body.gradient, body.bounds, cells=24)
-    return frame, mesh, settled(flow, frame, mesh.vertices)
+    return frame, mesh, refined_view(flow, frame, mesh.vertices)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_a_frame_has_no_nan(twisted):
     for values in (frame.ray_segments, frame.launch_segments, curves):
         assert values.dtype == np.float32 and values.shape[1:] == (2, 3) and np.all(np.isfinite(values))
     assert len(frame.ray_segments) == 64 * (frame.fan.points.shape[1] - 1)
-    assert set(np.round(levels, 9)) <= set(np.round(WISH.levels, 9)) and len(levels)
+    assert set(np.round(levels, 9)) <= set(np.round(REQUEST.levels, 9)) and len(levels)
     assert frame.fan.length == pytest.approx(2.0, abs=step_of(frame.fan.body) / 2)
 
 
@@ -52,24 +52,24 @@ def test_levels_are_those_of_the_field(twisted):
 def test_the_outline_lies_near_the_shadow_line(twisted):
     frame, mesh, found = twisted
     normals = normal(frame.fan.body, mesh.vertices)
-    drawn = outline(mesh, normals, WISH.direction)
+    drawn = outline(mesh, normals, REQUEST.direction)
     assert drawn.shape[1:] == (2, 3) and np.all(np.isfinite(drawn))
     length = float(np.sum(np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1)))
     assert length == pytest.approx(found.line.length, rel=0.02)
     n = normal(frame.fan.body, drawn.reshape(-1, 3).astype(float))
-    assert np.max(np.abs(n @ WISH.direction)) < 0.05
+    assert np.max(np.abs(n @ REQUEST.direction)) < 0.05
 
 
 def test_a_newer_wish_ends_the_work():
     body = sc.Sphere()
-    frame = moving_frame(cr.DirectFlow(body), WISH, step_of(body))
+    frame = preview_of(cr.DirectFlow(body), REQUEST, step_of(body))
     asked = []
 
     def stale():
         asked.append(0)
         return len(asked) == 2
 
-    assert settled(cr.DirectFlow(body), frame, np.zeros((0, 3)), stale) is None
+    assert refined_view(cr.DirectFlow(body), frame, np.zeros((0, 3)), stale) is None
     assert len(asked) == 2
 
 
@@ -77,7 +77,7 @@ def test_the_cut_of_a_sphere_is_near_the_partial_waves():
     from studies.reference import sphere
 
     # along z: theta of the cut is the angle from the forward direction
-    _, _, found = found_of(sc.Sphere(), WISH.changed(theta=0.0, length=6.5, rays=128))
+    _, _, found = found_of(sc.Sphere(), REQUEST.changed(theta=0.0, length=6.5, rays=128))
     exact = sphere.far_field(30.0, 1.0, np.cos(np.radians(found.cut_angles)), "hard")
     assert np.max(np.abs(found.far.total - exact)) < 0.02 * np.max(np.abs(exact))
     np.testing.assert_allclose(cut_directions(np.array([90.0, -90.0]), 90.0), [[0, 1, 0], [0, -1, 0]], atol=1e-12)
@@ -90,13 +90,13 @@ def test_the_error_told_is_that_of_the_rays_drawn(twisted):
     ends, _ = cr.trace(frame.fan.body, frame.fan.points[:, 0], frame.fan.directions[:, 0], frame.fan.length, rtol=1e-12)
     every = np.linalg.norm(frame.fan.points[:, -1] - ends, axis=1)
     assert found.drawn.error.rms < 20 * np.sqrt(np.mean(every**2)) and found.drawn.error.max < 20 * every.max()
-    assert "rays drawn: 64 rays" in settled_text(found) and f"rms {found.drawn.error.rms:.1e}" in settled_text(found)
+    assert "rays drawn: 64 rays" in refined_text(found) and f"rms {found.drawn.error.rms:.1e}" in refined_text(found)
 
 
 def test_long_rays_get_longer_steps():
     body = sc.Sphere()
     flow, step = cr.DirectFlow(body), step_of(body)
-    frame = moving_frame(flow, WISH.changed(length=400 * step, spacing=0.0), step)
+    frame = preview_of(flow, REQUEST.changed(length=400 * step, spacing=0.0), step)
     assert frame.fan.length == pytest.approx(400 * step, abs=1.5 * step) and len(frame.fan.travel_time) <= 193
     assert steps_of(0.1 * step, step) == (2, step)
 
@@ -111,14 +111,14 @@ def test_pictures_are_svg_of_finite_numbers(twisted):
 def test_a_weighted_body_has_rays_and_no_field():
     frame, _, found = found_of(sc.Sphere(speed="1 + 0.3*x"))
     assert frame.levels is None and found.body_levels is None and found.far is None and cut_svg(found) == ""
-    assert "no field" in settled_text(found) and "dB" not in moving_text(frame, 0.01, RANGE)
+    assert "no field" in refined_text(found) and "dB" not in preview_text(frame, 0.01, RANGE)
     assert plane_svg(found).count("<path") > 3
 
 
 def test_a_torus_is_drawn_all_the_way_round():
-    _, _, found = found_of(sc.Torus(), WISH.changed(theta=70.0))
+    _, _, found = found_of(sc.Torus(), REQUEST.changed(theta=70.0))
     assert "psi (degrees)" in plane_svg(found)
-    assert "occluded" in settled_text(found)
+    assert "occluded" in refined_text(found)
 
 
 def test_colours_of_levels():

@@ -8,33 +8,33 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.explorer.preview import moving_frame
-from creeping.explorer.request import Wish
+from creeping.explorer.preview import preview_of
+from creeping.explorer.request import ViewRequest
 
 pytest.importorskip("viser")
 BODY = sc.TwistedEllipsoid()
-WISH = Wish(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
+REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
 
 
 @pytest.fixture
 def page():
     from creeping.explorer.page import Explorer
 
-    made = Explorer(cr.DirectFlow(BODY, rtol=1e-9), WISH, port=8123)
+    made = Explorer(cr.DirectFlow(BODY, rtol=1e-9), REQUEST, port=8123)
     yield made
     made.close()
 
 
 def rays_of(page, **values):
-    """Segments of the rays by the engine, for the wish with other values."""
-    wish = WISH.changed(**values)
-    count = round(wish.length / page.step)
-    fan = moving_frame(page.flow, wish, page.step).fan
+    """Segments of the rays by the engine, for the request with other values."""
+    request = REQUEST.changed(**values)
+    count = round(request.length / page.step)
+    fan = preview_of(page.flow, request, page.step).fan
     assert len(fan.travel_time) == count + 1
     return np.stack([fan.points[:, :-1], fan.points[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
-def settled(page, seconds=60.0):
+def refined_view(page, seconds=60.0):
     until = time.monotonic() + seconds
     while not page.plane.content:
         assert time.monotonic() < until, page.status.content
@@ -46,7 +46,7 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
     first = rays_of(page)
     held = browser.segments(len(first))
     np.testing.assert_allclose(held, first, rtol=0, atol=1e-6)
-    settled(page)
+    refined_view(page)
     # a key on the slider of theta, as a hand would press it
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
@@ -54,13 +54,13 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
     slider = browser.driver.find_elements(By.CSS_SELECTOR, "[role=slider]")[0]
     slider.send_keys(Keys.ARROW_RIGHT * 5)
     until = time.monotonic() + 30
-    while page.wish.theta == WISH.theta:
+    while page.request.theta == REQUEST.theta:
         assert time.monotonic() < until
         time.sleep(0.1)
     time.sleep(1.0)
-    assert 50.0 < page.wish.theta < 50.6
+    assert 50.0 < page.request.theta < 50.6
     held = browser.segments(len(first))
-    np.testing.assert_allclose(held, rays_of(page, theta=page.wish.theta), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(held, rays_of(page, theta=page.request.theta), rtol=0, atol=1e-6)
     assert np.max(np.abs(held - first)) > 1e-3
     assert browser.errors() == []
     assert browser.requests_outside(urlsplit(page.address).netloc) == []
@@ -68,23 +68,23 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
 
 def test_the_arrow_turns_the_sliders_and_the_program_turns_nothing(page):
     class Event:
-        client, target = object(), page.stage.incidence
+        client, target = object(), page.scene.incidence
 
     # a quarter turn about x takes +z to -y
-    page.stage.incidence.wxyz = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+    page.scene.incidence.wxyz = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
     page._dragged(Event)
-    assert (page.wish.theta, page.wish.phi) == pytest.approx((90.0, -90.0))
+    assert (page.request.theta, page.request.phi) == pytest.approx((90.0, -90.0))
     assert (page.sliders["theta"].value, page.sliders["phi"].value) == pytest.approx((90.0, -90.0))
     Event.client = None
-    page.stage.incidence.wxyz = (1.0, 0.0, 0.0, 0.0)
+    page.scene.incidence.wxyz = (1.0, 0.0, 0.0, 0.0)
     page._dragged(Event)
-    assert page.wish.theta == pytest.approx(90.0)
+    assert page.request.theta == pytest.approx(90.0)
 
 
 def test_what_cannot_be_shown_is_told_and_the_page_lives_on(page):
     page.ask(length=float("nan"))
-    assert "length" in page.status.content and page.wish == WISH
-    settled(page)
+    assert "length" in page.status.content and page.request == REQUEST
+    refined_view(page)
     page.ask(theta=80.0)
     until = time.monotonic() + 30
     while "theta 80.0" not in page.status.content:
@@ -95,7 +95,7 @@ def test_what_cannot_be_shown_is_told_and_the_page_lives_on(page):
 def test_a_singular_incidence_is_named():
     from creeping.explorer.page import Explorer
 
-    made = Explorer(cr.DirectFlow(sc.Torus()), WISH.changed(theta=90.0, phi=0.0), port=8140)
+    made = Explorer(cr.DirectFlow(sc.Torus()), REQUEST.changed(theta=90.0, phi=0.0), port=8140)
     try:
         until = time.monotonic() + 60
         while "crosses itself" not in made.status.content:
@@ -145,25 +145,25 @@ def test_nothing_is_shared_with_the_world(page, monkeypatch):
     assert page.server.request_share_url() is None and asked == []
 
 
-def test_a_settled_result_is_not_drawn_over_a_newer_frame(page, monkeypatch):
+def test_a_refined_view_is_not_drawn_over_a_newer_frame(page, monkeypatch):
     from creeping.explorer import page as module
 
-    settled(page)
-    began, real = [], module.settled_text
+    refined_view(page)
+    began, real = [], module.refined_text
 
     def late(found):
-        # a newer wish is drawn after the work was found good, and before it is drawn
-        began.append(found.wish.theta)
-        if found.wish.theta == 60.0:
+        # a newer request is drawn after the work was found good, and before it is drawn
+        began.append(found.request.theta)
+        if found.request.theta == 60.0:
             page.ask(theta=70.0)
             until = time.monotonic() + 30
             while "theta 70.0" not in page.status.content and time.monotonic() < until:
                 time.sleep(0.01)
         return real(found)
 
-    monkeypatch.setattr(module, "settled_text", late)
+    monkeypatch.setattr(module, "refined_text", late)
     drawn = []
-    monkeypatch.setattr(page.stage, "settle", lambda found, paint: drawn.append(found.wish.theta))
+    monkeypatch.setattr(page.scene, "refine", lambda found, paint: drawn.append(found.request.theta))
     page.ask(theta=60.0)
     until = time.monotonic() + 90
     while 70.0 not in drawn:
@@ -181,15 +181,15 @@ def test_iso_phase_curves_can_be_turned_off_and_a_refusal_resets_the_slider(page
 
     slider.value = 1e-4
     page._slid("spacing", Event)
-    assert "curves" in page.status.content and slider.value == page.wish.spacing == WISH.spacing
+    assert "curves" in page.status.content and slider.value == page.request.spacing == REQUEST.spacing
     slider.value = 0.0
     page._slid("spacing", Event)
-    assert page.wish.spacing == 0.0
+    assert page.request.spacing == 0.0
 
 
 def test_nothing_works_on_after_the_end():
     from creeping.explorer.page import Explorer
 
-    made = Explorer(cr.DirectFlow(BODY, rtol=1e-6), WISH, port=8150)
+    made = Explorer(cr.DirectFlow(BODY, rtol=1e-6), REQUEST, port=8150)
     made.close()
     assert not any(worker.is_alive() for worker in made._workers)

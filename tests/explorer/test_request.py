@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from creeping import InvalidInputError
-from creeping.explorer.latest import Newest
-from creeping.explorer.request import Wish, angles
+from creeping.explorer.latest import Latest
+from creeping.explorer.request import ViewRequest, angles
 
 GOOD = {
     "theta": 30.0,
@@ -23,16 +23,16 @@ GOOD = {
 
 @pytest.mark.parametrize("theta, phi", [(0.0, 0.0), (30.0, -120.0), (90.0, 180.0), (180.0, 0.0)])
 def test_angles_come_back(theta, phi):
-    wish = Wish(**(GOOD | {"theta": theta, "phi": phi}))
-    assert np.linalg.norm(wish.direction) == pytest.approx(1.0)
-    assert angles(wish.direction)[0] == pytest.approx(theta, abs=1e-9)
+    request = ViewRequest(**(GOOD | {"theta": theta, "phi": phi}))
+    assert np.linalg.norm(request.direction) == pytest.approx(1.0)
+    assert angles(request.direction)[0] == pytest.approx(theta, abs=1e-9)
     if 0 < theta < 180:
-        assert angles(wish.direction)[1] == pytest.approx(phi)
+        assert angles(request.direction)[1] == pytest.approx(phi)
 
 
 def test_levels_end_with_the_rays():
-    np.testing.assert_allclose(Wish(**GOOD).levels, 0.25 * np.arange(1, 9))
-    assert len(Wish(**(GOOD | {"spacing": 0.0})).levels) == 0
+    np.testing.assert_allclose(ViewRequest(**GOOD).levels, 0.25 * np.arange(1, 9))
+    assert len(ViewRequest(**(GOOD | {"spacing": 0.0})).levels) == 0
 
 
 @pytest.mark.parametrize(
@@ -57,11 +57,11 @@ def test_levels_end_with_the_rays():
 )
 def test_what_is_out_of_range_is_refused_by_name(name, value):
     with pytest.raises(InvalidInputError, match=name):
-        Wish(**(GOOD | {name: value}))
+        ViewRequest(**(GOOD | {name: value}))
 
 
 def test_only_the_newest_is_taken():
-    queue = Newest()
+    queue = Latest()
     for value in range(5):
         queue.put(value)
     assert queue.take() == (4, 5)

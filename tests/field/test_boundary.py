@@ -63,13 +63,13 @@ def test_boundaries_by_name():
     m = np.array([1.5, 3.0])
     assert SOFT.q(m) is None
     assert HARD.q(m) == 0
-    (wall,) = scalar_boundaries(cr.Impedance(0.5 - 0.2j))
+    (wall,) = scalar_boundaries(cr.ImpedanceBoundary(0.5 - 0.2j))
     np.testing.assert_allclose(wall.q(m), 1j * m * (0.5 - 0.2j))
     assert modes_of(wall, m).tau.shape == (2, 10)
     assert modes_of(SOFT, m).tau.shape == (10,)
     # an admittance of zero is the hard boundary itself, and a real number is as good as a complex one
-    assert scalar_boundaries(cr.Impedance(0)) == (HARD,)
-    assert scalar_boundaries(cr.Impedance(1))[0].eta == 1
+    assert scalar_boundaries(cr.ImpedanceBoundary(0)) == (HARD,)
+    assert scalar_boundaries(cr.ImpedanceBoundary(1))[0].admittance == 1
 
 
 def test_fock_scale_is_infinite_on_flat_and_concave_ground():
@@ -77,10 +77,10 @@ def test_fock_scale_is_infinite_on_flat_and_concave_ground():
 
 
 @pytest.mark.parametrize(
-    "eta, match",
+    "admittance, match",
     [
-        (-0.1, "Re eta < 0"),
-        (-1e-9 + 1j, "Re eta < 0"),
+        (-0.1, "negative real part"),
+        (-1e-9 + 1j, "negative real part"),
         (float("nan"), "not finite"),
         (complex(0, float("inf")), "not finite"),
         (float("inf"), "soft"),
@@ -89,12 +89,12 @@ def test_fock_scale_is_infinite_on_flat_and_concave_ground():
         (np.array([1.0, 2.0]), "not a complex number"),
     ],
 )
-def test_bad_impedances_are_named(eta, match):
+def test_bad_impedances_are_named(admittance, match):
     with pytest.raises(cr.CreepingError, match=match):
-        cr.Impedance(eta)
+        cr.ImpedanceBoundary(admittance)
 
 
 @pytest.mark.parametrize("boundary", ["softt", "SOFT", "", None, 0.5, 1j, ("soft",), ["hard"], {"pec"}])
 def test_unknown_boundaries_are_named(boundary):
-    with pytest.raises(cr.CreepingError, match="is not 'soft', 'hard', 'pec' or Impedance"):
+    with pytest.raises(cr.CreepingError, match="is not 'soft', 'hard', 'pec' or ImpedanceBoundary"):
         scalar_boundaries(boundary)

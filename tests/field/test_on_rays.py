@@ -8,7 +8,7 @@ import scatterers as sc
 from creeping.field.on_rays import creeps, ray_magnitude
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", cr.Impedance(0.3 - 0.1j)])
+@pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(0.3 - 0.1j)])
 @pytest.mark.parametrize("body", [sc.Ellipsoid(1.2, 0.8, 0.6), sc.TwistedEllipsoid()], ids=["ellipsoid", "twisted"])
 def test_it_is_the_field_on_the_surface(body, boundary):
     line = cr.shadow_line(body, (1, 1, 1))

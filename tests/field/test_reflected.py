@@ -1,4 +1,4 @@
-"""The reflected field: mirrors at high frequency, the sphere, grazing incidence, flat and concave ground."""
+"""The reflected field: mirrors at high frequency, the sphere, grazing incidence, flat and concave regions."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_a_curved_mirror_tends_to_a_plane_one(boundary, order):
         "electric soft": -1,
         "hard": 1,
         "electric hard": 1,
-        "impedance": (COSINE - WALL.eta) / (COSINE + WALL.eta),
+        "impedance": (COSINE - WALL.admittance) / (COSINE + WALL.admittance),
     }[boundary.kind]
     ones = np.ones(3)
     np.testing.assert_allclose(plane_reflection(COSINE, boundary), expected * ones, rtol=1e-13)
@@ -116,6 +116,6 @@ def test_impedance_between_hard_and_soft_in_the_far_field():
     # η -> 0 hard, η -> ∞ soft
     ones = np.ones(3)
     for eta, limit in ((1e-6, HARD), (1e6, SOFT)):
-        (wall,) = scalar_boundaries(cr.Impedance(eta))
+        (wall,) = scalar_boundaries(cr.ImpedanceBoundary(eta))
         got = reflection(COSINE, ones, ones, 40.0, wall, 1)
         np.testing.assert_allclose(got, reflection(COSINE, ones, ones, 40.0, limit, 1), rtol=1e-4)

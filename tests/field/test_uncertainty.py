@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.rays.body_uncertainty import coarser_fan
+from creeping.rays.uncertain_body import coarse_fan
 from studies._meshes import on_body
 
 D, K = (0.3, 0.2, 0.9), 20.0
@@ -29,19 +29,19 @@ def fan_of(body):
 class Unsure:
     """An ellipsoid that knows of a coarser one."""
 
-    def __init__(self, body, coarser):
+    def __init__(self, body, coarse_fit):
         for name in ("level", "gradient", "hessian", "bounds", "atlas", "parameters", "compiled"):
             setattr(self, name, getattr(body, name))
-        self.coarser = coarser
+        self.coarse_fit = coarse_fit
 
 
-BODY, COARSER = sc.Ellipsoid(1.0, 0.8, 0.6), sc.Ellipsoid(1.001, 0.799, 0.6005)
-UNSURE = Unsure(BODY, COARSER)
+BODY, COARSE_FIT = sc.Ellipsoid(1.0, 0.8, 0.6), sc.Ellipsoid(1.001, 0.799, 0.6005)
+UNSURE = Unsure(BODY, COARSE_FIT)
 
 
 def test_bodies_known_exactly_have_none():
     assert cr.far_field_uncertainty(fan_of(BODY), grid(3), wavenumber=K) is None
-    assert coarser_fan(fan_of(BODY)) is None
+    assert coarse_fan(fan_of(BODY)) is None
 
 
 @pytest.mark.parametrize("boundary, order", [("soft", 1), ("hard", 2), ("pec", 2)])
@@ -57,10 +57,10 @@ def test_a_coarser_body_of_another_size_has_the_field_of_another_frequency(bound
 
 
 def test_the_other_fan_is_of_the_coarser_body():
-    fan, other = fan_of(UNSURE), coarser_fan(fan_of(UNSURE))
-    assert other.body is COARSER and other.points.shape == fan.points.shape
+    fan, other = fan_of(UNSURE), coarse_fan(fan_of(UNSURE))
+    assert other.body is COARSE_FIT and other.points.shape == fan.points.shape
     np.testing.assert_allclose(other.line.direction, fan.line.direction)
-    np.testing.assert_allclose(COARSER.level(other.points), 0, atol=1e-9)
+    np.testing.assert_allclose(COARSE_FIT.level(other.points), 0, atol=1e-9)
     assert 0 < np.abs(BODY.level(other.points)).max() < 1e-2
 
 

@@ -56,7 +56,7 @@ def by_quadrature(body, state, length):
 @pytest.mark.parametrize("name", NON_CONVEX)
 def test_carried_by_the_map_through_detachment(name, rng):
     body = NON_CONVEX[name]
-    flow = cr.build_phase_map(body, tolerance=1e-7, length=2.0, outputs=8)
+    flow = cr.build_phase_map(body, tolerance=1e-7, length=2.0, n_steps=8)
     states = pack(*random_bundle_points(body, 400, rng=rng), lanes=12)
     times = np.arange(1, 9) / 4
     got = flow.transport(states, times)

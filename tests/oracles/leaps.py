@@ -26,7 +26,7 @@ def evaluate(table, chart, grid, degree):
     return out
 
 
-def carry_riding(grid, leap, chart, place, states, out):
+def carry_jacobi_and_curvatures(grid, leap, chart, place, states, out):
     """Fill lanes 6 to 9 of out with M times those of states, lanes 10 and 11 with attenuation and detachment.
 
     Times of detachment count from the start of the leap.
@@ -60,7 +60,7 @@ def leap(flow, states):
     d = evaluate(table.state, chart, place, grid.degree) + table.centre
     out = np.empty_like(states)
     out[:, :3], out[:, 3:6] = move(model, inner, d)
-    carry_riding(grid, table, chart, place, states, out)
+    carry_jacobi_and_curvatures(grid, table, chart, place, states, out)
     return out
 
 
@@ -77,7 +77,7 @@ def _ambient(model, grid, leap, states):
     d = evaluate(leap.state, chart, place, grid.degree)
     out = np.empty_like(states)
     out[:, :3], out[:, 3:6] = project_bundle(model.body, x + leap.time * p + d[:, :3], p + d[:, 3:6])
-    carry_riding(grid, leap, chart, place, states, out)
+    carry_jacobi_and_curvatures(grid, leap, chart, place, states, out)
     return out
 
 

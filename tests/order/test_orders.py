@@ -26,19 +26,20 @@ def error_of(body, **options):
 def test_spline_order(order, nodes):
     # the doubly periodic torus: h is 1/nodes without margins
     body = sc.Torus()
-    errors = [error_of(body, horizon=1 / 8, grid=(n, n, n), order=order) for n in nodes]
+    errors = [error_of(body, horizon=1 / 8, grid=(n, n, n), degree=order) for n in nodes]
     assert errors[-1] < 1e-6
     assert slope(1 / np.array(nodes), errors) == pytest.approx(order + 1, abs=ORDER)
 
 
-@pytest.mark.parametrize("order", [3, 5])
+@pytest.mark.parametrize("degree", [3, 5])
 def test_spline_order_on_six_charts(order):
     # not the sphere: its displacement is the same rotation everywhere
     body = sc.Ellipsoid(1.2, 0.8, 0.8)
     nodes = np.array([21, 29, 41])
     cells = nodes - 5
     errors = [
-        error_of(body, horizon=1 / 2, grid=(int(n), int(4 * c)), order=order) for n, c in zip(nodes, cells, strict=True)
+        error_of(body, horizon=1 / 2, grid=(int(n), int(4 * c)), degree=order)
+        for n, c in zip(nodes, cells, strict=True)
     ]
     # between these grids and rounding a quintic still gains more than its order: 6.5 was measured
     assert slope(1 / cells, errors) == pytest.approx(order + 1, abs=ORDER if order == 3 else 2 * ORDER)
@@ -48,7 +49,7 @@ def test_burn_in_order():
     body = sc.Torus()
     steps = np.array([2.0**-3, 2.0**-4, 2.0**-5])
     errors = [
-        error_of(body, horizon=1 / 4, grid=(64, 64, 64), order=5, method="tower", time_step=float(tau), stages=k)
+        error_of(body, horizon=1 / 4, grid=(64, 64, 64), degree=5, method="tower", time_step=float(tau), stages=k)
         for k, tau in enumerate(steps, start=1)
     ]
     assert slope(steps, errors) == pytest.approx(4, abs=ORDER)

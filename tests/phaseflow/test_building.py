@@ -20,7 +20,7 @@ EXAMPLES = {
 def test_examples_of_the_paper(number):
     body, grid, bound = EXAMPLES[number]
     flow = cr.build_phase_map(
-        body, horizon=1 / 8, time_step=2**-10, stages=7, grid=grid, order=3, method="tower", cache=False
+        body, horizon=1 / 8, time_step=2**-10, stages=7, grid=grid, degree=3, method="tower", cache=False
     )
     assert len(flow.leaps) == 8
     # 2000 points: the rms of 200 scatters by a third around it
@@ -64,7 +64,7 @@ def test_bodies_of_any_scale():
         ({"tolerance": 0.0}, "tolerance"),
         ({"tolerance": float("nan")}, "tolerance"),
         ({"horizon": -1.0}, "horizon"),
-        ({"order": 4}, "degree 3 and 5"),
+        ({"degree": 4}, "degree 3 and 5"),
         ({"method": "magic"}, "method"),
         ({"grid": (4, 8)}, "at least"),
         ({"grid": (12.5, 16)}, "whole numbers"),

@@ -14,7 +14,7 @@ from creeping.geometry.surface import fingerprint
 from creeping.storage.folder import MANIFEST
 
 BODY = sc.Ellipsoid(1.0, 0.8, 0.6)
-OPTIONS = {"horizon": 0.25, "grid": (10, 12), "order": 3}
+OPTIONS = {"horizon": 0.25, "grid": (10, 12), "degree": 3}
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,7 @@ def test_cache_hit_rebuild_and_miss(tmp_path):
     repaired = cr.build_phase_map(BODY, **options)
     assert any("rebuilding" in line for line in said)
     np.testing.assert_array_equal(repaired.leaps[0].state, first.leaps[0].state)
-    cr.build_phase_map(BODY, **{**options, "order": 5})
+    cr.build_phase_map(BODY, **{**options, "degree": 5})
     assert len([p for p in tmp_path.iterdir() if p.is_dir()]) == 2
 
 
@@ -159,7 +159,7 @@ def test_second_process_waits_and_opens_the_same_map(tmp_path):
     code = (
         "import creeping as cr, scatterers as sc\n"
         "def say(text): print(text, flush=True)\n"
-        "options = dict(horizon=0.25, grid=(10, 12), order=3, progress=say)\n"
+        "options = dict(horizon=0.25, grid=(10, 12), degree=3, progress=say)\n"
         f"cr.build_phase_map(sc.Ellipsoid(1.0, 0.8, 0.6), cache={str(tmp_path)!r}, **options)"
     )
     both = [subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(2)]

@@ -51,18 +51,18 @@ def test_charts_without_a_margin_take_any_grid():
     assert least_cells(sc.Torus()) == 1
 
 
-@pytest.mark.parametrize("order", [3, 5])
-def test_grid_too_small_for_the_margin_is_refused(order):
+@pytest.mark.parametrize("degree", [3, 5])
+def test_grid_too_small_for_the_margin_is_refused(degree):
     body = Reaching(0.6)
     least = least_cells(body) + 1 + 2 * MARGIN
-    assert least == 12 > order + 5
+    assert least == 12 > degree + 5
     for grid in ((least - 1, 8), (least - 1, least, 8), (least, least - 1, 8)):
-        with pytest.raises(cr.CreepingError, match=rf"at least \[12, 12, {order + 1}\] for order {order}"):
-            cr.build_phase_map(body, horizon=0.1, grid=grid, order=order, cache=False)
+        with pytest.raises(cr.CreepingError, match=rf"at least \[12, 12, {degree + 1}\] for degree {degree}"):
+            cr.build_phase_map(body, horizon=0.1, grid=grid, degree=degree, cache=False)
         # the same grid does where charts reach everywhere
-        built = cr.build_phase_map(SPHERE, horizon=0.1, grid=grid, order=order, cache=False)
+        built = cr.build_phase_map(SPHERE, horizon=0.1, grid=grid, degree=degree, cache=False)
         assert built.error.rms < 1e-2
-    assert cr.build_phase_map(body, horizon=0.1, grid=(least, 8), order=order, cache=False).error.rms < 1e-2
+    assert cr.build_phase_map(body, horizon=0.1, grid=(least, 8), degree=degree, cache=False).error.rms < 1e-2
 
 
 def test_monge_charts_say_how_far_they_reach():

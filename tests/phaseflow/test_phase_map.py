@@ -41,27 +41,27 @@ def test_stays_on_the_bundle(body, phase_map, rng):
     assert np.abs(np.sum(p * body.gradient(x), axis=-1)).max() < 1e-12
 
 
-@pytest.mark.parametrize("order", [3, 5])
+@pytest.mark.parametrize("degree", [3, 5])
 @pytest.mark.parametrize("precision, bound", [("double", 1e-12), ("single", 1e-7)])
-def test_kernel_equals_numpy_twin(body, order, precision, bound, rng):
+def test_kernel_equals_numpy_twin(body, degree, precision, bound, rng):
     # sums over v are in single precision where coefficients are
-    flow = cr.build_phase_map(body, horizon=0.3, grid=(12, 16), order=order, precision=precision)
+    flow = cr.build_phase_map(body, horizon=0.3, grid=(12, 16), degree=degree, precision=precision)
     states = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True)
     np.testing.assert_allclose(flow.leap(states, 1), oracle(flow, states), rtol=2 * bound, atol=bound)
 
 
-@pytest.mark.parametrize("order", [3, 5])
-def test_kernel_equals_numpy_twin_in_space(body, order, rng):
+@pytest.mark.parametrize("degree", [3, 5])
+def test_kernel_equals_numpy_twin_in_space(body, degree, rng):
     options = {"time_step": 2**-6, "stages": 2, "method": "tower"}
     # fine enough that leaps end near T1Q: the kernel projects p with x, step by step, its twin after x
-    flow = cr.build_phase_map(body, horizon=2**-4, grid=(36, 64), order=order, **options)
+    flow = cr.build_phase_map(body, horizon=2**-4, grid=(36, 64), degree=degree, **options)
     assert flow.model.name == "ambient"
     states = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True)
     np.testing.assert_allclose(flow.leap(states, 1), oracle(flow, states), rtol=0, atol=1e-12)
 
 
 def test_models_of_bodies(body):
-    name = cr.build_phase_map(body, horizon=0.3, grid=(12, 16), order=3).model.name
+    name = cr.build_phase_map(body, horizon=0.3, grid=(12, 16), degree=3).model.name
     mirrored = body.speed is None and isinstance(body, sc.Sphere | sc.Ellipsoid)
     assert name == ("angles" if isinstance(body, sc.Torus) else "octant" if mirrored else "rotation")
 
@@ -143,7 +143,7 @@ def test_points_at_the_edges_of_charts_are_no_worse(phase_map):
 def test_any_time_between_the_maps(method, rng):
     body = sc.Ellipsoid(1.2, 0.8, 0.8)
     extra = {"time_step": 2**-6, "stages": 3} if method == "tower" else {}
-    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(24, 48), order=5, method=method, cache=False, **extra)
+    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(24, 48), degree=5, method=method, cache=False, **extra)
     assert len(flow.leaps) == (4 if method == "tower" else 1)
     x, p = random_bundle_points(body, 20, rng=rng)
     times = np.sort(rng.uniform(0, 1, 40))
@@ -176,7 +176,7 @@ def test_body_without_compiled_parts_gives_the_same_map(rng):
             return compiled.parameters(points)
 
     plain = Plain()
-    options = {"horizon": 0.25, "grid": (10, 12), "order": 3, "cache": False}
+    options = {"horizon": 0.25, "grid": (10, 12), "degree": 3, "cache": False}
     one, other = cr.build_phase_map(plain, **options), cr.build_phase_map(compiled, **options)
     assert (one.model.name, other.model.name) == ("ambient", "octant")
     x, p = random_bundle_points(compiled, 10, rng=rng)
@@ -197,15 +197,15 @@ def test_direct_flow_has_the_same_protocol(rng):
     x, p = random_bundle_points(body, 5, rng=rng)
     np.testing.assert_allclose(flow.apply(x, p)[0], cr.trace(body, x, p, flow.horizon)[0], atol=1e-9)
     assert flow.error is None
-    assert isinstance(cr.build_phase_map(body, horizon=0.2, grid=(10, 12), order=3, cache=False), PhaseMap)
+    assert isinstance(cr.build_phase_map(body, horizon=0.2, grid=(10, 12), degree=3, cache=False), PhaseMap)
 
 
 def test_table_of_the_body_stands_in_for_a_dear_psi(rng):
     body = sc.Gridded.sampled(sc.Ellipsoid(1.2, 0.8, 0.8), 24)
     model = model_of(body)
-    assert len(model._exits) == 6
+    assert len(model._surface_table) == 6
     exact = model_of(body)
-    exact._exits = np.zeros((0, 1, 1, 4))
+    exact._surface_table = np.zeros((0, 1, 1, 4))
     for chart in range(6):
         at = model.at(chart, rng.random(200), rng.random(200), 2 * np.pi * rng.random(200))
         states = model.states(at)
@@ -219,7 +219,7 @@ def test_table_of_the_body_stands_in_for_a_dear_psi(rng):
 
 def test_map_of_a_gridded_body(rng):
     body = sc.Gridded.sampled(sc.Ellipsoid(1.2, 0.8, 0.8), 24)
-    flow = cr.build_phase_map(body, tolerance=1e-5, length=2.0, outputs=4, cache=False)
+    flow = cr.build_phase_map(body, tolerance=1e-5, length=2.0, n_steps=4, cache=False)
     states = pack(*random_bundle_points(body, 100, rng=rng), lanes=12)
     times = np.array([0.5, 1.0, 2.0])
     got, exact = flow.transport(states, times), cr.DirectFlow(body, rtol=1e-12).transport(states, times)

@@ -42,14 +42,14 @@ def test_second_order_falls_with_frequency(fan, boundary):
 @pytest.mark.parametrize("eta", [1.0, 0.3 - 0.2j])
 def test_impedance_on_the_body(fan, eta):
     theta = np.radians(np.array([20.0, 40, 60, 80, 88]))
-    found = cr.surface_field(fan, field_sphere.observers(theta), wavenumber=100.0, boundary=cr.Impedance(eta))
+    found = cr.surface_field(fan, field_sphere.observers(theta), wavenumber=100.0, boundary=cr.ImpedanceBoundary(eta))
     assert found == pytest.approx(sphere.surface_field(100.0, 1.0, np.cos(theta), eta), rel=5e-3)
 
 
 def test_impedance_passes_to_hard(fan):
     r = field_sphere.observers(np.radians(np.arange(0, 181, 10.0)))
     hard = cr.far_field(fan, r, wavenumber=30.0, boundary="hard").total
-    nearly = cr.far_field(fan, r, wavenumber=30.0, boundary=cr.Impedance(1e-7)).total
+    nearly = cr.far_field(fan, r, wavenumber=30.0, boundary=cr.ImpedanceBoundary(1e-7)).total
     assert nearly == pytest.approx(hard, rel=1e-4)
 
 

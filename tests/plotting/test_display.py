@@ -47,7 +47,7 @@ def test_another_display_asks_again(answers, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("code", "stderr", "told"),
+    ("code", "stderr", "message"),
     [
         (-11, b"", "signal 11"),
         (3, b"", "blank"),
@@ -55,11 +55,11 @@ def test_another_display_asks_again(answers, monkeypatch):
         (7, b"", "exit code 7"),
     ],
 )
-def test_failure_names_the_packages(answers, code, stderr, told):
+def test_failure_names_the_packages(answers, code, stderr, message):
     answers.code, answers.stderr = code, stderr
     probe = gl_available()
     assert not probe.ok
-    assert told in probe.reason
+    assert message in probe.reason
     for package in ("libegl1", "libgl1-mesa-dri", "libx11-6"):
         assert package in probe.reason
 

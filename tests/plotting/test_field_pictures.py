@@ -25,7 +25,7 @@ def at(angle):
     return np.stack([np.sin(t) * np.cos(0.3), np.sin(t) * np.sin(0.3), -np.cos(t)], axis=-1)
 
 
-@pytest.mark.parametrize("boundary", ["hard", "soft", cr.Impedance(0.5 + 0.2j)])
+@pytest.mark.parametrize("boundary", ["hard", "soft", cr.ImpedanceBoundary(0.5 + 0.2j)])
 def test_levels_are_those_of_the_exact_series(fan, boundary):
     angles = np.array([0.0, 20.0, 50.0, 70.0, 80.0, 89.0, 91.0, 100.0, 120.0])
     levels = surface_levels(fan, at(angles), wavenumber=K, boundary=boundary)
@@ -33,7 +33,7 @@ def test_levels_are_those_of_the_exact_series(fan, boundary):
     if boundary == "soft":
         exact = sphere.surface_derivative(K, 1.0, cosine, "soft") / K
     else:
-        exact = sphere.surface_field(K, 1.0, cosine, boundary if boundary == "hard" else boundary.eta)
+        exact = sphere.surface_field(K, 1.0, cosine, boundary if boundary == "hard" else boundary.admittance)
     error = np.abs(levels - 20 * np.log10(np.abs(exact)))
     # the lit side is of leading order: 0.4 dB where geometrical optics misses 3 dB, if soft 20
     assert error[:3].max() < 0.08
@@ -41,7 +41,7 @@ def test_levels_are_those_of_the_exact_series(fan, boundary):
     assert error[6:].max() < 0.04
 
 
-@pytest.mark.parametrize("boundary", ["hard", "soft", cr.Impedance(0.5 + 0.2j)])
+@pytest.mark.parametrize("boundary", ["hard", "soft", cr.ImpedanceBoundary(0.5 + 0.2j)])
 def test_lit_side_joins_the_shadow(fan, boundary):
     # the leading order has Fock's function on both sides of the shadow line
     left, right = surface_levels(fan, at([89.9999, 90.0001]), wavenumber=K, boundary=boundary, order=1)

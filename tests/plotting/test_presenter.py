@@ -222,7 +222,7 @@ def test_pictures_leave_pyplot_alone(results):
 
 
 def test_a_map_that_was_not_measured_says_so(small_map):
-    blank = replace(small_map, growth=None, error=cr.MapError(np.nan, np.nan, 0))
+    blank = replace(small_map, growth=None, error=cr.ErrorEstimate(np.nan, np.nan, 0))
     assert "not measured" in repr(blank)
     assert table(blank).rows["error of one g_T0"] == "not measured"
     with pytest.raises(cr.InvalidInputError, match="not been measured"):

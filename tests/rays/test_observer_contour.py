@@ -1,4 +1,4 @@
-"""Crossings of an observer's horizon, the joints, and the nodes of the forward integral."""
+"""Crossings of an observer's horizon, of the shadow line, and the nodes of the forward integral."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal
-from creeping.rays.observer_contour import forward_nodes, joints
+from creeping.rays.observer_contour import forward_nodes, line_crossings
 from creeping.rays.strips import strips_of
 
 D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
@@ -32,7 +32,7 @@ def test_joints_of_the_sphere_are_across_both_directions(fans):
     (strip,) = strips_of(fans["sphere"])
     for theta in (0.01, 0.7, 2.0):
         r = directions_at(theta)[0]
-        parts = joints(strip, r)
+        parts = line_crossings(strip, r)
         assert [dark for *_, dark in parts] in ([True, False], [False, True])
         across = np.cross(D, r) / np.linalg.norm(np.cross(D, r))
         for start, end, dark in parts:
@@ -48,8 +48,8 @@ def test_joints_of_the_sphere_are_across_both_directions(fans):
 def test_forward_nodes_of_the_sphere(fans, theta):
     fan = fans["sphere"]
     r = directions_at(theta)
-    shadow, lit, lost = forward_nodes(strips_of(fan), fan.line, np.array([0]), r, np.array([40]))
-    assert not len(lost)
+    shadow, lit, missing = forward_nodes(strips_of(fan), fan.line, np.array([0]), r, np.array([40]))
+    assert not len(missing)
     # both halves are half great circles, of arclength πa across the wave
     assert shadow.weight.sum() == pytest.approx(np.pi * RADIUS, rel=1e-6)
     assert lit.weight.sum() == pytest.approx(np.pi * RADIUS, rel=1e-4)
@@ -64,16 +64,16 @@ def test_forward_nodes_of_the_sphere(fans, theta):
 def test_forward_nodes_of_the_ellipsoid(fans):
     fan = fans["triaxial"]
     r = directions_at(0.1, 0.25, 0.5)
-    shadow, lit, lost = forward_nodes(strips_of(fan), fan.line, np.array([0, 2]), r, np.array([30, 60]))
-    assert not len(lost)
+    shadow, lit, missing = forward_nodes(strips_of(fan), fan.line, np.array([0, 2]), r, np.array([30, 60]))
+    assert not len(missing)
     assert set(shadow.observer) == set(lit.observer) == {0, 2}
     n = normal(TRIAXIAL, shadow.rays.points)
     np.testing.assert_allclose(np.sum(n * r[shadow.observer], axis=1), 0, atol=1e-7)
     assert np.all(np.sum(shadow.rays.first_normal * r[shadow.observer], axis=1) < 0)
     np.testing.assert_allclose(np.sum(lit.normals * (D + r[lit.observer]), axis=1), 0, atol=1e-8)
     assert np.max(np.abs(TRIAXIAL.level(lit.points))) < 1e-8
-    # both halves project on the same chord, from joint to joint across the plane of d and r; Green's theorem on an
-    # affine circle: the sum of widths across q is that of the shadow line of the direction q
+    # both halves project on the same chord, from crossing to crossing across the plane of d and r; Green's theorem on
+    # an affine circle: the sum of widths across q is that of the shadow line of the direction q
     for k in (0, 2):
         q = (D + r[k]) / np.linalg.norm(D + r[k])
         line = cr.shadow_line(TRIAXIAL, q)

@@ -74,7 +74,7 @@ def test_an_incidence_does_not_depend_on_its_company(quantity, rng):
     # 70 rays do not fill their blocks
     request = sweep_request(quantity, length=3.0, n_rays=70, **fields)
     d = directions(9, rng)
-    for flow in (cr.DirectFlow(body, rtol=1e-7), cr.build_phase_map(body, tolerance=1e-4, length=3.0, outputs=12)):
+    for flow in (cr.DirectFlow(body, rtol=1e-7), cr.build_phase_map(body, tolerance=1e-4, length=3.0, n_steps=12)):
         sweeper = Sweeper(flow, request)
         whole, part = sweeper(d), sweeper(d[4:6])
         for name in whole:
@@ -85,7 +85,7 @@ def test_an_incidence_does_not_depend_on_its_company(quantity, rng):
 
 def test_a_map_carries_what_direct_integration_does(rng):
     body = BODIES["twisted"]
-    flow = cr.build_phase_map(body, tolerance=3e-5, length=4.0, outputs=1, rays=10**8)
+    flow = cr.build_phase_map(body, tolerance=3e-5, length=4.0, n_steps=1, n_rays=10**8)
     request = sweep_request("rays", length=4.0, n_rays=128)
     d = directions(6, rng)
     found, exact = (Sweeper(f, request)(d) for f in (flow, cr.DirectFlow(body, rtol=1e-11)))
@@ -110,12 +110,12 @@ def test_singular_incidences_give_nothing():
     assert FAILED not in found["incidence_status"]
 
 
-def test_rough_ground_ends_rays():
+def test_non_smooth_regions_ends_rays():
     body = sc.Implicit("x**2 + y**2 + 1.2*z**2 - 1")
-    rough = type("Rough", (), {"rough": staticmethod(lambda x: x[..., 2] > 0.8)})
-    body.rough = rough.rough  # type: ignore[attr-defined]
+    non_smooth = type("NonSmooth", (), {"non_smooth": staticmethod(lambda x: x[..., 2] > 0.8)})
+    body.non_smooth = non_smooth.non_smooth  # type: ignore[attr-defined]
     request = sweep_request("rays", length=2.5, n_rays=64, n_steps=8)
     found = Sweeper(cr.DirectFlow(body), request)(np.array([[1.0, 0, 0]]))
-    assert RayStatus.ROUGH in found["ray_status"]
-    ended = found["ray_status"][0] == RayStatus.ROUGH
+    assert RayStatus.NON_SMOOTH in found["ray_status"]
+    ended = found["ray_status"][0] == RayStatus.NON_SMOOTH
     assert np.all(found["detachment"][0][ended] < 2.5)

@@ -65,7 +65,7 @@ def files(tmp_path_factory):
 
 @cache
 def points_of(path):
-    return read_cad(path, "m" if path.suffix == ".brep" else None, 2000, say=lambda _: None)
+    return read_cad(path, "m" if path.suffix == ".brep" else None, 2000, progress=lambda _: None)
 
 
 @cache
@@ -78,7 +78,7 @@ def test_points_lie_on_the_body_with_its_normals(files, name):
     found, body = points_of(files / name), EXACT[name.split(".")[0]]
     at = found.mesh.vertices
     assert 1500 < len(at) < 3000
-    assert found.edges == () and len(found.rough) == 0 and found.mesh.repairs == ()
+    assert found.edges == () and len(found.non_smooth) == 0 and found.mesh.repairs == ()
     assert np.max(np.abs(body.level(at)) / np.linalg.norm(body.gradient(at), axis=1)) < 1e-12
     # at a pole of its parameters a face has none
     known = np.isfinite(found.normals).all(axis=1)
@@ -88,22 +88,22 @@ def test_points_lie_on_the_body_with_its_normals(files, name):
 
 @pytest.mark.parametrize("points", [500, 4000])
 def test_as_many_points_as_asked(files, points):
-    found = read_cad(files / "torus.step", None, points, say=lambda _: None)
+    found = read_cad(files / "torus.step", None, points, progress=lambda _: None)
     assert len(found.mesh.vertices) == pytest.approx(points, rel=0.15)
 
 
 def test_step_files_state_their_unit(files, tmp_path):
-    stated = read_cad(files / "torus.step", "mm", 500, say=lambda _: None)
+    stated = read_cad(files / "torus.step", "mm", 500, progress=lambda _: None)
     np.testing.assert_allclose(np.ptp(stated.mesh.vertices[:, 2]), 1, atol=1e-3)
     for unit in ("m", "in"):
         with pytest.raises(ValueError, match=rf"torus.step is in mm, not in {unit}; leave units out"):
-            read_cad(files / "torus.step", unit, 500, say=lambda _: None)
+            read_cad(files / "torus.step", unit, 500, progress=lambda _: None)
     # the same numbers, said to be metres
     text = (files / "torus.step").read_text()
     large = tmp_path / "large.STP"
     large.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT($,.METRE.)"))
     assert text.count("SI_UNIT(.MILLI.,.METRE.)") == 1
-    metres = read_cad(large, "m", 500, say=lambda _: None)
+    metres = read_cad(large, "m", 500, progress=lambda _: None)
     np.testing.assert_allclose(np.ptp(metres.mesh.vertices[:, 2]), 1000, atol=1)
 
 
@@ -112,7 +112,7 @@ def test_brep_files_need_a_unit(files):
         sc.Cad(files / "box.brep", cache=False)
     with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
         sc.Cad(files / "box.brep", "yard", cache=False)
-    inches = read_cad(files / "ellipsoid.brep", "in", 500, say=lambda _: None)
+    inches = read_cad(files / "ellipsoid.brep", "in", 500, progress=lambda _: None)
     np.testing.assert_allclose(np.ptp(inches.mesh.vertices, axis=0), 0.0254 * np.array([2.4, 1.6, 1.6]), rtol=1e-2)
 
 
@@ -159,10 +159,10 @@ def test_what_is_no_smooth_body_is_refused(files, tmp_path, name):
 def test_edges_are_where_they_are(files):
     found = points_of(files / "box.brep")
     assert len(found.edges) == 12 and all("90 deg" in line for line in found.edges)
-    off = np.sort(np.minimum(found.rough, 1 - found.rough), axis=1)
+    off = np.sort(np.minimum(found.non_smooth, 1 - found.non_smooth), axis=1)
     np.testing.assert_allclose(off[:, :2], 0, atol=1e-12)
     rim = points_of(files / "cone.brep")
-    np.testing.assert_allclose(rim.rough[:, 2], 0, atol=1e-12)
+    np.testing.assert_allclose(rim.non_smooth[:, 2], 0, atol=1e-12)
     assert points_of(files / "capsule.brep").edges == ()
 
 
@@ -253,7 +253,7 @@ def test_modules_of_the_working_folder_are_not_imported(files, tmp_path, monkeyp
     for module in ("numpy", "gmsh", "scatterers"):
         (tmp_path / f"{module}.py").write_text("raise SystemExit('imported by accident')")
     monkeypatch.chdir(tmp_path)
-    assert len(read_cad(files / "torus.step", None, 500, say=lambda _: None).mesh.vertices) > 400
+    assert len(read_cad(files / "torus.step", None, 500, progress=lambda _: None).mesh.vertices) > 400
 
 
 def test_ellipsoid_against_the_exact_one(files):
@@ -281,17 +281,17 @@ def test_ellipsoid_against_the_exact_one(files):
 
 
 def test_second_opening_takes_the_fit_from_the_cache(files, tmp_path, monkeypatch):
-    said = [], []
+    messages = [], []
     path = files / "ellipsoid.step"
-    first = sc.Cad(path, points=2000, cache=tmp_path, progress=said[0].append)
-    assert said[0][0] == "reading the CAD file" and any("fitting" in line for line in said[0])
+    first = sc.Cad(path, points=2000, cache=tmp_path, progress=messages[0].append)
+    assert messages[0][0] == "reading the CAD file" and any("fitting" in line for line in messages[0])
 
     def forbidden(*_, **__):
         raise AssertionError("gmsh was asked")
 
     monkeypatch.setattr(_cad_files, "_meshed", forbidden)
-    second = sc.Cad(str(path), points=2000, cache=tmp_path, progress=said[1].append)
-    assert said[1] == [] and second.fingerprint == first.fingerprint and second.fit == first.fit
+    second = sc.Cad(str(path), points=2000, cache=tmp_path, progress=messages[1].append)
+    assert messages[1] == [] and second.fingerprint == first.fingerprint and second.fit == first.fit
     # other points are another fit
     with pytest.raises(AssertionError, match="gmsh was asked"):
         sc.Cad(path, points=2100, cache=tmp_path)

@@ -258,7 +258,7 @@ def test_tips_are_rounded_off_on_request_only():
     reach = 0.025 * np.linalg.norm(body.bounds[1] - body.bounds[0])
     z = np.linspace(0, 0.3, 400)
     axis = np.stack([0 * z, 0 * z, z], axis=-1)
-    np.testing.assert_array_equal(body.rough(axis), z < reach)
+    np.testing.assert_array_equal(body.non_smooth(axis), z < reach)
     cone = np.stack([z * np.sqrt(1 - z), 0 * z, z], axis=-1)
     kept = np.linalg.norm(cone, axis=-1) > reach
     np.testing.assert_allclose(body.level(cone[kept]), 0, atol=1e-13)
@@ -266,9 +266,9 @@ def test_tips_are_rounded_off_on_request_only():
 
 
 @pytest.mark.parametrize("name", ["ellipsoid", "torus"])
-def test_smooth_bodies_have_no_rough_places(name):
+def test_smooth_bodies_have_no_non_smooth_places(name):
     body = Implicit(TEXTS[name], allow_rough=True)
-    assert not np.any(body.rough(points_of(name)))
+    assert not np.any(body.non_smooth(points_of(name)))
 
 
 @pytest.mark.parametrize(

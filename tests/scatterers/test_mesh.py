@@ -1,4 +1,4 @@
-"""Bodies from meshes against the exact bodies that the vertices lie on; the cache, refusals, and rough ground."""
+"""Bodies from meshes against the exact bodies that the vertices lie on; the cache, refusals, and non-smooth regions."""
 
 import json
 import subprocess
@@ -121,7 +121,7 @@ def test_errors_against_the_exact_body(name, n):
     found = dict(zip(QUANTITIES, errors(name, n), strict=True))
     allowed = dict(zip(QUANTITIES, LIMITS[name, n], strict=True))
     assert {quantity: value for quantity, value in found.items() if value > allowed[quantity]} == {}
-    assert not mesh.rough(cloud(name)[0]).any()
+    assert not mesh.non_smooth(cloud(name)[0]).any()
 
 
 @pytest.mark.parametrize("name, n", sizes(2000, 10000))
@@ -186,21 +186,21 @@ def test_an_object_and_a_file_are_the_same_body(tmp_path):
     assert read.fingerprint != ball().fingerprint
 
 
-def open_in(folder, said=None, **options):
-    return sc.Mesh(BALL, cache=folder, progress=None if said is None else said.append, **options)
+def open_in(folder, messages=None, **options):
+    return sc.Mesh(BALL, cache=folder, progress=None if messages is None else messages.append, **options)
 
 
 def test_second_opening_takes_the_fit_from_the_cache(tmp_path):
-    said = [], []
-    first, second = open_in(tmp_path, said[0]), open_in(str(tmp_path), said[1])
+    messages = [], []
+    first, second = open_in(tmp_path, messages[0]), open_in(str(tmp_path), messages[1])
     assert [f.name for f in tmp_path.iterdir()] == [f"{first._identity()}.npz"]
-    assert said[0][0] == "reading the mesh" and "normals of 642 vertices" in said[0]
-    assert any("fitting" in line for line in said[0])
-    assert said[1] == []
+    assert messages[0][0] == "reading the mesh" and "normals of 642 vertices" in messages[0]
+    assert any("fitting" in line for line in messages[0])
+    assert messages[1] == []
     assert second.fingerprint == first.fingerprint == ball().fingerprint
     assert (second.fit, repr(second.quality)) == (first.fit, repr(first.quality))
     at = np.random.default_rng(2).uniform(-1, 1, size=(200, 3))
-    for body, again in ((first, second), (first.coarser, second.coarser)):
+    for body, again in ((first, second), (first.coarse_fit, second.coarse_fit)):
         np.testing.assert_array_equal(again.level(at), body.level(at))
 
 
@@ -226,20 +226,20 @@ def test_the_users_cache_is_used_unless_told_otherwise(tmp_path, monkeypatch):
 @pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b[:-9] + b"nonsense!", lambda b: b""])
 def test_a_damaged_fit_is_made_again(tmp_path, damage):
     open_in(tmp_path)
-    (file,), said = tmp_path.iterdir(), []
+    (file,), messages = tmp_path.iterdir(), []
     file.write_bytes(damage(file.read_bytes()))
-    body = open_in(tmp_path, said)
-    assert any("fitting" in line for line in said)
+    body = open_in(tmp_path, messages)
+    assert any("fitting" in line for line in messages)
     assert body.fit == ball().fit
     assert _fit_cache.load(tmp_path, body._identity()) is not None
 
 
 def test_an_unwritable_cache_is_said_and_no_more(tmp_path):
     (tmp_path / "file").write_text("")
-    said = []
-    body = open_in(tmp_path / "file" / "fits", said)
+    messages = []
+    body = open_in(tmp_path / "file" / "fits", messages)
     assert body.fit == ball().fit
-    assert len([line for line in said if line.startswith("the fit is not cached: ")]) == 1
+    assert len([line for line in messages if line.startswith("the fit is not cached: ")]) == 1
 
 
 def test_what_is_asked_is_part_of_the_name():
@@ -262,7 +262,7 @@ def test_reports_print_and_survive_json():
     again = MeshQuality.from_json(json.loads(json.dumps(body.quality.to_json())), body.quality.badness)
     assert again.summary(10.0) == body.quality.summary(10.0)
     assert "size                       2 x 2 x 2 m" in body.quality.summary()
-    assert repr(body).startswith("Mesh(mesh-") and repr(body.coarser).startswith("SplineBody(mesh-")
+    assert repr(body).startswith("Mesh(mesh-") and repr(body.coarse_fit).startswith("SplineBody(mesh-")
 
 
 def test_speed_weighs_the_flow():
@@ -316,23 +316,23 @@ def drop():
 
 
 @pytest.mark.slow
-def test_rough_ground_is_at_the_tip_only():
+def test_the_non_smooth_region_is_at_the_tip_only():
     with pytest.raises(ValueError, match="not smooth enough"):
         sc.Mesh(Triangles(*drop()), cache=False)
     body = sc.Mesh(Triangles(*drop()), allow_rough=True, cache=False)
     points = drop()[0]
-    rough, x = body.rough(points), points[:, 0]
-    assert body.rough(np.array([1.0, 0, 0])) and rough[x > 0.98].all()
-    assert not rough[x < 0.5].any()
-    assert rough.mean() < 0.2
+    non_smooth, x = body.non_smooth(points), points[:, 0]
+    assert body.non_smooth(np.array([1.0, 0, 0])) and non_smooth[x > 0.98].all()
+    assert not non_smooth[x < 0.5].any()
+    assert non_smooth.mean() < 0.2
     # or an incidence on it would be compared with rays that go on
-    np.testing.assert_array_equal(body.coarser.rough(points), rough)
+    np.testing.assert_array_equal(body.coarse_fit.non_smooth(points), non_smooth)
     line = cr.shadow_line(body, (1.0, 0.02, 0.01))
     fan = cr.launch(cr.DirectFlow(body), line, length=2.5, n_rays=32, n_steps=50, max_gap=np.inf)
-    meets = np.array([body.rough(ray).any() for ray in fan.points])
+    meets = np.array([body.non_smooth(ray).any() for ray in fan.points])
     # all of them go about the tip, and end where it begins
     assert meets.mean() > 0.5
-    np.testing.assert_array_equal(fan.status == cr.RayStatus.ROUGH, meets)
+    np.testing.assert_array_equal(fan.status == cr.RayStatus.NON_SMOOTH, meets)
     back = cr.launch(
         cr.DirectFlow(body), cr.shadow_line(body, (-1.0, 0.02, 0.01)), length=1.0, n_rays=32, n_steps=50, max_gap=np.inf
     )
@@ -353,9 +353,9 @@ def test_almond():
     with pytest.raises(ValueError, match="not smooth enough"):
         sc.Mesh(Triangles(vertices, triangles), cache=False)
     body = sc.Mesh(Triangles(vertices, triangles), allow_rough=True, cache=False)
-    assert body.rough(vertices[-1]) and not body.rough(vertices[0])
+    assert body.non_smooth(vertices[-1]) and not body.non_smooth(vertices[0])
     x = vertices[:, 0]
-    assert body.rough(vertices[x > 0.57]).all() and not body.rough(vertices[np.abs(x) < 0.2]).any()
+    assert body.non_smooth(vertices[x > 0.57]).all() and not body.non_smooth(vertices[np.abs(x) < 0.2]).any()
     # the closed form of MESH.md, 1.3: y^2 + 9 z^2 = A(x)
     blunt = project(body, vertices[x < -0.05])
     across = (0.193333 * np.sqrt(np.maximum(1 - (blunt[:, 0] / 0.416667) ** 2, 0))) ** 2
@@ -363,6 +363,6 @@ def test_almond():
     assert rms(off) < 1e-5
     line = cr.shadow_line(body, (1.0, 0.2, 0.3))
     fan = cr.launch(cr.DirectFlow(body), line, length=size(body), n_rays=32, n_steps=50)
-    ended = fan.status == cr.RayStatus.ROUGH
+    ended = fan.status == cr.RayStatus.NON_SMOOTH
     assert ended.mean() > 0.5
     assert np.all(fan.points[ended][:, :, 0].max(axis=1) > 0.4)

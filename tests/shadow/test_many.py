@@ -163,9 +163,9 @@ def test_thousand_directions_against_the_finest_mesh(name, monkeypatch):
     meshes = prepared(body)
     monkeypatch.setattr(meshes, "_packed", {tier: meshes.packed(2) for tier in range(meshes.count)})
     exact = shadow_lines(body, d, 32)
-    sure = (found.status == OK) & (exact.status == OK)
-    assert np.mean(sure) > 0.98
-    np.testing.assert_array_equal(found.curves[sure], exact.curves[sure])
-    assert np.max(np.abs(found.length / exact.length - 1)[sure]) < 3e-8
+    certain = (found.status == OK) & (exact.status == OK)
+    assert np.mean(certain) > 0.98
+    np.testing.assert_array_equal(found.curves[certain], exact.curves[certain])
+    assert np.max(np.abs(found.length / exact.length - 1)[certain]) < 3e-8
     for status in STATUSES:
-        assert np.max(np.abs(getattr(found, status) - getattr(exact, status))[sure]) < 1e-6
+        assert np.max(np.abs(getattr(found, status) - getattr(exact, status))[certain]) < 1e-6

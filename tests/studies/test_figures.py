@@ -91,7 +91,7 @@ def test_cross_sections_of_a_sweep_are_those_of_one_incidence(drawn):
         # a soft wave is far weaker
         assert one["mean_dB"]["soft"] < one["mean_dB"]["hard"] - 30
     assert max(ellipsoid["unresolved"].values()) < 0.1 and max(ellipsoid["without_return"].values()) == 0
-    # rays that leave concave ground have no field
+    # rays that leave concave regions have no field
     assert 0 < twisted["without_return"]["hard"] < 0.1
 
 

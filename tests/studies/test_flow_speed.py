@@ -56,12 +56,12 @@ def test_refusals_keep_their_reason(monkeypatch):
 def test_tables_are_printed_stored_and_drawn(capsys, tmp_path):
     rows = [
         {"body": "a", "requested": 1e-3, "achieved": 5e-4},
-        {"body": "a", "requested": 1e-4, "achieved": math.nan, "remark": "refused: it is too dear"},
+        {"body": "a", "requested": 1e-4, "achieved": math.nan, "remark": "refused: it is too expensive"},
     ]
     cases.show("Table", rows)
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "Table" and lines[2].split() == ["body", "requested", "achieved", "remark"]
-    assert lines[3].split() == ["a", "0.001", "5.0e-04"] and lines[4].endswith("-  refused: it is too dear")
+    assert lines[3].split() == ["a", "0.001", "5.0e-04"] and lines[4].endswith("-  refused: it is too expensive")
     assert json.loads(json.dumps(cases.plain(rows), allow_nan=False))[1]["achieved"] is None
     cases.draw(rows, tmp_path / "requested.png")
     assert (tmp_path / "requested.png").stat().st_size > 0

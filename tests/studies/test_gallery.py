@@ -195,18 +195,18 @@ def test_a_figure_is_drawn_into_out(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments, told",
+    "arguments, message",
     [
         (["field_spheres"], "did you mean field_sphere?"),
         (["nothing"], "python -m studies lists them"),
         (["field_cost", "--quick"], "takes no options"),
     ],
 )
-def test_what_there_is_not_is_refused(arguments, told, capsys):
+def test_what_there_is_not_is_refused(arguments, message, capsys):
     with pytest.raises(SystemExit) as ended:
         command.main(arguments)
     assert ended.value.code == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_help_of_a_study_without_options_is_its_docstring(capsys):

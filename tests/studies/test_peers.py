@@ -10,7 +10,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
-from studies._peers import HeyokaFlow, heyoka_at_error, measured, scipy_flow
+from studies._peers import HeyokaFlow, heyoka_at_error, scipy_flow, seconds_of
 
 BODIES = {"triaxial": sc.Ellipsoid(1.0, 0.8, 0.6), "torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}
 TIMES = np.array([0.0, 0.7, 2.0])
@@ -29,28 +29,28 @@ def traced(name):
     return states, trace_states(body, states, TIMES, rtol=1e-12), np.trapezoid(decay, fine, axis=1)
 
 
-@pytest.mark.parametrize("riding", [False, True])
+@pytest.mark.parametrize("carry_jacobi", [False, True])
 @pytest.mark.parametrize("name", BODIES)
-def test_scipy_agrees(name, riding):
+def test_scipy_agrees(name, carry_jacobi):
     states, exact, decay = traced(name)
-    found = scipy_flow(BODIES[name], states, TIMES, rtol=1e-9, riding=riding)
-    assert found.shape == (RAYS, 3, 9 if riding else 6)
-    lanes = 8 if riding else 6
+    found = scipy_flow(BODIES[name], states, TIMES, rtol=1e-9, carry_jacobi=carry_jacobi)
+    assert found.shape == (RAYS, 3, 9 if carry_jacobi else 6)
+    lanes = 8 if carry_jacobi else 6
     np.testing.assert_allclose(found[..., :lanes], exact[..., :lanes], atol=2e-7)
-    if riding:
+    if carry_jacobi:
         # error estimates of order 8 see the kink of max(kappa_n, 0)^(2/3) poorly
         np.testing.assert_allclose(found[:, -1, 8], decay, atol=1e-7 if name == "triaxial" else 1e-4)
-    last = scipy_flow(BODIES[name], states, TIMES[-1:], rtol=1e-9, riding=riding)
+    last = scipy_flow(BODIES[name], states, TIMES[-1:], rtol=1e-9, carry_jacobi=carry_jacobi)
     np.testing.assert_allclose(last[:, 0, :lanes], exact[:, -1, :lanes], atol=2e-7)
 
 
-@pytest.mark.parametrize("riding", [False, True])
+@pytest.mark.parametrize("carry_jacobi", [False, True])
 @pytest.mark.parametrize("name", BODIES)
-def test_heyoka_agrees(name, riding):
+def test_heyoka_agrees(name, carry_jacobi):
     pytest.importorskip("heyoka", exc_type=ImportError)
     states, exact, decay = traced(name)
-    peer = HeyokaFlow(BODIES[name], tolerance=1e-14, riding=riding)
-    assert peer.lanes == (6 if not riding else 9 if name == "triaxial" else 8)
+    peer = HeyokaFlow(BODIES[name], tolerance=1e-14, carry_jacobi=carry_jacobi)
+    assert peer.lanes == (6 if not carry_jacobi else 9 if name == "triaxial" else 8)
     lanes = min(peer.lanes, 8)
     for outputs in (slice(None), slice(1, None), slice(2, None)):
         found = peer.flow(states, TIMES[outputs])
@@ -69,7 +69,7 @@ def test_heyoka_meets_an_error_and_no_more():
         gap = flow.flow(states, TIMES)[:, -1] - exact[:, -1, :6]
         return np.sqrt(np.mean(np.sum(gap**2, axis=1)))
 
-    looser = HeyokaFlow(BODIES["twisted"], tolerance=peer.tolerance * np.exp(2), riding=False)
+    looser = HeyokaFlow(BODIES["twisted"], tolerance=peer.tolerance * np.exp(2), carry_jacobi=False)
     assert looser.order == peer.order - 1
     assert rms(peer) <= 1e-6 < rms(looser)
     with pytest.raises(ValueError, match="no order"):
@@ -85,5 +85,5 @@ def test_peers_refuse_what_they_have_no_equations_for():
 
 def test_measured_warms_up():
     calls = []
-    assert measured(lambda: calls.append(1), 3) >= 0
+    assert seconds_of(lambda: calls.append(1), 3) >= 0
     assert len(calls) == 4

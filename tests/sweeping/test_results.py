@@ -107,10 +107,10 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"incidences": [(0, 0, 1), (0, 0, 0)]}, "1 of 2 incidences is zero .rows 1"),
-        ({"incidences": [(0, np.nan, 1)]}, "1 of 1 incidences is not finite"),
-        ({"incidences": (0, 0, 1)}, r"shape \(3,\); give rows"),
-        ({"incidences": [(0, 1)]}, r"shape \(1, 2\)"),
+        ({"directions": [(0, 0, 1), (0, 0, 0)]}, "1 of 2 directions is zero .rows 1"),
+        ({"directions": [(0, np.nan, 1)]}, "1 of 1 directions is not finite"),
+        ({"directions": (0, 0, 1)}, r"shape \(3,\); give rows"),
+        ({"directions": [(0, 1)]}, r"shape \(1, 2\)"),
         ({"n_rays": 0, "length": -1.0, "wavenumbers": 3}, "length = -1.0 .*; n_rays = 0 .*; wavenumbers belong"),
         ({"quantity": "monostatic"}, "needs wavenumbers"),
         ({"quantity": "monostatic", "wavenumbers": 1.0, "boundary": "sfot"}, "sfot"),
@@ -118,14 +118,14 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
         ({"chunk": 0}, "chunk = 0"),
         ({"resume": True}, "resume goes with store="),
         ({"client": "tcp://nowhere:1"}, "client goes with store=.*seen by all workers"),
-        ({"incidences": np.ones((3_000_000, 3)), "n_rays": 60_000}, "GB of results; give store="),
+        ({"directions": np.ones((3_000_000, 3)), "n_rays": 60_000}, "GB of results; give store="),
         ({"n_rays": 65_536, "n_steps": 4096}, "one incidence gives 19.3 GB of results.*fewer rays or steps"),
         ({"n_rays": 65_536, "n_steps": 4096, "store": "never.zarr"}, "one incidence gives 19.3 GB of results"),
     ],
 )
 def test_bad_input_is_refused_before_anything_is_computed(options, words):
     with pytest.raises(cr.InvalidInputError, match=words):
-        cr.sweep_directions(fake.FLOW, **({"incidences": [(0, 0, 1)], "quantity": "rays"} | options))
+        cr.sweep_directions(fake.FLOW, **({"directions": [(0, 0, 1)], "quantity": "rays"} | options))
 
 
 def test_a_field_on_a_weighted_body_is_refused():

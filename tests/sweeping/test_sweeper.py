@@ -101,7 +101,7 @@ def test_no_ray_is_counted_twice_or_lost(semiaxes):
     # found 2026-11-21: two searches for one ray, 1e-6 apart, made two; rays next to the box's faces counted as hidden
     body = sc.Ellipsoid(*semiaxes)
     d = np.concatenate([cr.fibonacci_directions(200), np.eye(3)])
-    for flow in (cr.DirectFlow(body, rtol=1e-8), cr.build_phase_map(body, tolerance=3e-5, length=4.5, outputs=9)):
+    for flow in (cr.DirectFlow(body, rtol=1e-8), cr.build_phase_map(body, tolerance=3e-5, length=4.5, n_steps=9)):
         geometry = geometry_of(flow, d, 128, 4.5)
         shed = geometry.shed
         assert np.all(geometry.leaves)

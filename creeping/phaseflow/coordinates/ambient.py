@@ -1,6 +1,6 @@
 """Maps stored in space, for any atlas: D = x' - x - t p and p' - p at (chart, u, v, angle).
 
-p = E (cos angle, sin angle) with E(u, v) the isometric frame of the chart (`creeping.geometry.frames.polar_frame`). A
+p = E (cos angle, sin angle) with E(u, v) the polar frame of the chart (`creeping.geometry.frames.polar_frame`). A
 leap ends off T1Q by the error of the map and is put back.
 
 Sources: [YC06b]; Derivations, B2.

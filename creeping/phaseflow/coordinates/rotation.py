@@ -50,7 +50,7 @@ class CompiledModel:
         self._back = back.function, back.parameters
 
     @cached_property
-    def _exits(self) -> FloatArray:
+    def _surface_table(self) -> FloatArray:
         """Table of x(u, v) for the kernels, none if psi itself is to be used."""
         return np.zeros((0, 1, 1, 4))
 
@@ -63,7 +63,7 @@ class CompiledModel:
         from creeping.phaseflow.kernels.nodes import to_body
 
         out = np.empty((len(coordinates), 6))
-        to_body(self.kind, self._exits, *self._there, coordinates, out)
+        to_body(self.kind, self._surface_table, *self._there, coordinates, out)
         return out
 
     def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
@@ -77,7 +77,7 @@ class CompiledModel:
         from creeping.phaseflow.kernels.nodes import displacements
 
         out = np.empty((len(nodes), 4))
-        surest = displacements(self.kind, self._exits, *self._there, *self._back, nodes, traced, out)
+        surest = displacements(self.kind, self._surface_table, *self._there, *self._back, nodes, traced, out)
         if not surest >= SUREST:
             raise ToleranceError(
                 f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {surest:.2f}); "
@@ -102,7 +102,9 @@ class CompiledModel:
             # shares of a thread stay small, so that what is known of their rays stays in the cache
             for start in range(part.start, part.stop, SHARE):
                 some = slice(start, min(start + SHARE, part.stop))
-                kernel(self.kind, self._exits, *self._there, *self._back, *tables, states[some], counts, out[some])
+                kernel(
+                    self.kind, self._surface_table, *self._there, *self._back, *tables, states[some], counts, out[some]
+                )
 
         in_threads(run, len(states))
         return out
@@ -115,8 +117,8 @@ class CompiledModel:
         from creeping.phaseflow.kernels.nodes import double
 
         out = np.empty((len(nodes), 4))
-        matrices = np.empty((len(nodes) if leap.rides else 0, 4))
-        curvatures = np.empty((len(nodes) if leap.attenuates else 0, 16))
+        matrices = np.empty((len(nodes) if leap.has_jacobi else 0, 4))
+        curvatures = np.empty((len(nodes) if leap.has_curvature else 0, 16))
         tables = _tables(leap), grid.degree, *self.placement(grid)
 
         def run(part: slice) -> None:
@@ -134,7 +136,7 @@ class RotationModel(CompiledModel):
     charts = 6
 
     @cached_property
-    def _exits(self) -> FloatArray:
+    def _surface_table(self) -> FloatArray:
         return exit_table(self.body, self)
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
@@ -171,8 +173,8 @@ class OctantModel(RotationModel):
     charts = 3
 
     @cached_property
-    def _exits(self) -> FloatArray:
-        return RotationModel(self.body)._exits
+    def _surface_table(self) -> FloatArray:
+        return RotationModel(self.body)._surface_table
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""
@@ -207,7 +209,7 @@ def _tables(leap: Leap) -> tuple[Any, ...]:
 def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
     """Coefficients (6, n, n, 4) of x(u, v) on the charts where psi is an iteration, none (0, 1, 1, 4) elsewhere."""
     found = np.zeros((0, 1, 1, 4))
-    model._exits = found
+    model._surface_table = found
     if not getattr(getattr(body.atlas, "sphere_map", None), "iterative", False):
         return found
     rng = np.random.default_rng(0)
@@ -224,9 +226,9 @@ def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
         for axis in (1, 2):
             operator = interpolation_operator(side, 5, False)
             values = np.moveaxis(np.tensordot(operator, values, axes=(1, axis)), 0, axis)
-        model._exits = np.ascontiguousarray(values)
+        model._surface_table = np.ascontiguousarray(values)
         error = (model.states(at) - exact) / np.array([size(body)] * 3 + [1.0] * 3)
-        model._exits = found
+        model._surface_table = found
         if float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) < EXIT_ERROR:
             return np.ascontiguousarray(values)
     return found

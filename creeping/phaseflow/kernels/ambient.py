@@ -39,8 +39,8 @@ _jacobi_3, _jacobi_5 = contraction(3, 4), contraction(5, 4)
 
 
 @njit(**options)
-def _stencil(table, jacobi, ride_along, degree, chart, iu, iv, ia, wu, wv, wa, out):
-    """Interpolate the state lanes into out[:8] and, on the ride-along, the Jacobi lanes into out[8:12]."""
+def _stencil(table, jacobi, carry_jacobi, degree, chart, iu, iv, ia, wu, wv, wa, out):
+    """Interpolate the state lanes into out[:8] and, if it is carried, the Jacobi lanes into out[8:12]."""
     row = table.shape[3]
     plane = row * table.shape[2]
     first = (chart * table.shape[1] + iu) * plane + iv * row + ia
@@ -48,7 +48,7 @@ def _stencil(table, jacobi, ride_along, degree, chart, iu, iv, ia, wu, wv, wa, o
         _state_3(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, 0, 1, out, 0)
     else:
         _state_5(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, 0, 1, out, 0)
-    if ride_along:
+    if carry_jacobi:
         if degree == 3:
             _jacobi_3(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, 0, 1, out, 8)
         else:

@@ -56,7 +56,7 @@ def _frame(derivative, frame):
 
 
 @njit(**options)
-def enter(forward, forward_par, inverse, inverse_par, x, p, work, r):
+def to_coordinates(forward, forward_par, inverse, inverse_par, x, p, work, r):
     """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
     frame = work[18:24]
     inverse(x, r[0:3], inverse_par)
@@ -69,7 +69,7 @@ def enter(forward, forward_par, inverse, inverse_par, x, p, work, r):
 
 
 @njit(**options)
-def leave(forward, forward_par, r, work, x, p):
+def from_coordinates(forward, forward_par, r, work, x, p):
     """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
     frame = work[18:24]
     forward(r[0:3], x, work[9:18], forward_par)

@@ -11,17 +11,17 @@ from numba import njit
 
 from creeping.geodesics.kernels.attenuation import SAMPLES, extend
 from creeping.kernels.block import BLOCK, aligned, options
-from creeping.phaseflow.kernels.composition import WORK, enter, leap_block, leave, place_block
+from creeping.phaseflow.kernels.composition import WORK, from_coordinates, leap_block, place_block, to_coordinates
 
 
 @njit(**options)
 def flow_ordered(
-    kind, exits, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out
+    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out
 ):
     """Do what `composition.flow` does, for many rays."""
     n, lanes = states.shape
     table, more = leap[0], lanes - 6
-    riding = 0 if lanes == 6 else (1 if lanes == 10 else 2)
+    extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
     x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
     m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
     work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
@@ -42,7 +42,7 @@ def flow_ordered(
             source = start + min(i, count - 1)
             for k in range(3):
                 x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
-        enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
+        to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
         place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
         for i in range(count):
             order[start + i] = start + i
@@ -67,7 +67,7 @@ def flow_ordered(
                     at = mine[min(i, count - 1)]
                     for k in range(more):
                         m[k, i] = carried[at, k]
-                creeping = leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d)
+                creeping = leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d)
                 if creeping > 0:
                     extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
                 place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
@@ -81,7 +81,7 @@ def flow_ordered(
             for i in range(BLOCK):
                 for k in range(4):
                     r[k, i] = ray[start + min(i, count - 1), k]
-            leave(kind, exits, there, there_par, r, work, x, p)
+            from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
             for i in range(count):
                 for k in range(3):
                     out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]

@@ -1,8 +1,8 @@
 """Compiled composition of phase maps in the model coordinates of a body; twins in plain numpy are in tests/oracles.
 
 Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`rotation`), and ANGLES, turns (`angles`). A map
-is a table of their displacement; a ray enters the model once, is composed there, and leaves it for an output. FOLDED
-are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes.
+is a table of their displacement; a ray is converted to the model once, is composed there, and is converted back for an
+output. FOLDED are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes.
 """
 
 import numpy as np
@@ -12,16 +12,17 @@ from creeping.geodesics.kernels.attenuation import SAMPLES, extend
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.phaseflow.kernels import angles as _angles
 from creeping.phaseflow.kernels import rotation as _rotations
-from creeping.phaseflow.kernels import surface_table as _surface_exits
+from creeping.phaseflow.kernels import surface_table as _surface_table
 from creeping.phaseflow.kernels.stencil import cells_and_fractions, interpolate, interpolate_where, weights
 
 ROTATION, ANGLES, FOLDED = 0, 1, 2
 WORK = 48
 """Rows of work space for a block."""
 
-_enter_rotation, _enter_angles = _rotations.enter, _angles.enter
-_leave_rotation, _leave_angles = _rotations.leave, _angles.leave
-_enter_by_table, _leave_by_table = _surface_exits.enter, _surface_exits.leave
+_to_rotation, _to_angles = _rotations.to_coordinates, _angles.to_coordinates
+_from_rotation, _from_angles = _rotations.from_coordinates, _angles.from_coordinates
+_to_rotation_by_table = _surface_table.to_coordinates
+_from_rotation_by_table = _surface_table.from_coordinates
 _locate_rotation, _locate_angles = _rotations.locate, _angles.locate
 _move_rotation, _move_angles, _unfold = _rotations.move, _angles.move, _rotations.unfold
 
@@ -36,25 +37,25 @@ def move(kind, r, d, centre):
 
 
 @njit(**options)
-def enter(kind, exits, there, there_par, back, back_par, x, p, work, r):
+def to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r):
     """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
     if kind == ANGLES:
-        _enter_angles(there, there_par, back, back_par, x, p, work, r)
-    elif exits.shape[0] > 0:
-        _enter_by_table(exits, back, back_par, x, p, work, r)
+        _to_angles(there, there_par, back, back_par, x, p, work, r)
+    elif surface_table.shape[0] > 0:
+        _to_rotation_by_table(surface_table, back, back_par, x, p, work, r)
     else:
-        _enter_rotation(there, there_par, back, back_par, x, p, work, r)
+        _to_rotation(there, there_par, back, back_par, x, p, work, r)
 
 
 @njit(**options)
-def leave(kind, exits, there, there_par, r, work, x, p):
+def from_coordinates(kind, surface_table, there, there_par, r, work, x, p):
     """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
     if kind == ANGLES:
-        _leave_angles(there, there_par, r, work, x, p)
-    elif exits.shape[0] > 0:
-        _leave_by_table(exits, r, work, x, p)
+        _from_angles(there, there_par, r, work, x, p)
+    elif surface_table.shape[0] > 0:
+        _from_rotation_by_table(surface_table, r, work, x, p)
     else:
-        _leave_rotation(there, there_par, r, work, x, p)
+        _from_rotation(there, there_par, r, work, x, p)
 
 
 @njit(**options)
@@ -82,11 +83,11 @@ def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
 
 
 @njit(**options)
-def leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d):
+def leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d):
     """Move r (4, BLOCK) and the Jacobi matrices, m (6, BLOCK), by one leap, their stencils being placed.
 
     ``leap`` is (table, centre, jacobi, matrix, curvature). d (4 BLOCK, 4) keeps what is interpolated: displacements,
-    matrices, and for riding = 2 the curvatures of rays that have not detached, row 5 of m; ``odd`` says what was
+    matrices, and for extras = 2 the curvatures of rays that have not detached, row 5 of m; ``odd`` says what was
     reflected. Returns the number of these rays.
     """
     table, centre, jacobi, matrix, curvature = leap
@@ -99,10 +100,10 @@ def leap_block(kind, leap, riding, degree, uva, place, odd, count, r, m, w, d):
     if kind == FOLDED:
         _unfold(df, odd)
     move(kind, rf, df, centre)
-    if riding:
+    if extras:
         interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
         _carry_jacobi(ef, matrix, m.reshape(-1))
-    if riding > 1:
+    if extras > 1:
         return interpolate_where(curvature, degree, place, wu, wv, wa, m[5], count, d[2 * BLOCK :].reshape(-1))
     return 0
 
@@ -119,13 +120,15 @@ def _carry_jacobi(d, matrix, m):
 
 
 @njit(**options)
-def flow(kind, exits, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out):
+def flow(
+    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out
+):
     """Compose the map counts[0], then counts[1], ... times on states (n, 6, 10 or 12) into out (n, m, the same).
 
     ``leap`` is (table, centre, jacobi, matrix, curvature): table (charts, nu, nv, na, 4) holds the displacement less
     its mean ``centre``, jacobi the Jacobi matrix less its mean ``matrix`` (4,), curvature (..., 8) that of
     `geodesics.kernels.attenuation`, as are the ``rules``. ``there`` takes the model to the body, ``back`` the body to
-    the model; ``exits`` (6 or 0, n, n, 4) is a table of x(u, v) that replaces ``there``.
+    the model; ``surface_table`` (6 or 0, n, n, 4) is a table of x(u, v) that replaces ``there``.
     """
     n, lanes = states.shape
     x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
@@ -133,7 +136,7 @@ def flow(kind, exits, there, there_par, back, back_par, leap, time, rules, degre
     m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
     work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
-    riding = 0 if lanes == 6 else (1 if lanes == 10 else 2)
+    extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(BLOCK):
@@ -142,16 +145,16 @@ def flow(kind, exits, there, there_par, back, back_par, leap, time, rules, degre
                 x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
             for k in range(6, lanes):
                 m[k - 6, i] = states[source, k]
-        enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
+        to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
         now = 0.0
         for output in range(counts.shape[0]):
             for _ in range(counts[output]):
                 place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
-                creeping = leap_block(kind, leap, riding, degree, uva, place, work[7], count, r, m, w, d)
+                creeping = leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d)
                 if creeping > 0:
                     extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
                 now += time
-            leave(kind, exits, there, there_par, r, work, x, p)
+            from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
             for i in range(count):
                 for k in range(3):
                     out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]

@@ -6,7 +6,15 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import BLOCK, aligned, options
-from creeping.phaseflow.kernels.composition import ANGLES, WORK, enter, leap_block, leave, move, place_block
+from creeping.phaseflow.kernels.composition import (
+    ANGLES,
+    WORK,
+    from_coordinates,
+    leap_block,
+    move,
+    place_block,
+    to_coordinates,
+)
 
 
 @njit(**options)
@@ -18,7 +26,7 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
     # no ray detaches from a node
     m[5, :] = math.inf
     n = nodes.shape[0]
-    riding = 0 if matrices.shape[0] == 0 else (1 if curvatures.shape[0] == 0 else 2)
+    extras = 0 if matrices.shape[0] == 0 else (1 if curvatures.shape[0] == 0 else 2)
     whole = np.empty((4, BLOCK))
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
@@ -30,9 +38,9 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
             whole[0, i], whole[1, i], whole[2, i], whole[3, i] = 0.0 if kind == ANGLES else 1.0, 0.0, 0.0, 0.0
         for half in range(2):
             place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
-            leap_block(kind, leap, riding, degree, uva, place, work[7], count, r, m, w, d)
+            leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d)
             move(kind, whole.reshape(-1), d[:BLOCK].reshape(-1), leap[1])
-            if riding > 1:
+            if extras > 1:
                 kappa = d[2 * BLOCK :].reshape(BLOCK, 8)
                 for i in range(count):
                     for k in range(8):
@@ -40,12 +48,12 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
         for i in range(count):
             for k in range(4):
                 displacement[start + i, k] = whole[k, i]
-                if riding > 0:
+                if extras > 0:
                     matrices[start + i, k] = m[k, i]
 
 
 @njit(**options)
-def to_body(kind, exits, there, there_par, model, out):
+def to_body(kind, surface_table, there, there_par, model, out):
     """States (n, 6) of model coordinates (n, 4)."""
     x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
     n = model.shape[0]
@@ -54,14 +62,14 @@ def to_body(kind, exits, there, there_par, model, out):
         for i in range(BLOCK):
             for k in range(4):
                 r[k, i] = model[start + min(i, count - 1), k]
-        leave(kind, exits, there, there_par, r, work, x, p)
+        from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
         for i in range(count):
             for k in range(3):
                 out[start + i, k], out[start + i, 3 + k] = x[k, i], p[k, i]
 
 
 @njit(**options)
-def displacements(kind, exits, there, there_par, back, back_par, nodes, traced, out):
+def displacements(kind, surface_table, there, there_par, back, back_par, nodes, traced, out):
     """Displacement (n, 4) from nodes (n, 4) along traced states (n, m, lanes), followed continuously.
 
     A rotation is that of two quaternions, an angle known up to turns: successive states must be near enough to tell
@@ -77,7 +85,7 @@ def displacements(kind, exits, there, there_par, back, back_par, nodes, traced, 
                 source = start + min(i, count - 1)
                 for k in range(3):
                     x[k, i], p[k, i] = traced[source, m, k], traced[source, m, 3 + k]
-            enter(kind, exits, there, there_par, back, back_par, x, p, work, r)
+            to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
             for i in range(count):
                 node, d = nodes[start + i], out[start + i]
                 if kind != ANGLES:

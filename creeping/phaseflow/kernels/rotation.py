@@ -152,7 +152,7 @@ def _shape(derivative, s, q, first, second, root):
 
 
 @njit(**options)
-def enter(forward, forward_par, inverse, inverse_par, x, p, work, r):
+def to_coordinates(forward, forward_par, inverse, inverse_par, x, p, work, r):
     """Rotations r (4, BLOCK) of points x and directions p (3, BLOCK)."""
     s, q = work[0:3], work[3:6]
     inverse(x, s, inverse_par)
@@ -205,7 +205,7 @@ def quaternion(sx, sy, sz, qx, qy, qz, r, i):
 
 
 @njit(**options)
-def leave(forward, forward_par, r, work, x, p):
+def from_coordinates(forward, forward_par, r, work, x, p):
     """Points x and directions p (3, BLOCK) of rotations r (4, BLOCK)."""
     s, q, first, second, root = work[0:3], work[3:6], work[18:21], work[21:24], work[24:27]
     columns(r.reshape(-1), s.reshape(-1), q.reshape(-1))

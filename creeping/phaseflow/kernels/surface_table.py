@@ -1,4 +1,6 @@
-"""Compiled ways into and out of rotations by a table of x(u, v) instead of psi; see `rotation`, `surface_spline`.
+"""Compiled conversion of (x, p) to and from rotations by a table of x(u, v) instead of psi.
+
+See `rotation` and `surface_spline`.
 
 With T = [x_u, x_v] and G = T^T T, and the stereographic charts being conformal,
 
@@ -52,7 +54,7 @@ def _root(out, i):
 
 
 @njit(**options)
-def leave(table, r, work, x, p):
+def from_coordinates(table, r, work, x, p):
     """Points x and directions p (3, BLOCK) of rotations r (4, BLOCK)."""
     s, q, along, across, u, v = work[0:3], work[3:6], work[44], work[45], work[6], work[7]
     chart, cell = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
@@ -70,7 +72,7 @@ def leave(table, r, work, x, p):
 
 
 @njit(**options)
-def enter(table, inverse, inverse_par, x, p, work, r):
+def to_coordinates(table, inverse, inverse_par, x, p, work, r):
     """Rotations r (4, BLOCK) of points x and directions p (3, BLOCK)."""
     s, u, v = work[0:3], work[6], work[7]
     chart, cell = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)

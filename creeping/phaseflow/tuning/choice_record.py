@@ -10,7 +10,7 @@ from pathlib import Path
 
 from creeping._typing import Any
 from creeping.geodesics.direct_flow import DirectFlow
-from creeping.geodesics.integrator import MapError
+from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.surface import Surface
 from creeping.phaseflow.cache import cache_folder, cached_place
 from creeping.phaseflow.phase_map import PhaseMap
@@ -35,8 +35,8 @@ def remembered_choice(
         if stored and not content["stored"]:
             return None
         step, error = content["step"], content["error"]
-        measured = MapError(float(error[0]), float(error[1]), int(error[2]))
-        return DirectFlow(body, float(content["rtol"]), horizon, None if step is None else float(step), measured)
+        error_estimate = ErrorEstimate(float(error[0]), float(error[1]), int(error[2]))
+        return DirectFlow(body, float(content["rtol"]), horizon, None if step is None else float(step), error_estimate)
     except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):
         return None
 
@@ -48,8 +48,8 @@ def remember_choice(
     content: dict[str, Any] = {"kind": "map"}
     if isinstance(flow, DirectFlow):
         assert flow.error is not None
-        measured = [flow.error.rms, flow.error.max, flow.error.samples]
-        content = {"kind": "direct", "rtol": flow.rtol, "step": flow.step, "error": measured, "stored": stored}
+        error_estimate = [flow.error.rms, flow.error.max, flow.error.samples]
+        content = {"kind": "direct", "rtol": flow.rtol, "step": flow.step, "error": error_estimate, "stored": stored}
     place = _file(body, key, folder)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)

@@ -18,16 +18,16 @@ from creeping.errors import IntegrationError, InvalidInputError, ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.integrator import MapError, trace_states
+from creeping.geodesics.integrator import ErrorEstimate, trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.building import Progress, require_checked, settled, upper_bound
+from creeping.phaseflow.building import Progress, require_checked, sampled_errors, upper_bound
 from creeping.phaseflow.cache import cached_phase_map, is_cached
 from creeping.phaseflow.coordinates.base import model_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.tuning.choice_record import remember_choice, remembered_choice
-from creeping.phaseflow.tuning.request import Request
+from creeping.phaseflow.tuning.request import MapSpec
 from creeping.phaseflow.tuning.search import RAYS, Candidate, candidates, tracing_cost, tuned_map
 
 SAMPLES = 512
@@ -45,11 +45,11 @@ SMALLEST = 60_000
 def choose_flow(
     body: Surface,
     *,
-    rays: int,
+    n_rays: int,
     length: float,
     tolerance: float = 1e-6,
-    outputs: int = 1,
-    ride_along: bool = True,
+    n_steps: int = 1,
+    carry_jacobi: bool = True,
     cache: bool | str | Path = True,
     progress: Progress | None = None,
 ) -> PhaseMap | DirectFlow:
@@ -58,14 +58,14 @@ def choose_flow(
     Parameters
     ----------
     body : Surface
-    rays : int
+    n_rays : int
         Rays of all incidences together.
     length : float, L (travel time for a weighted body)
     tolerance : float
         Rms error of (x, p) at the end of the rays, 1e-12 to 1e-1.
-    outputs : int
+    n_steps : int
         Equally spaced points wanted on each ray.
-    ride_along : bool
+    carry_jacobi : bool
         Whether the Jacobi matrix is wanted, as by fans.
     cache : bool or path
         As for `build_phase_map`; a map in the cache costs nothing to build. The choice is kept there too: it rests on
@@ -77,7 +77,7 @@ def choose_flow(
     Returns
     -------
     PhaseMap or DirectFlow
-        Its horizon is ``length/outputs`` or divides it. Always direct for bodies without kernels.
+        Its horizon is ``length/n_steps`` or divides it. Always direct for bodies without kernels.
 
     Raises
     ------
@@ -90,120 +90,121 @@ def choose_flow(
     --------
     >>> import creeping as cr
     >>> import scatterers as sc
-    >>> flow = cr.choose_flow(sc.Sphere(), rays=10, length=1.0, tolerance=1e-6, cache=False)
+    >>> flow = cr.choose_flow(sc.Sphere(), n_rays=10, length=1.0, tolerance=1e-6, cache=False)
     >>> type(flow).__name__, flow.error.rms < 1e-6             # few rays do not pay for a map
     ('DirectFlow', True)
     """
-    if not (isinstance(rays, (int, np.integer)) and rays >= 1):
-        raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
+    if not (isinstance(n_rays, (int, np.integer)) and n_rays >= 1):
+        raise InvalidInputError(f"n_rays = {n_rays!r} is not a whole number >= 1")
     if not 1e-12 <= tolerance <= 1e-1:
         raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-12 and 1e-1")
-    bounded, riding = max(float(tolerance), 1e-9), bool(ride_along)
-    request = Request(body, bounded, length, outputs, None, None, None, None, riding, "direct", None, None)
-    say = progress or (lambda _: None)
+    spec = MapSpec(
+        body=body,
+        tolerance=max(float(tolerance), 1e-9),
+        length=length,
+        n_steps=n_steps,
+        n_rays=n_rays,
+        carry_jacobi=bool(carry_jacobi),
+    )
+    report: Progress = progress or (lambda _: None)
     require_checked(body)
-    request.rays = int(rays)
     if cache is False:
-        return _chosen(request, tolerance, False, False, False, say)
-    key = request.key() | {"tolerance": float(tolerance), "rays": int(rays)}
-    stored = _stored(request, tolerance, cache)
-    before = remembered_choice(body, key, length / outputs, stored=stored, folder=cache)
+        return _chosen(spec, tolerance, False, False, False, report)
+    key = spec.key() | {"tolerance": float(tolerance), "rays": int(n_rays)}
+    stored = _stored(spec, tolerance, cache)
+    before = remembered_choice(body, key, length / n_steps, stored=stored is not None, folder=cache)
     if isinstance(before, DirectFlow):
-        say("direct integration, as chosen before")
+        report("direct integration, as chosen before")
         return before
-    flow = _chosen(request, tolerance, cache, stored, before is not None, say)
-    remember_choice(body, key, flow, stored=_stored(request, tolerance, cache), folder=cache)
+    flow = _chosen(stored or spec, tolerance, cache, stored is not None, before is not None, report)
+    remember_choice(body, key, flow, stored=_stored(spec, tolerance, cache) is not None, folder=cache)
     return flow
 
 
-def _stored(request: Request, tolerance: float, cache: bool | str | Path) -> bool:
-    """Whether a map for the request is in the cache; one for the usual number of rays will do and is taken."""
+def _stored(spec: MapSpec, tolerance: float, cache: bool | str | Path) -> MapSpec | None:
+    """The spec of a map in the cache that serves: the one asked for, or one for the usual number of rays."""
     if tolerance < 1e-9:
-        return False
-    rays = request.rays
-    if is_cached(request.body, request.key(), folder=cache):
-        return True
-    request.rays = RAYS
-    if is_cached(request.body, request.key(), folder=cache):
-        return True
-    request.rays = rays
-    return False
+        return None
+    for one in (spec, replace(spec, n_rays=RAYS)):
+        if is_cached(one.body, one.key(), folder=cache):
+            return one
+    return None
 
 
 def _chosen(
-    request: Request, tolerance: float, cache: bool | str | Path, stored: bool, before: bool, say: Progress
+    spec: MapSpec, tolerance: float, cache: bool | str | Path, stored: bool, before: bool, progress: Progress
 ) -> PhaseMap | DirectFlow:
     """The flow that is cheaper by the clock, or the map if it is ``stored`` and was the choice ``before``."""
-    body, rays, outputs, ride_along = request.body, request.rays, request.outputs, request.ride_along
-    length = request.length
+    body, n_rays, n_steps, carry_jacobi = spec.body, spec.n_rays, spec.n_steps, spec.carry_jacobi
+    length = spec.length
     assert length is not None
     cost = tracing_cost(body)
     if stored and before:
-        say("phase map, as chosen before")
-        return cached_phase_map(body, request.key(), lambda: tuned_map(request, say), folder=cache, progress=say)
-    if rays * length * cost < QUICK and not stored:
-        say(f"direct integration: {rays} rays take about {rays * length * cost:.1g} s")
-        return _untuned_direct(body, length, outputs, tolerance)
-    direct, each = tuned_direct(body, length, outputs, tolerance, ride_along)
+        progress("phase map, as chosen before")
+        return cached_phase_map(body, spec.key(), lambda: tuned_map(spec, progress), folder=cache, progress=progress)
+    if n_rays * length * cost < QUICK and not stored:
+        progress(f"direct integration: {n_rays} rays take about {n_rays * length * cost:.1g} s")
+        return _untuned_direct(body, length, n_steps, tolerance)
+    direct, each = tuned_direct(body, length, n_steps, tolerance, carry_jacobi)
     if not stored:
-        found, reason = _worth_building(request, rays * each, cost, tolerance)
+        found, reason = _worth_building(spec, n_rays * each, cost, tolerance)
         if reason:
-            say(f"direct integration: {reason}")
+            progress(f"direct integration: {reason}")
             return direct
-        request.direct = WORTH * rays * each
+        spec = replace(spec, seconds=WORTH * n_rays * each)
     else:
         found = None
 
     def build() -> PhaseMap:
-        return tuned_map(request, say, found)
+        return tuned_map(spec, progress, found)
 
     try:
-        flow = build() if cache is False else cached_phase_map(body, request.key(), build, folder=cache, progress=say)
+        flow = build() if cache is False else cached_phase_map(body, spec.key(), build, folder=cache, progress=progress)
     except ToleranceError as error:
-        say(f"direct integration: {error}")
+        progress(f"direct integration: {error}")
         return direct
-    composed = _seconds_per_ray(flow, body, length, outputs, ride_along, each)
+    composed = _seconds_per_ray(flow, body, length, n_steps, carry_jacobi, each)
     if composed > each:
-        say(f"direct integration: {1e6 * each:.2g} us a ray, with the map {1e6 * composed:.2g}")
+        progress(f"direct integration: {1e6 * each:.2g} us a ray, with the map {1e6 * composed:.2g}")
         return direct
-    say(f"phase map: {1e6 * composed:.2g} us a ray, direct integration {1e6 * each:.2g}")
+    progress(f"phase map: {1e6 * composed:.2g} us a ray, direct integration {1e6 * each:.2g}")
     return flow
 
 
-def _worth_building(request: Request, direct: float, cost: float, tolerance: float) -> tuple[list[Candidate], str]:
+def _worth_building(spec: MapSpec, direct: float, cost: float, tolerance: float) -> tuple[list[Candidate], str]:
     """Candidates for a map, and the reason to build none of them, if there is one; ``direct`` in seconds."""
-    body = request.body
-    said = f"{request.rays} rays take {direct:.2g} s"
+    body = spec.body
+    time = f"{spec.n_rays} rays take {direct:.2g} s"
     if tolerance < 1e-9:
-        return [], f"no map reaches such a tolerance; {said}"
+        return [], f"no map reaches such a tolerance; {time}"
     # what the smallest map takes, so that probing is not begun in vain
-    least = 0.3 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if request.ride_along else 1.0)
+    least = 0.3 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if spec.carry_jacobi else 1.0)
     if not isinstance(model_of(body), CompiledModel):
         return [], f"{body!r} has no compiled sphere map nor a doubly periodic chart"
     if direct < least:
-        return [], said
+        return [], time
     try:
-        found = candidates(request, model_of(body), cost)
+        found = candidates(spec, model_of(body), cost)
     except ToleranceError as error:
         return [], str(error)
-    assert request.length is not None
-    expected = found[0].seconds(request.rays, request.length)
+    assert spec.length is not None
+    expected = found[0].seconds(spec.n_rays, spec.length)
     # estimates err, and so do the gains that they promise
-    return found, f"{said}, with a map about {expected:.2g} s" if expected > WORTH * direct else ""
+    return found, f"{time}, with a map about {expected:.2g} s" if expected > WORTH * direct else ""
 
 
-def _untuned_direct(body: Surface, length: float, outputs: int, tolerance: float) -> DirectFlow:
+def _untuned_direct(body: Surface, length: float, n_steps: int, tolerance: float) -> DirectFlow:
     """Direct flow with adapted steps, measured on a few rays: for so little work that tuning would take longer."""
     states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(2)))
     times = np.array([length])
     exact = trace_states(body, states, times, rtol=float(np.clip(1e-4 * tolerance, 1e-14, 1e-10)))[:, 0]
     rtol = float(np.clip(0.1 * tolerance, 1e-14, 1e-3))
     while True:
-        flow = DirectFlow(body, rtol, length / outputs)
+        flow = DirectFlow(body, rtol, length / n_steps)
         error = np.linalg.norm(flow.transport(states, times)[:, 0] - exact, axis=1)
         rms = float(np.sqrt(np.mean(error**2)))
         if rms <= 0.3 * tolerance:
-            return replace(flow, error=MapError(rms, float(error.max()), len(states)))
+            return replace(flow, error=ErrorEstimate(rms, float(error.max()), len(states)))
         if rtol <= 1e-14:
             raise ToleranceError(
                 f"direct integration reaches rms {rms:.1e} after {length:g}, not {tolerance:.1e}; "
@@ -214,7 +215,7 @@ def _untuned_direct(body: Surface, length: float, outputs: int, tolerance: float
 
 
 def tuned_direct(
-    body: Surface, length: float, outputs: int, tolerance: float, ride_along: bool
+    body: Surface, length: float, n_steps: int, tolerance: float, carry_jacobi: bool
 ) -> tuple[DirectFlow, float]:
     """Direct flow with the longest equal steps that meet the tolerance, and its seconds a ray.
 
@@ -223,7 +224,7 @@ def tuned_direct(
     ToleranceError
         If it does not meet the tolerance with steps as short as 1e-3 body sizes.
     """
-    horizon = length / outputs
+    horizon = length / n_steps
     cost = tracing_cost(body)
     count = int(np.clip(BUDGET / (cost * length), 32, SAMPLES))
     times = np.array([length])
@@ -240,14 +241,16 @@ def tuned_direct(
     reached = np.inf
     for _ in range(12):
         try:
-            error = settled(errors, count, 1 if 4 * cost * length * count > BUDGET else 16)[:, 0]
+            error = sampled_errors(errors, count, 1 if 4 * cost * length * count > BUDGET else 16)[:, 0]
             reached = upper_bound(error)
         except IntegrationError:
             reached = np.inf
         if reached <= tolerance:
-            measured = MapError(float(np.sqrt(np.mean(error**2))), float(error.max()), len(error))
-            flow = DirectFlow(body, float(np.clip(1e-2 * tolerance, 1e-13, 1e-8)), horizon, length / steps, measured)
-            return flow, _seconds_per_ray(flow, body, length, outputs, ride_along, cost * length)
+            error_estimate = ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(error))
+            flow = DirectFlow(
+                body, float(np.clip(1e-2 * tolerance, 1e-13, 1e-8)), horizon, length / steps, error_estimate
+            )
+            return flow, _seconds_per_ray(flow, body, length, n_steps, carry_jacobi, cost * length)
         # an order below the method's own while it has not set in
         factor = (reached / (0.5 * tolerance)) ** (1 / 7.5) if np.isfinite(reached) else 2.0
         steps = int(np.ceil(steps * np.clip(factor, 1.1, 2.0)))
@@ -261,13 +264,13 @@ def tuned_direct(
 
 
 def _seconds_per_ray(
-    flow: PhaseMap | DirectFlow, body: Surface, length: float, outputs: int, ride_along: bool, guess: float
+    flow: PhaseMap | DirectFlow, body: Surface, length: float, n_steps: int, carry_jacobi: bool, guess: float
 ) -> float:
     """Measured time of one ray, on one thread."""
     # whole blocks, or their unused rays would count
     count = 64 * int(np.clip(BUDGET / (64 * guess), 1, 16))
-    states = _random_states(body, count, ride_along)
-    times = length * np.arange(1, outputs + 1) / outputs
+    states = _random_states(body, count, carry_jacobi)
+    times = length * np.arange(1, n_steps + 1) / n_steps
     flow.transport(states[:64], times[:1])
     best = np.inf
     for _ in range(3):
@@ -277,6 +280,6 @@ def _seconds_per_ray(
     return max(float(best), 1e-9) / count
 
 
-def _random_states(body: Surface, count: int, ride_along: bool) -> FloatArray:
+def _random_states(body: Surface, count: int, carry_jacobi: bool) -> FloatArray:
     # what a fan carries, or a flow
-    return pack(*random_bundle_points(body, count, rng=np.random.default_rng(3)), lanes=12 if ride_along else 6)
+    return pack(*random_bundle_points(body, count, rng=np.random.default_rng(3)), lanes=12 if carry_jacobi else 6)

@@ -1,5 +1,7 @@
 """Asking for a phase map: parameters checked against each other, the missing ones chosen, the cache consulted."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,8 @@ from creeping.phaseflow.building import (
     Progress,
     build_direct,
     build_tower,
-    measured,
     require_checked,
+    with_errors,
 )
 from creeping.phaseflow.cache import cached_phase_map
 from creeping.phaseflow.coordinates.base import model_of
@@ -28,13 +30,13 @@ def build_phase_map(
     *,
     tolerance: float | None = None,
     length: float | None = None,
-    outputs: int = 1,
-    rays: int = RAYS,
+    n_steps: int = 1,
+    n_rays: int = RAYS,
     horizon: float | None = None,
     grid: tuple[int, int] | tuple[int, int, int] | None = None,
-    order: int | None = None,
+    degree: int | None = None,
     precision: str | None = None,
-    ride_along: bool = True,
+    carry_jacobi: bool = True,
     method: str = "direct",
     time_step: float | None = None,
     stages: int | None = None,
@@ -48,22 +50,22 @@ def build_phase_map(
     body : Surface
     tolerance : float, optional
         Rms error, 1e-9 to 1e-1, of one g_T0, or with ``length`` of the final state; chooses whatever of horizon, grid,
-        order and precision is not given. 1e-6 if neither tolerance nor grid is given.
+        degree and precision is not given. 1e-6 if neither tolerance nor grid is given.
     length : float, optional, L (travel time for a weighted body)
         Length of the rays that shall meet the tolerance; the horizon is as long as pays.
-    outputs : int
+    n_steps : int
         Equally spaced points of a ray that are wanted, with ``length``: the horizon divides their distance.
-    rays : int
+    n_rays : int
         Rays to come, in all: what a build may cost follows from it.
     horizon : float, optional
         T0, L (travel time for a weighted body).
     grid : (nodes, angles) or (nodes_u, nodes_v, angles), optional
         Nodes per chart, margin included, and on the circle.
-    order : int, optional
+    degree : int, optional
         Degree of the splines, 3 or 5.
     precision : {"single", "double"}, optional
         Of the stored coefficients; sums are in double. With a tolerance single where that is exact enough, else double.
-    ride_along : bool
+    carry_jacobi : bool
         Whether to carry the Jacobi matrix, which fans need.
     method : {"direct", "tower"}
         "tower" is Algorithm 1 and needs ``time_step``, ``stages``, ``horizon`` and ``grid``; it stores (x, p) in space,
@@ -93,96 +95,133 @@ def build_phase_map(
     --------
     >>> import creeping as cr
     >>> import scatterers as sc
-    >>> pm = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), order=3, cache=False)
+    >>> pm = cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), degree=3, cache=False)
     >>> pm.horizon, pm.error.rms < 1e-9
     (0.5, True)
     """
     if tolerance is None and grid is None:
         tolerance = 1e-6
-    request = Request(
-        body, tolerance, length, outputs, horizon, grid, order, precision, ride_along, method, time_step, stages
+    spec = MapSpec(
+        body=body,
+        tolerance=tolerance,
+        length=length,
+        n_steps=n_steps,
+        n_rays=n_rays,
+        horizon=horizon,
+        grid=grid,
+        degree=degree,
+        precision=precision,
+        carry_jacobi=carry_jacobi,
+        method=method,
+        time_step=time_step,
+        stages=stages,
     )
-    if not isinstance(rays, (int, np.integer)) or rays < 1:
-        raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
     if not isinstance(cache, (bool, str, Path)):
         raise InvalidInputError(f"cache = {cache!r} is neither True, False nor a folder")
-    request.rays = int(rays)
-    say = progress or (lambda _: None)
+    report: Progress = progress or (lambda _: None)
     if cache is False:
-        return request.build(say)
-    return cached_phase_map(body, request.key(), lambda: request.build(say), folder=cache, progress=say)
+        return spec.build(report)
+    return cached_phase_map(body, spec.key(), lambda: spec.build(report), folder=cache, progress=report)
 
 
-class Request:
-    """Checked parameters of one build."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MapSpec:
+    """Checked parameters of one build.
 
-    def __init__(
-        self,
-        body: Surface,
-        tolerance: float | None,
-        length: float | None,
-        outputs: int,
-        horizon: float | None,
-        grid: tuple[int, ...] | None,
-        order: int | None,
-        precision: str | None,
-        ride_along: bool,
-        method: str,
-        time_step: float | None,
-        stages: int | None,
-    ) -> None:
+    Attributes
+    ----------
+    body, tolerance, length, n_steps, n_rays, horizon, grid, degree, precision, carry_jacobi, method, time_step, stages
+        As for `build_phase_map`.
+    seconds : float
+        Of direct integration, if that is the other choice: what tuning and rays may take.
+    """
+
+    body: Surface
+    tolerance: float | None = None
+    length: float | None = None
+    n_steps: int = 1
+    n_rays: int = RAYS
+    horizon: float | None = None
+    grid: tuple[int, ...] | None = None
+    degree: int | None = None
+    precision: str | None = None
+    carry_jacobi: bool = True
+    method: str = "direct"
+    time_step: float | None = None
+    stages: int | None = None
+    seconds: float = float("inf")
+
+    def __post_init__(self) -> None:
+        tolerance, precision = self.tolerance, self.precision
         if tolerance is not None and not 1e-9 <= tolerance <= 1e-1:
             raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-9 and 1e-1")
-        for name, value in (("horizon", horizon), ("length", length)):
+        for name, value in (("horizon", self.horizon), ("length", self.length)):
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
-        if length is not None and tolerance is None:
+        if self.length is not None and tolerance is None:
             raise InvalidInputError("length belongs to a tolerance: give both, or horizon and grid alone")
-        if not isinstance(outputs, (int, np.integer)) or outputs < 1 or (outputs > 1 and length is None):
-            raise InvalidInputError(f"outputs = {outputs!r}: give a whole number >= 1, and the length they divide")
-        if order not in (None, 3, 5):
-            raise InvalidInputError(f"order = {order!r}: splines of degree 3 and 5 are built")
+        n_steps, n_rays = self.n_steps, self.n_rays
+        if not isinstance(n_steps, (int, np.integer)) or n_steps < 1 or (n_steps > 1 and self.length is None):
+            raise InvalidInputError(f"n_steps = {n_steps!r}: give a whole number >= 1, and the length they divide")
+        if not isinstance(n_rays, (int, np.integer)) or n_rays < 1:
+            raise InvalidInputError(f"n_rays = {n_rays!r} is not a whole number >= 1")
+        if self.degree not in (None, 3, 5):
+            raise InvalidInputError(f"degree = {self.degree!r}: splines of degree 3 and 5 are built")
         if precision not in (None, "single", "double"):
             raise InvalidInputError(f"precision = {precision!r} is neither 'single' nor 'double'")
-        if method not in ("direct", "tower"):
-            raise InvalidInputError(f"method = {method!r} is neither 'direct' nor 'tower'")
+        if self.method not in ("direct", "tower"):
+            raise InvalidInputError(f"method = {self.method!r} is neither 'direct' nor 'tower'")
         # plain numbers, which can be stored
-        self.body, self.tolerance = body, tolerance and float(tolerance)
-        self.length, self.horizon = length and float(length), horizon and float(horizon)
-        self.outputs = int(outputs)
-        self.order, self.precision, self.ride_along, self.method = order, precision, ride_along, method
-        self.periodic = _common_periodicity(body)
-        self.nodes = None if grid is None else _nodes(grid, order or 5, self.periodic, least_cells(body))
-        self.rays, self.direct = RAYS, np.inf
-        self.burn_in, self.base, self.stages = time_step, 0, stages or 0
-        if method == "tower":
-            if None in (horizon, grid, time_step, stages):
+        for name in ("tolerance", "length", "horizon"):
+            object.__setattr__(self, name, getattr(self, name) and float(getattr(self, name)))
+        object.__setattr__(self, "n_steps", int(n_steps))
+        object.__setattr__(self, "n_rays", int(n_rays))
+        # what is wrong with the grid or the tower is found here
+        _ = self.nodes
+        if self.method == "tower":
+            if None in (self.horizon, self.grid, self.time_step, self.stages):
                 raise InvalidInputError("method='tower' needs horizon, grid, time_step and stages")
-            if precision == "single" or not ride_along:
+            if precision == "single" or not self.carry_jacobi:
                 raise InvalidInputError("method='tower' stores double precision with the Jacobi matrix")
-            self.burn_in, self.base, self.stages = _tower_base(horizon, time_step, stages)
-        elif time_step is not None or stages is not None:
+            _ = self.tower
+        elif self.time_step is not None or self.stages is not None:
             raise InvalidInputError("time_step and stages belong to method='tower'")
 
+    @cached_property
+    def periodic(self) -> tuple[bool, bool]:
+        """Whether u and v of the charts wrap."""
+        return _common_periodicity(self.body)
+
+    @cached_property
+    def nodes(self) -> tuple[int, int, int] | None:
+        """Nodes of the grid along u, v and the angle, if it is given."""
+        return None if self.grid is None else _nodes(self.grid, self.degree or 5, self.periodic, least_cells(self.body))
+
+    @cached_property
+    def tower(self) -> tuple[float, int, int] | None:
+        """Burn-in tau, B and S, for method "tower"."""
+        return _tower_base(self.horizon, self.time_step, self.stages) if self.method == "tower" else None
+
     def key(self) -> dict[str, Any]:
-        """Parameters that decide the result, for the cache."""
+        """Parameters that decide the result, for the cache; the names are those of the maps that are stored."""
+        burn_in, _, stages = self.tower or (None, 0, 0)
         return {
             "tolerance": self.tolerance,
             "length": self.length,
-            "outputs": self.outputs,
+            "outputs": self.n_steps,
             # the magnitude only, or hardly a map would be found again
-            "rays": round(float(np.log10(self.rays))),
+            "rays": round(float(np.log10(self.n_rays))),
             "horizon": self.horizon,
             "nodes": self.nodes and list(self.nodes),
-            "degree": self.order,
+            "degree": self.degree,
             "precision": self.precision,
-            "ride_along": self.ride_along,
+            "ride_along": self.carry_jacobi,
             "method": self.method,
-            "time_step": self.burn_in,
-            "stages": self.stages,
+            "time_step": burn_in,
+            "stages": stages,
         }
 
-    def build(self, say: Progress) -> PhaseMap:
+    def build(self, progress: Progress) -> PhaseMap:
         """Build with the parameters given, choosing the missing ones.
 
         Raises
@@ -192,15 +231,14 @@ class Request:
         """
         require_checked(self.body)
         if self.nodes is None:
-            return tuned_map(self, say)
-        grid = Grid(self.nodes, self.order or 5, self.periodic)
-        if self.method == "tower":
-            assert self.burn_in is not None
-            result = build_tower(self.body, grid, self.burn_in, self.base, self.stages, say)
+            return tuned_map(self, progress)
+        grid = Grid(self.nodes, self.degree or 5, self.periodic)
+        if self.tower:
+            result = build_tower(self.body, grid, *self.tower, progress)
         else:
-            plan = Plan(self.horizon or natural_horizon(self.body), grid, self.precision == "single", self.ride_along)
-            result = build_direct(self.body, model_of(self.body), plan, say, rtol=1e-11)
-        result = measured(result, self.length)
+            plan = Plan(self.horizon or natural_horizon(self.body), grid, self.precision == "single", self.carry_jacobi)
+            result = build_direct(self.body, model_of(self.body), plan, progress, rtol=1e-11)
+        result = with_errors(result, self.length)
         reached = result.growth.rms[-1] if self.length and result.growth else result.error.rms
         if self.tolerance is not None and reached > self.tolerance:
             factor = (reached / self.tolerance) ** (1 / (grid.degree + 1))
@@ -232,7 +270,7 @@ def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool], cell
     least = [degree + 1 if wraps else max(degree + 5, cells + 1 + 2 * MARGIN) for wraps in periodic] + [degree + 1]
     if len(nodes) != 3 or not whole or any(n < m for n, m in zip(nodes, least, strict=True)):
         raise InvalidInputError(
-            f"grid = {grid!r}: give two or three whole numbers of at least {least} for order {degree}"
+            f"grid = {grid!r}: give two or three whole numbers of at least {least} for degree {degree}"
         )
     return nodes
 

@@ -1,4 +1,4 @@
-"""Choosing horizon, grid, order and precision of a map from a tolerance on the end of rays of a given length.
+"""Choosing horizon, grid, degree and precision of a map from a tolerance on the end of rays of a given length.
 
 Rows of points along one axis of the grid at a time are traced to every horizon in question. Splines through every 2nd,
 3rd, ... of them give the error of each axis against its cells, e_u, e_v, e_a. Errors of leaps are carried to the end of
@@ -25,14 +25,14 @@ from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.building import Plan, Progress, build_direct, curvature_reach, measured
+from creeping.phaseflow.building import Plan, Progress, build_direct, curvature_reach, with_errors
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.splines import thinning_operator
 
 if TYPE_CHECKING:
-    from creeping.phaseflow.tuning.request import Request
+    from creeping.phaseflow.tuning.request import MapSpec
 
 RAYS = 1_000_000
 """Rays for which a map is tuned unless their number is known: what a build may cost follows from it."""
@@ -85,21 +85,21 @@ class Candidate:
         return self.build + rays * length * self.leap
 
 
-def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None = None) -> PhaseMap:
-    """Build the fastest map that meets the request's tolerance, of the candidates if these are known already.
+def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None = None) -> PhaseMap:
+    """Build the fastest map that meets the tolerance of the spec, of the candidates if these are known already.
 
     Raises
     ------
     ToleranceError
         If no map within the limits meets the tolerance; with the best that was reached.
     """
-    body, tolerance = request.body, request.tolerance
+    body, tolerance = spec.body, spec.tolerance
     assert tolerance is not None
     model = model_of(body)
     cost = tracing_cost(body)
     if found is None:
-        say("probing horizons and grids")
-        found = candidates(request, model, cost)
+        progress("probing horizons and grids")
+        found = candidates(spec, model, cost)
     best: tuple[float, PhaseMap] | None = None
     started = clock()
     for candidate in found[:3]:
@@ -107,19 +107,19 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
         if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
             plan = _scaled(plan, 0.6)
         for _ in range(6):
-            say(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
+            progress(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
             began = clock()
-            built = build_direct(body, model, plan, say, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
-            result = _measured(built, request, cost)
+            built = build_direct(body, model, plan, progress, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
+            result = _measured(built, spec, cost)
             assert result.growth is not None
-            reached = result.growth.bound if request.length else result.error.rms
+            reached = result.growth.bound if spec.length else result.error.rms
             if best is None or reached < best[0]:
                 best = reached, result
             if reached <= tolerance:
-                result.parameters.update(tolerance=tolerance, length=request.length)
+                result.parameters.update(tolerance=tolerance, length=spec.length)
                 return result
-            doubtful = candidate.target < RISKY * np.hypot(1, size(body)) or reached > 0.5 * before
-            if plan.single and request.precision is None and doubtful:
+            limited = candidate.target < RISKY * np.hypot(1, size(body)) or reached > 0.5 * before
+            if plan.single and spec.precision is None and limited:
                 # the grid is no longer what limits it
                 plan, before = replace(plan, single=False), np.inf
             else:
@@ -133,14 +133,14 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
             # what was spent is spent: it is the next map and its rays that must pay, and no map is tuned for ever
             own = float(built.parameters["seconds"])
             more = int(np.prod(plan.grid.nodes)) / int(np.prod(built.grid.nodes))
-            ahead = clock() - began - own + own * more + request.rays * (request.length or 0.0) * candidate.leap
-            if max(ahead, clock() - started) > request.direct:
+            ahead = clock() - began - own + own * more + spec.n_rays * (spec.length or 0.0) * candidate.leap
+            if max(ahead, clock() - started) > spec.seconds:
                 raise ToleranceError(
                     f"tuning took {clock() - started:.2g} s, and {ahead:.2g} s are ahead: direct integration is near"
                 )
     assert best is not None
     reached, result = best
-    what = f"rays of length {request.length:g}" if request.length else "one g_T0"
+    what = f"rays of length {spec.length:g}" if spec.length else "one g_T0"
     raise ToleranceError(
         f"no map of at most {MAX_NODES} nodes reached rms {tolerance:.1e} after {what}: the best is {reached:.1e}"
         f" with horizon {result.horizon:g} and grid {result.grid.nodes}"
@@ -149,20 +149,20 @@ def tuned_map(request: "Request", say: Progress, found: list[Candidate] | None =
     )
 
 
-def _measured(built: PhaseMap, request: "Request", cost: float) -> PhaseMap:
+def _measured(built: PhaseMap, spec: "MapSpec", cost: float) -> PhaseMap:
     """The map with its errors; where F is expensive on fewer rays, and against a reference only so much better."""
-    length = request.length or built.horizon
-    assert request.tolerance is not None
-    budget = _budget(request, cost)
+    length = spec.length or built.horizon
+    assert spec.tolerance is not None
+    budget = _budget(spec, cost)
     samples = int(np.clip(budget / (cost * length), 400, 2000))
-    dear = 4 * cost * length * samples > budget
-    rtol = 1e-3 * request.tolerance if dear else 1e-12
-    return measured(built, request.length, samples=samples, rtol=rtol, most=1 if dear else 16)
+    expensive = 4 * cost * length * samples > budget
+    rtol = 1e-3 * spec.tolerance if expensive else 1e-12
+    return with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16)
 
 
-def _budget(request: "Request", cost: float) -> float:
+def _budget(spec: "MapSpec", cost: float) -> float:
     """Seconds that one probe or measurement may take."""
-    return float(np.clip(SHARE * request.rays * cost * (request.length or natural_horizon(request.body)), *BUDGET))
+    return float(np.clip(SHARE * spec.n_rays * cost * (spec.length or natural_horizon(spec.body)), *BUDGET))
 
 
 def tracing_cost(body: Surface) -> float:
@@ -175,7 +175,7 @@ def tracing_cost(body: Surface) -> float:
     return max(clock() - start, 1e-7) / (256 * length)
 
 
-def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]:
+def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
     """Horizons with their grids, the fastest first.
 
     Raises
@@ -183,24 +183,22 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
     ToleranceError
         If none needs fewer than MAX_NODES.
     """
-    body, tolerance = request.body, request.tolerance
+    body, tolerance = spec.body, spec.tolerance
     assert tolerance is not None
     natural = natural_horizon(body)
-    horizons = _horizons(request, natural, cost)
-    probe = _Probe(body, model, horizons, request.periodic)
-    orders = (request.order,) if request.order else (3, 5)
-    rays = int(np.clip(_budget(request, cost) / (2 * cost * (request.length or natural)), 48, 512))
-    stretch = amplification(body, request.length or natural, rays)
+    horizons = _horizons(spec, natural, cost)
+    probe = _Probe(body, model, horizons, spec.periodic)
+    degrees = (spec.degree,) if spec.degree else (3, 5)
+    rays = int(np.clip(_budget(spec, cost) / (2 * cost * (spec.length or natural)), 48, 512))
+    stretch = amplification(body, spec.length or natural, rays)
     found = []
     fewest = (np.inf, 0.0)
     for k, horizon in enumerate(horizons):
-        gain = growth_factor(*stretch, horizon) if request.length else 1.0
+        gain = growth_factor(*stretch, horizon) if spec.length else 1.0
         target = SAFE * tolerance / gain
-        single = request.precision == "single" or (
-            request.precision is None and target > SINGLE * np.hypot(1, size(body))
-        )
-        for order in orders:
-            grid = probe.grid(k, order, target)
+        single = spec.precision == "single" or (spec.precision is None and target > SINGLE * np.hypot(1, size(body)))
+        for degree in degrees:
+            grid = probe.grid(k, degree, target)
             nodes = model.charts * int(np.prod(grid.nodes))
             nbytes = float(nodes * model.lanes * (4 if single else 8))
             fewest = min(fewest, (nodes, horizon))
@@ -208,49 +206,49 @@ def candidates(request: "Request", model: Model, cost: float) -> list[Candidate]
                 continue
             doublings = _doublings(horizon, natural, cost)
             plan = Plan(
-                horizon, grid, single, request.ride_along, doublings, least_cells(body), curvature_reach(tolerance)
+                horizon, grid, single, spec.carry_jacobi, doublings, least_cells(body), curvature_reach(tolerance)
             )
             # the curvatures are wanted at several times of each leap
-            traced = cost * horizon / 2**plan.doublings * (6.0 if request.ride_along else 1.0)
-            build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if request.ride_along else 1.0)
-            build += FIXED + 2 * _budget(request, cost)
-            leap = leap_seconds(order, nbytes)
-            if request.ride_along:
+            traced = cost * horizon / 2**plan.doublings * (6.0 if spec.carry_jacobi else 1.0)
+            build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if spec.carry_jacobi else 1.0)
+            build += FIXED + 2 * _budget(spec, cost)
+            leap = leap_seconds(degree, nbytes)
+            if spec.carry_jacobi:
                 # lanes are four times as many, and the attenuation is summed
                 leap = 4 * leap + 40e-9
             found.append(Candidate(plan, leap / horizon, build, target))
     if not found:
         raise ToleranceError(
             f"no map of at most {MAX_NODES} nodes is expected to reach rms {tolerance:.1e}"
-            + (f" after rays of length {request.length:g}" if request.length else "")
+            + (f" after rays of length {spec.length:g}" if spec.length else "")
             + f": the best, with horizon {fewest[1]:g}, needs about {fewest[0]:.0e}; loosen the tolerance, "
             "or integrate with DirectFlow",
         )
-    length = request.length or natural
-    return sorted(found, key=lambda one: one.seconds(request.rays, length))
+    length = spec.length or natural
+    return sorted(found, key=lambda one: one.seconds(spec.n_rays, length))
 
 
-def leap_seconds(order: int, nbytes: float) -> float:
+def leap_seconds(degree: int, nbytes: float) -> float:
     """Estimated time of one leap of a ray anywhere on the body.
 
     Measured on one core: 20 (cubic) and 40 ns in the nearest cache, more by the logarithm of the table beyond 1 MB,
     where a stencil's cache lines come from farther away.
     """
-    base, lines = (20.0, 0.6) if order == 3 else (40.0, 1.0)
+    base, lines = (20.0, 0.6) if degree == 3 else (40.0, 1.0)
     return 1e-9 * (base + 27.0 * lines * float(np.log2(max(nbytes / 1e6, 1.0))))
 
 
-def _horizons(request: "Request", natural: float, cost: float) -> list[float]:
+def _horizons(spec: "MapSpec", natural: float, cost: float) -> list[float]:
     """Horizons to try, ascending: they divide the distance of outputs; from 0.4 times the natural one to 16 times."""
-    if request.horizon:
-        return [request.horizon]
-    if not request.length:
+    if spec.horizon:
+        return [spec.horizon]
+    if not spec.length:
         return [natural]
     # probing a horizon traces some 14 000 rays that far
-    # over longer leaps the curvatures do not ride along
-    reach = natural * (curvature_reach(request.tolerance or 0.0) if request.ride_along else 16)
-    longest = max(natural, min(reach, 4 * _budget(request, cost) / (cost * 3 * LINES * CELLS)))
-    distance = request.length / request.outputs
+    # over longer leaps the curvatures are not carried
+    reach = natural * (curvature_reach(spec.tolerance or 0.0) if spec.carry_jacobi else 16)
+    longest = max(natural, min(reach, 4 * _budget(spec, cost) / (cost * 3 * LINES * CELLS)))
+    distance = spec.length / spec.n_steps
     leaps = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
     found = [distance / m for m in leaps if 0.4 * natural <= distance / m <= longest]
     if not found:
@@ -317,15 +315,15 @@ class _Probe:
             values.append(model.displacement(coordinates, states[:, :upto], times[:upto]).reshape(LINES, count, -1))
         return np.stack(values)
 
-    def errors(self, k: int, axis: int, order: int) -> tuple[FloatArray, FloatArray]:
+    def errors(self, k: int, axis: int, degree: int) -> tuple[FloatArray, FloatArray]:
         """Cells of an axis, ascending, and the rms error of splines with them."""
         data, wraps = self.rows[axis][k], self.periodic[axis]
         count = data.shape[1]
         cells, errors = [], []
         for stride in STRIDES[::-1]:
-            if CELLS // stride < order + 4:
+            if CELLS // stride < degree + 4:
                 continue
-            spline = np.tensordot(thinning_operator(count, stride, order, wraps), data[:, ::stride], axes=(1, 1))
+            spline = np.tensordot(thinning_operator(count, stride, degree, wraps), data[:, ::stride], axes=(1, 1))
             # a chart's margin spares it the ends of the row
             inner = slice(None) if wraps else slice(MARGIN * stride, count - MARGIN * stride)
             difference = np.moveaxis(spline, 0, 1)[:, inner] - data[:, inner]
@@ -333,29 +331,29 @@ class _Probe:
             errors.append(self.scale * float(np.sqrt(np.mean(np.sum(difference**2, axis=-1)))) + 1e-300)
         return np.array(cells), np.array(errors)
 
-    def grid(self, k: int, order: int, target: float) -> Grid:
+    def grid(self, k: int, degree: int, target: float) -> Grid:
         """Fewest nodes whose three errors together are the target."""
         cells = []
         for axis in range(3):
-            n, e = self.errors(k, axis, order)
+            n, e = self.errors(k, axis, degree)
             # the error that rows of finer cells would have, where tracing itself is no longer exact enough
             e = np.maximum.accumulate(e[::-1])[::-1]
             wanted = target / np.sqrt(3)
             if wanted >= e[0]:
-                cells.append(float(n[0]) * max((e[0] / wanted) ** (1 / (order + 1)), 0.5))
+                cells.append(float(n[0]) * max((e[0] / wanted) ** (1 / (degree + 1)), 0.5))
             elif wanted <= e[-1]:
-                cells.append(float(n[-1]) * (e[-1] / wanted) ** (1 / (order + 1)))
+                cells.append(float(n[-1]) * (e[-1] / wanted) ** (1 / (degree + 1)))
             else:
                 cells.append(float(np.exp(np.interp(-np.log(wanted), -np.log(e), np.log(n)))))
-        return _grid(cells, order, self.periodic[:2], least_cells(self.body))
+        return _grid(cells, degree, self.periodic[:2], least_cells(self.body))
 
 
-def _grid(cells: list[float], order: int, periodic: tuple[bool, ...], least: int) -> Grid:
+def _grid(cells: list[float], degree: int, periodic: tuple[bool, ...], least: int) -> Grid:
     sides = [
-        max(int(np.ceil(c)) if wraps else max(int(np.ceil(c)), least) + 1 + 2 * MARGIN, order + (1 if wraps else 5))
+        max(int(np.ceil(c)) if wraps else max(int(np.ceil(c)), least) + 1 + 2 * MARGIN, degree + (1 if wraps else 5))
         for c, wraps in zip(cells, periodic, strict=False)
     ]
-    return Grid((sides[0], sides[1], max(4 * int(np.ceil(cells[2] / 4)), 8)), order, (periodic[0], periodic[1]))
+    return Grid((sides[0], sides[1], max(4 * int(np.ceil(cells[2] / 4)), 8)), degree, (periodic[0], periodic[1]))
 
 
 def _finer(plan: Plan, excess: float) -> Plan:

@@ -134,14 +134,14 @@ def sample_fan(level, level_par, weights, states, arc, first, samples, alive, wo
 
 
 @njit(**options)
-def seek(step, samples, sure, arc, closed, r, back, skipped, early, along, cells, inside, heights, crossings, at):
+def seek(step, samples, certain, arc, closed, r, back, skipped, early, along, cells, inside, heights, crossings, at):
     """Cells in which rays leave towards r, and where rays cross the horizon.
 
     Parameters
     ----------
     step : float
         Time between states.
-    samples, sure : (rays, SAMPLE, m), (rays,)
+    samples, certain : (rays, SAMPLE, m), (rays,)
         See `sample_fan`; the first ``skipped`` of a ray are not there.
     arc, closed : (rays,)
         Number of each ray's arc, not finite where there is no ray, and 1 if the arc is a whole curve.
@@ -179,7 +179,7 @@ def seek(step, samples, sure, arc, closed, r, back, skipped, early, along, cells
                 height[row, i] = one[3 * row, i] * r[0] + one[3 * row + 1, i] * r[1] + one[3 * row + 2, i] * r[2]
         if not back:
             continue
-        alive = sure[ray]
+        alive = certain[ray]
         for i in range(skipped, m):
             alive &= one[CURVATURE, i] > 0.0
             if i == skipped or not (height[0, i] * height[0, i - 1] < 0.0 and height[2, i] > 0.0):

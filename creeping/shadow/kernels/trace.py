@@ -1,6 +1,6 @@
 """Compiled shadow lines of many incidences: the steps of `marching`, `newton`, `crossings`, `arcs`.
 
-A line is sought on one mesh; a step that is not sure of it says so, and so does its length if it is not certain to
+A line is sought on one mesh; a step that is not certain of it says so, and so does its length if it is not certain to
 SETTLED. `creeping.shadow.many` goes on to finer meshes.
 
 Sources: Derivations, R11.
@@ -70,7 +70,7 @@ def least_criticals(points, directions, least):
 
 
 @njit(**options)
-def trace_lines(level, level_par, box, mesh, directions, every, summary, sure, launched, places):
+def trace_lines(level, level_par, box, mesh, directions, every, summary, certain_lines, launched, places):
     """Lines of incidences (n, 3) on a mesh, and where their rays start.
 
     Parameters
@@ -84,8 +84,8 @@ def trace_lines(level, level_par, box, mesh, directions, every, summary, sure, l
     every : bool
         Whether rays start from the whole line, not from its attached arcs alone.
     summary : (n, SUMMARY), filled
-    sure : (n,) of bool, filled
-        Whether every step was sure of the line.
+    certain_lines : (n,) of bool, filled
+        Whether every step was certain of the line.
     launched : (n, rays, LAUNCHED), filled
         NaN where there is no ray.
     places : (n, rays), filled
@@ -110,7 +110,7 @@ def trace_lines(level, level_par, box, mesh, directions, every, summary, sure, l
                 level, level_par, box, d, x, T, work[4][0], starts, components, spacing, every, summary[row],
                 launched[row], places[row], arcs, which,
             )[0]  # fmt: skip
-        sure[row] = found and certain
+        certain_lines[row] = found and certain
 
 
 @njit(**options)
@@ -119,7 +119,7 @@ def trace_nodes(level, level_par, box, mesh, d):
 
     Returns
     -------
-    found, sure : bool
+    found, certain : bool
     x, T : (3, n)
     kappa : (n,)
         kappa_n(d).
@@ -130,11 +130,11 @@ def trace_nodes(level, level_par, box, mesh, d):
     """
     work = work_of(mesh)
     starts, spacing = np.empty(COMPONENTS + 1, np.int64), np.empty(COMPONENTS)
-    found, sure, components, length, error = find_nodes(level, level_par, box, mesh, d, 0, work, starts, spacing)
+    found, certain, components, length, error = find_nodes(level, level_par, box, mesh, d, 0, work, starts, spacing)
     total = starts[components] if found else 0
     x, T = work[3][2][: 3 * total].reshape(3, total), work[3][3][: 3 * total].reshape(3, total)
     kappa = work[4][0][:total].copy()
-    return found, sure, x.copy(), T.copy(), kappa, starts[: components + 1], spacing[:components], length, error
+    return found, certain, x.copy(), T.copy(), kappa, starts[: components + 1], spacing[:components], length, error
 
 
 @njit(**options)
@@ -160,7 +160,7 @@ def work_of(mesh):
 def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
     """Equally spaced nodes of one line on one mesh, the longest curve first, left in the work space.
 
-    Returns whether there are any, whether every step was sure of them, and components, length and its relative error.
+    Returns whether there are any, whether every step was certain of them, components, length and its relative error.
     """
     vertices, normals, triangles, neighbours, edge, _, wanted = mesh
     s, (lit, found, stamp), (raw, raw_starts, kept), flat, (kappa, h, beside, slopes), scratch = work
@@ -181,11 +181,11 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
     if newton(level, level_par, d, x, reach, scratch, T, kappa) == FAILED:
         return nothing
     step = newton(level, level_par, d, x, reach, scratch, T, kappa)
-    sure = step < COARSE_STEP * edge
-    for _ in range(MORE if not sure else 0):
+    certain = step < COARSE_STEP * edge
+    for _ in range(MORE if not certain else 0):
         step = newton(level, level_par, d, x, reach, scratch, T, kappa)
     kept_starts = np.empty(COMPONENTS + 1, np.int64)
-    sure &= not prune(x, T, raw_starts, components, APART * edge, kept, kept_starts)
+    certain &= not prune(x, T, raw_starts, components, APART * edge, kept, kept_starts)
     lengths, counts = np.empty(COMPONENTS), np.empty(COMPONENTS, np.int64)
     share_nodes(x, T, kept, kept_starts, components, wanted, lengths, counts)
     # the longest curve first
@@ -210,7 +210,7 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
     last = newton(level, level_par, d, y, reach, scratch, U, kappa)
     if not last < LOST * extent:
         return nothing
-    sure &= last < UNSETTLED * extent
+    certain &= last < UNSETTLED * extent
     length, error, rough = 0.0, 0.0, 0.0
     for again in range(2):
         length, error, rough = 0.0, 0.0, 0.0
@@ -225,8 +225,8 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
                 equalise(y, slopes, starts[c], size, own, h)
         if again == 0 and not newton(level, level_par, d, y, reach, scratch, U, kappa) < LOST * extent:
             return nothing
-    sure &= rough < SETTLED * length and error < PRECISE * length
-    return True, sure, components, length, error / length
+    certain &= rough < SETTLED * length and error < PRECISE * length
+    return True, certain, components, length, error / length
 
 
 @njit(**options)
@@ -236,9 +236,9 @@ def finish(
     """Arcs and rays of a line with equally spaced nodes.
 
     arcs (LIMIT + components, 2) gets their ends, as numbers of nodes with fractions, and ``which`` (2, the same) their
-    component and state. Shares and rays are filled in; returns whether every step was sure, and the number of arcs.
+    component and state. Shares and rays are filled in; returns whether every step was certain, and the number of arcs.
     """
-    sure = True
+    certain = True
     n = starts[components]
     owner, state = which[0], which[1]
     plane, boxes, scratch = np.empty((5, n)), np.empty((6, n // BOX + 1)), aligned(18, BLOCK)
@@ -248,12 +248,12 @@ def finish(
         some, hidden = cusps(kappa, starts[c], starts[c + 1] - starts[c], at[count:])
         where[count : count + some] = c
         count += some
-        sure &= not hidden
+        certain &= not hidden
     extreme = project(x, T, n, d, plane)
     owner_of_box = np.empty(n // BOX + 1, np.int64)
     if not convex(plane, starts, components):
         some = crossings(plane, starts, components, spacing, boxes, owner_of_box, at[count:], where[count:])
-        sure &= some >= 0
+        certain &= some >= 0
         count += max(some, 0)
     number = np.empty(components, np.int64)
     for c in range(components):
@@ -262,7 +262,7 @@ def finish(
     total = arcs_of(at, where, count, starts, components, arcs, owner)
     extent = max(box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[1, 2] - box[0, 2])
     reach = 0.01 * extent
-    sure &= classify(level, level_par, box, d, x, starts, extreme, arcs, owner, total, reach, scratch, state)
+    certain &= classify(level, level_par, box, d, x, starts, extreme, arcs, owner, total, reach, scratch, state)
     total = merge(arcs, owner, state, total, starts)
     summary[SHARES : SHARES + 3] = 0.0
     for k in range(total):
@@ -290,7 +290,7 @@ def finish(
         for k in range(total if every else 0):
             if owner[k] == c and (place - arcs[k, 0]) % number[c] < arcs[k, 1] - arcs[k, 0]:
                 launched[m, STATE] = state[k]
-    return sure, total
+    return certain, total
 
 
 @njit(**options)

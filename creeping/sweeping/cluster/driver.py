@@ -17,7 +17,7 @@ import distributed
 from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.sweeping.cluster.workers import THREADS, Recipe, RecipePlugin, one_incidence, whole_task
-from creeping.sweeping.plan import Arrays, Beginning, SweepPlan
+from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.store import SweepStore
 
@@ -64,7 +64,7 @@ def fill_on(
     window = _Window(client, plan, stop)
     try:
         dead = []
-        status, beginning = store.status(), Beginning()
+        status, guard = store.status(), FirstTaskGuard()
         for task, outcome in window.results(missing):
             if isinstance(outcome, distributed.KilledWorker):
                 dead.append(task)
@@ -74,7 +74,7 @@ def fill_on(
             yield task
             # those that failed before may fail again
             if status[task] == UNDONE:
-                beginning.add(store.rows(task).stop - store.rows(task).start, common)
+                guard.add(store.rows(task).stop - store.rows(task).start, common)
         for task in dead:
             if stop():
                 return

@@ -61,8 +61,8 @@ def read_directions(name: str, table: Any, folder: Path, mistakes: list[str]) ->
     """Unit directions of a table; its mistakes are added to the list."""
     kind = table.get("kind") if isinstance(table, dict) else None
     if not isinstance(kind, str) or kind not in KINDS:
-        told = "is missing" if kind is None else f"= {kind!r} is unknown"
-        mistakes.append(f"[{name}] kind {told}{nearest(str(kind or ''), KINDS)}")
+        what = "is missing" if kind is None else f"= {kind!r} is unknown"
+        mistakes.append(f"[{name}] kind {what}{nearest(str(kind or ''), KINDS)}")
         return None
     before = len(mistakes)
     values = read_table(name, {k: v for k, v in table.items() if k != "kind"}, KINDS[kind], mistakes)

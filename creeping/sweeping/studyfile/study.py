@@ -243,12 +243,14 @@ def _request(
             order=main["order"] or 2,
         )
     except InvalidInputError as error:
-        told = getattr(error, "mistakes", [str(error)])
+        reasons = getattr(error, "mistakes", [str(error)])
         # what follows from a mistake that is told already is none of its own
         unsure = any(text.startswith(("[study] wavenumbers", "[study] quantity")) for text in mistakes)
         needs = "needs wavenumbers"
-        told = [reason for reason in told if not (reason.startswith("observation") or (unsure and needs in reason))]
-        mistakes += [f"[study] {reason.replace(needs, needs + '_per_length')}" for reason in told]
+        reasons = [
+            reason for reason in reasons if not (reason.startswith("observation") or (unsure and needs in reason))
+        ]
+        mistakes += [f"[study] {reason.replace(needs, needs + '_per_length')}" for reason in reasons]
         return None
     reason = too_large(request)
     if reason:

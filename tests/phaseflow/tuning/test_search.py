@@ -9,7 +9,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.kernels.threads import thread_count
-from creeping.phaseflow.building import Plan, build_direct, measured
+from creeping.phaseflow.building import Plan, build_direct, with_errors
 from creeping.phaseflow.coordinates import rotation as compiled_models
 from creeping.phaseflow.coordinates.base import model_of
 from creeping.phaseflow.grid import Grid
@@ -24,7 +24,7 @@ def rms_at_end(flow, body, length, rng, rays=1000):
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-6, 1e-7])
 def test_tolerance_is_met_after_the_whole_length(body, tolerance, rng):
-    flow = cr.build_phase_map(body, tolerance=tolerance, length=4.0, ride_along=False, cache=False)
+    flow = cr.build_phase_map(body, tolerance=tolerance, length=4.0, carry_jacobi=False, cache=False)
     assert flow.growth.lengths[-1] == 4.0
     assert flow.growth.rms[-1] <= tolerance
     assert (4.0 / flow.horizon) % 1 == pytest.approx(0, abs=1e-9)
@@ -32,13 +32,13 @@ def test_tolerance_is_met_after_the_whole_length(body, tolerance, rng):
 
 
 def test_horizon_divides_the_distance_of_outputs():
-    flow = cr.build_phase_map(sc.Torus(), tolerance=1e-5, length=3.0, outputs=10, cache=False)
+    flow = cr.build_phase_map(sc.Torus(), tolerance=1e-5, length=3.0, n_steps=10, cache=False)
     assert (0.3 / flow.horizon) % 1 == pytest.approx(0, abs=1e-9)
 
 
 def test_chaos_is_said(rng):
     body = sc.TwistedEllipsoid()
-    flow = cr.build_phase_map(body, tolerance=1e-5, length=8.0, ride_along=False, cache=False)
+    flow = cr.build_phase_map(body, tolerance=1e-5, length=8.0, carry_jacobi=False, cache=False)
     growth = flow.growth
     assert growth.rms_after(8.0) == pytest.approx(growth.rms[-1])
     assert growth.rms_after(0.5 * growth.lengths[0]) == growth.rms[0]
@@ -51,16 +51,16 @@ def test_chaos_is_said(rng):
 
 def test_no_jacobi_matrix_without_ride_along(rng):
     body = sc.Sphere()
-    flow = cr.build_phase_map(body, tolerance=1e-4, length=2.0, ride_along=False, cache=False)
-    assert not flow.rides
-    with pytest.raises(cr.CreepingError, match="ride_along=True"):
+    flow = cr.build_phase_map(body, tolerance=1e-4, length=2.0, carry_jacobi=False, cache=False)
+    assert not flow.has_jacobi
+    with pytest.raises(cr.CreepingError, match="carry_jacobi=True"):
         flow.transport(pack(*random_bundle_points(body, 3, rng=rng), jacobi=True), np.array([2.0]))
 
 
 def test_doubling_agrees_with_tracing(body, rng):
     model, grid = model_of(body), Grid((24, 24, 32), 5, tuple(body.atlas.charts[0].periodic))
     maps = [
-        measured(build_direct(body, model, Plan(0.4, grid, doublings=d), lambda _: None, rtol=1e-11)) for d in (0, 2)
+        with_errors(build_direct(body, model, Plan(0.4, grid, doublings=d), lambda _: None, rtol=1e-11)) for d in (0, 2)
     ]
     assert maps[1].error.rms < 3 * maps[0].error.rms + 1e-10
     states = pack(*random_bundle_points(body, 50, rng=rng), lanes=12)
@@ -108,26 +108,26 @@ def test_state_that_is_not_a_number_reads_inside_the_table():
 
 
 def test_few_rays_are_integrated_directly():
-    said = []
-    flow = cr.choose_flow(sc.Sphere(), rays=10, length=2.0, progress=said.append, cache=False)
+    messages = []
+    flow = cr.choose_flow(sc.Sphere(), n_rays=10, length=2.0, progress=messages.append, cache=False)
     assert isinstance(flow, cr.DirectFlow)
     assert flow.error.rms <= 1e-6
-    assert "direct integration" in said[-1]
+    assert "direct integration" in messages[-1]
 
 
 def test_many_rays_are_mapped(rng):
-    body, said = sc.Ellipsoid(1.2, 0.8, 0.8), []
+    body, messages = sc.Ellipsoid(1.2, 0.8, 0.8), []
     flow = cr.choose_flow(
-        body, rays=10**8, length=8.0, tolerance=1e-6, ride_along=False, progress=said.append, cache=False
+        body, n_rays=10**8, length=8.0, tolerance=1e-6, carry_jacobi=False, progress=messages.append, cache=False
     )
     assert isinstance(flow, cr.PhaseMap)
-    assert "phase map" in said[-1]
+    assert "phase map" in messages[-1]
     assert rms_at_end(flow, body, 8.0, rng) <= 1e-6
 
 
 def test_tolerance_below_any_map_is_integrated_directly(rng):
     body = sc.Ellipsoid(1.2, 0.8, 0.8)
-    flow = cr.choose_flow(body, rays=10**9, length=2.0, tolerance=1e-11, cache=False)
+    flow = cr.choose_flow(body, n_rays=10**9, length=2.0, tolerance=1e-11, cache=False)
     assert isinstance(flow, cr.DirectFlow)
     assert rms_at_end(flow, body, 2.0, rng, 200) <= 1e-11
 
@@ -136,20 +136,20 @@ def test_stored_map_is_used_again(tmp_path):
     body = sc.Ellipsoid(1.2, 0.8, 0.8)
     options = {"length": 4.0, "tolerance": 1e-5, "cache": tmp_path}
     cr.build_phase_map(body, **options)
-    said = []
-    cr.choose_flow(body, rays=10**7, progress=said.append, **options)
-    assert not any("tracing" in text for text in said)
+    messages = []
+    cr.choose_flow(body, n_rays=10**7, progress=messages.append, **options)
+    assert not any("tracing" in text for text in messages)
 
 
 @pytest.mark.parametrize("rays", [10, 10**7])
 def test_a_choice_is_made_once(rays, tmp_path, monkeypatch):
-    body, said = sc.Ellipsoid(1.2, 0.8, 0.8), []
-    options = {"rays": rays, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
+    body, messages = sc.Ellipsoid(1.2, 0.8, 0.8), []
+    options = {"n_rays": rays, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
     first = cr.choose_flow(body, **options)
     # a machine on which the other flow would be the faster
     monkeypatch.setattr("creeping.phaseflow.tuning.flow_choice.tracing_cost", lambda body: 1.0 if rays == 10 else 1e-12)
-    again = cr.choose_flow(body, progress=said.append, **options)
-    assert type(again) is type(first) and "as chosen before" in said[-1]
+    again = cr.choose_flow(body, progress=messages.append, **options)
+    assert type(again) is type(first) and "as chosen before" in messages[-1]
     if rays == 10:
         assert again == first
     else:
@@ -157,7 +157,7 @@ def test_a_choice_is_made_once(rays, tmp_path, monkeypatch):
 
 
 def test_a_damaged_choice_is_made_again(tmp_path):
-    options = {"rays": 10, "length": 2.0, "cache": tmp_path}
+    options = {"n_rays": 10, "length": 2.0, "cache": tmp_path}
     first = cr.choose_flow(sc.Sphere(), **options)
     (kept,) = tmp_path.glob("*.json")
     whole = kept.read_text()
@@ -165,19 +165,19 @@ def test_a_damaged_choice_is_made_again(tmp_path):
     for text in ("", "[]", "3", '{"kind": "direct", "rtol": "x"}', *changed):
         assert text != whole
         kept.write_text(text)
-        said = []
-        assert cr.choose_flow(sc.Sphere(), progress=said.append, **options) == first
-        assert "as chosen before" not in said[-1]
+        messages = []
+        assert cr.choose_flow(sc.Sphere(), progress=messages.append, **options) == first
+        assert "as chosen before" not in messages[-1]
 
 
 def test_a_map_that_has_come_since_reopens_the_choice(tmp_path):
     body = sc.Sphere()
-    options = {"rays": 20_000, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
+    options = {"n_rays": 20_000, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
     assert isinstance(cr.choose_flow(body, **options), cr.DirectFlow)
     cr.build_phase_map(body, length=4.0, tolerance=1e-4, cache=tmp_path)
-    said = []
-    cr.choose_flow(body, progress=said.append, **options)
-    assert "as chosen before" not in said[-1]
+    messages = []
+    cr.choose_flow(body, progress=messages.append, **options)
+    assert "as chosen before" not in messages[-1]
     again = []
     cr.choose_flow(body, progress=again.append, **options)
     assert "as chosen before" in again[-1]
@@ -185,9 +185,9 @@ def test_a_map_that_has_come_since_reopens_the_choice(tmp_path):
 
 def test_numbers_of_numpy_make_the_same_choice(tmp_path):
     options = {"length": 2.0, "cache": tmp_path}
-    first = cr.choose_flow(sc.Sphere(), rays=10, tolerance=1e-5, **options)
+    first = cr.choose_flow(sc.Sphere(), n_rays=10, tolerance=1e-5, **options)
     assert (
-        cr.choose_flow(sc.Sphere(), rays=np.int64(10), tolerance=np.float64(1e-5), ride_along=np.True_, **options)
+        cr.choose_flow(sc.Sphere(), n_rays=np.int64(10), tolerance=np.float64(1e-5), carry_jacobi=np.True_, **options)
         == first
     )
     assert len(list(tmp_path.glob("*.json"))) == 1
@@ -196,21 +196,21 @@ def test_numbers_of_numpy_make_the_same_choice(tmp_path):
 @pytest.mark.parametrize(
     "options, match",
     [
-        ({"rays": 0}, "rays"),
-        ({"rays": 2.5}, "rays"),
+        ({"n_rays": 0}, "n_rays"),
+        ({"n_rays": 2.5}, "n_rays"),
         ({"length": -1.0}, "length"),
         ({"length": float("nan")}, "length"),
         ({"tolerance": 1e-15}, "tolerance"),
-        ({"outputs": 0}, "outputs"),
+        ({"n_steps": 0}, "n_steps"),
     ],
 )
 def test_bad_numbers_are_named(options, match):
     with pytest.raises(cr.CreepingError, match=match):
-        cr.choose_flow(sc.Sphere(), **({"rays": 10, "length": 2.0, "cache": False} | options))
+        cr.choose_flow(sc.Sphere(), **({"n_rays": 10, "length": 2.0, "cache": False} | options))
 
 
-@pytest.mark.parametrize("options", [{"length": 2.0, "grid": (12, 16), "horizon": 0.5}, {"outputs": 4}])
-def test_length_and_outputs_belong_together(options):
+@pytest.mark.parametrize("options", [{"length": 2.0, "grid": (12, 16), "horizon": 0.5}, {"n_steps": 4}])
+def test_length_and_steps_belong_together(options):
     with pytest.raises(cr.CreepingError, match="length"):
         cr.build_phase_map(sc.Sphere(), cache=False, **options)
 
@@ -222,7 +222,7 @@ def test_direct_flow_refuses_what_it_cannot_do(options):
 
 
 def test_numbers_of_numpy_name_the_same_map(tmp_path):
-    options = {"tolerance": np.float64(1e-4), "outputs": np.int64(2), "cache": tmp_path}
+    options = {"tolerance": np.float64(1e-4), "n_steps": np.int64(2), "cache": tmp_path}
     cr.build_phase_map(sc.Sphere(), length=np.int64(2), **options)
     cr.build_phase_map(sc.Sphere(), length=2.0, **options)
     assert len(list(tmp_path.glob("*/manifest.json"))) == 1

@@ -138,7 +138,7 @@ def test_charts_reach_beyond_their_squares(rng, name):
 
 
 @every
-def test_isometric_frame_is_the_least_rotation(rng, name):
+def test_polar_frame_is_the_least_rotation(rng, name):
     body = covered(name)
     for chart in body.atlas.charts[:3]:
         uv = rng.uniform(-0.3, 1.3, (50, 2))
@@ -192,7 +192,7 @@ def test_check_passes(name):
 
 def test_phase_map_in_space(rng):
     body = covered("ellipsoid")
-    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(16, 24), order=5, method="direct", cache=False)
+    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(16, 24), degree=5, method="direct", cache=False)
     print(f"rms {flow.error.rms:.1e}, max {flow.error.max:.1e}")
     # 1.3e-8 measured
     assert flow.error.rms < 1e-7

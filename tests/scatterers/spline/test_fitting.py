@@ -227,9 +227,9 @@ def test_smoothing_quiets_noise(rng):
 
 
 def test_progress_is_told():
-    told = []
-    fit(*cloud(sc.Sphere(), 300), 0.4, say=told.append)
-    assert told and all("curvatures changing by" in line for line in told)
+    messages = []
+    fit(*cloud(sc.Sphere(), 300), 0.4, progress=messages.append)
+    assert messages and all("curvatures changing by" in line for line in messages)
 
 
 def test_too_many_nodes_are_refused():

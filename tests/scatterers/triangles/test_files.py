@@ -22,9 +22,9 @@ def mesh(vertices=VERTICES, faces=FACES):
 
 
 def read(source, units=None):
-    said = []
-    found = read_mesh(source, units, say=said.append)
-    assert found.repairs == tuple(said)
+    messages = []
+    found = read_mesh(source, units, progress=messages.append)
+    assert found.repairs == tuple(messages)
     return found
 
 

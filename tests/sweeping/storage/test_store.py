@@ -63,7 +63,7 @@ def test_the_same_plan_gives_the_same_bytes(tmp_path):
 
 def test_the_flow_is_kept(tmp_path):
     request = sweep_request("rays", length=1.0, n_rays=4)
-    built = cr.build_phase_map(sc.Torus(), horizon=0.25, grid=(16, 24), order=3, cache=False)
+    built = cr.build_phase_map(sc.Torus(), horizon=0.25, grid=(16, 24), degree=3, cache=False)
     for name, flow in (("map", built), ("direct", cr.DirectFlow(sc.Torus(), 1e-7, 0.5, 0.01))):
         plan = SweepPlan(flow, request, cr.fibonacci_directions(2), 1)
         store = SweepStore.create(tmp_path / name, plan)

@@ -1,4 +1,4 @@
-"""Rays that end on rough ground, their fields, and what the uncertainty of a body does to rays."""
+"""Rays that end on non-smooth regions, their fields, and what the uncertainty of a body does to rays."""
 
 from functools import cache
 
@@ -8,8 +8,8 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project, size
-from creeping.rays.body_uncertainty import body_error
-from creeping.rays.nonsmooth import ROUGH_SPACING
+from creeping.rays.nonsmooth import NON_SMOOTH_SPACING
+from creeping.rays.uncertain_body import body_uncertainty
 
 EXACT = sc.Ellipsoid(1.0, 0.8, 0.6)
 INCIDENCE = (0.3, 0.5, 0.81)
@@ -18,7 +18,7 @@ SPOT, REACH = project(EXACT, np.array([0.3, 0.7, -0.1])), 0.15
 
 
 class Wrapped:
-    """An ellipsoid that says of itself what it does not know: ``rough`` or ``coarser``."""
+    """An ellipsoid that says of itself what it does not know: ``non_smooth`` or ``coarse_fit``."""
 
     def __init__(self, body=EXACT, **members):
         for name in ("level", "gradient", "hessian", "bounds", "atlas", "parameters", "compiled"):
@@ -37,7 +37,7 @@ def fan_of(body, direction=INCIDENCE, n_rays=96):
     return cr.launch(cr.DirectFlow(body), line, length=LENGTH, n_rays=n_rays, n_steps=50, max_gap=np.inf)
 
 
-ROUGH, PLAIN = Wrapped(rough=near), Wrapped()
+NON_SMOOTH, PLAIN = Wrapped(non_smooth=near), Wrapped()
 
 
 @cache
@@ -50,67 +50,68 @@ def entries():
     return np.where(inside.any(axis=1), times[np.argmax(inside, axis=1)], np.inf)
 
 
-def test_rays_end_just_before_rough_ground():
-    fan, met = fan_of(ROUGH), np.isfinite(entries())
+def test_rays_end_just_before_non_smooth_regions():
+    fan, met = fan_of(NON_SMOOTH), np.isfinite(entries())
     assert 4 < met.sum() < len(met) / 2
-    np.testing.assert_array_equal(fan.status == cr.RayStatus.ROUGH, met)
+    np.testing.assert_array_equal(fan.status == cr.RayStatus.NON_SMOOTH, met)
     before = entries()[met] - fan.detachment[met]
     # the look-out's step, and that of the reference
-    step = ROUGH_SPACING * size(EXACT)
+    step = NON_SMOOTH_SPACING * size(EXACT)
     assert np.all(before > -1e-9) and np.all(before < 2 * step + 1e-3)
 
 
 def test_other_rays_and_all_geometry_are_unchanged():
-    rough, plain = fan_of(ROUGH), fan_of(PLAIN)
-    others = rough.status != cr.RayStatus.ROUGH
-    np.testing.assert_array_equal(rough.status[others], plain.status[others])
-    np.testing.assert_array_equal(rough.detachment[others], plain.detachment[others])
+    non_smooth, plain = fan_of(NON_SMOOTH), fan_of(PLAIN)
+    others = non_smooth.status != cr.RayStatus.NON_SMOOTH
+    np.testing.assert_array_equal(non_smooth.status[others], plain.status[others])
+    np.testing.assert_array_equal(non_smooth.detachment[others], plain.detachment[others])
     for name in ("points", "directions", "spreading", "curvature", "attenuation", "eikonal"):
-        np.testing.assert_array_equal(getattr(rough, name), getattr(plain, name))
-    assert f"{int((~others).sum())} ROUGH" in repr(rough)
+        np.testing.assert_array_equal(getattr(non_smooth, name), getattr(plain, name))
+    assert f"{int((~others).sum())} NON_SMOOTH" in repr(non_smooth)
 
 
-def test_rays_launched_on_rough_ground_end_at_once():
+def test_rays_launched_on_non_smooth_regions_end_at_once():
     start = fan_of(PLAIN).points[7, 0]
-    fan = fan_of(Wrapped(rough=lambda x: np.linalg.norm(x - start, axis=-1) < 0.1))
+    fan = fan_of(Wrapped(non_smooth=lambda x: np.linalg.norm(x - start, axis=-1) < 0.1))
     launched = np.linalg.norm(fan.points[:, 0] - start, axis=-1) < 0.1
     assert launched.sum() > 1
-    assert np.all(fan.status[launched] == cr.RayStatus.ROUGH)
+    assert np.all(fan.status[launched] == cr.RayStatus.NON_SMOOTH)
     np.testing.assert_array_equal(fan.detachment[launched], 0)
 
 
 def test_what_comes_first_ends_a_ray():
-    """On the bent body rays detach; a rough place that they come to later is not their end."""
+    """On the bent body rays detach; a non-smooth place that they come to later is not their end."""
     bent = sc.TwistedEllipsoid()
     plain = fan_of(bent, (1, 1, 1))
     detached = np.flatnonzero(plain.status == cr.RayStatus.DETACHED)
     ray = detached[np.argmin(plain.detachment[detached])]
     step = int(np.searchsorted(plain.travel_time, plain.detachment[ray]))
 
-    def rough_about(spot):
+    def non_smooth_about(spot):
         return lambda x: np.linalg.norm(x - spot, axis=-1) < 0.02
 
     late, early = (
-        fan_of(Wrapped(bent, rough=rough_about(plain.points[ray, k])), (1, 1, 1)) for k in (step + 4, step // 2)
+        fan_of(Wrapped(bent, non_smooth=non_smooth_about(plain.points[ray, k])), (1, 1, 1))
+        for k in (step + 4, step // 2)
     )
     assert late.status[ray] == cr.RayStatus.DETACHED
     assert late.detachment[ray] == plain.detachment[ray]
-    assert early.status[ray] == cr.RayStatus.ROUGH
+    assert early.status[ray] == cr.RayStatus.NON_SMOOTH
     assert early.detachment[ray] < plain.detachment[ray]
 
 
-def test_empty_and_smooth_fans_say_nothing_of_rough_ground():
-    smooth = fan_of(Wrapped(rough=lambda x: np.zeros(x.shape[:-1], dtype=bool)))
+def test_empty_and_smooth_fans_say_nothing_of_non_smooth_regions():
+    smooth = fan_of(Wrapped(non_smooth=lambda x: np.zeros(x.shape[:-1], dtype=bool)))
     assert np.all(smooth.status == cr.RayStatus.OK) and np.all(np.isinf(smooth.detachment))
 
 
-def test_fields_of_a_fan_with_rough_rays_are_finite_and_change_behind_it_only():
-    rough, plain = fan_of(ROUGH), fan_of(PLAIN)
+def test_fields_of_a_fan_with_rays_that_end_early_are_finite_and_change_behind_it_only():
+    non_smooth, plain = fan_of(NON_SMOOTH), fan_of(PLAIN)
     n = normal(EXACT, SPOT)
     k = 30.0
     # behind the ball, and where no ray that met it comes
-    met = np.flatnonzero((rough.status == cr.RayStatus.ROUGH) & (rough.detachment < 0.5))
-    behind = rough.points[met[len(met) // 2], 30]
+    met = np.flatnonzero((non_smooth.status == cr.RayStatus.NON_SMOOTH) & (non_smooth.detachment < 0.5))
+    behind = non_smooth.points[met[len(met) // 2], 30]
     away = np.flatnonzero(np.min(np.linalg.norm(plain.points[:, :, None] - SPOT, axis=-1), axis=(1, 2)) > 0.6)
     elsewhere = plain.points[away[len(away) // 2], 10]
     places = np.stack([behind, elsewhere, SPOT])
@@ -118,26 +119,26 @@ def test_fields_of_a_fan_with_rough_rays_are_finite_and_change_behind_it_only():
         lambda fan: cr.surface_field(fan, places, wavenumber=k, boundary="hard"),
         lambda fan: cr.near_field(fan, places + 0.1 * normal(EXACT, places), wavenumber=k, boundary="hard"),
     ):
-        found, expected = field(rough), field(plain)
+        found, expected = field(non_smooth), field(plain)
         assert np.all(np.isfinite(found)) and np.all(np.isfinite(expected))
         assert found[1] == pytest.approx(expected[1], rel=1e-6)
         assert abs(found[0] - expected[0]) > 1e-3 * abs(expected[0])
     far = [
         cr.far_field(fan, np.stack([n, -n, fan.line.direction]), wavenumber=k, boundary="hard")
-        for fan in (rough, plain)
+        for fan in (non_smooth, plain)
     ]
     assert all(np.all(np.isfinite(one.total)) for one in far)
 
 
 # the same body, known to a thousandth
-COARSER = sc.Ellipsoid(1.001, 0.799, 0.6005)
-UNSURE = Wrapped(coarser=COARSER)
+COARSE_FIT = sc.Ellipsoid(1.001, 0.799, 0.6005)
+UNSURE = Wrapped(coarse_fit=COARSE_FIT)
 
 
 def by_hand(fan, ray):
     """End and attenuation of one ray on both bodies."""
     ends, d = [], fan.line.direction
-    for body in (EXACT, COARSER):
+    for body in (EXACT, COARSE_FIT):
         start = project(body, fan.points[ray, 0])
         n = normal(body, start)
         p = d - np.sum(d * n) * n
@@ -152,7 +153,7 @@ def by_hand(fan, ray):
 
 def test_error_is_the_difference_of_rays_traced_by_hand():
     fan = fan_of(UNSURE)
-    found = body_error(fan, rays=5)
+    found = body_uncertainty(fan, n_rays=5)
     chosen = np.unique(np.linspace(0, len(fan.points) - 1, 5).astype(int))
     assert found.rays == len(chosen) == 5
     pairs = [by_hand(fan, ray) for ray in chosen]
@@ -164,36 +165,41 @@ def test_error_is_the_difference_of_rays_traced_by_hand():
 
 def test_spreading_differs_as_that_of_two_fans():
     # launched from the same points: only along its own line does the fan of the other body agree, so to first order
-    ours, theirs = fan_of(UNSURE, n_rays=12), fan_of(COARSER, n_rays=12)
+    ours, theirs = fan_of(UNSURE, n_rays=12), fan_of(COARSE_FIT, n_rays=12)
     difference = np.sqrt(np.mean((ours.spreading[:, -1] - theirs.spreading[:, -1]) ** 2))
-    assert body_error(ours, rays=12).spreading == pytest.approx(difference, rel=0.5)
+    assert body_uncertainty(ours, n_rays=12).spreading == pytest.approx(difference, rel=0.5)
 
 
 def test_error_goes_with_the_difference_of_the_bodies():
     axes, off = np.array([1.0, 0.8, 0.6]), np.array([1e-3, -1e-3, 5e-4])
-    found = [body_error(fan_of(Wrapped(coarser=sc.Ellipsoid(*(axes + f * off)))), rays=12) for f in (1.0, 0.1)]
+    found = [
+        body_uncertainty(fan_of(Wrapped(coarse_fit=sc.Ellipsoid(*(axes + f * off)))), n_rays=12) for f in (1.0, 0.1)
+    ]
     for name in ("points", "spreading", "attenuation"):
         assert getattr(found[0], name) == pytest.approx(10 * getattr(found[1], name), rel=0.02)
     assert 1e-4 < found[0].points < 1e-2
 
 
 def test_the_same_body_has_no_error():
-    found = body_error(fan_of(Wrapped(coarser=EXACT)), rays=6)
+    found = body_uncertainty(fan_of(Wrapped(coarse_fit=EXACT)), n_rays=6)
     assert max(found.points, found.spreading, found.attenuation) < 1e-12
 
 
 def test_bodies_known_exactly_have_none():
-    assert body_error(fan_of(EXACT)) is None
-    assert body_error(fan_of(PLAIN)) is None
+    assert body_uncertainty(fan_of(EXACT)) is None
+    assert body_uncertainty(fan_of(PLAIN)) is None
 
 
 def test_rays_that_end_are_left_out():
-    assert body_error(fan_of(Wrapped(coarser=COARSER, rough=lambda x: np.ones(x.shape[:-1], dtype=bool)))) is None
-    some = fan_of(Wrapped(coarser=COARSER, rough=near))
-    assert body_error(some, rays=1000).rays == np.sum(some.status == cr.RayStatus.OK)
+    assert (
+        body_uncertainty(fan_of(Wrapped(coarse_fit=COARSE_FIT, non_smooth=lambda x: np.ones(x.shape[:-1], dtype=bool))))
+        is None
+    )
+    some = fan_of(Wrapped(coarse_fit=COARSE_FIT, non_smooth=near))
+    assert body_uncertainty(some, n_rays=1000).rays == np.sum(some.status == cr.RayStatus.OK)
 
 
 @pytest.mark.parametrize("rays", [0, -1, 2.5, "4", True, None, np.nan])
 def test_bad_numbers_of_rays(rays):
     with pytest.raises(cr.CreepingError, match=r"rays = .* is not a whole number >= 1"):
-        body_error(fan_of(UNSURE), rays=rays)
+        body_uncertainty(fan_of(UNSURE), n_rays=rays)

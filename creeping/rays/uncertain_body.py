@@ -1,8 +1,8 @@
 """What the uncertainty of a body does to its creeping rays.
 
-A body known from points offers itself ``coarser`` as well (see `creeping.geometry.surface.Surface`). Rays of a fan are
-traced on both, from the same points, projected, and with the same d; they differ by about the error of the coarser
-body. Or the whole incidence is done again on it, shadow line and all (`coarser_fan`), for what follows from a fan.
+A body known from points offers itself ``coarse_fit`` as well (see `creeping.geometry.surface.Surface`). Rays of a fan
+are traced on both, from the same points, projected, and with the same d; they differ by about the error of the coarse
+fit. Or the whole incidence is done again on it, shadow line and all (`coarse_fan`), for what follows from a fan.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ RTOL = 1e-10
 
 
 @dataclass(frozen=True)
-class BodyError:
-    """Differences at the last steps of rays on a body and on its coarser twin.
+class BodyUncertainty:
+    """Differences at the last steps of rays on a body and on its coarser fit.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class BodyError:
     Examples
     --------
     >>> import creeping as cr
-    >>> cr.BodyError(points=1e-6, spreading=1e-5, attenuation=2e-6, rays=16).rays
+    >>> cr.BodyUncertainty(points=1e-6, spreading=1e-5, attenuation=2e-6, rays=16).rays
     16
     """
 
@@ -52,24 +52,24 @@ class BodyError:
     rays: int
 
 
-def body_error(fan: RayFan, *, rays: int = RAYS) -> BodyError | None:
+def body_uncertainty(fan: RayFan, *, n_rays: int = RAYS) -> BodyUncertainty | None:
     """Estimate how far a fan is off because its body is known only approximately.
 
     Parameters
     ----------
     fan : RayFan
-    rays : int
+    n_rays : int
         How many of its rays are traced again.
 
     Returns
     -------
-    BodyError or None
+    BodyUncertainty or None
         None for a body that is known exactly, and if no ray reaches the end.
 
     Raises
     ------
     InvalidInputError
-        If ``rays`` is not a positive whole number.
+        If ``n_rays`` is not a positive whole number.
 
     Examples
     --------
@@ -78,18 +78,18 @@ def body_error(fan: RayFan, *, rays: int = RAYS) -> BodyError | None:
     >>> ball = sc.Sphere()
     >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
     >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=0.5, n_rays=8)
-    >>> cr.body_error(fan) is None                                 # a sphere is known exactly
+    >>> cr.body_uncertainty(fan) is None                                 # a sphere is known exactly
     True
     """
-    if isinstance(rays, bool) or not isinstance(rays, (int, np.integer)) or rays < 1:
-        raise InvalidInputError(f"rays = {rays!r} is not a whole number >= 1")
-    coarser: Any = getattr(fan.body, "coarser", None)
+    if isinstance(n_rays, bool) or not isinstance(n_rays, (int, np.integer)) or n_rays < 1:
+        raise InvalidInputError(f"n_rays = {n_rays!r} is not a whole number >= 1")
+    coarse_fit: Any = getattr(fan.body, "coarse_fit", None)
     good = np.flatnonzero(fan.status == RayStatus.OK)
-    if coarser is None or not len(good):
+    if coarse_fit is None or not len(good):
         return None
-    chosen = good[np.unique(np.linspace(0, len(good) - 1, rays).astype(int))]
+    chosen = good[np.unique(np.linspace(0, len(good) - 1, n_rays).astype(int))]
     starts = fan.points[chosen, 0]
-    ends = [_ends(body, starts, fan) for body in (fan.body, coarser)]
+    ends = [_ends(body, starts, fan) for body in (fan.body, coarse_fit)]
     both = np.isinf(ends[0][:, 5]) & np.isinf(ends[1][:, 5])
     if not both.any():
         return None
@@ -99,20 +99,20 @@ def body_error(fan: RayFan, *, rays: int = RAYS) -> BodyError | None:
     def rms(values: FloatArray) -> float:
         return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
 
-    return BodyError(rms(off[:, :3]), rms(off[:, 3:4]), rms(off[:, 4:5]), int(both.sum()))
+    return BodyUncertainty(rms(off[:, :3]), rms(off[:, 3:4]), rms(off[:, 4:5]), int(both.sum()))
 
 
-def coarser_fan(fan: RayFan) -> RayFan | None:
-    """The same incidence on the coarser body, None for a body that is known exactly.
+def coarse_fan(fan: RayFan) -> RayFan | None:
+    """The same incidence on the coarser fit, None for a body that is known exactly.
 
     As many rays and steps as the fan has, from its own shadow line, by direct integration.
     """
-    coarser: Any = getattr(fan.body, "coarser", None)
-    if coarser is None:
+    coarse_fit: Any = getattr(fan.body, "coarse_fit", None)
+    if coarse_fit is None:
         return None
-    line = shadow_line(coarser, fan.line.direction)
+    line = shadow_line(coarse_fit, fan.line.direction)
     rays, steps = max(len(fan.points), 1), len(fan.travel_time) - 1
-    flow = DirectFlow(coarser, rtol=RTOL)
+    flow = DirectFlow(coarse_fit, rtol=RTOL)
     return launch(flow, line, length=fan.length, n_rays=rays, n_steps=steps, max_gap=float("inf"))
 
 
