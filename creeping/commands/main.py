@@ -162,6 +162,20 @@ def levels_of(fan: Any, step: float, of: str) -> Any:
     return step * np.arange(first, last + 1)
 
 
+def _studies() -> Any:
+    """The package of studies, which lies beside this one in the repository and is not installed."""
+    from importlib import import_module
+
+    from creeping.errors import InvalidInputError
+
+    beside = str(Path(__file__).parents[2])
+    if not (Path(beside) / "studies" / "__init__.py").is_file():
+        raise InvalidInputError("figures are drawn by `studies`, which only the repository has; run this from a clone")
+    if beside not in sys.path:
+        sys.path.append(beside)
+    return import_module("studies")
+
+
 def _carrier(
     flow: str, shape: Any, line: Any, rays: int, length: float, tolerance: float, cache: bool, progress: Any
 ) -> tuple[Any, int]:
@@ -192,7 +206,7 @@ def figure(
     json_: Json = False,
 ) -> int:
     """Draw figures of the paper, each with a sidecar of its parameters, error and seconds."""
-    import studies
+    studies = _studies()
     from creeping.errors import InvalidInputError
 
     if list_:

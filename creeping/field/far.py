@@ -221,14 +221,14 @@ def held_rate(rays: RayPoints, m: FloatArray, passed: BoolArray) -> FloatArray:
 
 
 def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
-    """i √(κ_t1 κ_t2)/(k J'): how much of one polarisation's wave goes with the other's (n,).
+    """i κ_t1 κ_t2/(k J'): how much of one polarisation's wave goes with the other's (n,), without unit.
 
     An amplitude n0.E that varies across the rays has a transverse field of higher order in 1/k; the soft wave is so
     weak that this outweighs it. Found on the sphere, exactly; κ_t at both ends, for reciprocity, on other bodies.
     """
     first, last = rays.transverse
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(1j * np.sqrt(np.maximum(first * last, 0.0)) / (wavenumber * rays.spreading_rate))
+        return np.asarray(1j * np.maximum(first * last, 0.0) / (wavenumber * rays.spreading_rate))
 
 
 class _Parts:

@@ -56,7 +56,8 @@ def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
 
 def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     """Geometry of a fan for directions (..., 3), kept with the fan until other directions are asked for."""
-    r = unit_directions(observation, "observation directions").reshape(-1, 3)
+    empty = np.shape(observation)[-1:] == (3,) and np.size(observation) == 0
+    r = np.zeros((0, 3)) if empty else unit_directions(observation, "observation directions").reshape(-1, 3)
     key = r.tobytes()
     kept = _KEPT.get(fan)
     if kept is None or kept[0] != key:

@@ -21,7 +21,7 @@ PLANE = (6.4, 4.4)  # inches
 
 def line_of(curve: ShadowCurve) -> ShadowLine:
     """Shadow line that consists of one curve, for pictures: how far it is from crossing itself is not known."""
-    return ShadowLine(curve.body, curve.direction, (curve,), np.nan, curve.line_nodes(), curve.fractions)
+    return ShadowLine(curve.body, curve.direction, (curve,), np.nan, curve.line_nodes())
 
 
 def plot_line(

@@ -45,6 +45,8 @@ def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: 
     n, rays = there.shape
     padded = -(-rays // CHUNK) * CHUNK
     some = np.flatnonzero(there.any(axis=1))
+    if not len(some):
+        return np.full((n, rays, len(times), components), np.nan)
     points = launch.points
     if padded > rays or not there.all():
         points = np.empty((len(some), padded, 3))

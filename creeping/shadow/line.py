@@ -152,12 +152,19 @@ class ShadowLine(DrawnOnBody):
     curves: tuple[ShadowCurve, ...]
     singular_distance: float
     nodes: LineNodes
-    fractions: dict[str, float]
 
     @property
     def length(self) -> float:
         """Length of all curves, L."""
         return self.nodes.length
+
+    @property
+    def fractions(self) -> dict[str, float]:
+        """Share of the whole length with each status."""
+        length = sum(curve.length for curve in self.curves) or 1.0
+        return {
+            status: sum(curve.fractions[status] * curve.length for curve in self.curves) / length for status in STATUSES
+        }
 
     def arcs(self, launch_from: str = "attached") -> list[Arc]:
         """Arcs that launch rays: the attached ones, or with "all" each whole curve."""
@@ -236,7 +243,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     for curve, exact_curve in zip(curves, panels, strict=False):
         # the nodes of a line that turns this fast are too far apart to go through
         vars(curve)["panels"] = exact_curve
-    return ShadowLine(body, d, tuple(curves), distance, nodes, dict(zip(STATUSES, found.shares.tolist(), strict=True)))
+    return ShadowLine(body, d, tuple(curves), distance, nodes)
 
 
 def interpolated(nodes: FloatArray, places: FloatArray) -> FloatArray:

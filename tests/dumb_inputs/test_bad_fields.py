@@ -82,7 +82,7 @@ def test_points_that_are_no_numbers_are_named(fan, name, at):
 
 
 def test_a_direction_of_no_length_is_counted(fan):
-    with pytest.raises(cr.CreepingError, match="1 of 2 observation directions are zero"):
+    with pytest.raises(cr.CreepingError, match="1 of 2 observation directions is zero"):
         cr.far_field(fan, [[0.0, 0, 1], [0.0, 0, 0]], wavenumber=10.0)
 
 
@@ -125,7 +125,7 @@ def no_rays():
     """A fan none of whose arcs has a ray."""
     fan = launched()
     arrays = ("points", "directions", "eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
-    rows = (*arrays, "status", "detachment", "curve_index", "arc_index", "arclength")
+    rows = (*arrays, "status", "detachment", "curve_index", "arc_index", "arclength", "spacing")
     values = {name: getattr(fan, name) for name in fan.__dataclass_fields__}
     values |= {name: values[name][:0] for name in rows} | {"closed_arcs": ()}
     return cr.RayFan(**values)

@@ -10,6 +10,7 @@ from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
+from creeping.shadow.nodes import finished
 from creeping.shadow.status import NO_RAY, OK, SINGULAR
 from creeping.sweeping.request import SweepRequest
 
@@ -55,7 +56,8 @@ class PlainSweeper:
         out["curves"][row] = len(line.curves)
         out["line_length"][row] = line.length
         out["line_error"][row] = line.nodes.error
-        for name, share in line.fractions.items():
+        shares = finished(line.body, line.direction, line.nodes, 0).shares
+        for name, share in zip(line.fractions, shares, strict=True):
             out[name][row] = share
         out["singular_distance"][row] = line.singular_distance
 

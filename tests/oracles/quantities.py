@@ -25,7 +25,7 @@ def ray_points(fan):
     lanes[..., 8] = np.unwrap(np.arctan2(-scale * lanes[..., 7], lanes[..., 6]), axis=1)
     if len(states):
         _along(fan, states, step, lanes)
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.ROUGH))
+    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
     alive = launched[:, None] & (times < fan.detachment[:, None])
     return times, RayPoints(lanes, _starts(fan, lanes), np.broadcast_to(times, alive.shape), alive, scale)
 

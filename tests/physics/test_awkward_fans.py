@@ -10,7 +10,7 @@ DIRECTIONS = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 1], [0.3, 0.5, 0.812], [-1
 FANS = {
     "open arcs": {"n_rays": 64},
     "arcs of one ray": {"n_rays": 3, "max_gap": np.inf},
-    "every point launches": {"n_rays": 48, "status": "all"},
+    "every point launches": {"n_rays": 48, "launch_from": "all"},
     "five steps": {"n_rays": 40, "n_steps": 5},
 }
 

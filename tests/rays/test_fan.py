@@ -29,11 +29,19 @@ def across_difference(fan, shift):
 
 
 @pytest.mark.parametrize("direction", [INCIDENCE, (1, 1, 1)])
-def test_spreading_is_the_distance_of_neighbouring_rays(body, direction, phase_map):
-    fan = cr.launch(phase_map(body), cr.shadow_line(body, direction), length=1.5, n_rays=24, n_steps=16, max_gap=np.inf)
+def test_spreading_is_the_distance_of_neighbouring_rays(body, direction):
+    # not by a map: which one is built from a tolerance depends on a stopwatch, and its J errs by more than (x, p)
+    fan = cr.launch(
+        cr.DirectFlow(body, rtol=1e-11),
+        cr.shadow_line(body, direction),
+        length=1.5,
+        n_rays=24,
+        n_steps=16,
+        max_gap=np.inf,
+    )
     expected = across_difference(fan, 1e-4)
     # next to a caustic a relative error means nothing
-    before_caustic = (fan.caustic_index == 0) & (np.abs(fan.spreading) > 0.1)
+    before_caustic = (fan.caustic_index == 0) & (np.abs(fan.spreading) > 0.05)
     error = np.abs(fan.spreading - expected)[before_caustic] / np.abs(expected[before_caustic])
     assert before_caustic.sum() > 100
     assert error.max() < SPREADING

@@ -25,7 +25,7 @@ def test_lines_agree_with_both_references():
 
 def test_a_line_that_differs_is_counted():
     directions = fibonacci_directions(6)
-    lines = sweep_lines.on_meshes(sweep_lines.BODIES["ellipsoid"], directions, (0, 0, 0))
+    lines = sweep_lines.on_mesh(sweep_lines.BODIES["ellipsoid"], directions, 0)
     assert not np.any(lines.status == FOLLOWED)
     other = lines._replace(curves=lines.curves + 1, length=lines.length * 1.01)
     found = sweep_lines.differences(lines, other)

@@ -90,7 +90,7 @@ def test_kill_9_of_the_driver(tmp_path, monkeypatch, workers, after, seconds):
 def test_kill_9_while_the_store_is_made_leaves_none(tmp_path):
     folder = tmp_path / "s.zarr"
     code = (
-        "import os, signal, fake_sweeps; from creeping.sweeping import store;"
+        "import os, signal, fake_sweeps; from creeping.sweeping.storage import store;"
         "store.save_flow = lambda *_: os.kill(os.getpid(), signal.SIGKILL);"
         f"fake_sweeps.drive({str(folder)!r}, 60, 3, 0)"
     )
