@@ -56,8 +56,7 @@ def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
 
 def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     """Geometry of a fan for directions (..., 3), kept with the fan until other directions are asked for."""
-    empty = np.shape(observation)[-1:] == (3,) and np.size(observation) == 0
-    r = np.zeros((0, 3)) if empty else unit_directions(observation, "observation directions").reshape(-1, 3)
+    r = _observers(observation)
     key = r.tobytes()
     kept = _KEPT.get(fan)
     if kept is None or kept[0] != key:
@@ -67,6 +66,17 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
         geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], lambda _: (line, make()))
         _KEPT[fan] = kept = (key, geometry)
     return kept[1]
+
+
+def _observers(observation: ArrayLike) -> FloatArray:
+    """Unit directions of a caller's observers (m, 3), of which there may be none."""
+    try:
+        if np.asarray(observation, dtype=float).shape == (0, 3):
+            return np.zeros((0, 3))
+    except (TypeError, ValueError):
+        # what it is not is said below
+        pass
+    return unit_directions(observation, "observation directions").reshape(-1, 3)
 
 
 def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":
@@ -226,6 +236,9 @@ class FarGeometry:
         which = which[found]
         arc = launch.arc_index
         same = arc[which] == arc[which, ray][:, None]
+        if not len(which):
+            # of no rays at all there is no first one
+            same = np.zeros((0, 1), dtype=bool)
         first, last = np.argmax(same, axis=1), same.shape[1] - 1 - np.argmax(same[:, ::-1], axis=1)
         place = ray + across + moved
         inside = (launch.closed[which, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+from scipy.optimize.elementwise import find_root
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.surface import Surface, normal, size
@@ -116,13 +117,8 @@ def line_crossings(strip: Strip, r: FloatArray) -> list[tuple[float, float, bool
 
     values = height(sigma)
     changes = np.flatnonzero(values[:-1] * values[1:] < 0)
-    left, right = sigma[changes], sigma[changes + 1]
     negative = values[changes] < 0
-    for _ in range(45):
-        middle = 0.5 * (left + right)
-        same = (height(middle) < 0) == negative
-        left, right = np.where(same, middle, left), np.where(same, right, middle)
-    cuts = 0.5 * (left + right)
+    cuts = find_root(height, (sigma[changes], sigma[changes + 1])).x if len(changes) else np.zeros(0)
     if not len(cuts):
         return [(low, high, bool(values[0] < 0))]
     if strip.closed:

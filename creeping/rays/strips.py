@@ -67,8 +67,12 @@ class Strip:
         return np.clip(np.searchsorted(self.positions, self.wrap(sigma), side="right") - 1, 0, len(self.positions) - 1)
 
     def coarse_normals(self, body: Surface) -> FloatArray:
-        """N at the coarse steps of the rays: (rays, coarse steps, 3)."""
-        return normal(body, self.rays.points[:, self.coarse_steps])
+        """n at the coarse steps of the rays, found once: (rays, coarse steps, 3)."""
+        known = vars(self)
+        if "coarse normals" not in known:
+            known["coarse normals"] = normal(body, self.rays.points[:, self.coarse_steps])
+        found: FloatArray = known["coarse normals"]
+        return found
 
     @property
     def coarse_steps(self) -> IntArray:
