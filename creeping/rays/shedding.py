@@ -1,10 +1,9 @@
-"""Which creeping rays are shed towards an observer: all of them, far away, off the body, or on it.
+"""Which creeping rays are shed towards an observer: all of them, off the body or on it.
 
-    far away, direction r     p(σ, s) = r
     at y off the body         x(σ, s) + l p(σ, s) = y,  l > 0
     at y on the body          x(σ, s) = y
 
-In each case two functions on the strip vanish together, n.v and b.v with v = r or y - x (on the body: y - x along two
+In each case two functions on the strip vanish together, n.v and b.v with v = y - x (on the body: y - x along two
 tangents at y). Cells in which both change sign start Newton's method on the strip's splines.
 
 Sources: Derivations, R12.
@@ -44,7 +43,7 @@ class ShedRays:
     rays : RayPoints
         (n,) Where the rays leave the body, or are on it.
     reach : (n,), L
-        l from there to the observer: inf far away, 0 on the body.
+        l from there to the observer: 0 on the body.
     """
 
     observer: IntArray
@@ -52,22 +51,6 @@ class ShedRays:
     sigma: FloatArray
     rays: RayPoints
     reach: FloatArray
-
-
-def shed_far(strips: tuple[Strip, ...], body: Surface, directions: FloatArray) -> ShedRays:
-    """Rays shed in the unit directions r (m, 3)."""
-
-    def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
-        return some @ n, some @ b, lambda row, at: np.sum(some[row] * p[:, at].T, axis=1) > 0
-
-    def step(at: RayPoints, slopes: tuple[FloatArray, FloatArray], target: FloatArray) -> tuple[FloatArray, FloatArray]:
-        residual = target - at.directions
-        # splines keep p of unit length to their own error only
-        residual = residual - np.sum(residual * target, axis=-1, keepdims=True) * target
-        return np.stack([slopes[0][:, 3:], slopes[1][:, 3:]], axis=-1), residual
-
-    found = _search(strips, body, directions, functions, step)
-    return ShedRays(*found, np.full(len(found[0]), np.inf))
 
 
 def shed_near(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> ShedRays:

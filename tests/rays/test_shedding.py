@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from oracles.shedding import shed_far
 from tolerances import SHED
 
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import project
-from creeping.rays.shedding import shed_far, shed_near, shed_on
+from creeping.rays.shedding import shed_near, shed_on
 from creeping.rays.strips import strips_of
 
 D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
