@@ -1,5 +1,10 @@
 """Bodies and phase maps shared by the tests; no test touches the user's cache."""
 
+import os
+
+# the processes of pytest-xdist share the cores; threads for small matrices would only take them from each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from results_to_show import (  # noqa: F401

@@ -57,7 +57,7 @@ class FarField(Drawn):
     unresolved : (m,) of bool
         Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
         fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
-        forward lobe with no mid-horizon (a concave region) or with a rim that the body hides in part.
+        forward lobe with no bisector contour (a concave region) or with a rim that the body hides in part.
     wavenumber : float, 1/L
     boundary : str
     order : int

@@ -19,9 +19,9 @@ Sources: [YC06b], [C76], [G05]; Derivations, R1 to R4.
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geometry.curvature import gaussian_curvature, principal_curvature_bound
+from creeping.geometry.curvature import principal_curvature_bound
 from creeping.geometry.kept import kept
-from creeping.geometry.speed import speed_hessian, speed_of, speed_values
+from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface
 
 
@@ -44,22 +44,6 @@ def natural_horizon(body: Surface) -> float:
 def sharpest_curvature(body: Surface) -> float:
     """Largest |kappa_1| or |kappa_2| over points all over a body, 1/L."""
     return kept(body, "sharpest curvature", lambda: principal_curvature_bound(body, points_of_charts(body)))
-
-
-def metric_curvature(body: Surface, points: FloatArray) -> FloatArray:
-    """Curvature G of the metric ds/c, 1/time^2; the Gaussian K without a weight: (..., 3) -> (...)."""
-    gauss = gaussian_curvature(body, points)
-    speed = speed_of(body)
-    if speed is None:
-        return gauss
-    g, h = body.gradient(points), body.hessian(points)
-    norm = np.linalg.norm(g, axis=-1)
-    n = g / norm[..., None]
-    c, dc, ddc = speed.value(points), speed.gradient(points), speed_hessian(body, points)
-    along_n = np.sum(n * dc, axis=-1)
-    mean = (np.trace(h, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, h, n)) / norm
-    laplacian = np.trace(ddc, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, ddc, n) - mean * along_n
-    return np.asarray(c**2 * gauss + c * laplacian - (np.sum(dc * dc, axis=-1) - along_n**2))
 
 
 def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -160,13 +160,24 @@ def project(body: Surface, points: FloatArray, *, iterations: int = 8) -> FloatA
     points = np.array(points, dtype=float)
     close = 1e-15 * size(body)
     for _ in range(iterations):
-        gradient = body.gradient(points)
-        step = body.level(points) / np.sum(gradient * gradient, axis=-1)
-        moving = ~(np.abs(step) * np.linalg.norm(gradient, axis=-1) <= close)
+        step, distance = step_onto(body.level(points), body.gradient(points))
+        moving = ~(np.abs(distance) <= close)
         if not np.any(moving):
             break
-        points -= np.where(moving, step, 0.0)[..., None] * gradient
+        points += np.where(moving[..., None], step, 0.0)
     return points
+
+
+def step_onto(level: FloatArray, gradient: FloatArray, reach: float = np.inf) -> tuple[FloatArray, FloatArray]:
+    """Newton step onto F = 0 along grad F, at most ``reach``, L, and the distance F/|grad F|: (..., 3), (...).
+
+    Where grad F = 0 neither is finite.
+    """
+    norm = np.linalg.norm(gradient, axis=-1)
+    with np.errstate(all="ignore"):
+        distance = level / norm
+        step = -np.clip(distance, -reach, reach) / norm
+    return step[..., None] * gradient, distance
 
 
 def fingerprint(body: Surface) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
+from creeping.geometry.surface import step_onto
 
 MAX_POINTS = 12_000_000
 """Grid points of the finest triangulation."""
@@ -93,6 +94,18 @@ def triangulate(
     >>> mesh.euler_characteristic, mesh.components
     (0, 1)
     """
+    vertices, tiles = quadrilaterals(level, gradient, bounds, cells=cells)
+    return Triangulation(vertices, np.concatenate([tiles[:, [0, 1, 2]], tiles[:, [0, 2, 3]]]))
+
+
+def quadrilaterals(
+    level: Callable[[FloatArray], FloatArray],
+    gradient: Callable[[FloatArray], FloatArray],
+    bounds: FloatArray,
+    *,
+    cells: int = 48,
+) -> tuple[FloatArray, IntArray]:
+    """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there."""
     box = np.asarray(bounds, dtype=float)
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
         raise SurfaceError(f"bounds {box.tolist()} are not two corners of a box; give [[xmin, ...], [xmax, ...]]")
@@ -100,8 +113,8 @@ def triangulate(
         axes = _grid_axes(box, cells)
         values = _grid_values(level, axes)
         vertices, number = _cell_vertices(values, values < 0, axes)
-        triangles = _quadrilaterals(values < 0, number)
-        if _closed(triangles):
+        tiles = _around_edges(values < 0, number)
+        if _closed(tiles):
             break
         finer = cells + cells // 2
         if np.prod([len(axis) for axis in _grid_axes(box, finer)]) > MAX_POINTS:
@@ -110,7 +123,7 @@ def triangulate(
             )
         cells = finer
     reach = max(float(axis[1] - axis[0]) for axis in axes)
-    return Triangulation(_onto_surface(level, gradient, vertices, reach), triangles)
+    return _onto_surface(level, gradient, vertices, reach), tiles
 
 
 def _grid_axes(box: FloatArray, cells: int) -> list[FloatArray]:
@@ -175,9 +188,9 @@ def _cell_vertices(values: FloatArray, inside: BoolArray, axes: list[FloatArray]
     return origin + (cell + offset) * spacing, number
 
 
-def _quadrilaterals(inside: BoolArray, number: IntArray) -> IntArray:
-    """Two triangles around each grid edge whose ends differ in sign, seen counter-clockwise from outside."""
-    triangles = []
+def _around_edges(inside: BoolArray, number: IntArray) -> IntArray:
+    """Quadrilateral around each grid edge whose ends differ in sign, seen counter-clockwise from outside (m, 4)."""
+    tiles = []
     for axis in range(3):
         b, c = (axis + 1) % 3, (axis + 2) % 3
         start = [slice(1, -1)] * 3
@@ -195,16 +208,14 @@ def _quadrilaterals(inside: BoolArray, number: IntArray) -> IntArray:
                 cell[:, c] += shift_c
                 corners.append(number[tuple(cell.T)])
             quad = np.stack(corners, axis=1)
-            if not outward:
-                quad = quad[:, ::-1]
-            triangles += [quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]]
-    return np.concatenate(triangles)
+            tiles.append(quad if outward else quad[:, ::-1])
+    return np.concatenate(tiles)
 
 
-def _closed(triangles: IntArray) -> bool:
+def _closed(tiles: IntArray) -> bool:
     """Whether every directed edge occurs once and its reverse once."""
-    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    code = edges.min(axis=1) * (triangles.max() + 1) + edges.max(axis=1)
+    edges = np.stack([tiles, np.roll(tiles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    code = edges.min(axis=1) * (tiles.max() + 1) + edges.max(axis=1)
     forward = edges[:, 0] < edges[:, 1]
     keys, counts = np.unique(code[forward], return_counts=True)
     reverse_keys, reverse_counts = np.unique(code[~forward], return_counts=True)
@@ -221,12 +232,8 @@ def _onto_surface(
     points = vertices.copy()
     distance = np.full(len(points), np.inf)
     for _ in range(20):
-        slope = gradient(points)
-        norm = np.linalg.norm(slope, axis=-1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = level(points) / norm
-            step = np.clip(distance, -reach, reach) / norm
-        points = points - step[:, None] * slope
+        step, distance = step_onto(level(points), gradient(points), reach)
+        points = points + step
         if not np.all(np.isfinite(points)):
             break
         if np.max(np.abs(distance)) < 1e-14 * max(1.0, float(np.abs(points).max())):

@@ -1,7 +1,7 @@
 """Where creeping rays cross the horizon n.r = 0 of a distant observer: nodes of the integrals over the shadow line.
 
 On a ray, (n.r)' = κₙ p.r + τ b.r. A fan integral takes every crossing with p.r > 0; the shadow half of the forward
-integral takes the first one of each ray that starts with n.r < 0. Its lit half runs over the mid-horizon
+integral takes the first one of each ray that starts with n.r < 0. Its lit half runs over the bisector contour
 n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to both d and r.
 
 Sources: Derivations, R12, F10 and F11.
@@ -42,7 +42,7 @@ class HorizonRays:
 
 @dataclass(frozen=True, eq=False)
 class MidHorizon:
-    """Nodes on the mid-horizon.
+    """Nodes on the bisector contour n.(d + r) = 0.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ def forward_nodes(
 
 
 class _MidSeeds(NamedTuple):
-    """Nodes of the mid-horizon: observer (n,), points (n, 3), weight (n,)."""
+    """Nodes of the bisector contour: observer (n,), points (n, 3), weight (n,)."""
 
     observer: IntArray
     points: FloatArray
@@ -206,7 +206,7 @@ def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArra
 def _mid_horizon(
     strip: Strip, line: ShadowLine, sigma: FloatArray, r: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Points (n, 3) of the mid-horizon beside the rays σ, d(arclength across q)/dσ, and whether they were found.
+    """Points (n, 3) of the bisector contour beside the rays σ, d(arclength across q)/dσ, and whether they were found.
 
     Each is sought from the launch point in the plane of n0 and d: F = 0, n.q = 0, (x - x0).b0 = 0.
     """

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import Compiled
+from scatterers.spline.cloud import step_onto
 from scatterers.spline.tensor import SYMMETRIC, evaluated
 
 FloatArray = NDArray[np.float64]
@@ -96,10 +97,8 @@ def _onto(compiled: Compiled, points: FloatArray, reach: float, steps: int) -> F
     """Newton steps along grad F, none longer than ``reach``."""
     for _ in range(steps):
         value, gradient, _ = evaluated(compiled, points)
-        slope = np.linalg.norm(gradient, axis=-1)
-        with np.errstate(all="ignore"):
-            step = (np.clip(value / slope, -reach, reach) / slope)[..., None] * gradient
-        points = points - np.where(np.isfinite(step), step, 0.0)
+        step, _ = step_onto(value, gradient, reach)
+        points = points + np.where(np.isfinite(step), step, 0.0)
     return points
 
 

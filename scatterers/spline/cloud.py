@@ -86,11 +86,8 @@ def onto(level: Field, gradient: Field, points: FloatArray, reach: float) -> Flo
     active = np.arange(len(points))
     for _ in range(NEWTON):
         x = points[active]
-        slope = gradient(x)
-        norm = np.linalg.norm(slope, axis=-1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = level(x) / norm
-            points[active] = x - (np.clip(distance, -reach, reach) / norm)[:, None] * slope
+        step, distance = step_onto(level(x), gradient(x), reach)
+        points[active] = x + step
         active = active[~(np.abs(distance) < SMALL * reach)]
         if not len(active):
             return points
@@ -98,3 +95,15 @@ def onto(level: Field, gradient: Field, points: FloatArray, reach: float) -> Flo
         f"{len(active)} of {len(points)} points found no zero of F (first near {points[active[0]].round(4).tolist()}); "
         "F must be smooth with grad F != 0 on the body"
     )
+
+
+def step_onto(level: FloatArray, gradient: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
+    """Newton step onto F = 0 along grad F, at most ``reach``, L, and the distance F/|grad F|: (..., 3), (...).
+
+    Where grad F = 0 neither is finite.
+    """
+    norm = np.linalg.norm(gradient, axis=-1)
+    with np.errstate(all="ignore"):
+        distance = level / norm
+        step = -np.clip(distance, -reach, reach) / norm
+    return step[..., None] * gradient, distance

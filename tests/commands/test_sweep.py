@@ -91,6 +91,7 @@ def test_damage_is_renewed_by_verify(sweep, tmp_path):
 ARRAYS = ("points/c/2/0/0/0", "attenuation/c/0/0/0")
 
 
+@pytest.mark.slow
 def test_workers_give_the_same(sweep, tmp_path):
     sweep()
     for count in (1, 2):

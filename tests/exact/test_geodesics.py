@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from oracles.tracer import metric_curvature
 from tolerances import INVARIANT, TRACE
 
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.equations import metric_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.curvature import gaussian_curvature

@@ -145,6 +145,7 @@ def test_nothing_is_shared_with_the_world(page, monkeypatch):
     assert page.server.request_share_url() is None and asked == []
 
 
+@pytest.mark.slow
 def test_a_refined_view_is_not_drawn_over_a_newer_frame(page, monkeypatch):
     from creeping.explorer import page as module
 

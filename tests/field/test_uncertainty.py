@@ -76,6 +76,7 @@ class Triangles:
         self.vertices, self.faces = vertices, faces
 
 
+@pytest.mark.slow
 def test_the_field_of_a_mesh_agrees_within_its_uncertainty():
     exact, vertices, faces = on_body("ellipsoid", 2000)
     mesh = sc.Mesh(Triangles(vertices, faces), cache=False)

@@ -3,10 +3,26 @@
 import numpy as np
 
 from creeping.geodesics.bundle import project_bundle
-from creeping.geodesics.equations import metric_curvature, vector_field
+from creeping.geodesics.equations import vector_field
 from creeping.geodesics.integrator import MAX_STEPS, error_scale
-from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.speed import speed_values
+from creeping.geometry.curvature import gaussian_curvature, normal_curvature
+from creeping.geometry.speed import speed_hessian, speed_of, speed_values
+
+
+def metric_curvature(body, points):
+    """Curvature G of the metric ds/c, 1/time^2; the Gaussian K without a weight: (..., 3) -> (...)."""
+    gauss = gaussian_curvature(body, points)
+    speed = speed_of(body)
+    if speed is None:
+        return gauss
+    g, h = body.gradient(points), body.hessian(points)
+    norm = np.linalg.norm(g, axis=-1)
+    n = g / norm[..., None]
+    c, dc, ddc = speed.value(points), speed.gradient(points), speed_hessian(body, points)
+    along_n = np.sum(n * dc, axis=-1)
+    mean = (np.trace(h, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, h, n)) / norm
+    laplacian = np.trace(ddc, axis1=-2, axis2=-1) - np.einsum("...i,...ij,...j->...", n, ddc, n) - mean * along_n
+    return c**2 * gauss + c * laplacian - (np.sum(dc * dc, axis=-1) - along_n**2)
 
 
 def derivative(body, states):

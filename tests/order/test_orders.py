@@ -22,7 +22,7 @@ def error_of(body, **options):
     return measure(flow, samples=5000, rng=np.random.default_rng(1)).rms
 
 
-@pytest.mark.parametrize("order, nodes", [(3, (48, 64, 96)), (5, (56, 72, 92))])
+@pytest.mark.parametrize("order, nodes", [pytest.param(3, (48, 64, 96), marks=pytest.mark.slow), (5, (56, 72, 92))])
 def test_spline_order(order, nodes):
     # the doubly periodic torus: h is 1/nodes without margins
     body = sc.Torus()
@@ -31,7 +31,7 @@ def test_spline_order(order, nodes):
     assert slope(1 / np.array(nodes), errors) == pytest.approx(order + 1, abs=ORDER)
 
 
-@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("degree", [3, pytest.param(5, marks=pytest.mark.slow)])
 def test_spline_order_on_six_charts(degree):
     # not the sphere: its displacement is the same rotation everywhere
     body = sc.Ellipsoid(1.2, 0.8, 0.8)

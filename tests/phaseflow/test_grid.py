@@ -79,6 +79,7 @@ def test_thinned_and_refined_grids_keep_the_margin(factor):
     assert _scaled(Plan(0.5, grid_of(20)), 0.5).grid.cells[0] < 12
 
 
+@pytest.mark.slow
 def test_tuned_maps_keep_the_margin():
     # a loose tolerance alone would ask for fewer cells
     body, plain = Reaching(0.25), cr.build_phase_map(SPHERE, tolerance=1e-2, cache=False)

@@ -153,6 +153,7 @@ def test_any_time_between_the_maps(method, rng):
     assert rms(got[1], exact[1]) < 2e-6
 
 
+@pytest.mark.slow
 def test_body_without_compiled_parts_gives_the_same_map(rng):
     compiled = sc.Ellipsoid(1.0, 0.8, 0.6)
 

@@ -197,7 +197,9 @@ def test_parameters_of_other_bodies_are_angles_too(name):
     assert np.all((theta >= 0) & (theta <= np.pi) & (phi > -np.pi) & (phi <= np.pi))
 
 
-@pytest.mark.parametrize("name, scale", [("ellipsoid", 1e-2), ("ellipsoid", 1e2), ("torus", 1e-2)])
+@pytest.mark.parametrize(
+    "name, scale", [("ellipsoid", 1e-2), ("ellipsoid", 1e2), pytest.param("torus", 1e-2, marks=pytest.mark.slow)]
+)
 def test_scale_changes_nothing_but_lengths(name, scale):
     text = TEXTS[name].replace("x", f"(x/{scale!r})").replace("y", f"(y/{scale!r})").replace("z", f"(z/{scale!r})")
     body, unit = Implicit(text), body_of(name)
@@ -210,7 +212,9 @@ def test_scale_changes_nothing_but_lengths(name, scale):
     np.testing.assert_allclose(lengths[0], np.multiply(scale, lengths[1]), rtol=1e-8)
 
 
-@pytest.mark.parametrize("name, given", [("ellipsoid", True), ("ellipsoid", False), ("torus", True)])
+@pytest.mark.parametrize(
+    "name, given", [("ellipsoid", True), ("ellipsoid", False), pytest.param("torus", True, marks=pytest.mark.slow)]
+)
 def test_off_the_origin(name, given):
     centre = np.array([3.0, -2.0, 1.5])
     shifted = "".join(dict(zip("xyz", ("(x-3)", "(y+2)", "(z-1.5)"), strict=True)).get(c, c) for c in TEXTS[name])

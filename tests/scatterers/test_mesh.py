@@ -111,7 +111,12 @@ def errors(name, n, kind="even"):
 
 
 def sizes(*counts):
-    return [pytest.param(name, n, marks=pytest.mark.slow if n > 4000 else ()) for n in counts for name in NAMES]
+    fast = [(NAMES[0], n) for n in counts if n <= 4000]
+    return [
+        pytest.param(*case, marks=() if case in fast else pytest.mark.slow)
+        for n in counts
+        for case in [(name, n) for name in NAMES]
+    ]
 
 
 @pytest.mark.parametrize("name, n", sizes(2000, 10000))
@@ -145,7 +150,7 @@ def test_slivers_are_as_good(name):
     assert np.all(np.array(errors(name, 2000, "slivers")) < LIMITS[name, 2000])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [NAMES[0], *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES[1:])])
 def test_noise_is_met_and_told(name):
     mesh, clean = opened(name, 2000, "noisy"), opened(name, 2000)
     assert mesh.quality.verdict in ("smooth", "noisy")
@@ -223,7 +228,14 @@ def test_the_users_cache_is_used_unless_told_otherwise(tmp_path, monkeypatch):
     assert (tmp_path / "fits" / f"{body._identity()}.npz").is_file()
 
 
-@pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b[:-9] + b"nonsense!", lambda b: b""])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda b: b[: len(b) // 2],
+        pytest.param(lambda b: b[:-9] + b"nonsense!", marks=pytest.mark.slow),
+        pytest.param(lambda b: b"", marks=pytest.mark.slow),
+    ],
+)
 def test_a_damaged_fit_is_made_again(tmp_path, damage):
     open_in(tmp_path)
     (file,), messages = tmp_path.iterdir(), []

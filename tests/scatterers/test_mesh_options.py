@@ -36,6 +36,7 @@ def test_badness_comes_back_from_the_cache(tmp_path):
     np.testing.assert_array_equal(made[1].quality.badness, made[0].quality.badness)
 
 
+@pytest.mark.slow
 def test_fine_meshes_are_fitted_on_the_grid_that_suffices(monkeypatch):
     points, triangles = geodesic_sphere(4000)
     monkeypatch.setattr("scatterers.mesh.GRID", 20_000)

@@ -281,6 +281,7 @@ def assert_shows(folder, name):
     assert f'href="{name}.html"' in index and f"_images/{name}" in index
 
 
+@pytest.mark.slow
 def test_site_of_one_figure(tmp_path):
     built(tmp_path / "site", CHEAP)
     assert_shows(tmp_path / "site", CHEAP)

@@ -11,6 +11,7 @@ from numba import njit
 from creeping.geodesics.hermite import NEAREST
 from creeping.geodesics.kernels.integrator import right_hand_side, two_thirds
 from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.curvature import second_form
 
 SAMPLES = 23
 """Rows of work space of `extend`: twelve Gauss points, both ends, the least of them, eight Chebyshev times."""
@@ -257,8 +258,8 @@ def _curvature(y, geometry, weight, weighted, out):
     for i in range(BLOCK):
         px, py, pz = yf[3 * BLOCK + i], yf[4 * BLOCK + i], yf[5 * BLOCK + i]
         gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
-        bent = px * px * g[4 * BLOCK + i] + py * py * g[5 * BLOCK + i] + pz * pz * g[6 * BLOCK + i]
-        bent += 2 * (py * pz * g[7 * BLOCK + i] + px * pz * g[8 * BLOCK + i] + px * py * g[9 * BLOCK + i])
+        xx, yy, zz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i]
+        bent = second_form(px, py, pz, xx, yy, zz, g[7 * BLOCK + i], g[8 * BLOCK + i], g[9 * BLOCK + i])
         out[i] = bent / ((px * px + py * py + pz * pz) * math.sqrt(gx * gx + gy * gy + gz * gz))
     if weighted:
         for i in range(BLOCK):

@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.curvature import adjugate_form, second_form
 from creeping.kernels.weighted_sum import combination
 
 _sum_2, _sum_4, _sum_6, _sum_8, _sum_10 = (combination(n) for n in (2, 4, 6, 8, 10))
@@ -49,8 +50,8 @@ def right_hand_side(level, level_par, speed, speed_par, weighted, y, k, geometry
     for i in range(BLOCK):
         px, py, pz = yf[3 * BLOCK + i], yf[4 * BLOCK + i], yf[5 * BLOCK + i]
         gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
-        bent = px * px * g[4 * BLOCK + i] + py * py * g[5 * BLOCK + i] + pz * pz * g[6 * BLOCK + i]
-        bent += 2 * (py * pz * g[7 * BLOCK + i] + px * pz * g[8 * BLOCK + i] + px * py * g[9 * BLOCK + i])
+        xx, yy, zz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i]
+        bent = second_form(px, py, pz, xx, yy, zz, g[7 * BLOCK + i], g[8 * BLOCK + i], g[9 * BLOCK + i])
         turn = -bent / (gx * gx + gy * gy + gz * gz)
         kf[i], kf[BLOCK + i], kf[2 * BLOCK + i] = px, py, pz
         kf[3 * BLOCK + i], kf[4 * BLOCK + i], kf[5 * BLOCK + i] = turn * gx, turn * gy, turn * gz
@@ -76,12 +77,8 @@ def _gaussian_curvature(g, kf):
         gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
         xx, yy, zz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i]
         yz, xz, xy = g[7 * BLOCK + i], g[8 * BLOCK + i], g[9 * BLOCK + i]
-        total = gx * gx * (yy * zz - yz * yz) + gy * gy * (xx * zz - xz * xz) + gz * gz * (xx * yy - xy * xy)
-        total += 2 * gy * gz * (xy * xz - xx * yz)
-        total += 2 * gx * gz * (xy * yz - yy * xz)
-        total += 2 * gx * gy * (xz * yz - zz * xy)
         square = gx * gx + gy * gy + gz * gz
-        kf[7 * BLOCK + i] = total / (square * square)
+        kf[7 * BLOCK + i] = adjugate_form(gx, gy, gz, xx, yy, zz, yz, xz, xy) / (square * square)
 
 
 @njit(**options)
@@ -138,10 +135,8 @@ def _add_weight(speed, speed_par, y, k, geometry, weight):
         if lanes > 6:
             h, s = hess[:, i], ddc[:, i]
             trace_h, trace_s = h[0] + h[1] + h[2], s[0] + s[1] + s[2]
-            nhn = nx * nx * h[0] + ny * ny * h[1] + nz * nz * h[2]
-            nhn += 2 * (ny * nz * h[3] + nx * nz * h[4] + nx * ny * h[5])
-            nsn = nx * nx * s[0] + ny * ny * s[1] + nz * nz * s[2]
-            nsn += 2 * (ny * nz * s[3] + nx * nz * s[4] + nx * ny * s[5])
+            nhn = second_form(nx, ny, nz, h[0], h[1], h[2], h[3], h[4], h[5])
+            nsn = second_form(nx, ny, nz, s[0], s[1], s[2], s[3], s[4], s[5])
             laplacian = trace_s - nsn - (trace_h - nhn) * inverse * along_n
             tangential = cx * cx + cy * cy + cz * cz - along_n * along_n
             k[7, i] = c[i] * c[i] * k[7, i] + c[i] * laplacian - tangential

@@ -12,47 +12,26 @@ from numba import njit
 from creeping.geodesics.kernels.integrator import project_block
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.contraction import contraction
-
-
-@njit(**options)
-def spline_weights(t, degree, w):
-    """Weights of the degree + 1 uniform B-splines that do not vanish at fraction t of a cell."""
-    w[0] = 1.0
-    for d in range(1, degree + 1):
-        w[d] = t * w[d - 1] / d
-        for j in range(d - 1, 0, -1):
-            w[j] = ((t + d - j) * w[j - 1] + (j + 1 - t) * w[j]) / d
-        w[0] = (1.0 - t) * w[0] / d
-
-
-@njit(**options)
-def _cell(t, cells, degree, w):
-    """Cell number of grid coordinate t, held inside the grid, and the weights there."""
-    # written so that a coordinate that is not a number gets cell 0
-    i = int(min(t, cells - 1.0)) if t > 0.0 else 0
-    spline_weights(t - i, degree, w)
-    return i
-
+from creeping.kernels.splines import cells_and_fractions, weights
 
 _state_3, _state_5 = contraction(3, 8), contraction(5, 8)
 _jacobi_3, _jacobi_5 = contraction(3, 4), contraction(5, 4)
 
 
 @njit(**options)
-def _stencil(table, jacobi, carry_jacobi, degree, chart, iu, iv, ia, wu, wv, wa, out):
-    """Interpolate the state lanes into out[:8] and, if it is carried, the Jacobi lanes into out[8:12]."""
+def _stencil(table, jacobi, carry_jacobi, degree, first, wu, wv, wa, ray, out):
+    """Interpolate the state lanes of a ray into out[:8] and, if it is carried, the Jacobi lanes into out[8:12]."""
     row = table.shape[3]
     plane = row * table.shape[2]
-    first = (chart * table.shape[1] + iu) * plane + iv * row + ia
     if degree == 3:
-        _state_3(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, 0, 1, out, 0)
+        _state_3(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, ray, BLOCK, out, 0)
     else:
-        _state_5(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, 0, 1, out, 0)
+        _state_5(table, 8 * first, 8 * plane, 8 * row, wu, wv, wa, ray, BLOCK, out, 0)
     if carry_jacobi:
         if degree == 3:
-            _jacobi_3(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, 0, 1, out, 8)
+            _jacobi_3(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, ray, BLOCK, out, 8)
         else:
-            _jacobi_5(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, 0, 1, out, 8)
+            _jacobi_5(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, ray, BLOCK, out, 8)
 
 
 @njit(**options)
@@ -66,9 +45,11 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
     n, lanes = states.shape
     y, geometry = aligned(6, BLOCK), aligned(10, BLOCK)
     chart, uv, frame = np.empty(BLOCK, np.int64), np.empty((2, BLOCK)), np.empty((6, BLOCK))
-    wu, wv, wa, d = np.empty(8), np.empty(8), np.empty(8), np.empty(12)
-    last_u = table.shape[1] - degree
-    last_v = table.shape[2] - degree
+    w, places, cell = aligned(3, 6 * BLOCK), aligned(3, BLOCK), np.empty((3, BLOCK), np.int64)
+    d = np.empty(12)
+    last = table.shape[1] - degree - 1, table.shape[2] - degree - 1, int(cells[2]) - 1
+    row = table.shape[3]
+    plane = row * table.shape[2]
     turns = cells[2] / (2 * math.pi)
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
@@ -81,17 +62,20 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
             if not off <= tolerance:
                 level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
             locate(y[:3], geometry[1:4], chart, uv, frame, locate_par)
-            for i in range(count):
+            for i in range(BLOCK):
                 px, py, pz = y[3, i], y[4, i], y[5, i]
                 across = px * frame[3, i] + py * frame[4, i] + pz * frame[5, i]
                 along = px * frame[0, i] + py * frame[1, i] + pz * frame[2, i]
                 angle = math.atan2(across, along) * turns
-                if angle < 0.0:
-                    angle += cells[2]
-                ia = _cell(angle, int(cells[2]), degree, wa)
-                iu = _cell(origin[0] + cells[0] * uv[0, i], last_u, degree, wu)
-                iv = _cell(origin[1] + cells[1] * uv[1, i], last_v, degree, wv)
-                _stencil(table, jacobi, lanes > 6, degree, chart[i], iu, iv, ia, wu, wv, wa, d)
+                places[0, i], places[1, i] = origin[0] + cells[0] * uv[0, i], origin[1] + cells[1] * uv[1, i]
+                places[2, i] = angle + cells[2] if angle < 0.0 else angle
+            for axis in range(3):
+                cells_and_fractions(places[axis], last[axis], cell[axis])
+                weights(places[axis], degree, w[axis])
+            for i in range(count):
+                px, py, pz = y[3, i], y[4, i], y[5, i]
+                first = (chart[i] * table.shape[1] + cell[0, i]) * plane + cell[1, i] * row + cell[2, i]
+                _stencil(table, jacobi, lanes > 6, degree, first, w[0], w[1], w[2], i, d)
                 y[0, i] += horizon * px + d[0]
                 y[1, i] += horizon * py + d[1]
                 y[2, i] += horizon * pz + d[2]

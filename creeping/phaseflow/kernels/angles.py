@@ -13,6 +13,7 @@ import math
 from numba import njit
 
 from creeping.kernels.block import BLOCK, options
+from creeping.kernels.curvature import inverse_root
 from creeping.phaseflow.kernels.stencil import turns
 
 
@@ -48,9 +49,7 @@ def _frame(derivative, frame):
         g11 = ux * ux + uy * uy + uz * uz
         g12 = ux * vx + uy * vy + uz * vz
         g22 = vx * vx + vy * vy + vz * vz
-        s = math.sqrt(g11 * g22 - g12 * g12)
-        scale = 1.0 / (s * math.sqrt(g11 + g22 + 2.0 * s))
-        m11, m12, m22 = (g22 + s) * scale, -g12 * scale, (g11 + s) * scale
+        m11, m12, m22 = inverse_root(g11, g12, g22)
         frame[0, i], frame[1, i], frame[2, i] = m11 * ux + m12 * vx, m11 * uy + m12 * vy, m11 * uz + m12 * vz
         frame[3, i], frame[4, i], frame[5, i] = m12 * ux + m22 * vx, m12 * uy + m22 * vy, m12 * uz + m22 * vz
 

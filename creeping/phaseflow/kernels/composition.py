@@ -10,10 +10,11 @@ from numba import njit
 
 from creeping.geodesics.kernels.attenuation import SAMPLES, extend
 from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.splines import cells_and_fractions, weights
 from creeping.phaseflow.kernels import angles as _angles
 from creeping.phaseflow.kernels import rotation as _rotations
 from creeping.phaseflow.kernels import surface_table as _surface_table
-from creeping.phaseflow.kernels.stencil import cells_and_fractions, interpolate, interpolate_where, weights
+from creeping.phaseflow.kernels.stencil import interpolate, interpolate_where
 
 ROTATION, ANGLES, FOLDED = 0, 1, 2
 WORK = 48

@@ -19,6 +19,7 @@ import math
 from numba import njit
 
 from creeping.kernels.block import BLOCK, options
+from creeping.kernels.curvature import inverse_root
 from creeping.phaseflow.kernels.stencil import turns
 
 REACH = math.sqrt(2) - 1
@@ -146,9 +147,7 @@ def _shape(derivative, s, q, first, second, root):
             g11 += one * one
             g12 += one * other
             g22 += other * other
-        s2 = math.sqrt(g11 * g22 - g12 * g12)
-        scale = 1.0 / (s2 * math.sqrt(g11 + g22 + 2.0 * s2))
-        root[i], root[BLOCK + i], root[2 * BLOCK + i] = (g22 + s2) * scale, -g12 * scale, (g11 + s2) * scale
+        root[i], root[BLOCK + i], root[2 * BLOCK + i] = inverse_root(g11, g12, g22)
 
 
 @njit(**options)

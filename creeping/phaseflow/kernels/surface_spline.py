@@ -61,20 +61,6 @@ def _contract(typing: Any, table: Any, offset: Any, stride: Any, weights: Any, p
 
 
 @njit(**options)
-def slopes(t, w):
-    """Derivatives of the quintic B-spline weights at fractions t (BLOCK,) into w (6, BLOCK), flat."""
-    for i in range(BLOCK):
-        a, b = t[i], 1.0 - t[i]
-        aa, bb = a * a, b * b
-        w[i] = -bb * bb * (1 / 24)
-        w[BLOCK + i] = (-10.0 + a * (8.0 + a * (12.0 + a * (5.0 * a - 16.0)))) * (1 / 24)
-        w[2 * BLOCK + i] = a * (-24.0 + aa * (24.0 - 10.0 * a)) * (1 / 24)
-        w[3 * BLOCK + i] = -b * (-24.0 + bb * (24.0 - 10.0 * b)) * (1 / 24)
-        w[4 * BLOCK + i] = -(-10.0 + b * (8.0 + b * (12.0 + b * (5.0 * b - 16.0)))) * (1 / 24)
-        w[5 * BLOCK + i] = aa * aa * (1 / 24)
-
-
-@njit(**options)
 def tangents(table, place, w, count, out):
     """x, x_u, x_v of a block's stencils into out (BLOCK, 12), flat; see `_contract` for w."""
     stride = LANES * table.shape[2]

@@ -15,10 +15,11 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import BLOCK, options
+from creeping.kernels.curvature import inverse_root
+from creeping.kernels.splines import cells_and_fractions, slopes, weights
 from creeping.phaseflow.kernels.rotation import REACH, face, quaternion
 from creeping.phaseflow.kernels.rotation import columns as columns_of
-from creeping.phaseflow.kernels.stencil import cells_and_fractions, weights
-from creeping.phaseflow.kernels.surface_spline import DEGREE, slopes, tangents
+from creeping.phaseflow.kernels.surface_spline import DEGREE, tangents
 
 MARGIN = 2.0
 
@@ -48,9 +49,7 @@ def _root(out, i):
     g11 = out[k + 4] * out[k + 4] + out[k + 5] * out[k + 5] + out[k + 6] * out[k + 6]
     g12 = out[k + 4] * out[k + 8] + out[k + 5] * out[k + 9] + out[k + 6] * out[k + 10]
     g22 = out[k + 8] * out[k + 8] + out[k + 9] * out[k + 9] + out[k + 10] * out[k + 10]
-    s = math.sqrt(g11 * g22 - g12 * g12)
-    scale = 1.0 / (s * math.sqrt(g11 + g22 + 2.0 * s))
-    return (g22 + s) * scale, -g12 * scale, (g11 + s) * scale
+    return inverse_root(g11, g12, g22)
 
 
 @njit(**options)

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import strict_options as options
+from creeping.kernels.curvature import second_form
 from creeping.rays.quantities import GAUSS, GUARD, SHARPEST
 
 WIDTH = 2 * GUARD
@@ -112,10 +113,8 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
         nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
         bx, by, bz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
         xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
-        bent = px * px * xx + py * py * yy + pz * pz * zz
-        kappa[k] = (bent + 2 * (py * pz * yz + px * pz * xz + px * py * xy)) * inverse
-        bent = bx * bx * xx + by * by * yy + bz * bz * zz
-        across[k] = (bent + 2 * (by * bz * yz + bx * bz * xz + bx * by * xy)) * inverse
+        kappa[k] = second_form(px, py, pz, xx, yy, zz, yz, xz, xy) * inverse
+        across[k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
         normals[0, k], normals[1, k], normals[2, k] = nx, ny, nz
     totals[0, :] = 0.0
     good[0] = kappa[GUARD] > 0.0

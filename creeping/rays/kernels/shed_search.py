@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import strict_options as options
+from creeping.kernels.curvature import adjugate_form, second_form
 
 PARTS = 4
 """Samples of a step."""
@@ -60,15 +61,13 @@ def _sample(level, level_par, weights, states, first, work, fine, J):
         gx, gy, gz = g[1, k], g[2, k], g[3, k]
         xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
         square = gx * gx + gy * gy + gz * gz
-        along = px * px * xx + py * py * yy + pz * pz * zz + 2 * (py * pz * yz + px * pz * xz + px * py * xy)
+        along = second_form(px, py, pz, xx, yy, zz, yz, xz, xy)
         if k <= first:
             alive &= along > 0.0
         if k == 0:
             launched = along / math.sqrt(square)
         bend[0, k], bend[1, k], bend[2, k] = -along / square * gx, -along / square * gy, -along / square * gz
-        gauss = gx * gx * (yy * zz - yz * yz) + gy * gy * (xx * zz - xz * xz) + gz * gz * (xx * yy - xy * xy)
-        gauss += 2 * (gy * gz * (xy * xz - xx * yz) + gx * gz * (xy * yz - yy * xz) + gx * gy * (xz * yz - zz * xy))
-        second[k] = -gauss / (square * square) * states[k, 6]
+        second[k] = -adjugate_form(gx, gy, gz, xx, yy, zz, yz, xz, xy) / (square * square) * states[k, 6]
     for k in range(first, K - 1):
         for part in range(PARTS):
             i = (k - first) * PARTS + part

@@ -184,7 +184,7 @@ def test_points_off_the_body_have_no_chart():
     np.testing.assert_array_equal(np.isnan(uv).all(axis=-1), chart < 0)
 
 
-@pytest.mark.parametrize("name", ["ellipsoid", "torus", "genus 2"])
+@pytest.mark.parametrize("name", ["ellipsoid", "torus", pytest.param("genus 2", marks=pytest.mark.slow)])
 def test_check_passes(name):
     report = cr.check_surface(covered(name))
     assert report.ok, report

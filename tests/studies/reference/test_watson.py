@@ -9,7 +9,7 @@ from studies.reference import sphere, watson
 ANGLES = np.radians([30.0, 60.0, 90.0, 120.0, 150.0])
 
 
-@pytest.mark.parametrize("ka", [10.0, 100.0])
+@pytest.mark.parametrize("ka", [10.0, pytest.param(100.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.5 - 0.3j])
 def test_shadow_is_all_residues(ka, boundary):
     theta = np.radians([0.0, 20.0, 40.0, 55.0])
@@ -62,6 +62,7 @@ def test_pole_solves_the_characteristic_equation():
     assert h1vp(31.0, x) == pytest.approx(hankel(30.0) - 31 / x * hankel(31.0), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_poles_of_high_frequency():
     zeros, slopes = ai_zeros(3)[:2]
     turn, m = np.exp(1j * np.pi / 3), 250 ** (1 / 3)
