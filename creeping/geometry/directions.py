@@ -220,6 +220,8 @@ def unit_directions(directions: ArrayLike, what: str = "directions") -> FloatArr
     InvalidInputError
         If the shape is another or rows are zero or not finite; the rows are named, and are ``rows`` of the error.
     """
+    if np.iscomplexobj(directions):
+        raise InvalidInputError(f"{what} are complex; give real vectors")
     try:
         d = np.asarray(directions, dtype=float)
     except (TypeError, ValueError) as error:

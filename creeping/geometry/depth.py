@@ -1,0 +1,47 @@
+"""Points inside a body, by their depth under its surface.
+
+A point is as deep as the nearest of many nodes of the body is far, less what the nodes are apart.
+
+Sources: Derivations, B11.
+"""
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.geometry.kept import kept
+from creeping.geometry.quadrature import body_nodes
+from creeping.geometry.surface import Surface, size
+
+TRIED = 20_000
+"""Points of the box that are tried."""
+
+
+def inner_points(body: Surface, depth: float, count: int) -> FloatArray:
+    """Points inside, at least ``depth``, L, under the surface, evenly spread: (count, 3), L.
+
+    Fewer, or none, where the body is hardly or nowhere that thick; the same ones at every call.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> points = inner_points(sc.Sphere(), 0.3, 50)
+    >>> points.shape, bool(np.linalg.norm(points, axis=1).max() < 0.7)
+    ((50, 3), True)
+    """
+    x, distance = kept(body, "depths", lambda: _depths(body))
+    return np.asarray(x[distance > depth][:count])
+
+
+def _depths(body: Surface) -> tuple[FloatArray, FloatArray]:
+    """Points inside (n, 3) and bounds of their depth (n,), L."""
+    from scipy.spatial import cKDTree
+    from scipy.stats import qmc
+
+    low, high = np.asarray(body.bounds, dtype=float)
+    x = low + (high - low) * qmc.Halton(3, scramble=False).random(TRIED)
+    x = x[body.level(x) < 0]
+    nodes = body_nodes(body, 4 / size(body))
+    # half the distance between neighbouring nodes, of those that are furthest apart
+    apart = 0.5 * float(np.sqrt(np.max(nodes.weights)))
+    distance, _ = cKDTree(nodes.points).query(x)
+    return x, np.sqrt(np.maximum(distance**2 - apart**2, 0.0))

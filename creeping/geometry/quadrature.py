@@ -1,0 +1,205 @@
+"""Quadrature over a whole body: nodes x, unit normals, weights dS and the shape operator, on F = 0 to rounding.
+
+A closed mesh of bilinear quadrilaterals Y(u, v) near the body is mapped onto it by y = x + h n(x), its nearest points,
+which tiles the body without gaps or overlaps, whatever its genus; Gauss's product rule on each tile, with
+
+    dS = (Y_u x Y_v).n du dv/((1 + h kappa_1)(1 + h kappa_2)),
+
+2 M = kappa_1 + kappa_2 and K from H. The integral of n over a closed surface is 0; what the rule gives for it tells
+its error. For integrands as fast as e^{i a u} on a tile of -1 < u < 1 a rule of p points leaves
+
+    2^(2p) (p!)^4 a^(2p)/((2p + 1) (2p)!^3).
+
+Sources: [G98], [DR84, sec. 2.7]; Derivations, B11.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.errors import SurfaceError
+from creeping.geometry.curvature import principal_curvature_bound
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.kept import kept
+from creeping.geometry.surface import Surface, size
+from creeping.geometry.triangulation import quadrilaterals
+
+CELLS, MOST_CELLS, MOST_NODES = 24, 120, 3_000_000
+"""Cells of the coarsest and the finest mesh, and the most nodes."""
+FEWEST, MOST = 3, 10
+"""Points of Gauss's rule along a side of a tile."""
+SMALL = 5e-3
+"""Error of a tile for the fastest integrand, as a share of its area; over the body most of it cancels."""
+CLOSED = 1e-6
+"""Integral of n, as a share of the area, beyond which a mesh is too coarse for the body."""
+KEPT = 4
+"""Rules kept with a body."""
+STEPS = 12
+"""Newton steps to the nearest point."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyNodes:
+    """Quadrature of a body.
+
+    Attributes
+    ----------
+    points, normals : (n, 3), L and 1
+    weights : (n,), L^2
+    hessians : (n, 6), 1/L
+        xx, yy, zz, yz, xz, xy of H/|grad F|: t.Ht/|grad F| is the normal curvature along t.
+    error : float
+        Integral of n as a share of the area.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    weights: FloatArray
+    hessians: FloatArray
+    error: float
+
+    def curvature(self, directions: FloatArray) -> FloatArray:
+        """Normal curvature, 1/L, along unit tangents (n, 3): (n,)."""
+        p, h = directions, self.hessians
+        second = np.sum(p * p * h[:, :3], axis=1)
+        mixed = p[:, 1] * p[:, 2] * h[:, 3] + p[:, 0] * p[:, 2] * h[:, 4] + p[:, 0] * p[:, 1] * h[:, 5]
+        return np.asarray(second + 2 * mixed)
+
+    @property
+    def total_curvature(self) -> FloatArray:
+        """kappa_1 + kappa_2 (n,), 1/L."""
+        return np.asarray(np.sum(self.hessians[:, :3], axis=1) - self.curvature(self.normals))
+
+
+def body_nodes(body: Surface, rate: float) -> BodyNodes:
+    """Nodes for integrands e^{i phase} whose phase changes by at most ``rate``, 1/L, along the body.
+
+    Made once for each rule that rates lead to, and kept with the body.
+
+    Raises
+    ------
+    SurfaceError
+        If no mesh within bounds resolves the body or the rate.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> nodes = body_nodes(sc.Torus(R=1.0, r=0.5), rate=20.0)
+    >>> round(float(nodes.weights.sum()), 6), round(float(4 * np.pi**2 * 0.5), 6)
+    (19.739209, 19.739209)
+    """
+    found = kept(body, "quadratures", lambda: _Rules(_first_cells(body)))
+    while found.cells:
+        edge, tiles = found.sizes[found.cells] = found.sizes.get(found.cells) or _size(body, found.cells)
+        points, cells = _points_for(0.5 * rate * edge), found.cells
+        while points > MOST and cells < MOST_CELLS:
+            cells = _finer(cells)
+            edge, tiles = found.sizes[cells] = found.sizes.get(cells) or _size(body, cells)
+            points = _points_for(0.5 * rate * edge)
+        if points > MOST or tiles * points**2 > MOST_NODES:
+            if points == FEWEST:
+                break
+            raise SurfaceError(
+                f"a phase that turns once in {2 * np.pi / rate:.3g} L asks for more than {MOST_NODES} nodes; "
+                "take a lower wavenumber, or rays"
+            )
+        # the last one used stands last
+        key = cells, points
+        nodes = found.rules[key] = found.rules.pop(key) if key in found.rules else _nodes(body, cells, points)
+        while len(found.rules) > KEPT:
+            found.rules.pop(next(iter(found.rules)))
+        if nodes.error <= CLOSED:
+            return nodes
+        found.cells = _finer(cells) if cells < MOST_CELLS else 0
+    found.cells = 0
+    raise SurfaceError(
+        f"no mesh of up to {MOST_CELLS} cells or {MOST_NODES} nodes integrates over the body, which is too thin or too "
+        "sharp; its fields go by rays"
+    )
+
+
+@dataclass
+class _Rules:
+    """Rules of a body; ``cells`` of the coarsest mesh that is not known to be too coarse, 0 if there is none."""
+
+    cells: int
+    sizes: dict[int, tuple[float, int]] = field(default_factory=dict)
+    rules: dict[tuple[int, int], BodyNodes] = field(default_factory=dict)
+
+
+def _first_cells(body: Surface) -> int:
+    """Cells of a mesh whose tiles are about as large as the least radius of curvature; 0 if that takes too many."""
+    vertices, tiles = quadrilaterals(body.level, body.gradient, body.bounds, cells=CELLS)
+    corners = vertices[tiles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+    wanted = CELLS * float(np.median(sides)) * principal_curvature_bound(body, vertices)
+    return 0 if wanted > 2 * MOST_CELLS else max(CELLS, min(MOST_CELLS, round(0.3 * wanted)))
+
+
+def _finer(cells: int) -> int:
+    return min(MOST_CELLS, cells + cells // 2)
+
+
+def _points_for(half: float) -> int:
+    """Fewest points of Gauss's rule for e^{i half u} on -1 < u < 1."""
+    for p in range(FEWEST, MOST + 1):
+        log = 2 * p * math.log(2 * max(half, 1e-9)) + 4 * math.lgamma(p + 1) - 3 * math.lgamma(2 * p + 1)
+        if log - math.log(2 * p + 1) < math.log(SMALL):
+            return p
+    return MOST + 1
+
+
+def _size(body: Surface, cells: int) -> tuple[float, int]:
+    """Long side of the tiles of a mesh, L, nine of ten are shorter, and their number."""
+    vertices, tiles = quadrilaterals(body.level, body.gradient, body.bounds, cells=cells)
+    corners = vertices[tiles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+    return float(np.quantile(np.max(sides, axis=1), 0.9)), len(tiles)
+
+
+def _nodes(body: Surface, cells: int, points: int) -> BodyNodes:
+    vertices, tiles = quadrilaterals(body.level, body.gradient, body.bounds, cells=cells)
+    u, w = np.polynomial.legendre.leggauss(points)
+    low, high = 0.5 * (1 - u), 0.5 * (1 + u)
+    # bilinear weights of the corners, counter-clockwise, and their derivatives: (4, points, points)
+    shape = np.stack([np.outer(a, b) for a, b in ((low, low), (high, low), (high, high), (low, high))])
+    one = np.ones(points)
+    by_u = 0.5 * np.stack([np.outer(s * one, b) for s, b in ((-1, low), (1, low), (1, high), (-1, high))])
+    by_v = 0.5 * np.stack([np.outer(a, s * one) for a, s in ((low, -1), (high, -1), (high, 1), (low, 1))])
+    corners = vertices[tiles]
+    y, yu, yv = (np.einsum("kuv,qkx->quvx", part, corners).reshape(-1, 3) for part in (shape, by_u, by_v))
+    x, n, hessians, height = nearest_points(body, y)
+    nodes = BodyNodes(x, n, np.ones(len(x)), hessians, 0.0)
+    total = nodes.total_curvature
+    gauss = _gauss(n, hessians)
+    stretch = 1 + height * total + height**2 * gauss
+    area = np.sum(np.cross(yu, yv) * n, axis=1) * np.tile(np.outer(w, w).ravel(), len(tiles))
+    weights = area / stretch
+    whole = float(np.sum(weights))
+    # beyond the centres of curvature the map is not one to one
+    folded = not np.all(stretch > 0.1) or not np.all(np.isfinite(weights))
+    error = np.inf if folded else float(np.linalg.norm(weights @ n)) / whole
+    return BodyNodes(x, n, weights, hessians, error)
+
+
+def _gauss(n: FloatArray, h: FloatArray) -> FloatArray:
+    """K (m,) from unit normals and H/|grad F|."""
+    xx, yy, zz, yz, xz, xy = h.T
+    x, y, z = n.T
+    plain = x * x * (yy * zz - yz**2) + y * y * (xx * zz - xz**2) + z * z * (xx * yy - xy**2)
+    mixed = y * z * (xy * xz - xx * yz) + x * z * (xy * yz - yy * xz) + x * y * (xz * yz - zz * xy)
+    return np.asarray(plain + 2 * mixed)
+
+
+def nearest_points(body: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Points of the body nearest to points near it: x, n (m, 3), H/|grad F| (m, 6) and the height above it (m,)."""
+    from creeping.geometry.kernels.nearest import nearest
+
+    m = len(points)
+    x, n, hessians, height = np.empty((3, m)), np.empty((3, m)), np.empty((6, m)), np.empty(m)
+    with evaluators(body) as parts:
+        close = 1e-14 * size(body)
+        nearest(*parts[:2], np.ascontiguousarray(points.T), STEPS, close, x, n, hessians, height)
+    return np.ascontiguousarray(x.T), np.ascontiguousarray(n.T), np.ascontiguousarray(hessians.T), height

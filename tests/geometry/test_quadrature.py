@@ -1,0 +1,97 @@
+"""Quadrature over whole bodies against closed forms and the divergence theorem."""
+
+import numpy as np
+import pytest
+
+import scatterers as sc
+from creeping.errors import SurfaceError
+from creeping.geometry.curvature import gaussian_curvature
+from creeping.geometry.depth import inner_points
+from creeping.geometry.quadrature import body_nodes, nearest_points
+
+BODIES = {
+    "sphere": sc.Sphere(radius=2.0),
+    "slender": sc.Ellipsoid(0.2, 0.3, 1.0),
+    "torus": sc.Torus(R=1.0, r=0.4),
+    "twisted": sc.TwistedEllipsoid(),
+}
+GENUS = {"torus": 1}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_gauss_and_bonnet(name):
+    # the integral of K is 2 pi times the Euler characteristic, whatever the shape
+    nodes = body_nodes(BODIES[name], 20.0)
+    total = np.sum(nodes.weights * gaussian_curvature(BODIES[name], nodes.points))
+    assert total == pytest.approx(4 * np.pi * (1 - GENUS.get(name, 0)), abs=2e-4)
+
+
+def test_areas_of_closed_form():
+    assert np.sum(body_nodes(BODIES["sphere"], 5.0).weights) == pytest.approx(16 * np.pi, rel=1e-8)
+    assert np.sum(body_nodes(BODIES["torus"], 5.0).weights) == pytest.approx(4 * np.pi**2 * 0.4, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("rate", [8.0, 60.0])
+def test_waves_through_a_closed_surface(name, rate, rng):
+    # the flux of a field without sources, e^{iq.x} a with q.a = 0, is 0: as fast a phase as was asked for
+    q = rng.normal(size=3)
+    q *= rate / np.linalg.norm(q)
+    a = np.cross(q, rng.normal(size=3))
+    a /= np.linalg.norm(a)
+    nodes = body_nodes(BODIES[name], rate)
+    flux = np.sum(nodes.weights * (nodes.normals @ a) * np.exp(1j * (nodes.points @ q)))
+    assert abs(flux) < 1e-4 * np.sum(nodes.weights)
+
+
+def test_nodes_are_on_the_body_and_curvatures_are_its():
+    body = BODIES["twisted"]
+    nodes = body_nodes(body, 10.0)
+    assert np.max(np.abs(body.level(nodes.points))) < 1e-13
+    gradient = body.gradient(nodes.points)
+    norm = np.linalg.norm(gradient, axis=1)
+    np.testing.assert_allclose(nodes.normals, gradient / norm[:, None], atol=1e-12)
+    shape = body.hessian(nodes.points) / norm[:, None, None]
+    tangent = np.cross(nodes.normals, [0.3, 0.5, 0.8])
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    expected = np.einsum("ni,nij,nj->n", tangent, shape, tangent)
+    np.testing.assert_allclose(nodes.curvature(tangent), expected, atol=1e-10)
+
+
+def test_nearest_points_of_a_sphere_and_of_an_ellipsoid(rng):
+    s = rng.normal(size=(50, 3))
+    s /= np.linalg.norm(s, axis=1, keepdims=True)
+    x, n, _, height = nearest_points(BODIES["sphere"], s * rng.uniform(1.8, 2.3, (50, 1)))
+    np.testing.assert_allclose(x, 2 * s, atol=1e-12)
+    np.testing.assert_allclose(n, s, atol=1e-12)
+    body = BODIES["slender"]
+    foot, normals, _, _ = nearest_points(body, s * [0.2, 0.3, 1.0])
+    off = 0.02 * rng.uniform(-1, 1, 50)
+    again, _, _, height = nearest_points(body, foot + off[:, None] * normals)
+    np.testing.assert_allclose(again, foot, atol=1e-11)
+    np.testing.assert_allclose(height, off, atol=1e-12)
+
+
+def test_scale_changes_nothing_but_lengths():
+    one, large = (body_nodes(sc.Ellipsoid(s, 0.8 * s, 0.6 * s), 20.0 / s) for s in (1.0, 1e6))
+    np.testing.assert_allclose(large.weights, 1e12 * one.weights, rtol=1e-9)
+
+
+def test_a_rate_beyond_every_mesh_is_refused():
+    with pytest.raises(SurfaceError, match="asks for more than"):
+        body_nodes(BODIES["sphere"], 1e6)
+
+
+def test_inner_points_are_as_deep_as_told():
+    body = BODIES["torus"]
+    points = inner_points(body, 0.2, 60)
+    ring = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 1.0, points[:, 2])
+    assert len(points) == 60 and ring.max() < 0.2 + 1e-6
+    assert len(inner_points(body, 0.5, 60)) == 0
+
+
+def test_a_body_as_thin_as_a_sheet_is_refused_at_once_the_second_time():
+    body = sc.Ellipsoid(1.0, 1.0, 0.003)
+    for _ in range(2):
+        with pytest.raises(SurfaceError, match="too thin or too sharp"):
+            body_nodes(body, 5.0)
