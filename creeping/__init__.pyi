@@ -8,8 +8,10 @@ from .errors import StoredMapError as StoredMapError
 from .errors import SurfaceError as SurfaceError
 from .errors import ToleranceError as ToleranceError
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
-from .field.far import FarField as FarField
+from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
+from .field.currents.whole_body import surface_currents as surface_currents
 from .field.far import far_field as far_field
+from .field.far_result import FarField as FarField
 from .field.near import near_field as near_field
 from .field.surface import surface_field as surface_field
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty

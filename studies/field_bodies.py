@@ -76,7 +76,7 @@ def far_errors(name: str, boundary: Any, k: float, incidence: int, count: int = 
     """Total far field over the sphere of directions: medians by sector, largest error, and that of resolved ones."""
     solution, fan = reference(name, boundary, k), fan_of(name, incidence)
     r = sphere_of_directions(count)
-    found = cr.far_field(fan, r, wavenumber=k, boundary=boundary)
+    found = cr.far_field(fan, r, wavenumber=k, boundary=boundary, method="rays")
     exact = solution.far_field(r)[:, incidence]
     error, theta = np.abs(found.total - exact), np.degrees(np.arccos(r @ fan.line.direction))
     share = 100 * error / np.abs(exact)
@@ -98,7 +98,7 @@ def scan_jump(name: str, boundary: Any, k: float, incidence: int, azimuth: float
     side = np.cos(azimuth) * e + np.sin(azimuth) * np.cross(d, e)
     theta = np.radians(np.arange(0, 180.1, 1.25))[:, None]
     r = np.cos(theta) * d + np.sin(theta) * side
-    found = cr.far_field(fan, r, wavenumber=k, boundary=boundary).total
+    found = cr.far_field(fan, r, wavenumber=k, boundary=boundary, method="rays").total
     error = found - reference(name, boundary, k).far_field(r)[:, incidence]
     return float(100 * np.max(np.abs(np.diff(error))) / largest(name, boundary, k, incidence))
 
@@ -165,7 +165,7 @@ def reciprocity(name: str, boundary: Any, k: float) -> float:
         both = []
         for incident, observer in ((d, r), (-r, -d)):
             fan = cr.launch(flow, cr.shadow_line(body, incident), length=5.0, n_rays=256)
-            found = cr.far_field(fan, [observer, incident], wavenumber=k, boundary=boundary).total
+            found = cr.far_field(fan, [observer, incident], wavenumber=k, boundary=boundary, method="rays").total
             both.append(found[0])
             ahead = max(ahead, abs(found[1]))
         worst = max(worst, abs(both[0] - both[1]))

@@ -14,8 +14,8 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import scalar_boundaries
-from creeping.field.far import isolated_rays
 from creeping.field.far_geometry import far_geometry
+from creeping.field.far_rays import isolated_rays
 from creeping.field.forward import fan_half
 from creeping.rays.fan import RayFan
 from studies.reference import sphere, watson
@@ -127,7 +127,7 @@ def row_functions() -> dict[str, Callable[[RayFan, float], float]]:
 
 
 def sectors(fan: RayFan, k: float, boundary: Any) -> tuple[list[float], float]:
-    """Total far field, 0 to 180 deg in steps of 1.
+    """Total far field by rays, 0 to 180 deg in steps of 1.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def sectors(fan: RayFan, k: float, boundary: Any) -> tuple[list[float], float]:
         3 deg, per cent.
     """
     theta = np.radians(np.arange(0, 181, 1.0))
-    found = cr.far_field(fan, observers(theta), wavenumber=k, boundary=boundary)
+    found = cr.far_field(fan, observers(theta), wavenumber=k, boundary=boundary, method="rays")
     exact = sphere.far_field(k, 1.0, np.cos(theta), boundary)
     error = found.total - exact
     parts = [slice(first, first + 31) for first in range(0, 180, 30)]

@@ -64,7 +64,7 @@ def agreement(found: Any, flow: Any, length: float, n_rays: int) -> dict[str, fl
         d = found["direction"].values[row]
         fan = cr.launch(flow, cr.shadow_line(flow.body, d), length=length, n_rays=n_rays)
         for name in BOUNDARIES:
-            far = cr.far_field(fan, -d, wavenumber=K, boundary=name).creeping
+            far = cr.far_field(fan, -d, wavenumber=K, boundary=name, method="rays").creeping
             value = np.sqrt(0.5 * np.sum(np.abs(far) ** 2)) if name == "pec" else np.abs(far[0])
             gap = abs(float(cross_section_decibels(value)) - levels[name][row])
             if np.isfinite(gap) and not bad[name][row]:

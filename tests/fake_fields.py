@@ -25,6 +25,8 @@ def far_of(directions, total, **changes):
         "forward": 0 * total,
         "method": np.full(len(total), "rays"),
         "unresolved": np.zeros(len(total), dtype=bool),
+        "error": 0.01 * np.abs(total),
+        "error_by": "extinction",
         "wavenumber": 20.0,
         "boundary": "hard",
         "order": 2,

@@ -110,7 +110,7 @@ def ball_cut(ball_fan):
     """From 40 degrees on one side to 180 on the other, in the plane y = 0."""
     angles = np.radians(np.arange(-40.0, 181.0, 5.0))
     directions = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
-    return cr.far_field(ball_fan, directions, wavenumber=30.0, boundary="hard")
+    return cr.far_field(ball_fan, directions, wavenumber=30.0, boundary="hard", method="rays")
 
 
 @pytest.fixture(scope="session")

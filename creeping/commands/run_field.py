@@ -11,8 +11,10 @@ import numpy as np
 from creeping import files, plotting
 from creeping._typing import FloatArray
 from creeping.errors import CreepingError, InvalidInputError
+from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, parse_boundary
-from creeping.field.far import FarField, checked, far_field
+from creeping.field.far import far_field
+from creeping.field.far_result import FarField
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.files.ffe import grid_directions
 from creeping.geometry.directions import unit_direction
@@ -66,6 +68,7 @@ class Job:
             "not_finite": int(np.sum(~finite)),
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
+            "error": _stated_error(far),
         }
         if hasattr(fan.body, "coarse_fit"):
             entry["uncertain_by"] = self._uncertainty(far, fan)
@@ -205,7 +208,15 @@ def _own_cut(direction: FloatArray) -> str:
     return f"cut:{0.0 if level else np.degrees(np.arctan2(direction[1], direction[0])):.10g}"
 
 
+def _stated_error(far: FarField) -> dict[str, Any]:
+    """Rms and largest error of the field, and what tells it; None where it is not known."""
+    known = far.error[np.isfinite(far.error)]
+    if not len(known):
+        return {"rms": None, "max": None, "by": None}
+    return {"rms": float(np.sqrt(np.mean(known**2))), "max": float(known.max()), "by": far.error_by}
+
+
 def _part(far: FarField, start: int, end: int) -> FarField:
     rows = slice(int(start), int(end))
-    names = ("directions", "creeping", "reflected", "forward", "method", "unresolved")
+    names = ("directions", "creeping", "reflected", "forward", "method", "unresolved", "error")
     return replace(far, **{name: getattr(far, name)[rows] for name in names})

@@ -124,6 +124,9 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             f"field: k = {f['wavenumber']:g}, {f['boundary']}, {f['directions']} directions, "
             f"|f| up to {f['largest']:.4g}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
         )
+        if f["error"]["by"] is not None:
+            off = f["error"]
+            rows.append(f"error of the field by {off['by']}: rms {off['rms']:.1e}, max {off['max']:.1e}")
         if "uncertain_by" in f:
             off = f["uncertain_by"]
             known = off["reason"] or f"rms {off['rms']:.1e}, max {off['max']:.1e}"

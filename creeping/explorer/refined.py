@@ -11,7 +11,8 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.explorer.preview import Preview
 from creeping.explorer.request import ViewRequest
-from creeping.field.far import FarField, far_field
+from creeping.field.far import far_field
+from creeping.field.far_result import FarField
 from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.speed import speed_of
 from creeping.plotting.field_pictures import surface_levels

@@ -1,119 +1,50 @@
-"""The far field of a plane wave: u_s ~ f(r) e^{ikR}/R, every direction, uniform across the caustics that we know of.
+"""The far field of a plane wave, u_s ~ f(r) e^{ikR}/R: by the currents of the whole body, or ray by ray.
 
-    f = w F + (1 - w) [(1 - v) f_rays + v f_fan + f_reflected] + w W(θ; 4°, 12°) f_rays, long ones only
+Currents (`creeping.field.currents`) have no caustics, blends or hand-overs, and measure their own error; their cost
+grows like k^2 with every direction. Rays (`creeping.field.far_rays`) cost the same at any k and tell what each of them
+gives; where the reflected field has a caustic they err, and what they say of it is the size of their second order.
 
-with θ the angle from d, m̄ the mean of m over the shadow line and W a smooth step,
-
-    w = 1 - W(m̄ θ; 0.55, 0.85)                  F the forward lobe (`creeping.field.forward`)
-    v = W(min χ; 0.38, 0.52) for θ > 90°      χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > 0.9
-    f_rays = Σ -√(m1 m2) √(2/k) P |J'|^(-1/2) e^{-iπN/2} e^{ik(d.x0 + s - r.x)}   all rays with p = r
-
-Sources: [LK59], [P79]; Derivations, F3, F10, F14 and F15. The thresholds of W were set by trial.
+Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
-from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._presenting import Drawn
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.errors import InvalidInputError
-from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.far_geometry import FarGeometry, far_geometry, merging, off_axis
-from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
-from creeping.field.polarisation import dyads, wave_frame
-from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude
-from creeping.field.shed_wave import scales, shed_wave, smoothstep
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError, SurfaceError
+from creeping.field.arguments import checked
+from creeping.field.boundary import BoundaryLike, scalar_boundaries
+from creeping.field.currents.whole_body import SurfaceCurrents, surface_currents
+from creeping.field.far_geometry import far_geometry, observers_of
+from creeping.field.far_rays import error_by_order, field_of
+from creeping.field.far_result import FarField
+from creeping.geometry.quadrature import body_nodes
+from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
-from creeping.rays.quantities import RayPoints
 
-FORWARD = (0.55, 0.85)
-"""m̄ θ between which the forward lobe gives way."""
-NEAR_AXIS = (0.3, 0.45)
-"""m̄ θ between which its silhouette gives way to the poles."""
-LONG_RAYS = (np.radians(4.0), np.radians(12.0))
-CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)}
-"""Polarisations of a conductor and the other of each, with the sign of their coupling."""
-MATTERS = 0.05
-"""Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
-HIDDEN = 0.01
-"""Share of the shadow line from which hidden parts leave the forward lobe unresolved."""
-MERGED = (0.38, 0.52)
-"""χ between which the fan integral replaces isolated rays."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class FarField(Drawn):
-    """Far field in m directions, a length; scalar, or (θ̂, φ̂) scattered by (θ̂, φ̂) incident.
-
-    Attributes
-    ----------
-    directions : (m, 3)
-        Unit r, from the body to the observer.
-    creeping, reflected, forward : (m,) or (m, 2, 2) complex, L
-        Parts; where parts are blended each carries its weight.
-    method : (m,) of str
-        What served the creeping part: "forward", "rays", "fan", or several joined by "+".
-    unresolved : (m,) of bool
-        Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
-        fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
-        forward lobe with no bisector contour (a concave region) or with a rim that the body hides in part.
-    wavenumber : float, 1/L
-    boundary : str
-    order : int
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import creeping as cr
-    >>> import scatterers as sc
-    >>> ball = sc.Sphere()
-    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
-    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
-    >>> ff = cr.far_field(fan, [(0, 1, 0)], wavenumber=30.0, boundary="soft")
-    >>> bool(abs(ff.cross_section[0] / np.pi - 1) < 0.05), ff.method.tolist()       # about pi radius^2
-    (True, ['rays'])
-    """
-
-    directions: FloatArray
-    creeping: ComplexArray
-    reflected: ComplexArray
-    forward: ComplexArray
-    method: np.ndarray[Any, np.dtype[np.str_]]
-    unresolved: BoolArray
-    wavenumber: float
-    boundary: str
-    order: int
-
-    @property
-    def total(self) -> ComplexArray:
-        """Sum of the parts."""
-        return np.asarray(self.creeping + self.reflected + self.forward)
-
-    @property
-    def cross_section(self) -> FloatArray:
-        """4π|f|², L²."""
-        return np.asarray(4 * np.pi * np.abs(self.total) ** 2)
-
-    def __repr__(self) -> str:
-        names, counts = np.unique(self.method, return_counts=True)
-        served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
-        size = np.abs(self.total)
-        finite = np.isfinite(size)
-        largest = np.max(size, initial=0.0, where=finite)
-        missing = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
-        return (
-            f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
-            f"order {self.order})\n"
-            f"  {served or 'none'}\n"
-            f"  |f| up to {largest:.4g} L; {int(self.unresolved.sum())} unresolved{missing}"
-        )
+METHODS = ("auto", "currents", "rays")
+AFFORDABLE = 3e9
+"""Nodes times directions up to which "auto" takes currents: some ten seconds of one core."""
+MOST_NODES = 1.5e6
+"""Nodes up to which it does, for the memory's sake."""
+UNRESOLVED = 0.1
+"""Error, as a share of the largest |f|, from which a direction counts as unresolved."""
+_CURRENTS: "WeakKeyDictionary[RayFan, dict[tuple[float, BoundaryLike], SurfaceCurrents]]" = WeakKeyDictionary()
+KEPT = 2
+"""Currents kept with a fan, of so many wavenumbers and boundaries."""
 
 
 def far_field(
-    fan: RayFan, observation: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+    fan: RayFan,
+    observation: ArrayLike,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+    method: str = "auto",
 ) -> FarField:
-    """Far field scattered by the body of a fan.
+    """Far field scattered by the body of a fan, with its error.
 
     Parameters
     ----------
@@ -124,17 +55,22 @@ def far_field(
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     order : 2 or 1
-        Second-order creeping waves, or the leading order.
+        Second-order creeping waves, or the leading order, which is by rays.
+    method : {"auto", "currents", "rays"}
+        The currents of the whole body, or isolated rays. "auto" takes currents unless they cost more than some ten
+        seconds, the boundary is "pec" or the order 1.
 
     Returns
     -------
     FarField
-        Geometry is kept with the fan: another frequency or boundary for the same directions costs less.
+        Geometry and currents are kept with the fan: the same directions, or the same frequency, cost less again.
 
     Raises
     ------
     InvalidInputError
-        On bad directions, wavenumber, boundary or order, and for a weighted body.
+        On bad directions, wavenumber, boundary, order or method, and for a weighted body.
+    SurfaceError
+        If currents are asked for and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------
@@ -142,196 +78,67 @@ def far_field(
     >>> import scatterers as sc
     >>> ball = sc.Sphere()
     >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
-    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=3.0, n_rays=16)
     >>> ff = cr.far_field(fan, [(0, 1, 0)], wavenumber=30.0, boundary="soft")
-    >>> round(float(abs(ff.total[0])), 3)                                           # about radius/2
-    0.504
+    >>> round(float(abs(ff.total[0])), 3), bool(ff.error[0] < 2e-3), ff.method.tolist()     # about radius/2
+    (0.504, True, ['currents'])
     """
-    scalar_boundaries(boundary)
-    k = checked(wavenumber, order)
-    return field_of(far_geometry(fan, observation), k, boundary, order)
-
-
-def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int) -> FarField:
-    """Far field of a geometry, one row for each observer of each incidence."""
     kinds = scalar_boundaries(boundary)
-    parts = _Parts(geometry, len(kinds), k, order)
-    for number, kind in enumerate(kinds):
-        parts.add(number, kind)
-    return FarField(
-        directions=geometry.directions.copy(),
-        creeping=parts.creeping,
-        reflected=parts.reflected,
-        forward=parts.forward,
-        method=_methods(parts.in_forward, parts.in_fan),
-        unresolved=parts.unresolved(),
-        wavenumber=k,
-        boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.admittance:g}",
-        order=order,
-    )
+    k = checked(wavenumber, order)
+    if method not in METHODS:
+        raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
+    able = len(kinds) == 1 and order == 2
+    if method == "currents" and not able:
+        what = f"order {order}" if order != 2 else f"boundary {boundary!r}"
+        raise InvalidInputError(f"method 'currents' has no {what}; give method='rays'")
+    r = observers_of(observation)
+    if method == "currents" or (method == "auto" and able and len(r) and _affordable(fan, len(r), k)):
+        try:
+            return _by_currents(_currents(fan, k, boundary), r, boundary)
+        except SurfaceError:
+            if method == "currents":
+                raise
+    geometry = far_geometry(fan, r)
+    return error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
 
 
-def checked(wavenumber: float, order: int) -> float:
-    """The wavenumber, if it and the order are usable."""
+def _affordable(fan: RayFan, directions: int, wavenumber: float) -> bool:
+    """Whether currents cost little enough, by the area of the body."""
+    if not len(fan.points):
+        return False
     try:
-        k = float(wavenumber)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a number") from error
-    if not (np.isfinite(k) and k > 0):
-        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a positive finite number")
-    if order not in (1, 2):
-        raise InvalidInputError(f"order = {order!r} is neither 1 nor 2")
-    return k
+        area = float(np.sum(body_nodes(fan.body, 4 / size(fan.body)).weights))
+    except SurfaceError:
+        return False
+    # some six nodes a wavelength on the lit half, and the least that a mesh has
+    nodes = max(3e4, 0.5 * area * (6 * wavenumber / (2 * np.pi)) ** 2)
+    return nodes < MOST_NODES and nodes * directions < AFFORDABLE
 
 
-def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
-    rays = geometry.shed.rays
-    m1, m2 = scales(rays, wavenumber)
-    path = rays.eikonal - np.sum(rays.directions * rays.points, axis=-1)
-    phase = wavenumber * path - 0.5 * np.pi * rays.far_caustics
-    wave = shed_wave(rays, wavenumber, boundary, order)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        if order == 2 and boundary in CROSSED:
-            sign, other = CROSSED[boundary]
-            wave = wave + sign * gradient_coupling(rays, wavenumber) * shed_wave(rays, wavenumber, other, order)
-        amplitude = np.sqrt(2 * m1 * m2 / wavenumber / held_rate(rays, m2, passed_fold(geometry)))
-        wave = np.where(amplitude > 0, -amplitude * wave * np.exp(1j * phase), 0.0)
-    return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
+def _currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents:
+    kept = _CURRENTS.setdefault(fan, {})
+    key = (wavenumber, boundary)
+    if key not in kept:
+        while len(kept) >= KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = surface_currents(fan, wavenumber=wavenumber, boundary=boundary)
+    return kept[key]
 
 
-def passed_fold(geometry: FarGeometry) -> BoolArray:
-    """Whether a shed ray is past the fold J' = 0 of its launch point (n,): φ outside [0, π/2], or turned back.
-
-    Over regions with K < 0, φ may come back to 0.
-    """
-    rays = geometry.shed.rays
-    turned = geometry.angle[geometry.shed.observer] > np.pi / 2
-    return np.asarray((rays.prufer > np.pi / 2) | (rays.prufer < 0) | turned)
-
-
-def held_rate(rays: RayPoints, m: FloatArray, passed: BoolArray) -> FloatArray:
-    """|J'| (n,), held above |J|κₙ/(2m) at folds that are not the launch point's own, which the ray has passed.
-
-    There a fold's wave stops growing.
-    """
-    rate = np.abs(rays.spreading_rate)
-    least = np.where(passed, 0.5 * np.abs(rays.spreading) * np.maximum(rays.curvature[1], 0.0) / m, 0.0)
-    return np.asarray(np.sqrt(np.sqrt(rate**4 + least**4)))
-
-
-def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
-    """i κ_t1 κ_t2/(k J'): how much of one polarisation's wave goes with the other's (n,), without unit.
-
-    An amplitude n0.E that varies across the rays has a transverse field of higher order in 1/k; the soft wave is so
-    weak that this outweighs it. Found on the sphere, exactly; κ_t at both ends, for reciprocity, on other bodies.
-    """
-    first, last = rays.transverse
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(1j * np.maximum(first * last, 0.0) / (wavenumber * rays.spreading_rate))
-
-
-class _Parts:
-    """Weighted parts of the far field, summed contribution by contribution."""
-
-    def __init__(self, geometry: FarGeometry, kinds: int, wavenumber: float, order: int) -> None:
-        self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
-        self.incident = geometry.direction
-        self.vector = kinds == 2
-        m = len(geometry.directions)
-        self.creeping, self.reflected, self.forward = (
-            np.zeros((m, 2, 2) if self.vector else m, dtype=complex) for _ in range(3)
-        )
-        self.failing_size, self.missing = np.zeros(m), np.zeros(m, dtype=bool)
-        theta = geometry.angle
-        m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
-        self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
-        self.beyond_axis = smoothstep(m_theta, *NEAR_AXIS)
-        self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.least_merging, *MERGED), 0.0)
-        self.long_rays = self.in_forward * smoothstep(theta, *LONG_RAYS)
-
-    def unresolved(self) -> BoolArray:
-        """Directions in which an expansion fails for what matters there (m,)."""
-        total = np.abs(self.creeping + self.reflected + self.forward)
-        largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
-        return np.asarray((self.missing & (self.in_forward > 0)) | (self.failing_size > MATTERS * largest))
-
-    def _note_failing(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
-        """Note the size of contributions (n,) whose expansion fails."""
-        np.add.at(self.failing_size, observer, np.where(failing, np.abs(wave), 0.0))
-
-    def add(self, number: int, kind: Boundary) -> None:
-        """Add every part of one scalar problem."""
-        g, k, order = self.geometry, self.wavenumber, self.order
-        w, shed = self.in_forward, g.shed
-        share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
-        wave = _weighted(share, isolated_rays(g, k, kind, order))
-        # the first zero of J' is the launch point itself, where the forward lobe serves
-        merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
-        self._note_failing(shed.observer, wave, merged)
-        n0, n = shed.rays.first_normal, g.shed_normals
-        self._sum(self.creeping, number, shed.observer, wave, n0, n)
-        fan = g.fan_nodes(k, self.in_fan > 0)
-        wave = _weighted(((1 - w) * self.in_fan)[fan.observer], fan_half(fan, g.directions, k, kind, order))
-        self._sum(self.creeping, number, fan.observer, wave, fan.rays.first_normal, g.normals_of(fan.rays.points))
-        s = g.specular
-        incident = self.incident[s.observer]
-        wave = reflected_amplitude(s, g.directions, incident, k, kind, order)
-        if self.vector:
-            # at normal incidence no polarisation is along the plane of incidence: both take the mean of their orders
-            other = reflected_amplitude(s, g.directions, incident, k, CROSSED[kind][1], order)
-            wave = wave - 0.5 * (1 - smoothstep(s.sine, *NORMAL)) * (wave + other)
-        wave = _weighted((1 - w)[s.observer], wave)
-        self._note_failing(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
-        self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
-        if np.any(w > 0):
-            self._add_forward(number, kind)
-
-    def _add_forward(self, number: int, kind: Boundary) -> None:
-        """Add the forward lobes."""
-        g, k, order, w = self.geometry, self.wavenumber, self.order, self.in_forward
-        shadow, lit, missing = g.forward_nodes(k, w > 0)
-        self.missing[missing] = True
-        wave = shadow_half(shadow, g.directions, self.incident, k, kind, order, self.beyond_axis[shadow.observer])
-        wave = _weighted(w[shadow.observer], wave)
-        self._sum(
-            self.forward, number, shadow.observer, wave, shadow.rays.first_normal, g.normals_of(shadow.rays.points)
-        )
-        wave = lit_half(lit, g.directions, self.incident, k, kind, order, self.beyond_axis[lit.observer])
-        self._sum(self.forward, number, lit.observer, _weighted(w[lit.observer], wave), lit.normals, lit.normals)
-        for incidence in np.unique(g.incidence[w > 0]):
-            here, line = (g.incidence == incidence) & (w > 0), g.line_of(int(incidence))
-            self.missing[here] |= line.fractions["occluded"] > HIDDEN
-            ahead = np.flatnonzero(here & (self.beyond_axis < 1))
-            wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(line, g.directions[ahead], k)
-            # any normal of the plane of d and r will do, and any vector across d where they are one
-            aside = np.cross(line.direction, off_axis(g.directions[ahead], line.direction))
-            self._sum(self.forward, number, ahead, wave, aside, aside)
-
-    def _sum(
-        self, into: ComplexArray, number: int, observer: IntArray, wave: ComplexArray, n0: FloatArray, n: FloatArray
-    ) -> None:
-        """Add contributions (n,) of normals n0 where they land and n where they leave (n, 3)."""
-        if not self.vector:
-            np.add.at(into, observer, wave)
-            return
-        d, r = self.incident[observer], self.geometry.directions[observer]
-        spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=-1)])
-        spare /= np.maximum(np.linalg.norm(spare, axis=-1, keepdims=True), 1e-300)
-        pair = dyads(wave_frame(n0, d, spare), wave_frame(n, r, spare), d, r)
-        np.add.at(into, observer, wave[:, None, None] * pair[:, number])
-
-
-def _weighted(share: FloatArray, wave: ComplexArray) -> ComplexArray:
-    """Product, 0 where the share is 0 even if the wave is infinite there."""
-    return np.asarray(np.where(share != 0, share * np.where(share != 0, wave, 0.0), 0.0))
-
-
-def _methods(forward: FloatArray, fan: FloatArray) -> np.ndarray[Any, np.dtype[np.str_]]:
-    names = []
-    for w, v in zip(forward, fan, strict=True):
-        used = [
-            name for name, share in (("forward", w), ("rays", (1 - w) * (1 - v)), ("fan", (1 - w) * v)) if share > 0
-        ]
-        names.append("+".join(used))
-    return np.array(names, dtype="<U16")
+def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike) -> FarField:
+    lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
+    error = currents.error(r)
+    largest = max(float(np.max(np.abs(lit + dark), initial=0.0)), abs(currents.far(currents.direction[None])[0]))
+    return FarField(
+        directions=r.copy(),
+        creeping=dark,
+        reflected=lit,
+        forward=np.zeros(len(r), dtype=complex),
+        method=np.full(len(r), "currents", dtype="<U16"),
+        unresolved=~(error < UNRESOLVED * largest),
+        error=error,
+        error_by="extinction",
+        wavenumber=currents.wavenumber,
+        boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.admittance:g}",
+        order=2,
+    )

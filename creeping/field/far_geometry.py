@@ -56,7 +56,7 @@ def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
 
 def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     """Geometry of a fan for directions (..., 3), kept with the fan until other directions are asked for."""
-    r = _observers(observation)
+    r = observers_of(observation)
     key = r.tobytes()
     kept = _KEPT.get(fan)
     if kept is None or kept[0] != key:
@@ -68,14 +68,15 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     return kept[1]
 
 
-def _observers(observation: ArrayLike) -> FloatArray:
+def observers_of(observation: ArrayLike) -> FloatArray:
     """Unit directions of a caller's observers (m, 3), of which there may be none."""
     try:
-        if np.asarray(observation, dtype=float).shape == (0, 3):
-            return np.zeros((0, 3))
+        nothing = np.shape(observation) == (0, 3)
     except (TypeError, ValueError):
         # what it is not is said below
-        pass
+        nothing = False
+    if nothing:
+        return np.zeros((0, 3))
     return unit_directions(observation, "observation directions").reshape(-1, 3)
 
 

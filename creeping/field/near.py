@@ -17,9 +17,9 @@ import numpy as np
 
 from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
 from creeping.field.creeping_modes import modes_of
-from creeping.field.far import checked
 from creeping.field.far_geometry import fan_strips
 from creeping.field.shed_wave import (
     amplitude_factor,
@@ -31,7 +31,8 @@ from creeping.field.shed_wave import (
     smoothstep,
 )
 from creeping.field.special.airy import MODES
-from creeping.field.special.fock import FAR_HEIGHT, height_gain, near_pekeris, pekeris, transition
+from creeping.field.special.fock import pekeris_star, transition_rate
+from creeping.field.special.height_gain import FAR_HEIGHT, height_gain, near_pekeris
 from creeping.field.surface import scalar_boundary, surface_amplitude, surface_waves
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.surface import size
@@ -159,10 +160,11 @@ def _uniform(
         if order == 2:
             out[low] += _second(rays[low], height[low], wavenumber, boundary)
     if np.any(tall):
-        X = wavenumber * reach[tall] * xi[tall] ** 2 / (2 * m1[tall] * m2[tall])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            edge = np.exp(0.25j * np.pi) / (2 * np.sqrt(np.pi) * xi[tall]) * (1 - transition(X))
-            out[tall] = (1 - smoothstep(xi[tall], 0, HARD_BY)) * (pekeris(xi[tall], _part(q, tall)) + edge)
+        # P + (1 - F_t(X))/(2 √π ξ) of the edge without the poles of both: F_t(X)/ξ is finite on the shadow boundary
+        per = np.sqrt(wavenumber * reach[tall] / (2 * m1[tall] * m2[tall]))
+        edge = transition_rate(per * xi[tall]) * per / (2 * np.sqrt(np.pi))
+        star = pekeris_star(xi[tall], _part(q, tall))
+        out[tall] = (1 - smoothstep(xi[tall], 0, HARD_BY)) * np.exp(0.25j * np.pi) * (star - edge)
     series = (~low) & (xi > 0)
     if np.any(series):
         part = rays[series]

@@ -12,9 +12,9 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.far import checked
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary
 from creeping.geometry.speed import speed_of

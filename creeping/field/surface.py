@@ -19,9 +19,9 @@ import numpy as np
 
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.creeping_modes import modes_of
-from creeping.field.far import checked
 from creeping.field.far_geometry import fan_strips
 from creeping.field.shed_wave import (
     SECOND_ORDER,
@@ -155,13 +155,20 @@ def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) ->
     i = rays.integrals
     attachment = rays.radius_rate[0] / m1 / 12
     turn = np.cbrt(2 / wavenumber) * (i[..., 2] / 60 - 2 / 45 * i[..., 4]) - attachment
-    linear = (1 / 10 if q is None else -1 / 30) + r / 4
+    bend = varying_curvature(rays)
+    linear = (1 / 10 - bend / 60 if q is None else -1 / 30 + bend / 180) + r / 4 + rays.radius_rate[0] ** 2 / 36
     total = 1j * turn * surface_function(xi, q, 2) + linear / (m1 * m2) * surface_function(xi, q, 1)
     if q is not None:
-        total = total - (0.1 + 0.25 * boundary.sign * r) / (m1 * m2) * surface_slope(xi, q)
+        total = total - (0.1 + 0.25 * boundary.sign * r - bend / 60) / (m1 * m2) * surface_slope(xi, q)
         if np.ndim(q):
             total = total - 2 / 15 * q / (m1 * m2) * surface_slope(xi, q, 1)
     return np.asarray(total)
+
+
+def varying_curvature(rays: RayPoints) -> FloatArray:
+    """ρρ'' - (2/3) ρ'², mean of both ends (...)."""
+    pairs = zip(rays.radius_bend, rays.radius_rate, strict=True)
+    return np.asarray(0.5 * sum(bend - 2 / 3 * rate**2 for bend, rate in pairs))
 
 
 def surface_amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Boundary) -> ComplexArray:
@@ -170,10 +177,16 @@ def surface_amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary
     first, last = transverse_ratios(rays)
     r: FloatArray = 0.5 * (first + last)[..., None]
     tau, m0, q_m0 = modes.tau, modes.m0, modes.q_m0
+    bend = varying_curvature(rays)[..., None]
+    attached = rays.radius_rate[0][..., None] ** 2 / 36
     if boundary.kind == "soft":
-        bracket = tau * (1 / 10 + r / 4)
+        bracket = tau * (1 / 10 + r / 4 - bend / 60 + attached)
     else:
         # q² M0 = τ M0 - 1
         crossed = tau * (tau * m0 - 1) - tau * q_m0 * m0 + q_m0
-        bracket = tau * (r / 4 - 1 / 30) + (0.1 + 0.25 * boundary.sign * r) * (m0**2 - q_m0) - 2 / 15 * crossed
+        bracket = (
+            tau * (r / 4 - 1 / 30 + bend / 180 + attached)
+            + (0.1 + 0.25 * boundary.sign * r) * (m0**2 - q_m0)
+            - 2 / 15 * crossed
+        )
     return np.asarray(1 + limited(bracket / (m1 * m2)[..., None], 2.0))

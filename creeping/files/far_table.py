@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any, ComplexArray, FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.field.decibels import decibels
 
 if TYPE_CHECKING:
-    from creeping.field.far import FarField
+    from creeping.field.far_result import FarField
 
 PARTS = ("creeping", "reflected", "forward")
 _COMPONENTS = ("_tt", "_tp", "_pt", "_pp")
@@ -39,11 +39,12 @@ def notes(far: "FarField") -> dict[str, str]:
         columns[f"re{suffix}"] = f"real part of the far field f, L{name}; {of}"
         columns[f"im{suffix}"] = "imaginary part"
         columns[f"dB{suffix}"] = "20 log10 |f|, -inf where f is 0"
+        columns[f"error{suffix}"] = f"error of f, L, {_error_of(far)}"
         for part in PARTS:
             columns[f"{part}_re{suffix}"] = f"part of f, L{name}"
             columns[f"{part}_im{suffix}"] = "imaginary part"
     columns["method"] = "what served the creeping part"
-    columns["unresolved"] = "1 where a part was not found or its expansion fails"
+    columns["unresolved"] = "1 where a part was not found, its expansion fails or the error is large"
     return columns
 
 
@@ -52,7 +53,7 @@ def rows(far: "FarField") -> Iterable[tuple[Any, ...]]:
     columns: list[Any] = [*np.asarray(far.directions).T, *np.degrees(angles_of(far.directions)).T]
     for k in range(len(_suffixes(far))):
         total = _component(far.total, k)
-        columns += [total.real, total.imag, decibels(total)]
+        columns += [total.real, total.imag, decibels(total), _component(far.error, k)]
         for part in PARTS:
             values = _component(getattr(far, part), k)
             columns += [values.real, values.imag]
@@ -61,11 +62,17 @@ def rows(far: "FarField") -> Iterable[tuple[Any, ...]]:
         yield (*row, method, int(lost))
 
 
+def _error_of(far: "FarField") -> str:
+    if far.error_by == "extinction":
+        return "measured inside the body, for 95 of 100 directions"
+    return "what the second order adds; blind to caustics of the reflected field" if far.error_by else "not known"
+
+
 def _suffixes(far: "FarField") -> tuple[str, ...]:
     return ("",) if np.ndim(far.total) == 1 else _COMPONENTS
 
 
-def _component(values: ComplexArray, number: int) -> ComplexArray:
+def _component(values: Any, number: int) -> Any:
     """One component (m,) of a field (m,) or (m, 2, 2)."""
     return np.asarray(values).reshape(len(values), -1)[:, number]
 

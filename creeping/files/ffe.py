@@ -22,7 +22,7 @@ from creeping.geometry.directions import unit_direction
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
-    from creeping.field.far import FarField
+    from creeping.field.far_result import FarField
 
 LIGHT = 299792458.0
 """Speed of light, m/s."""

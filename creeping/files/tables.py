@@ -19,7 +19,7 @@ from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
-    from creeping.field.far import FarField
+    from creeping.field.far_result import FarField
 
 _RAY_COLUMNS = ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
 

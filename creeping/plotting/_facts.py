@@ -11,7 +11,7 @@ from creeping._typing import Any, FloatArray
 from creeping.files.far_table import angles_of
 
 if TYPE_CHECKING:
-    from creeping.field.far import FarField
+    from creeping.field.far_result import FarField
     from creeping.geodesics.direct_flow import DirectFlow
     from creeping.geodesics.integrator import ErrorEstimate
     from creeping.phaseflow.phase_map import PhaseMap

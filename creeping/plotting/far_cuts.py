@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import cross_section_decibels, decibels, shown_range
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
 
 if TYPE_CHECKING:
-    from creeping.field.far import FarField
+    from creeping.field.far_result import FarField
 
 KINDS = ("cartesian", "polar")
 QUANTITIES = {
@@ -29,16 +29,25 @@ EXACT = "#111111"
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve of a cut: ``levels`` (m,) in dB, NaN where the field is not finite."""
+    """One curve of a cut: ``levels`` (m,) in dB, NaN where the field is not finite.
+
+    ``band`` (2, m) is the range of its error in dB, down to -inf, NaN where that is not known.
+    """
 
     label: str
     levels: FloatArray
     style: dict[str, Any]
+    band: FloatArray | None = None
 
     @property
     def thick(self) -> bool:
         """Whether it sets the range: parts, which are thinner, may vanish."""
         return bool(self.style["linewidth"] > 0.8)
+
+    def ordered(self, order: IntArray, label: str) -> "Curve":
+        """The same with its points in another order, and another label."""
+        band = None if self.band is None else self.band[:, order]
+        return Curve(label, self.levels[order], self.style, band)
 
 
 def far_cut_picture(
@@ -132,7 +141,11 @@ def draw_cut(
     for curve in reversed(curves):
         # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
         levels = np.maximum(curve.levels, low if polar else low - (high - low))
-        ax.plot(angle if polar else np.degrees(angle), levels, label=curve.label, **curve.style)
+        across = angle if polar else np.degrees(angle)
+        if curve.band is not None:
+            band = np.maximum(curve.band, low if polar else low - (high - low))
+            ax.fill_between(across, *band, color=curve.style["color"], alpha=0.18, linewidth=0, zorder=0.5)
+        ax.plot(across, levels, label=curve.label, **curve.style)
 
 
 def level_name(quantity: str, unit: str) -> str:
@@ -166,7 +179,7 @@ def cut_curves(
         for suffix, pick in _picks(label, whole, count, components):
             colour = COLOURS[len(thick) % len(COLOURS)]
             style = {"color": colour, "linewidth": 1.3}
-            thick.append(Curve(label + suffix, _levels(pick(whole), quantity), style))
+            thick.append(Curve(label + suffix, _levels(pick(whole), quantity), style, _band(field, pick, quantity)))
             for number, (part, dashes) in enumerate(PARTS.items() if parts and hasattr(field, "total") else ()):
                 # of one curve alone the parts have colours of their own, of several that of their curve
                 own = COLOURS[1 + number] if len(fields) == 1 and not suffix else colour
@@ -181,6 +194,16 @@ def cut_curves(
             style = {"color": EXACT, "linewidth": 3.2, "alpha": 0.3}
             thin.append(Curve(f"exact{suffix}", _levels(pick(exact), quantity), style))
     return thick + thin
+
+
+def _band(field: Any, pick: Any, quantity: str) -> FloatArray | None:
+    """Levels of |f| less and more its error (2, m); None of a field without one."""
+    error = getattr(field, "error", None)
+    if error is None or not np.any(np.isfinite(error)):
+        return None
+    size, off = np.abs(pick(field.total)), pick(error)
+    ends = np.stack([np.maximum(size - off, 0.0), size + off])
+    return np.asarray(QUANTITIES[quantity][1](ends.astype(complex)))
 
 
 def checked_angles(angles: ArrayLike) -> FloatArray:

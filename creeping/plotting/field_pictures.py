@@ -14,10 +14,10 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.decibels import decibels, shown_range
-from creeping.field.far import checked
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary, surface_field
 from creeping.geometry.surface import normal

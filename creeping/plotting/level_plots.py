@@ -1,7 +1,6 @@
 """Pictures that results draw of their levels: a far field against the angle, a map's error against the ray's length."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +14,7 @@ from creeping.plotting.far_cuts import COLOURS, Curve, checked_angles, cut_curve
 from creeping.plotting.pictures import add_legend, axes_or_new
 
 if TYPE_CHECKING:
-    from creeping.field.far import FarField
+    from creeping.field.far_result import FarField
     from creeping.phaseflow.phase_map import PhaseMap
 
 PAGE = (6.4, 4.2)  # inches
@@ -78,9 +77,7 @@ def plot_far(
         cut = CutAngles(given, angle_name, np.arange(len(given)))
     curves = cut_curves(len(cut.values), {"total": far}, quantity=quantity, parts=parts, components=components)
     heights = shown_range([curve.levels for curve in curves if curve.thick], span)
-    curves = [
-        replace(curve, levels=curve.levels[cut.order], label=curve.label.removeprefix("total, ")) for curve in curves
-    ]
+    curves = [curve.ordered(cut.order, curve.label.removeprefix("total, ")) for curve in curves]
     fresh, ax = axes_or_new(ax, PAGE)
     draw_cut(ax, cut.values[cut.order], curves, heights, quantity=quantity, unit=unit, angle_name=cut.name)
     _mark(ax, cut.values[cut.order], curves, np.asarray(far.unresolved)[cut.order], heights[1])

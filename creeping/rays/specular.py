@@ -21,7 +21,7 @@ from creeping.shadow.occlusion import occluded
 CONVERGED = 1e-10
 """Residual of the normal at a specular point."""
 FLAT = 1e-4
-"""Determinant of S + n n^T, over the square of its norm, below which a point counts as flat."""
+"""Determinant of L S + n n^T, L the body's size, over the square of its norm, below which a point counts as flat."""
 FLATTEST = 1e-8
 """Least principal curvature, in inverse body sizes."""
 ALIKE = 1e-6
@@ -202,10 +202,11 @@ def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatA
     g = np.linalg.norm(gradient, axis=1)
     n = gradient / g[:, None]
     gap = wanted - n
-    # S on the tangent plane, made regular by the identity along n
+    # S on the tangent plane, without unit, made regular by the identity along n
+    length = size(body)
     tangential = np.eye(3) - n[:, :, None] * n[:, None, :]
-    shape = tangential @ body.hessian(points) @ tangential / g[:, None, None] + n[:, :, None] * n[:, None, :]
-    right = gap - np.sum(gap * n, axis=1, keepdims=True) * n
+    shape = length * tangential @ body.hessian(points) @ tangential / g[:, None, None] + n[:, :, None] * n[:, None, :]
+    right = length * (gap - np.sum(gap * n, axis=1, keepdims=True) * n)
     scale = np.sum(shape * shape, axis=(1, 2))
     flat = np.abs(np.linalg.det(shape)) < FLAT * scale
     step = np.empty_like(right)

@@ -11,8 +11,8 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, parse_boundary
-from creeping.field.far import checked
 from creeping.geometry.directions import unit_directions
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 

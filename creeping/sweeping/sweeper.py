@@ -4,8 +4,8 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.field.boundary import parse_boundary
-from creeping.field.far import field_of
 from creeping.field.far_geometry import FarGeometry
+from creeping.field.far_rays import field_of
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, WHOLE, P, X
 from creeping.geometry.surface import Surface

@@ -52,7 +52,7 @@ def test_a_coarser_body_of_another_size_has_the_field_of_another_frequency(bound
     found = cr.far_field_uncertainty(fan, at, wavenumber=K, boundary=boundary, order=order)
     options = {"boundary": boundary, "order": order}
     mine, its = (cr.far_field(fan_of(BODY), at, wavenumber=k, **options).total for k in (K, s * K))
-    np.testing.assert_allclose(found, np.abs(mine - s * its), atol=3e-5 * np.abs(mine).max())
+    np.testing.assert_allclose(found, np.abs(mine - s * its), atol=1e-4 * np.abs(mine).max())
     assert found.max() > 1e-3 * np.abs(mine).max()
 
 

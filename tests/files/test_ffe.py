@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creeping import InvalidInputError
-from creeping.field.far import FarField
+from creeping.field.far_result import FarField
 from creeping.files import write_csv, write_ffe
 from creeping.files.far_table import angles_of
 from creeping.files.ffe import grid_directions
@@ -22,7 +22,9 @@ def far_of(directions, vector, seed=3):
     parts = [rng.normal(size=shape) + 1j * rng.normal(size=shape) for _ in range(3)]
     method = np.array(["rays", "rays+fan"] * len(directions))[: len(directions)]
     lost = np.arange(len(directions)) == 1
-    return FarField(directions, *parts, method, lost, 20.0, "pec" if vector else "hard", 2)
+    return FarField(
+        directions, *parts, method, lost, np.zeros(parts[0].shape), "", 20.0, "pec" if vector else "hard", 2
+    )
 
 
 def read_ffe(path):

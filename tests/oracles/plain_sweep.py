@@ -92,9 +92,8 @@ class PlainSweeper:
         # boundaries outermost would lose the geometry that far_field keeps for each wavenumber
         for k, wavenumber in enumerate(request.wavenumbers):
             for name, which, suffix in request.problems:
-                far = far_field(
-                    fan, observation, wavenumber=wavenumber, boundary=parse_boundary(name), order=request.order
-                )
+                asked = {"wavenumber": wavenumber, "boundary": parse_boundary(name), "order": request.order}
+                far = far_field(fan, observation, method="rays", **asked)
                 for part in PARTS_OF_FIELD:
                     if part + suffix in out:
                         values = getattr(far, part)

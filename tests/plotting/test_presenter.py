@@ -79,7 +79,7 @@ def test_reprs_are_three_lines_at_most(results):
 def test_reprs_say_what_is_wrong(twisted_fan, ball_cut):
     assert f"{int((twisted_fan.status == 1).sum())} DETACHED" in repr(twisted_fan)
     spoilt = far_of(ball_cut.directions, np.where(np.arange(len(ball_cut.total)) < 2, np.nan, 1.0))
-    assert "|f| up to 1 L; 0 unresolved, 2 not finite" in repr(spoilt)
+    assert "0 unresolved, 2 not finite" in repr(spoilt)
 
 
 def test_repr_of_a_body_is_one_line_and_cut():

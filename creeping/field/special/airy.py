@@ -33,14 +33,14 @@ MANY, CHEBYSHEV = 500, 40
 FIRST, RATIO = 0.05, 1.02
 """Least |q|, and ratio of neighbours, at which roots are kept; Newton goes on from the node below."""
 
-_TURN = np.exp(2j * np.pi / 3)
-_W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
+TURN = np.exp(2j * np.pi / 3)
+W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
 
 
 def w1(t: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
     """w1 and w1' at complex t, any shape; unscaled, for moderate |t|."""
-    value, slope, _, _ = airy(np.asarray(t) * _TURN)
-    return _W1 * value, _W1 * _TURN * slope
+    value, slope, _, _ = airy(np.asarray(t) * TURN)
+    return W1 * value, W1 * TURN * slope
 
 
 def scaled_ai(z: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
@@ -77,6 +77,25 @@ def _expansion() -> tuple[FloatArray, FloatArray]:
     number = np.arange(TERMS)
     sign = (-1.0) ** number
     return sign * np.array(u), -sign * np.array(u) * (6 * number + 1) / (6 * number - 1)
+
+
+def scaled_v(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """v and v' without the factor e^{-ζ}, and ζ."""
+    value, slope, zeta = scaled_ai(t)
+    return np.sqrt(np.pi) * value, np.sqrt(np.pi) * slope, zeta
+
+
+def scaled_w1(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """w1 and w1' without the factor e^{-ζ}, and ζ."""
+    value, slope, zeta = scaled_ai(t * TURN)
+    return W1 * value, W1 * TURN * slope, zeta
+
+
+def scaled_w2(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """w2/2i and w2'/2i without the factor e^{-ζ}, and ζ."""
+    value, slope, zeta = scaled_ai(t / TURN)
+    factor = np.conj(W1) / 2j
+    return factor * value, factor / TURN * slope, zeta
 
 
 @dataclass(frozen=True)
@@ -152,11 +171,13 @@ def _interpolated(q: ComplexArray, n: int) -> Modes | None:
     """Constants from Chebyshev nodes in log |q|, or None where they are not smooth enough, beside a branch point."""
     amounts = np.abs(q)
     low, high = np.log(max(amounts.min(), 1e-12)), np.log(amounts.max())
-    if high - low < 1e-9:
-        return None
-    unit = np.cos(np.pi * (np.arange(CHEBYSHEV) + 0.5) / CHEBYSHEV)
     phase = q.ravel()[np.argmax(amounts)] / amounts.max()
     fields = ("tau", "residue", "m0", "q_m0", "surface")
+    if high - low < 1e-9:
+        # one q, as on a sphere
+        modes = _at(np.array(np.exp(0.5 * (low + high)) * phase), n)
+        return Modes(*(np.broadcast_to(getattr(modes, name), (*q.shape, n)) for name in fields))
+    unit = np.cos(np.pi * (np.arange(CHEBYSHEV) + 0.5) / CHEBYSHEV)
 
     def exact(at: FloatArray) -> ComplexArray:
         modes = _at(np.exp(low + (high - low) * (at + 1) / 2) * phase, n)
@@ -240,8 +261,8 @@ def _newton(tau: ComplexArray, q: complex | ComplexArray) -> ComplexArray:
     dr/dτ = τ - r² by Airy's equation.
     """
     for _ in range(12):
-        value, slope, _ = scaled_ai(tau * _TURN)
-        slope = slope * _TURN
+        value, slope, _ = scaled_ai(tau * TURN)
+        slope = slope * TURN
         with np.errstate(divide="ignore", invalid="ignore"):
             r, inverse = slope / value, value / slope
             move = np.where(np.abs(r) < 1, (r - q) / (tau - r * r), (inverse - 1 / q) / (1 - tau * inverse * inverse))
@@ -253,8 +274,8 @@ def _newton(tau: ComplexArray, q: complex | ComplexArray) -> ComplexArray:
 
 
 def _constants(tau: ComplexArray, *, soft: bool) -> Modes:
-    value, slope, zeta = scaled_ai(tau * _TURN)
-    value, slope = _W1 * value, _W1 * _TURN * slope
+    value, slope, zeta = scaled_ai(tau * TURN)
+    value, slope = W1 * value, W1 * TURN * slope
     if soft:
         value = np.zeros_like(value)
     # all but the residues are ratios, free of the factor e^{-ζ}; a bound surface wave, whose w1 is huge, is not excited

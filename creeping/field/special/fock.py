@@ -21,23 +21,31 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.special import airy, wofz
+from scipy.special import wofz
 
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
-from creeping.field.special.airy import MODES, Modes, hard_modes, impedance_modes, scaled_ai, soft_modes
+from creeping.field.special.airy import (
+    MODES,
+    TURN,
+    Modes,
+    hard_modes,
+    impedance_modes,
+    scaled_v,
+    scaled_w1,
+    scaled_w2,
+    soft_modes,
+)
 
 LIT = -2.5
 """Below it the line of steepest descent is used."""
 SERIES = 2.5
 """Above it ten modes are good to 1e-9."""
-FAR_HEIGHT = 40.0
-"""Largest Y of the integral with height gain; beyond it the observer is far."""
+MANY, RATIO = 300, 1.12
+"""Number of different q above which tables are interpolated, and the ratio of their |q|."""
 FARTHEST = -200.0
 """Beyond it the reflection coefficient is taken as constant, an error below 1e-6."""
 
 _DOWN = np.exp(-1j * np.pi / 6)
-_UP = np.exp(2j * np.pi / 3)
-_FACTOR = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
 
 
 class _Path(NamedTuple):
@@ -58,36 +66,17 @@ def _path() -> _Path:
     """Gauss panels on both legs."""
     legs = []
     # reaches: the integrands fall below 1e-12 of their maximum for LIT <= ξ <= SERIES
-    for turn, reach, panels in ((_DOWN, 24.0, 14), (_UP, 24.0, 14)):
+    for turn, reach, panels in ((_DOWN, 24.0, 14), (TURN, 24.0, 14)):
         nodes, weights = np.polynomial.legendre.leggauss(16)
         edges = np.linspace(0, reach, panels + 1)
         r = (edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2).ravel()
         w = (np.diff(edges)[:, None] * weights / 2).ravel()
         t = r * turn
         # numerator: v on the lower leg, w2/2i on the upper one
-        upper, upper_slope, rise = _v(t) if turn is _DOWN else _w2(t)
-        lower, lower_slope, fall = _w1(t)
+        upper, upper_slope, rise = scaled_v(t) if turn is _DOWN else scaled_w2(t)
+        lower, lower_slope, fall = scaled_w1(t)
         legs.append((t, w * turn, lower, lower_slope, upper, upper_slope, fall, rise))
     return _Path(*(np.concatenate(parts) for parts in zip(*legs, strict=True)))
-
-
-def _v(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """v and v' without the factor e^{-ζ}, and ζ."""
-    value, slope, zeta = scaled_ai(t)
-    return np.sqrt(np.pi) * value, np.sqrt(np.pi) * slope, zeta
-
-
-def _w1(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """w1 and w1' without the factor e^{-ζ}, and ζ."""
-    value, slope, zeta = scaled_ai(t * _UP)
-    return _FACTOR * value, _FACTOR * _UP * slope, zeta
-
-
-def _w2(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """w2/2i and w2'/2i without the factor e^{-ζ}, and ζ."""
-    value, slope, zeta = scaled_ai(t / _UP)
-    factor = np.conj(_FACTOR) / 2j
-    return factor * value, factor / _UP * slope, zeta
 
 
 def _by_path(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
@@ -181,7 +170,35 @@ def _evaluate(which: str, xi: FloatArray, q: ComplexArray | float | None, power:
     if q is None or np.ndim(q) == 0:
         return _tabulated(which, xi.ravel(), None if q is None else complex(q), power).reshape(xi.shape)
     full_xi, full_q = np.broadcast_arrays(xi, np.asarray(q, dtype=complex))
-    return _direct(which, full_xi.ravel(), full_q.ravel(), power).reshape(full_xi.shape)
+    shape, full_xi, full_q = full_xi.shape, full_xi.ravel(), full_q.ravel()
+    # the far field keeps to one way, whatever the number of rays that go together
+    if len(full_q) < MANY or not which.startswith("surface"):
+        return _direct(which, full_xi, full_q, power).reshape(shape)
+    return _between_tables(which, full_xi, full_q, power).reshape(shape)
+
+
+def _between_tables(which: str, xi: FloatArray, q: ComplexArray, power: int) -> ComplexArray:
+    """From tables at fixed |q|, by polynomials of degree 7 in log |q|: xi (n,), q (n,) of one argument."""
+    deep = xi > SERIES
+    if np.any(deep):
+        out = np.empty(len(xi), dtype=complex)
+        out[deep] = _by_series(which, xi[deep], q[deep], power)
+        if not np.all(deep):
+            out[~deep] = _between_tables(which, xi[~deep], q[~deep], power)
+        return out
+    # the argument without its rounding, for all q of a boundary to meet the same tables
+    phase = complex(np.round(np.exp(1j * np.angle(q[np.argmax(np.abs(q))])), 12))
+    place = np.log(np.abs(q)) / np.log(RATIO)
+    first = np.floor(place).astype(int) - 3
+    out = np.zeros(len(xi), dtype=complex)
+    for number in range(first.min(), first.max() + 8):
+        inside = (first <= number) & (number < first + 8)
+        if np.any(inside):
+            others = first[inside, None] + np.arange(8)
+            gaps, apart = place[inside, None] - others, number - others
+            weight = np.prod(np.where(apart == 0, 1.0, gaps / np.where(apart == 0, 1, apart)), axis=1)
+            out[inside] += weight * _tabulated(which, xi[inside], RATIO**number * phase, power)
+    return out
 
 
 def _direct(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
@@ -204,10 +221,10 @@ def _by_descent(which: str, xi: FloatArray, q: ComplexArray | None, power: int) 
         # the integrand is a Gaussian of variance |ξ|/2, or 2|ξ|, times a slow factor
         step = (0.24 if on_surface else 0.12) * np.sqrt(-x)
         t = -(x**2) * (1.0 if on_surface else 0.25) + step * np.arange(-55, 56) * np.exp(0.75j * np.pi)
-        lower, lower_slope, fall = _w1(t)
+        lower, lower_slope, fall = scaled_w1(t)
         below = lower if q is None else lower_slope - q[part, None] * lower
         if which == "pekeris":
-            upper, upper_slope, rise = _w2(t)
+            upper, upper_slope, rise = scaled_w2(t)
             above = upper if q is None else upper_slope - q[part, None] * upper
             terms = above / below * np.exp(1j * x * t + fall - rise)
         elif which == "slope":
@@ -283,63 +300,9 @@ def transition(X: ArrayLike) -> ComplexArray:
     (0.809525-0.232199j)
     """
     root = np.sqrt(np.asarray(X, dtype=float))
-    return np.asarray(-1j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * root * wofz(np.exp(0.25j * np.pi) * root))
+    return np.asarray(root * transition_rate(root))
 
 
-def height_gain(tau: ComplexArray, Y: ArrayLike) -> ComplexArray:
-    """Height gain H = w₁(τ - Y)/[Y^(-1/4) exp(i (2/3) Y^(3/2) - i τ √Y + iπ/4)]: (..., n), (..., 1) -> (..., n).
-
-    Tends to 1 far from the body and to 0 on it, like Y^(1/4).
-    """
-    Y = np.asarray(Y, dtype=float)
-    value, _, zeta = scaled_ai((tau - Y) * np.exp(2j * np.pi / 3))
-    root = np.sqrt(Y)
-    # both exponents grow like Y^(3/2): subtract before the exponential
-    exponent = -zeta - 2j / 3 * Y * root + 1j * tau * root - 0.25j * np.pi
-    return np.asarray(_FACTOR * value * np.sqrt(root) * np.exp(exponent))
-
-
-def near_pekeris(xi: FloatArray, Y: FloatArray, q: ComplexArray | float | None) -> ComplexArray:
-    """Sum of modes with height gain, as an integral that holds down to ξ = 0 (n,), (n,) -> (n,); Y up to FAR_HEIGHT.
-
-    -(1/√π) Y^(1/4) e^{-i(2/3)Y^(3/2)} ∫ e^{i(ξ + √Y)t} [v(t - Y) - V(t) w₁(t - Y)] dt,   from ∞e^{2πi/3} over 0 to ∞
-    """
-    q_column = None if q is None else np.broadcast_to(np.asarray(q, dtype=complex), xi.shape)[:, None]
-    column = Y[:, None]
-    zeta = xi[:, None] + np.sqrt(column)
-
-    def coefficient(
-        above: ComplexArray, above_slope: ComplexArray, below: ComplexArray, below_slope: ComplexArray
-    ) -> ComplexArray:
-        if q_column is None:
-            return above / below
-        return np.asarray((above_slope - q_column * above) / (below_slope - q_column * below))
-
-    # on the axis neither grows beyond what a double holds, and the library's real routine is ten times as fast
-    r, w = _panels(32)
-    reach = column + 12.0
-    t = reach * r
-    ai, ai_slope, bi, bi_slope = airy(t)
-    V = coefficient(ai, ai_slope, bi + 1j * ai, bi_slope + 1j * ai_slope)
-    ai, _, bi, _ = airy(t - column)
-    bracket = np.sqrt(np.pi) * (ai - V * (bi + 1j * ai))
-    total = np.sum(bracket * np.exp(1j * zeta * t) * (w * reach), axis=1)
-    # on the upper leg the bracket is W w1(t - Y) - w2(t - Y), over 2i, and the path runs towards 0
-    r, w = _panels(16)
-    t = (24.0 * _UP * r)[None]
-    (above, above_slope, rise), (below, below_slope, fall) = _w2(t), _w1(t)
-    W = coefficient(above, above_slope, below, below_slope)
-    plain, _, plain_fall = _w2(t - column)
-    high, _, high_fall = _w1(t - column)
-    echo = W * high * np.exp(1j * zeta * t + fall - rise - high_fall)
-    direct = plain * np.exp(1j * zeta * t - plain_fall)
-    total += np.sum((direct - echo) * (24.0 * w), axis=1) * _UP
-    return np.asarray(-np.sqrt(np.sqrt(Y)) * np.exp(-2j / 3 * Y**1.5) / np.sqrt(np.pi) * total)
-
-
-@cache
-def _panels(count: int) -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights of so many equal panels of 16 Gauss points on the unit interval."""
-    nodes, weights = np.polynomial.legendre.leggauss(16)
-    edges = np.linspace(0.0, 1.0, count + 1)
-    return (edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2).ravel(), np.tile(weights / 2 / count, count)
+def transition_rate(root: ArrayLike) -> ComplexArray:
+    """F_t(X)/√X by √X, finite where X = 0: (...) -> (...)."""
+    return np.asarray(-1j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * wofz(np.exp(0.25j * np.pi) * np.asarray(root)))

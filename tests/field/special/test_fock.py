@@ -8,6 +8,7 @@ from tolerances import DIFFERENCE, FOCK_SEAM, FOCK_TABLE, PRINTED
 from creeping.field.special import fock
 from creeping.field.special.airy import soft_modes
 from creeping.field.special.fock import boundary_modes
+from creeping.field.special.height_gain import height_gain, near_pekeris
 
 QUARTER = np.exp(0.25j * np.pi)
 BOUNDARIES = [None, 0.0, 1j, 2 + 1j, 5j]
@@ -178,13 +179,13 @@ def test_transition_function():
 
 def test_height_gain_far_and_near():
     tau = soft_modes(3).tau
-    np.testing.assert_allclose(fock.height_gain(tau, np.array([1e6])), 1, atol=2e-2)
+    np.testing.assert_allclose(height_gain(tau, np.array([1e6])), 1, atol=2e-2)
     Y = np.array([[1e4], [1e6]])
-    gap = np.abs(fock.height_gain(tau, Y) - 1)
+    gap = np.abs(height_gain(tau, Y) - 1)
     # τ²/(4√Y) is the next term of the exponent
     np.testing.assert_allclose(gap * np.sqrt(Y), np.broadcast_to(np.abs(tau) ** 2 / 4, gap.shape), rtol=0.1)
     hard = boundary_modes(0.0, 3).tau
-    small = np.abs(fock.height_gain(hard, np.array([[1e-8], [1e-12]])))
+    small = np.abs(height_gain(hard, np.array([[1e-8], [1e-12]])))
     np.testing.assert_allclose(small[0] / small[1], 10.0, rtol=1e-3)
 
 
@@ -192,9 +193,9 @@ def test_height_gain_far_and_near():
 def test_integral_near_the_body_is_the_sum_of_modes_with_height_gain(q):
     xi, Y = (a.ravel() for a in np.meshgrid([1.2, 2.0, 3.0], [0.2, 2.0, 15.0]))
     modes = boundary_modes(q, 40)
-    gain = fock.height_gain(modes.tau, Y[:, None])
+    gain = height_gain(modes.tau, Y[:, None])
     terms = 2j * np.sqrt(np.pi) * modes.residue * np.exp(1j * xi[:, None] * modes.tau) * gain
-    near = fock.near_pekeris(xi, Y, q)
+    near = near_pekeris(xi, Y, q)
     ratio = near / np.sum(terms, axis=-1)
     # one constant phase between them: with or without the e^{iπ/4} of P
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
@@ -204,7 +205,7 @@ def test_integral_near_the_body_is_the_sum_of_modes_with_height_gain(q):
 @pytest.mark.parametrize("q", [None, 0.0])
 def test_integral_near_the_body_tends_to_the_far_one(q):
     xi = np.array([1.0, 2.0])
-    gap = [np.abs(fock.near_pekeris(xi, np.full(2, Y), q) / fock.pekeris(xi, q) - 1).max() for Y in (10.0, 40.0)]
+    gap = [np.abs(near_pekeris(xi, np.full(2, Y), q) / fock.pekeris(xi, q) - 1).max() for Y in (10.0, 40.0)]
     # H_p - 1 falls like Y^(-1/2)
     assert gap[1] < 0.6 * gap[0]
     assert gap[1] < 0.5

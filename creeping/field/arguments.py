@@ -1,0 +1,20 @@
+"""Arguments that fields have in common."""
+
+import numpy as np
+
+from creeping.errors import InvalidInputError
+
+
+def checked(wavenumber: float, order: int) -> float:
+    """The wavenumber, if it and the order are usable."""
+    if np.iscomplexobj(wavenumber):
+        raise InvalidInputError(f"wavenumber = {wavenumber!r} is complex; give a real one: losses belong to the medium")
+    try:
+        k = float(wavenumber)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a number") from error
+    if not (np.isfinite(k) and k > 0):
+        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a positive finite number")
+    if order not in (1, 2):
+        raise InvalidInputError(f"order = {order!r} is neither 1 nor 2")
+    return k

@@ -1,0 +1,1 @@
+"""Currents of the whole body, and what they radiate."""

@@ -1,0 +1,169 @@
+"""Currents of a plane wave on the lit side, uniform up to and a little beyond the shadow line.
+
+With c = -n.d, kappa_a and kappa_b the normal curvatures along and across the plane of incidence, rho' the rate of
+rho = 1/kappa_a along it, m = (k rho/2)^(1/3), xi = -m c, r = kappa_b/kappa_a and an admittance eta (0 hard), all times
+e^{ikd.x}:
+
+    optics    u = 2c/(c + eta) + [R (kappa_a/c^2 + kappa_b) - kappa_a (1 - c^2) R'/c]/(ik(c + eta)),
+              R = (c - eta)/(c + eta), R' = 2 eta/(c + eta)^2
+              soft  du/dn = -2ikc [1 + i (kappa_a/c^2 + kappa_b)/(2kc)]
+    Fock      u = e^{i xi^3/3} [g + (rho'/m) E + D/m^2],   soft  du/dn = (k/m) times the same with F in place of g
+              E = -i (xi^4/12) g - i (xi^2/6) Dg - (xi/6) g - (i/12) D^2 g
+              D = i (3/20) xi^5 g + i (xi^3/6) Dg + i (xi/60) D^2 g - Dg/30 - g_q/10 - (2/15) q (Dg)_q
+                  + (r/4)(xi^2 g + Dg - g_q)
+                  + rho rho'' [i (xi^5/60) g + i (xi^3/18) Dg + (xi^2/12) g + i (7 xi/180) D^2 g + Dg/180 + g_q/60]
+                  + rho'^2 [(-xi^8/288 + i (11/360) xi^5 + xi^2/72) g + (-xi^6/72 + i (5/108) xi^3) Dg
+                            + (-xi^4/48 + i (17/1080) xi) D^2 g - (xi^2/72) D^3 g - D^4 g/288 + (13/540) Dg - g_q/90]
+              soft  Dg times 1/10, -1/60 and 7/180 for -1/30, 1/180 and 13/540, and nothing that has g_q
+
+g(xi; q) is Fock's function, D^n g it with t^n under its integral, g_q = dg/dq. Optics is the series of
+Luneburg and Kline on the boundary: with psi the reflected eikonal, Lap psi = 2 kappa_a/c + 2 c kappa_b there. Fock's
+current is that of the shadow (`creeping.field.surface`) with the arclength behind the line replaced by c, and its
+|J|^(-1/2) by 1 + r xi^2/(4m^2). E and D must then fall off towards the light, where D/m^2 becomes the term of optics in
+kappa_b, which gives the factors of Dg and g_q that the shadow leaves open. So it holds wherever kappa_a > 0; optics
+alone stands elsewhere. Of an impedance the terms in rho'' and rho'^2 are left out.
+
+Sources: [KLS56], [F46]; Derivations, F16.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.boundary import Boundary
+from creeping.field.creeping_modes import fock_scale
+from creeping.field.reflected import plane_reflection
+from creeping.field.shed_wave import limited, smoothstep
+from creeping.field.special.fock import surface_function, surface_slope
+
+OPTICS = (4.0, 8.0)
+"""-xi over which Fock's current gives way to optics."""
+BOUND = 0.5
+"""Bound of the second order, as a share of the first: beyond a third of it the expansion fails."""
+LEAST_SCALE = 0.7
+"""m below which nothing is expanded in 1/m^2."""
+STEEPEST = 20.0
+"""Bound of |kappa_b/kappa_a| in the second order."""
+
+
+def lit_currents(
+    cosine: FloatArray,
+    along: FloatArray,
+    across: FloatArray,
+    rate: FloatArray,
+    bend: FloatArray,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int = 2,
+) -> ComplexArray:
+    """Field u of the boundary, or du/dn (1/L) where u = 0, over e^{ikd.x}, at points of the lit side (n,).
+
+    Parameters
+    ----------
+    cosine : (n,)
+        C = -n.d, to a little below 0.
+    along, across : (n,), 1/L
+        Normal curvatures kappa_a and kappa_b.
+    rate, bend : (n,)
+        rho' and rho rho'', without unit; read where kappa_a > 0.
+    wavenumber : float, 1/L
+    boundary : Boundary
+    order : 2 or 1
+
+    Examples
+    --------
+    >>> from creeping.field.boundary import HARD
+    >>> lit_currents(np.array([1.0]), *np.zeros((4, 1)), 10.0, HARD)             # twice the wave on a plane
+    array([2.+0.j])
+    """
+    m = fock_scale(wavenumber, along)
+    xi = -m * cosine
+    curved = (along > 0) & (xi > -OPTICS[1])
+    out = np.empty(cosine.shape, dtype=complex)
+    flat = ~curved
+    out[flat] = _optics(cosine[flat], along[flat], across[flat], wavenumber, boundary, order)
+    at = np.flatnonzero(curved)
+    out[at] = _near_grazing(
+        cosine[at], along[at], across[at], rate[at], bend[at], m[at], xi[at], wavenumber, boundary, order
+    )
+    return out
+
+
+def _optics(
+    cosine: FloatArray, along: FloatArray, across: FloatArray, wavenumber: float, boundary: Boundary, order: int
+) -> ComplexArray:
+    c = np.maximum(cosine, 1e-9)
+    k = wavenumber
+    if boundary.kind.endswith("soft"):
+        second = np.asarray(1j * (along / c**2 + across) / (2 * k * c), dtype=complex)
+        return np.asarray(-2j * k * c * (1 + (order == 2) * limited(second, BOUND)))
+    eta = boundary.admittance
+    R, slope = plane_reflection(c, boundary), 2 * eta / (c + eta) ** 2
+    second = (R * (along / c**2 + across) - along * (1 - c * c) * slope / c) / (2j * k * c)
+    return np.asarray(2 * c / (c + eta) * (1 + (order == 2) * limited(second, BOUND)))
+
+
+def _near_grazing(
+    cosine: FloatArray,
+    along: FloatArray,
+    across: FloatArray,
+    rate: FloatArray,
+    bend: FloatArray,
+    m: FloatArray,
+    xi: FloatArray,
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+) -> ComplexArray:
+    """Fock's current, of second order at grazing, passing into optics: (n,)."""
+    q = boundary.q(m)
+    scale = (wavenumber / m) * np.exp(1j * xi**3 / 3) if q is None else np.exp(1j * xi**3 / 3)
+    g = surface_function(xi, q)
+    out = g
+    if order == 2:
+        change = _corrections(xi, q, across / along, rate, bend, np.maximum(m, LEAST_SCALE), g, boundary)
+        out = g + limited(change, BOUND * np.abs(g))
+    out = out * scale
+    far = smoothstep(-xi, *OPTICS)
+    beyond = far > 0
+    ray = _optics(cosine[beyond], along[beyond], across[beyond], wavenumber, boundary, order)
+    out[beyond] = (1 - far[beyond]) * out[beyond] + far[beyond] * ray
+    return np.asarray(out)
+
+
+def _corrections(
+    xi: FloatArray,
+    q: ComplexArray | float | None,
+    ratio: FloatArray,
+    rate: FloatArray,
+    bend: FloatArray,
+    m: FloatArray,
+    g: ComplexArray,
+    boundary: Boundary,
+) -> ComplexArray:
+    """(rho'/m) E + D/m^2 (n,)."""
+    r = np.clip(ratio, -STEEPEST, STEEPEST)
+    soft, constant = q is None, not isinstance(q, np.ndarray)
+    one, two = (surface_function(xi, q, n) for n in (1, 2))
+    varying = -1j * (xi**4 / 12 * g + xi**2 / 6 * one + two / 12) - xi / 6 * g
+    curved = 0.15j * xi**5 * g + (1j * xi**3 / 6 + (1 / 10 if soft else -1 / 30)) * one + 1j * xi / 60 * two
+    curved = curved + r / 4 * (xi**2 * g + one)
+    if constant:
+        three, four = (surface_function(xi, q, n) for n in (3, 4))
+        curved = curved + bend * (
+            (1j / 60 * xi**5 + xi**2 / 12) * g
+            + (1j / 18 * xi**3 + (-1 / 60 if soft else 1 / 180)) * one
+            + 7j / 180 * xi * two
+        )
+        curved = curved + rate**2 * (
+            (-(xi**8) / 288 + 11j / 360 * xi**5 + xi**2 / 72) * g
+            + (-(xi**6) / 72 + 5j / 108 * xi**3 + (7 / 180 if soft else 13 / 540)) * one
+            + (-(xi**4) / 48 + 17j / 1080 * xi) * two
+            - xi**2 / 72 * three
+            - four / 288
+        )
+    if q is not None:
+        varies = bend / 60 - rate**2 / 90 if constant else 0.0
+        curved = curved + (varies - 0.1 - 0.25 * boundary.sign * r) * surface_slope(xi, q)
+        if not constant:
+            curved = curved - 2 / 15 * q * surface_slope(xi, q, 1)
+    return np.asarray(rate / m * varying + curved / m**2)

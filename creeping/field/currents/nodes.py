@@ -1,0 +1,206 @@
+"""Where currents are integrated: nodes all over the body for the lit side, and along creeping rays for the shadow.
+
+    lit      quadrature of the body (`creeping.geometry.quadrature`), its nodes from the light to xi = 0.6
+    shadow   dS = |J| ds dsigma_perp on the rays of a fan, dsigma_perp = |b.dx0| across them
+
+A current goes like |J|^(-1/2), so that its caustics on the body cost nothing in ray coordinates. From xi = 0 to 0.6
+behind the line both parts have a share, W(xi; 0, 0.6) that of the rays, W a smooth step.
+
+Sources: [LK59]; Derivations, F16.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import BoolArray, FloatArray
+from creeping.field.boundary import Boundary
+from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.shed_wave import smoothstep
+from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points
+from creeping.geometry.surface import Surface, normal, size
+from creeping.rays.fan import RayFan, launch
+from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
+from creeping.rays.tracer import ray_points
+from creeping.shadow.line import ShadowLine
+from creeping.shadow.occlusion import occluded
+from creeping.shadow.status import ATTACHED
+
+PENUMBRA = (0.0, 0.6)
+"""xi over which the rays take over from the lit side's nodes."""
+VARYING = 6.0
+"""-xi up to which the rate of curvature matters."""
+RAYS, GAP, STEPS = 4.0, 0.5, 5.0
+"""Rays a wavelength along the line, their largest distance in wavelengths, and steps a wavelength along them."""
+DECAY, LONGEST = 7.5, 4.0
+"""Rays are as long as their wave takes to fall by e^-DECAY, and at most LONGEST body sizes."""
+END = 0.15
+"""Share of a ray over which its weight falls to 0 at its end: a cut would radiate."""
+STEP = 1e-4
+"""Distance over which curvature is differenced, in body sizes."""
+
+
+@dataclass(frozen=True, eq=False)
+class LitNodes:
+    """Nodes of the lit side with what its currents ask for.
+
+    Attributes
+    ----------
+    points, normals : (n, 3), L and 1
+    weights : (n,), L^2
+        Of the quadrature, times the share of the lit side.
+    cosine : (n,)
+        C = -n.d.
+    along, across : (n,), 1/L
+        Normal curvatures along and across the plane of incidence.
+    rate, bend : (n,)
+        rho' and rho rho'' of rho = 1/kappa_a along it.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    weights: FloatArray
+    cosine: FloatArray
+    along: FloatArray
+    across: FloatArray
+    rate: FloatArray
+    bend: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class RayNodes:
+    """Nodes along creeping rays.
+
+    Attributes
+    ----------
+    rays : RayPoints
+        (n,)
+    normals : (n, 3)
+    weights : (n,), L^2
+        |J| ds dsigma_perp, times the share of the rays.
+    """
+
+    rays: RayPoints
+    normals: FloatArray
+    weights: FloatArray
+
+
+def plane_of_incidence(nodes: BodyNodes, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """C = -n.d and the normal curvatures, 1/L, along and across the plane of incidence (n,)."""
+    cosine = -nodes.normals @ direction
+    along_axis = direction + cosine[:, None] * nodes.normals
+    length = np.linalg.norm(along_axis, axis=1, keepdims=True)
+    # at normal incidence any plane will do: kappa_a/c^2 + kappa_b is the sum of both there
+    spare = np.cross(nodes.normals, np.eye(3)[np.argmin(np.abs(nodes.normals), axis=1)])
+    spare /= np.linalg.norm(spare, axis=1, keepdims=True)
+    along = nodes.curvature(np.where(length > 1e-6, along_axis / np.maximum(length, 1e-300), spare))
+    return cosine, along, nodes.total_curvature - along
+
+
+def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
+    """Nodes of the lit side of an incidence, for far fields at this wavenumber, 1/L, and below."""
+    d = line.direction
+    # of the integrand e^{ik(d - r).x}
+    whole = body_nodes(body, 2 * wavenumber)
+    cosine = -whole.normals @ d
+    # m c is at least PENUMBRA's end where the surface is that dark, unless it is nearly flat
+    near = np.flatnonzero(cosine > -0.6)
+    nodes = BodyNodes(whole.points[near], whole.normals[near], whole.weights[near], whole.hessians[near], whole.error)
+    cosine, along, across = plane_of_incidence(nodes, d)
+    xi = -fock_scale(wavenumber, along) * cosine
+    dark = cosine <= 0
+    kept = ~dark | ((along > 0) & (xi < PENUMBRA[1]))
+    kept[kept] = ~_out_of_the_wave(line, nodes.points[kept], dark[kept])
+    at = np.flatnonzero(kept)
+    share = np.where(dark[at], 1 - smoothstep(xi[at], *PENUMBRA), 1.0)
+    rate, bend = np.zeros((2, len(at)))
+    varies = (along[at] > 0) & (xi[at] > -VARYING)
+    rate[varies], bend[varies] = radius_rates(body, nodes.points[at][varies], d, along[at][varies])
+    return LitNodes(
+        nodes.points[at], nodes.normals[at], nodes.weights[at] * share, cosine[at], along[at], across[at], rate, bend
+    )
+
+
+def _out_of_the_wave(line: ShadowLine, points: FloatArray, dark: BoolArray) -> BoolArray:
+    """Whether the wave does not come to points of the lit side, or of the penumbra where ``dark`` (n,)."""
+    out = np.zeros(len(points), dtype=bool)
+    if line.fractions["attached"] == 1.0 and len(line.curves) == 1:
+        return out
+    out[~dark] = occluded(line.body, points[~dark], line.direction)
+    from scipy.spatial import cKDTree
+
+    # a point of the penumbra has the state of the line next to it
+    on_line = np.concatenate([curve.points for curve in line.curves])
+    state = np.concatenate([curve.state_at(curve.arclength) for curve in line.curves])
+    out[dark] = state[cKDTree(on_line).query(points[dark])[1]] != ATTACHED
+    return out
+
+
+def radius_rates(
+    body: Surface, points: FloatArray, direction: FloatArray, along: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """rho' and rho rho'' (n,) of rho = 1/kappa_a along the plane of incidence at points (n, 3), L."""
+    n = normal(body, points)
+    t = direction - np.sum(n * direction, axis=1, keepdims=True) * n
+    t /= np.maximum(np.linalg.norm(t, axis=1, keepdims=True), 1e-300)
+    ends, step = [], STEP * size(body)
+    for sign in (1, -1):
+        x, normals, hessians, _ = nearest_points(body, points + sign * step * t)
+        ends.append(plane_of_incidence(BodyNodes(x, normals, np.ones(len(x)), hessians, 0.0), direction)[1])
+    slope, bent = (ends[0] - ends[1]) / (2 * step), (ends[0] - 2 * along + ends[1]) / step**2
+    rate, bend = -slope / along**2, -bent / along**3 + 2 * slope**2 / along**4
+    return np.clip(rate, -STEEPEST, STEEPEST), np.clip(bend, -SHARPEST, SHARPEST)
+
+
+def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
+    """Nodes along the creeping rays of a fan's incidence, as long and as dense as the wavenumber, 1/L, asks for."""
+    length = _length(fan, wavenumber, boundary)
+    wavelength = 2 * np.pi / wavenumber
+    attached = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
+    n_rays = max(16, int(np.ceil(RAYS * attached / wavelength)))
+    dense = launch(fan.flow, fan.line, length=length, n_rays=n_rays, max_gap=GAP * wavelength, measured=False)
+    times = np.linspace(0.0, length, max(16, int(np.ceil(STEPS * length / wavelength))) + 1)
+    _, rays = ray_points(dense, times)
+    ds = np.full(len(times), times[1])
+    ds[[0, -1]] /= 2
+    weights = np.abs(rays.spreading) * ds * (dense.spacing * rays.width[:, 0])[:, None]
+    weights = weights * (1 - smoothstep(times, (1 - END) * length, length))
+    shape = rays.time.shape
+    points = rays.points.reshape(-1, 3)
+    normals = normal(fan.body, points).reshape(*shape, 3)
+    weights = weights * _share_of_rays(fan.body, rays, normals, fan.line.direction, wavenumber)
+    there = rays.alive & np.isfinite(weights) & (weights > 0)
+    return RayNodes(rays[there], normals[there], weights[there])
+
+
+def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
+    """Length, L, at which the first mode has fallen by e^-DECAY on all but the tenth of the rays that decay least."""
+    most = LONGEST * size(fan.body)
+    if not len(fan.points):
+        return most
+    rate = float(np.quantile(fan.attenuation[:, -1], 0.1)) / fan.length
+    curvature = rate**1.5
+    if not curvature > 0:
+        return most
+    slowest = float(np.min(modes_of(boundary, fock_scale(wavenumber, np.array(curvature))).tau.imag))
+    return float(min(most, DECAY / (np.cbrt(wavenumber / 2) * rate * max(slowest, 1e-3))))
+
+
+def _share_of_rays(
+    body: Surface, rays: RayPoints, normals: FloatArray, direction: FloatArray, wavenumber: float
+) -> FloatArray:
+    """Share of the rays (rays, steps): W up to where it first is 1, then 1."""
+    cosine = -normals @ direction
+    share = np.ones(cosine.shape)
+    # twice the end, for m at the launch point is not m here
+    near = -cosine * fock_scale(wavenumber, np.maximum(rays.curvature[0], 1e-300)) < 2 * PENUMBRA[1]
+    near &= np.logical_and.accumulate(near, axis=1)
+    points = rays.points[near]
+    g, h = body.gradient(points), body.hessian(points)
+    h = h / np.linalg.norm(g, axis=-1)[:, None, None]
+    entries = np.stack([h[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1)
+    _, along, _ = plane_of_incidence(BodyNodes(points, normals[near], np.ones(len(points)), entries, 0.0), direction)
+    with np.errstate(invalid="ignore"):
+        xi = np.where(along > 0, -fock_scale(wavenumber, along) * cosine[near], np.inf)
+    share[near] = smoothstep(xi, *PENUMBRA)
+    return np.where(np.maximum.accumulate(share >= 1, axis=1), 1.0, share)

@@ -1,0 +1,105 @@
+"""What currents radiate: the far field, the field at points, and what is left of the wave inside the body.
+
+With G = e^{ikR}/(4 pi R), u and du/dn on the whole body, and J = n x H on a conductor:
+
+    f(r) = -(1/4 pi) int (du/dn + ik (r.n) u) e^{-ikr.x} dS
+    u_s(y) = int (u dG/dn_x - du/dn G) dS
+    f(r) = (ik/4 pi) int [J - r (r.J)] e^{-ikr.x} dS,   H_s(y) = int grad_y G x J dS
+
+Inside the body the field of exact currents cancels the incident wave. What is left there, as a share of it, is the
+error of the currents that radiates: if nothing were left, nothing would be wrong outside either, by uniqueness.
+
+Sources: [CK13, sec. 2.2 and 6.2]; Derivations, F16 and F17.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.kernels.threads import in_threads
+
+TOGETHER = 32
+"""Fewest directions or points worth a thread."""
+
+
+def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray, wavenumber: float) -> ComplexArray:
+    """Sums of w e^{-ik r.x} over nodes (n, 3), L, for columns w (c, n): (m, c).
+
+    Examples
+    --------
+    >>> x = np.array([[0.0, 0.0, 0.5]])
+    >>> phase_sums(x, np.ones((1, 1), complex), np.array([[0.0, 0.0, 1.0]]), 2 * np.pi).round(12)
+    array([[-1.+0.j]])
+    """
+    from creeping.field.kernels.radiation import distant
+
+    turns = np.ascontiguousarray(points.T) * (wavenumber / (2 * np.pi))
+    real, imaginary = np.ascontiguousarray(weights.real), np.ascontiguousarray(weights.imag)
+    columns = len(weights)
+    out = np.empty((len(directions), 2 * columns))
+    directions = np.ascontiguousarray(directions)
+    in_threads(
+        lambda part: distant(turns, real, imaginary, directions[part], out[part]), len(directions), least=TOGETHER
+    )
+    return np.asarray(out[:, :columns] + 1j * out[:, columns:])
+
+
+def far_of_scalar(
+    points: FloatArray,
+    normals: FloatArray,
+    u: ComplexArray | None,
+    slope: ComplexArray | None,
+    directions: FloatArray,
+    wavenumber: float,
+) -> ComplexArray:
+    """f (m,), L, of u dS and du/dn dS at nodes (n,); None stands for nothing."""
+    columns = [] if u is None else list(-1j * wavenumber * u * normals.T)
+    if slope is not None:
+        columns.append(-slope)
+    sums = phase_sums(points, np.array(columns), directions, wavenumber) / (4 * np.pi)
+    f = np.zeros(len(directions), dtype=complex) if slope is None else sums[:, -1]
+    return np.asarray(f if u is None else f + np.sum(sums[:, :3] * directions, axis=1))
+
+
+def field_of_scalar(
+    points: FloatArray,
+    normals: FloatArray,
+    u: ComplexArray | None,
+    slope: ComplexArray | None,
+    at: FloatArray,
+    wavenumber: float,
+) -> ComplexArray:
+    """Scattered field at points (m, 3), L, off the body, of u dS and du/dn dS at nodes (n,)."""
+    from creeping.field.kernels.radiation import near
+
+    nothing = np.zeros(len(points), dtype=complex)
+    single = -(nothing if slope is None else slope) / (4 * np.pi)
+    double = (nothing if u is None else u) / (4 * np.pi)
+    out = np.empty((len(at), 2))
+    columns = np.ascontiguousarray(points.T), np.ascontiguousarray(normals.T)
+    pairs = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (single, double)]
+    at = np.ascontiguousarray(at)
+    in_threads(lambda part: near(*columns, *pairs, wavenumber, at[part], out[part]), len(at), least=TOGETHER)
+    return np.asarray(out[:, 0] + 1j * out[:, 1])
+
+
+def far_of_vector(
+    points: FloatArray, currents: ComplexArray, directions: FloatArray, wavenumber: float
+) -> ComplexArray:
+    """f (m, 3), L, of J dS (n, 3)."""
+    sums = phase_sums(points, np.asarray(currents.T), directions, wavenumber)
+    along = np.sum(sums * directions, axis=1, keepdims=True)
+    return np.asarray(1j * wavenumber / (4 * np.pi) * (sums - along * directions))
+
+
+def magnetic_field_of_vector(
+    points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
+) -> ComplexArray:
+    """Scattered H (m, 3) at points off the body, of J dS (n, 3), in the unit of the incident H times L^0."""
+    from creeping.field.kernels.radiation import curl
+
+    J = currents.T / (4 * np.pi)
+    real, imaginary = np.ascontiguousarray(J.real), np.ascontiguousarray(J.imag)
+    out = np.empty((len(at), 6))
+    columns, at = np.ascontiguousarray(points.T), np.ascontiguousarray(at)
+    in_threads(lambda part: curl(columns, real, imaginary, wavenumber, at[part], out[part]), len(at), least=TOGETHER)
+    return np.asarray(out[:, :3] + 1j * out[:, 3:])

@@ -1,0 +1,92 @@
+"""What a far field is: complex amplitudes by direction, their parts, and what is to be thought of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._presenting import Drawn
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FarField(Drawn):
+    """Far field in m directions, a length; scalar, or (θ̂, φ̂) scattered by (θ̂, φ̂) incident.
+
+    Attributes
+    ----------
+    directions : (m, 3)
+        Unit r, from the body to the observer.
+    creeping, reflected, forward : (m,) or (m, 2, 2) complex, L
+        Parts; where parts are blended each carries its weight. With currents they are what the creeping rays' currents
+        radiate, what the lit side's do, and nothing.
+    method : (m,) of str
+        What served: "currents", or for the creeping part "forward", "rays", "fan", or several joined by "+".
+    unresolved : (m,) of bool
+        Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
+        fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
+        forward lobe with no bisector contour (a concave region) or with a rim that the body hides in part. With
+        currents, whether the error is more than a tenth of the largest |f|.
+    error : (m,) or (m, 2, 2), L
+        Of |f|, meant to hold in 95 of 100 directions if ``error_by`` is "extinction"; NaN where it is not known.
+    error_by : str
+        "extinction", measured inside the body (`creeping.field.currents.whole_body`); "order", the size of what the
+        second order adds, which does not see caustics of the reflected field; "" for none.
+    wavenumber : float, 1/L
+    boundary : str
+    order : int
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> ff = cr.far_field(fan, [(0, 1, 0)], wavenumber=30.0, boundary="soft")
+    >>> bool(abs(ff.cross_section[0] / np.pi - 1) < 0.05), ff.method.tolist()       # about pi radius^2
+    (True, ['currents'])
+    """
+
+    directions: FloatArray
+    creeping: ComplexArray
+    reflected: ComplexArray
+    forward: ComplexArray
+    method: np.ndarray[Any, np.dtype[np.str_]]
+    unresolved: BoolArray
+    error: FloatArray
+    error_by: str
+    wavenumber: float
+    boundary: str
+    order: int
+
+    @property
+    def total(self) -> ComplexArray:
+        """Sum of the parts."""
+        return np.asarray(self.creeping + self.reflected + self.forward)
+
+    @property
+    def cross_section(self) -> FloatArray:
+        """4π|f|², L²."""
+        return np.asarray(4 * np.pi * np.abs(self.total) ** 2)
+
+    def __repr__(self) -> str:
+        names, counts = np.unique(self.method, return_counts=True)
+        served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
+        size = np.abs(self.total)
+        finite = np.isfinite(size)
+        largest = np.max(size, initial=0.0, where=finite)
+        missing = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
+        return (
+            f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
+            f"order {self.order})\n"
+            f"  {served or 'none'}; {int(self.unresolved.sum())} unresolved{missing}\n"
+            f"  |f| up to {largest:.4g} L{self._stated_error()}"
+        )
+
+    def _stated_error(self) -> str:
+        known = self.error[np.isfinite(self.error)]
+        if not len(known):
+            return ""
+        rms = float(np.sqrt(np.mean(known**2)))
+        return f"; error by {self.error_by} {rms:.2g} L rms, {known.max():.2g} L at most"

@@ -1,0 +1,109 @@
+"""Compiled sums over currents at nodes x_n of a body: phases of distant observers, and point sources.
+
+    distant   S_c(r) = sum_n w_cn e^{-ik r.x_n}
+    near      u(y) = sum_n [a_n + b_n n_n.(y - x_n) (1/R - ik)/R] e^{ikR}/R,   R = |y - x_n|
+    curl      H(y) = sum_n (ik - 1/R) e^{ikR}/R^2 (y - x_n) x J_n
+
+Phases are taken in turns and reduced to t of -1/2..1/2; cos 2 pi t = 1 - 2 s^2 and sin 2 pi t = 2 s c with
+s = sin(pi t) and c = cos(pi t) by their Taylor polynomials, good to rounding there, since libm's do not vectorise.
+
+Sources: [CK13, sec. 2.2 and 6.2]; Derivations, F16.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from creeping.kernels.block import options
+
+_S = np.array([(-1.0) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(10)])
+_C = np.array([(-1.0) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(11)])
+S0, S1, S2, S3, S4, S5, S6, S7, S8, S9 = (float(v) for v in _S)
+C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10 = (float(v) for v in _C)
+PART = 1024
+"""Nodes whose phases are held at a time."""
+
+
+@njit(**options)
+def cosine_sine(turns):
+    """Cosine and sine of an angle in turns."""
+    t = turns - math.floor(turns + 0.5)
+    z = t * t
+    s = S0 + z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * (S6 + z * (S7 + z * (S8 + z * S9))))))))
+    c = C5 + z * (C6 + z * (C7 + z * (C8 + z * (C9 + z * C10))))
+    c = C0 + z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * c))))
+    s *= t
+    return 1.0 - 2.0 * s * s, 2.0 * s * c
+
+
+@njit(**options)
+def distant(turns, real, imaginary, r, out):
+    """Fill out (m, 2 C), real parts of the C sums before their imaginary parts.
+
+    turns (3, n) are k x/2 pi, real and imaginary (C, n) the weights, r (m, 3) unit directions.
+    """
+    n, columns = turns.shape[1], real.shape[0]
+    cosines, sines = np.empty(PART), np.empty(PART)
+    out[:] = 0.0
+    for first in range(0, n, PART):
+        count = min(PART, n - first)
+        x, y, z = turns[0, first : first + count], turns[1, first : first + count], turns[2, first : first + count]
+        for j in range(r.shape[0]):
+            rx, ry, rz = -r[j, 0], -r[j, 1], -r[j, 2]
+            for i in range(count):
+                cosines[i], sines[i] = cosine_sine(rx * x[i] + ry * y[i] + rz * z[i])
+            for column in range(columns):
+                a, b = real[column, first : first + count], imaginary[column, first : first + count]
+                p, q = 0.0, 0.0
+                for i in range(count):
+                    p += a[i] * cosines[i] - b[i] * sines[i]
+                    q += a[i] * sines[i] + b[i] * cosines[i]
+                out[j, column] += p
+                out[j, columns + column] += q
+
+
+@njit(**options)
+def near(x, normals, single, double, k, y, out):
+    """Fill out (m, 2), real and imaginary part of u at points y (m, 3).
+
+    x and normals (3, n), single and double (2, n) the weights a and b, real before imaginary parts.
+    """
+    n = x.shape[1]
+    per = k / (2 * math.pi)
+    for j in range(y.shape[0]):
+        p, q = 0.0, 0.0
+        for i in range(n):
+            dx, dy, dz = y[j, 0] - x[0, i], y[j, 1] - x[1, i], y[j, 2] - x[2, i]
+            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+            c, s = cosine_sine(per / inverse)
+            lean = (normals[0, i] * dx + normals[1, i] * dy + normals[2, i] * dz) * inverse
+            # a + b n.R (1/R - ik)
+            u = single[0, i] + lean * (double[0, i] * inverse + double[1, i] * k)
+            v = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
+            p += (u * c - v * s) * inverse
+            q += (u * s + v * c) * inverse
+        out[j, 0], out[j, 1] = p, q
+
+
+@njit(**options)
+def curl(x, real, imaginary, k, y, out):
+    """Fill out (m, 6), real and imaginary parts of H at points y (m, 3); real and imaginary (3, n) are those of J."""
+    n = x.shape[1]
+    per = k / (2 * math.pi)
+    for j in range(y.shape[0]):
+        hx, hy, hz, gx, gy, gz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            dx, dy, dz = y[j, 0] - x[0, i], y[j, 1] - x[1, i], y[j, 2] - x[2, i]
+            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+            c, s = cosine_sine(per / inverse)
+            # (ik - 1/R) e^{ikR}/R^2
+            square = inverse * inverse
+            u, v = -(k * s + inverse * c) * square, (k * c - inverse * s) * square
+            ax, ay, az = real[0, i], real[1, i], real[2, i]
+            bx, by, bz = imaginary[0, i], imaginary[1, i], imaginary[2, i]
+            px, py, pz = u * ax - v * bx, u * ay - v * by, u * az - v * bz
+            qx, qy, qz = u * bx + v * ax, u * by + v * ay, u * bz + v * az
+            hx, hy, hz = hx + dy * pz - dz * py, hy + dz * px - dx * pz, hz + dx * py - dy * px
+            gx, gy, gz = gx + dy * qz - dz * qy, gy + dz * qx - dx * qz, gz + dx * qy - dy * qx
+        out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = hx, hy, hz, gx, gy, gz
