@@ -15,6 +15,8 @@ from .field.far_result import FarField as FarField
 from .field.near import near_field as near_field
 from .field.surface import surface_field as surface_field
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty
+from .field.validity_range import Validity as Validity
+from .field.validity_range import validity as validity
 from .geodesics.direct_flow import DirectFlow as DirectFlow
 from .geodesics.integrator import ErrorEstimate as ErrorEstimate
 from .geodesics.integrator import trace as trace

@@ -16,6 +16,7 @@ from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.field.uncertainty import far_field_uncertainty
+from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
 from creeping.geometry.directions import unit_direction
 from creeping.rays.fan import RayFan
@@ -69,6 +70,7 @@ class Job:
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
             "error": _stated_error(far),
+            "validity": _named(validity(fan, wavenumber=self.wavenumber)),
         }
         if hasattr(fan.body, "coarse_fit"):
             entry["uncertain_by"] = self._uncertainty(far, fan)
@@ -214,6 +216,11 @@ def _stated_error(far: FarField) -> dict[str, Any]:
     if not len(known):
         return {"rms": None, "max": None, "by": None}
     return {"rms": float(np.sqrt(np.mean(known**2))), "max": float(known.max()), "by": far.error_by}
+
+
+def _named(found: Validity) -> dict[str, float | None]:
+    """By name; None where there is no number."""
+    return {name: float(value) if np.isfinite(value) else None for name, value in found._asdict().items()}
 
 
 def _part(far: FarField, start: int, end: int) -> FarField:

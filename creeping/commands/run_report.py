@@ -124,6 +124,10 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             f"field: k = {f['wavenumber']:g}, {f['boundary']}, {f['directions']} directions, "
             f"|f| up to {f['largest']:.4g}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
         )
+        k_rho, transverse = f["validity"]["least_k_rho"], f["validity"]["largest_transverse"]
+        if k_rho is not None:
+            warning = "; the expansion is beyond its range" if k_rho < 10 or transverse > 1 else ""
+            rows.append(f"on its rays k rho >= {k_rho:.3g}, kappa_t rho/m^2 <= {transverse:.2g}{warning}")
         if f["error"]["by"] is not None:
             off = f["error"]
             rows.append(f"error of the field by {off['by']}: rms {off['rms']:.1e}, max {off['max']:.1e}")
