@@ -7,7 +7,7 @@ from creeping.errors import InvalidInputError
 
 def checked(wavenumber: float, order: int) -> float:
     """The wavenumber, if it and the order are usable."""
-    if np.iscomplexobj(wavenumber):
+    if isinstance(wavenumber, complex | np.complexfloating):
         raise InvalidInputError(f"wavenumber = {wavenumber!r} is complex; give a real one: losses belong to the medium")
     try:
         k = float(wavenumber)

@@ -220,12 +220,14 @@ def unit_directions(directions: ArrayLike, what: str = "directions") -> FloatArr
     InvalidInputError
         If the shape is another or rows are zero or not finite; the rows are named, and are ``rows`` of the error.
     """
-    if np.iscomplexobj(directions):
-        raise InvalidInputError(f"{what} are complex; give real vectors")
     try:
-        d = np.asarray(directions, dtype=float)
+        given = np.asarray(directions)
+        complex_valued = np.iscomplexobj(given)
+        d = np.zeros(0) if complex_valued else np.asarray(given, dtype=float)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{what} are not an array of numbers: {error}") from error
+    if complex_valued:
+        raise InvalidInputError(f"{what} are complex; give real vectors")
     if d.ndim < 1 or d.shape[-1] != 3 or d.size == 0:
         raise InvalidInputError(f"{what} have shape {d.shape}; give at least one row of three numbers, shape (n, 3)")
     flat = d.reshape(-1, 3)
