@@ -212,10 +212,10 @@ def _own_cut(direction: FloatArray) -> str:
 
 def _stated_error(far: FarField) -> dict[str, Any]:
     """Rms and largest error of the field, and what tells it; None where it is not known."""
-    known = far.error[np.isfinite(far.error)]
-    if not len(known):
+    off = far.stated_error
+    if off is None:
         return {"rms": None, "max": None, "by": None}
-    return {"rms": float(np.sqrt(np.mean(known**2))), "max": float(known.max()), "by": far.error_by}
+    return {"rms": off[0], "max": off[1], "by": far.error_by}
 
 
 def _named(found: Validity) -> dict[str, float | None]:

@@ -101,6 +101,11 @@ def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
     raise InvalidInputError(f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or ImpedanceBoundary(admittance)")
 
 
+def boundary_name(boundary: BoundaryLike) -> str:
+    """Text of a boundary, as `parse_boundary` takes it."""
+    return boundary if isinstance(boundary, str) else f"impedance:{boundary.admittance:g}"
+
+
 def parse_boundary(text: str) -> BoundaryLike:
     """Boundary of ``soft``, ``hard``, ``pec`` or ``impedance:ETA``.
 

@@ -14,7 +14,7 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked
-from creeping.field.boundary import BoundaryLike, scalar_boundaries
+from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.whole_body import SurfaceCurrents, surface_currents
 from creeping.field.far_geometry import far_geometry, observers_of
 from creeping.field.far_rays import error_by_order, field_of
@@ -139,6 +139,6 @@ def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLik
         error=error,
         error_by="extinction",
         wavenumber=currents.wavenumber,
-        boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.admittance:g}",
+        boundary=boundary_name(boundary),
         order=2,
     )

@@ -16,7 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.boundary import (
+    ELECTRIC_HARD,
+    ELECTRIC_SOFT,
+    Boundary,
+    BoundaryLike,
+    boundary_name,
+    scalar_boundaries,
+)
 from creeping.field.far_geometry import FarGeometry, merging, off_axis
 from creeping.field.far_result import FarField
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
@@ -56,7 +63,7 @@ def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
         error=np.full(parts.creeping.shape, np.nan),
         error_by="",
         wavenumber=k,
-        boundary=boundary if isinstance(boundary, str) else f"impedance:{boundary.admittance:g}",
+        boundary=boundary_name(boundary),
         order=order,
     )
 

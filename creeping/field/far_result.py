@@ -77,16 +77,17 @@ class FarField(Drawn):
         finite = np.isfinite(size)
         largest = np.max(size, initial=0.0, where=finite)
         missing = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
+        off = self.stated_error
+        error = "" if off is None else f"; error by {self.error_by} {off[0]:.2g} L rms, {off[1]:.2g} L at most"
         return (
             f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
             f"order {self.order})\n"
             f"  {served or 'none'}; {int(self.unresolved.sum())} unresolved{missing}\n"
-            f"  |f| up to {largest:.4g} L{self._stated_error()}"
+            f"  |f| up to {largest:.4g} L{error}"
         )
 
-    def _stated_error(self) -> str:
+    @property
+    def stated_error(self) -> tuple[float, float] | None:
+        """Rms and largest of the errors that are known, L; None if none is."""
         known = self.error[np.isfinite(self.error)]
-        if not len(known):
-            return ""
-        rms = float(np.sqrt(np.mean(known**2)))
-        return f"; error by {self.error_by} {rms:.2g} L rms, {known.max():.2g} L at most"
+        return (float(np.sqrt(np.mean(known**2))), float(known.max())) if len(known) else None

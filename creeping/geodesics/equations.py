@@ -19,7 +19,7 @@ Sources: [YC06b], [C76], [G05]; Derivations, R1 to R4.
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geometry.curvature import principal_curvature_bound
+from creeping.geometry.curvature import principal_curvature_bound, second_form
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface
@@ -49,7 +49,7 @@ def sharpest_curvature(body: Surface) -> float:
 def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Right-hand sides (x', p') of the flow at points, L, and unit tangents: twice (..., 3) -> twice (..., 3)."""
     g, h = body.gradient(points), body.hessian(points)
-    bent = np.einsum("...i,...ij,...j->...", directions, h, directions)
+    bent = second_form(directions, h)
     turning = -(bent / np.sum(g * g, axis=-1))[..., None] * g
     speed = speed_of(body)
     if speed is None:

@@ -23,8 +23,20 @@ def normal_curvature(body: Surface, points: FloatArray, directions: FloatArray) 
     >>> float(normal_curvature(sc.Sphere(radius=2.0), np.array([2.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])))
     0.5
     """
-    bent = np.einsum("...i,...ij,...j->...", directions, body.hessian(points), directions)
+    bent = second_form(directions, body.hessian(points))
     return np.asarray(bent / np.linalg.norm(body.gradient(points), axis=-1))
+
+
+def second_form(directions: FloatArray, hessians: FloatArray) -> FloatArray:
+    """p.Hp of vectors p and matrices H of any unit: (..., 3), (..., 3, 3) -> (...)."""
+    return np.asarray(np.einsum("...i,...ij,...j->...", directions, hessians, directions))
+
+
+def adjugate_form(gradients: FloatArray, hessians: FloatArray) -> FloatArray:
+    """g.adj(H) g of vectors g and matrices H of any unit: (..., 3), (..., 3, 3) -> (...)."""
+    # the columns of the adjugate of a symmetric matrix are cross products of its rows
+    rows = [hessians[..., k, :] for k in range(3)]
+    return second_form(gradients, np.stack([np.cross(rows[(k + 1) % 3], rows[(k + 2) % 3]) for k in range(3)], axis=-2))
 
 
 def gaussian_curvature(body: Surface, points: FloatArray) -> FloatArray:
@@ -36,10 +48,8 @@ def gaussian_curvature(body: Surface, points: FloatArray) -> FloatArray:
     >>> gaussian_curvature(sc.Torus(R=1.0, r=0.5), np.array([[1.5, 0.0, 0.0], [0.5, 0.0, 0.0]])).round(6)
     array([ 1.333333, -4.      ])
     """
-    g, h = body.gradient(points), body.hessian(points)
-    # the columns of the adjugate of a symmetric matrix are cross products of its rows
-    adjugate = np.stack([np.cross(h[..., (k + 1) % 3, :], h[..., (k + 2) % 3, :]) for k in range(3)], axis=-2)
-    return np.asarray(np.einsum("...i,...ij,...j->...", g, adjugate, g) / np.sum(g * g, axis=-1) ** 2)
+    g = body.gradient(points)
+    return np.asarray(adjugate_form(g, body.hessian(points)) / np.sum(g * g, axis=-1) ** 2)
 
 
 def principal_curvature_bound(body: Surface, points: FloatArray) -> float:

@@ -75,7 +75,7 @@ def _raise_failures(*functions: Any) -> None:
             function.raise_failure()
 
 
-def _entries(hessian: FloatArray) -> FloatArray:
+def entries_of(hessian: FloatArray) -> FloatArray:
     """The six entries of symmetric matrices: (n, 3, 3) -> (6, n)."""
     return np.stack([hessian[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))])
 
@@ -91,7 +91,7 @@ def _level(body: Surface) -> Any:
         one, x = known(), np.ascontiguousarray(points.T)
         values[:] = one.level(x)
         gradients[:] = np.asarray(one.gradient(x)).T
-        hessians[:] = _entries(np.asarray(one.hessian(x)))
+        hessians[:] = entries_of(np.asarray(one.hessian(x)))
 
     return level_callback(level)
 
@@ -107,7 +107,7 @@ def _speed(body: Surface) -> Any:
         one, x = known(), np.ascontiguousarray(points.T)
         values[:] = one.speed.value(x)
         gradients[:] = np.asarray(one.speed.gradient(x)).T
-        hessians[:] = _entries(speed_hessian(one, x))
+        hessians[:] = entries_of(speed_hessian(one, x))
 
     return level_callback(speed)
 

@@ -14,13 +14,13 @@ Sources: [G98], [DR84, sec. 2.7]; Derivations, B11.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.curvature import principal_curvature_bound
+from creeping.geometry.curvature import adjugate_form, principal_curvature_bound, second_form
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, size
@@ -36,6 +36,8 @@ CLOSED = 1e-6
 """Integral of n, as a share of the area, beyond which a mesh is too coarse for the body."""
 KEPT = 4
 """Rules kept with a body."""
+SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+"""Where xx, yy, zz, yz, xz, xy stand in a matrix."""
 STEPS = 12
 """Newton steps to the nearest point."""
 
@@ -62,10 +64,7 @@ class BodyNodes:
 
     def curvature(self, directions: FloatArray) -> FloatArray:
         """Normal curvature, 1/L, along unit tangents (n, 3): (n,)."""
-        p, h = directions, self.hessians
-        second = np.sum(p * p * h[:, :3], axis=1)
-        mixed = p[:, 1] * p[:, 2] * h[:, 3] + p[:, 0] * p[:, 2] * h[:, 4] + p[:, 0] * p[:, 1] * h[:, 5]
-        return np.asarray(second + 2 * mixed)
+        return second_form(directions, self.hessians[:, SYMMETRIC])
 
     @property
     def total_curvature(self) -> FloatArray:
@@ -90,13 +89,13 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     >>> round(float(nodes.weights.sum()), 6), round(float(4 * np.pi**2 * 0.5), 6)
     (19.739209, 19.739209)
     """
-    found = kept(body, "quadratures", lambda: _Rules(_first_cells(body)))
+    found = kept(body, "quadratures", lambda: _Rules(body))
     while found.cells:
-        edge, tiles = found.sizes[found.cells] = found.sizes.get(found.cells) or _size(body, found.cells)
+        edge, tiles = found.size(body, found.cells)
         points, cells = _points_for(0.5 * rate * edge), found.cells
         while points > MOST and cells < MOST_CELLS:
             cells = _finer(cells)
-            edge, tiles = found.sizes[cells] = found.sizes.get(cells) or _size(body, cells)
+            edge, tiles = found.size(body, cells)
             points = _points_for(0.5 * rate * edge)
         if points > MOST or tiles * points**2 > MOST_NODES:
             if points == FEWEST:
@@ -107,7 +106,9 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
             )
         # the last one used stands last
         key = cells, points
-        nodes = found.rules[key] = found.rules.pop(key) if key in found.rules else _nodes(body, cells, points)
+        nodes = found.rules[key] = (
+            found.rules.pop(key) if key in found.rules else _nodes(body, found.mesh(body, cells), points)
+        )
         while len(found.rules) > KEPT:
             found.rules.pop(next(iter(found.rules)))
         if nodes.error <= CLOSED:
@@ -120,22 +121,40 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     )
 
 
-@dataclass
 class _Rules:
-    """Rules of a body; ``cells`` of the coarsest mesh that is not known to be too coarse, 0 if there is none."""
+    """Rules of a body, sizes of its meshes, and the last mesh.
 
-    cells: int
-    sizes: dict[int, tuple[float, int]] = field(default_factory=dict)
-    rules: dict[tuple[int, int], BodyNodes] = field(default_factory=dict)
+    ``cells`` is that of the coarsest mesh that is not known to be too coarse, 0 if there is none.
+    """
+
+    def __init__(self, body: Surface) -> None:
+        self.rules: dict[tuple[int, int], BodyNodes] = {}
+        self._sizes: dict[int, tuple[float, int]] = {}
+        self._mesh: tuple[int, tuple[FloatArray, IntArray]] | None = None
+        # tiles about as large as the least radius of curvature
+        vertices, tiles = self.mesh(body, CELLS)
+        wanted = CELLS * float(np.median(_sides(vertices, tiles))) * principal_curvature_bound(body, vertices)
+        self.cells = 0 if wanted > 2 * MOST_CELLS else max(CELLS, min(MOST_CELLS, round(0.3 * wanted)))
+
+    def mesh(self, body: Surface, cells: int) -> tuple[FloatArray, IntArray]:
+        """Vertices and quadrilaterals of a mesh."""
+        if self._mesh is None or self._mesh[0] != cells:
+            self._mesh = cells, quadrilaterals(body.level, body.gradient, body.bounds, cells=cells)
+        return self._mesh[1]
+
+    def size(self, body: Surface, cells: int) -> tuple[float, int]:
+        """Long side of the tiles of a mesh, L, nine of ten are shorter, and their number."""
+        if cells not in self._sizes:
+            vertices, tiles = self.mesh(body, cells)
+            longest = np.max(_sides(vertices, tiles), axis=1)
+            self._sizes[cells] = float(np.quantile(longest, 0.9)), len(tiles)
+        return self._sizes[cells]
 
 
-def _first_cells(body: Surface) -> int:
-    """Cells of a mesh whose tiles are about as large as the least radius of curvature; 0 if that takes too many."""
-    vertices, tiles = quadrilaterals(body.level, body.gradient, body.bounds, cells=CELLS)
+def _sides(vertices: FloatArray, tiles: IntArray) -> FloatArray:
+    """Lengths of the sides of quadrilaterals (m, 4), L."""
     corners = vertices[tiles]
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
-    wanted = CELLS * float(np.median(sides)) * principal_curvature_bound(body, vertices)
-    return 0 if wanted > 2 * MOST_CELLS else max(CELLS, min(MOST_CELLS, round(0.3 * wanted)))
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1))
 
 
 def _finer(cells: int) -> int:
@@ -151,16 +170,8 @@ def _points_for(half: float) -> int:
     return MOST + 1
 
 
-def _size(body: Surface, cells: int) -> tuple[float, int]:
-    """Long side of the tiles of a mesh, L, nine of ten are shorter, and their number."""
-    vertices, tiles = quadrilaterals(body.level, body.gradient, body.bounds, cells=cells)
-    corners = vertices[tiles]
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
-    return float(np.quantile(np.max(sides, axis=1), 0.9)), len(tiles)
-
-
-def _nodes(body: Surface, cells: int, points: int) -> BodyNodes:
-    vertices, tiles = quadrilaterals(body.level, body.gradient, body.bounds, cells=cells)
+def _nodes(body: Surface, mesh: tuple[FloatArray, IntArray], points: int) -> BodyNodes:
+    vertices, tiles = mesh
     u, w = np.polynomial.legendre.leggauss(points)
     low, high = 0.5 * (1 - u), 0.5 * (1 + u)
     # bilinear weights of the corners, counter-clockwise, and their derivatives: (4, points, points)
@@ -173,7 +184,7 @@ def _nodes(body: Surface, cells: int, points: int) -> BodyNodes:
     x, n, hessians, height = nearest_points(body, y)
     nodes = BodyNodes(x, n, np.ones(len(x)), hessians, 0.0)
     total = nodes.total_curvature
-    gauss = _gauss(n, hessians)
+    gauss = adjugate_form(n, hessians[:, SYMMETRIC])
     stretch = 1 + height * total + height**2 * gauss
     area = np.sum(np.cross(yu, yv) * n, axis=1) * np.tile(np.outer(w, w).ravel(), len(tiles))
     weights = area / stretch
@@ -182,15 +193,6 @@ def _nodes(body: Surface, cells: int, points: int) -> BodyNodes:
     folded = not np.all(stretch > 0.1) or not np.all(np.isfinite(weights))
     error = np.inf if folded else float(np.linalg.norm(weights @ n)) / whole
     return BodyNodes(x, n, weights, hessians, error)
-
-
-def _gauss(n: FloatArray, h: FloatArray) -> FloatArray:
-    """K (m,) from unit normals and H/|grad F|."""
-    xx, yy, zz, yz, xz, xy = h.T
-    x, y, z = n.T
-    plain = x * x * (yy * zz - yz**2) + y * y * (xx * zz - xz**2) + z * z * (xx * yy - xy**2)
-    mixed = y * z * (xy * xz - xx * yz) + x * z * (xy * yz - yy * xz) + x * y * (xz * yz - zz * xy)
-    return np.asarray(plain + 2 * mixed)
 
 
 def nearest_points(body: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

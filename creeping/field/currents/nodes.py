@@ -17,6 +17,7 @@ from creeping._typing import BoolArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.shed_wave import smoothstep
+from creeping.geometry.evaluators import entries_of
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
@@ -198,7 +199,7 @@ def _share_of_rays(
     points = rays.points[near]
     g, h = body.gradient(points), body.hessian(points)
     h = h / np.linalg.norm(g, axis=-1)[:, None, None]
-    entries = np.stack([h[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1)
+    entries = entries_of(h).T
     _, along, _ = plane_of_incidence(BodyNodes(points, normals[near], np.ones(len(points)), entries, 0.0), direction)
     with np.errstate(invalid="ignore"):
         xi = np.where(along > 0, -fock_scale(wavenumber, along) * cosine[near], np.inf)

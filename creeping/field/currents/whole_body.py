@@ -98,13 +98,11 @@ class SurfaceCurrents:
 
     def far(self, directions: ArrayLike) -> ComplexArray:
         """Far-field amplitude f, L, in unit directions (m, 3): (m,)."""
-        r = np.asarray(directions, dtype=float)
-        return far_of_scalar(self.points, self.normals, *self._scalar(self.values), r, self.wavenumber)
+        return self._far(self.values, np.ones(len(self.lit), dtype=bool), directions)
 
     def far_of(self, part: BoolArray, directions: ArrayLike) -> ComplexArray:
         """What some of the nodes (n,) give to `far`, L: (m, 3) -> (m,)."""
-        r, values = np.asarray(directions, dtype=float), np.where(part, self.values, 0.0)
-        return far_of_scalar(self.points, self.normals, *self._scalar(values), r, self.wavenumber)
+        return self._far(self.values, part, directions)
 
     def scattered(self, points: ArrayLike) -> ComplexArray:
         """Scattered field at points (m, 3), L, at least a quarter of a wavelength off the surface: (m,)."""
@@ -138,15 +136,20 @@ class SurfaceCurrents:
 
     def error(self, directions: ArrayLike) -> FloatArray:
         """Error of f, L, that 95 of 100 directions keep to: (m, 3) -> (m,)."""
-        r = np.asarray(directions, dtype=float)
-        parts = [self._far_change(part, r) for part in (self.lit, ~self.lit)]
-        inside = _rms(self._scattered(self.change, self.inner_points))
-        shape = np.hypot(np.abs(parts[0]), np.abs(parts[1])) / inside
+        lit, dark = (self._far(self.change, part, directions) for part in (self.lit, ~self.lit))
+        shape = np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside
         return np.asarray(self.extinction * np.hypot(LEVEL * self.mean_amplitude, SHAPE * shape))
 
-    def _far_change(self, part: BoolArray, directions: FloatArray) -> ComplexArray:
-        change = np.where(part, self.change, 0.0)
-        return far_of_scalar(self.points, self.normals, *self._scalar(change), directions, self.wavenumber)
+    @cached_property
+    def _change_inside(self) -> float:
+        """Rms inside of what the second order adds."""
+        return _rms(self._scattered(self.change, self.inner_points))
+
+    def _far(self, values: ComplexArray, part: BoolArray, directions: ArrayLike) -> ComplexArray:
+        """f (m,) of values (n,) on some of the nodes."""
+        r = np.asarray(directions, dtype=float)
+        u, slope = (None if one is None else one[part] for one in self._scalar(values))
+        return far_of_scalar(self.points[part], self.normals[part], u, slope, r, self.wavenumber)
 
     def _scattered(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         return field_of_scalar(self.points, self.normals, *self._scalar(values), points, self.wavenumber)

@@ -29,9 +29,15 @@ def height_gain(tau: ComplexArray, Y: ArrayLike) -> ComplexArray:
         tau, Y = np.broadcast_arrays(tau, Y)
         out, high = np.empty(Y.shape, dtype=complex), (Y > HIGH) & (np.abs(tau) < 0.1 * Y)
         out[high] = _high_gain(tau[high], Y[high])
-        out[~high] = height_gain(tau[~high], np.minimum(Y[~high], HIGH))
+        # a root as large as the height has no expansion in their ratio
+        out[~high] = _plain_gain(tau[~high], Y[~high])
         return out
-    value, _, zeta = scaled_ai((tau - Y) * np.exp(2j * np.pi / 3))
+    return _plain_gain(tau, Y)
+
+
+def _plain_gain(tau: ComplexArray, Y: FloatArray) -> ComplexArray:
+    """Height gain as it stands: its exponents cancel to rounding times Y^(3/2)."""
+    value, _, zeta = scaled_ai((tau - Y) * TURN)
     root = np.sqrt(Y)
     # both exponents grow like Y^(3/2): subtract before the exponential
     exponent = -zeta - 2j / 3 * Y * root + 1j * tau * root - 0.25j * np.pi
