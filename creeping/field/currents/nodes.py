@@ -56,6 +56,10 @@ class LitNodes:
         Normal curvatures along and across the plane of incidence.
     rate, bend : (n,)
         rho' and rho rho'' of rho = 1/kappa_a along it.
+    axes : (n, 3)
+        Unit tangents a in the plane of incidence, with d.a >= 0.
+    twist : (n,), 1/L
+        Entry of the shape operator between a and b = n x a.
     """
 
     points: FloatArray
@@ -66,6 +70,8 @@ class LitNodes:
     across: FloatArray
     rate: FloatArray
     bend: FloatArray
+    axes: FloatArray
+    twist: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,23 +85,30 @@ class RayNodes:
     normals : (n, 3)
     weights : (n,), L^2
         |J| ds dsigma_perp, times the share of the rays.
+    twist : (n,), 1/L
+        Entry of the shape operator between p and n x p, the torsion of the rays.
     """
 
     rays: RayPoints
     normals: FloatArray
     weights: FloatArray
+    twist: FloatArray
 
 
 def plane_of_incidence(nodes: BodyNodes, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """C = -n.d and the normal curvatures, 1/L, along and across the plane of incidence (n,)."""
-    cosine = -nodes.normals @ direction
-    along_axis = direction + cosine[:, None] * nodes.normals
-    length = np.linalg.norm(along_axis, axis=1, keepdims=True)
+    along = nodes.curvature(axes_of_incidence(nodes.normals, direction))
+    return -nodes.normals @ direction, along, nodes.total_curvature - along
+
+
+def axes_of_incidence(normals: FloatArray, direction: FloatArray) -> FloatArray:
+    """Unit tangents in the plane of incidence (n, 3)."""
+    along = direction - (normals @ direction)[:, None] * normals
+    length = np.linalg.norm(along, axis=1, keepdims=True)
     # at normal incidence any plane will do: kappa_a/c^2 + kappa_b is the sum of both there
-    spare = np.cross(nodes.normals, np.eye(3)[np.argmin(np.abs(nodes.normals), axis=1)])
+    spare = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
     spare /= np.linalg.norm(spare, axis=1, keepdims=True)
-    along = nodes.curvature(np.where(length > 1e-6, along_axis / np.maximum(length, 1e-300), spare))
-    return cosine, along, nodes.total_curvature - along
+    return np.where(length > 1e-6, along / np.maximum(length, 1e-300), spare)
 
 
 def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
@@ -105,8 +118,7 @@ def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
     whole = body_nodes(body, 2 * wavenumber)
     cosine = -whole.normals @ d
     # m c is at least PENUMBRA's end where the surface is that dark, unless it is nearly flat
-    near = np.flatnonzero(cosine > -0.6)
-    nodes = BodyNodes(whole.points[near], whole.normals[near], whole.weights[near], whole.hessians[near], whole.error)
+    nodes = whole.part(np.flatnonzero(cosine > -0.6))
     cosine, along, across = plane_of_incidence(nodes, d)
     xi = -fock_scale(wavenumber, along) * cosine
     dark = cosine <= 0
@@ -117,8 +129,19 @@ def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
     rate, bend = np.zeros((2, len(at)))
     varies = (along[at] > 0) & (xi[at] > -VARYING)
     rate[varies], bend[varies] = radius_rates(body, nodes.points[at][varies], d, along[at][varies])
+    taken = nodes.part(at)
+    axes = axes_of_incidence(taken.normals, d)
     return LitNodes(
-        nodes.points[at], nodes.normals[at], nodes.weights[at] * share, cosine[at], along[at], across[at], rate, bend
+        taken.points,
+        taken.normals,
+        taken.weights * share,
+        cosine[at],
+        along[at],
+        across[at],
+        rate,
+        bend,
+        axes,
+        taken.twist(axes),
     )
 
 
@@ -171,7 +194,15 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     normals = normal(fan.body, points).reshape(*shape, 3)
     weights = weights * _share_of_rays(fan.body, rays, normals, fan.line.direction, wavenumber)
     there = rays.alive & np.isfinite(weights) & (weights > 0)
-    return RayNodes(rays[there], normals[there], weights[there])
+    rays, normals, weights = rays[there], normals[there], weights[there]
+    return RayNodes(rays, normals, weights, _nodes_at(fan.body, rays.points, normals).twist(rays.directions))
+
+
+def _nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:
+    """Points (n, 3) of the body, L, as nodes of weight 1."""
+    g, h = body.gradient(points), body.hessian(points)
+    entries = entries_of(h / np.linalg.norm(g, axis=-1)[:, None, None]).T
+    return BodyNodes(points, normals, np.ones(len(points)), entries, 0.0)
 
 
 def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
@@ -196,11 +227,7 @@ def _share_of_rays(
     # twice the end, for m at the launch point is not m here
     near = -cosine * fock_scale(wavenumber, np.maximum(rays.curvature[0], 1e-300)) < 2 * PENUMBRA[1]
     near &= np.logical_and.accumulate(near, axis=1)
-    points = rays.points[near]
-    g, h = body.gradient(points), body.hessian(points)
-    h = h / np.linalg.norm(g, axis=-1)[:, None, None]
-    entries = entries_of(h).T
-    _, along, _ = plane_of_incidence(BodyNodes(points, normals[near], np.ones(len(points)), entries, 0.0), direction)
+    _, along, _ = plane_of_incidence(_nodes_at(body, rays.points[near], normals[near]), direction)
     with np.errstate(invalid="ignore"):
         xi = np.where(along > 0, -fock_scale(wavenumber, along) * cosine[near], np.inf)
     share[near] = smoothstep(xi, *PENUMBRA)

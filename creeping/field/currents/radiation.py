@@ -85,18 +85,23 @@ def field_of_scalar(
 def far_of_vector(
     points: FloatArray, currents: ComplexArray, directions: FloatArray, wavenumber: float
 ) -> ComplexArray:
-    """f (m, 3), L, of J dS (n, 3)."""
-    sums = phase_sums(points, np.asarray(currents.T), directions, wavenumber)
-    along = np.sum(sums * directions, axis=1, keepdims=True)
-    return np.asarray(1j * wavenumber / (4 * np.pi) * (sums - along * directions))
+    """f (m, 3, ...), L, of J dS (n, 3, ...)."""
+    columns = currents.reshape(len(currents), -1).T
+    sums = phase_sums(points, np.asarray(columns), directions, wavenumber).reshape(-1, *currents.shape[1:])
+    along = np.einsum("mc...,mc->m...", sums, directions)
+    return np.asarray(1j * wavenumber / (4 * np.pi) * (sums - np.einsum("m...,mc->mc...", along, directions)))
 
 
 def magnetic_field_of_vector(
     points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
 ) -> ComplexArray:
-    """Scattered H (m, 3) at points off the body, of J dS (n, 3), in the unit of the incident H times L^0."""
+    """Scattered H (m, 3, ...) at points off the body, in the unit of the incident one, of J dS (n, 3, ...)."""
     from creeping.field.kernels.radiation import curl
 
+    if currents.ndim > 2:
+        each = np.moveaxis(currents.reshape(*currents.shape[:2], -1), -1, 0)
+        fields = [magnetic_field_of_vector(points, one, at, wavenumber) for one in each]
+        return np.stack(fields, axis=-1).reshape(len(at), 3, *currents.shape[2:])
     J = currents.T / (4 * np.pi)
     real, imaginary = np.ascontiguousarray(J.real), np.ascontiguousarray(J.imag)
     out = np.empty((len(at), 6))
