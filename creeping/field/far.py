@@ -16,6 +16,7 @@ from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.assembly import surface_currents
+from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import far_geometry, observers_of
 from creeping.field.far_rays import error_by_order, field_of
@@ -26,7 +27,7 @@ from creeping.rays.fan import RayFan
 
 METHODS = ("auto", "currents", "rays")
 AFFORDABLE = 3e9
-"""Nodes times directions up to which "auto" takes currents: some ten seconds of one core."""
+"""Nodes times directions, seen one by one, up to which "auto" takes currents: some ten seconds of one core."""
 MOST_NODES = 1.5e6
 """Nodes up to which it does, for the memory's sake."""
 UNRESOLVED = 0.1
@@ -113,7 +114,10 @@ def _affordable(fan: RayFan, directions: int, wavenumber: float) -> bool:
         return False
     # some six nodes a wavelength on the lit half, and the least that a mesh has
     nodes = max(3e4, 0.5 * area * (6 * wavenumber / (2 * np.pi)) ** 2)
-    return nodes < MOST_NODES and nodes * directions < AFFORDABLE
+    if nodes > MOST_NODES:
+        return False
+    cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
+    return nodes * directions < AFFORDABLE or transformed(int(nodes), directions, cells)
 
 
 def _currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents:
