@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
+from creeping.field.ray_ends import RayEnds
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import WITH_JACOBI
 from creeping.geometry.directions import unit_directions
@@ -153,6 +154,8 @@ class FarGeometry:
     directions, direction : (n m, 3)
         r and d of each observer.
     incidence : (n m,) of int
+    ends : RayEnds
+        Of the rays.
     """
 
     def __init__(
@@ -194,6 +197,7 @@ class FarGeometry:
         cells, crossings = 64, 2 + int(self.tracer.steps * TURN / np.pi)
         most = len(times) * PARTS
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
+        self.ends = RayEnds(self.tracer, launch, states, times)
         while rays:
             found, places = np.empty((cells * n * many, 4), np.int64), np.empty((cells * n * many, 2))
             crossed = np.empty((crossings * rays * max(1, int(back.sum())), 4))

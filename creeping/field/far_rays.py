@@ -59,7 +59,7 @@ def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
         reflected=parts.reflected,
         forward=parts.forward,
         method=_methods(parts.in_forward, parts.in_fan),
-        unresolved=parts.unresolved(),
+        unresolved=parts.unresolved(lost_wave(geometry, k, boundary)),
         error=np.full(parts.creeping.shape, np.nan),
         error_by="",
         wavenumber=k,
@@ -69,11 +69,22 @@ def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
 
 
 def error_by_order(far: FarField, geometry: FarGeometry, boundary: BoundaryLike) -> FarField:
-    """A far field with the difference of both orders as its error."""
+    """A far field with an error: the difference of both orders, and what rays that end too early would still give."""
     other = field_of(geometry, far.wavenumber, boundary, 3 - far.order)
+    lost = lost_wave(geometry, far.wavenumber, boundary)
     with np.errstate(invalid="ignore"):
         error = np.abs(far.total - other.total)
+    error = np.hypot(error, lost.reshape(-1, *(1,) * (error.ndim - 1)))
     return replace(far, error=np.where(np.isfinite(error), error, np.nan), error_by="order")
+
+
+def lost_wave(geometry: FarGeometry, wavenumber: float, boundary: BoundaryLike) -> FloatArray:
+    """Bound of what rays beyond their ends would give each observer (m,), L, of the worse polarisation."""
+    lost = [
+        geometry.ends.lost(geometry.directions, geometry.incidence, wavenumber, kind)
+        for kind in scalar_boundaries(boundary)
+    ]
+    return np.asarray(np.max(lost, axis=0))
 
 
 def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
@@ -142,11 +153,12 @@ class _Parts:
         self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.least_merging, *MERGED), 0.0)
         self.long_rays = self.in_forward * smoothstep(theta, *LONG_RAYS)
 
-    def unresolved(self) -> BoolArray:
-        """Directions in which an expansion fails for what matters there (m,)."""
+    def unresolved(self, lost: FloatArray) -> BoolArray:
+        """Directions in which an expansion fails, or rays end too early, for what matters there (m,)."""
         total = np.abs(self.creeping + self.reflected + self.forward)
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
-        return np.asarray((self.missing & (self.in_forward > 0)) | (self.failing_size > MATTERS * largest))
+        failing = np.maximum(self.failing_size, (1 - self.in_forward) * lost)
+        return np.asarray((self.missing & (self.in_forward > 0)) | (failing > MATTERS * largest))
 
     def _note_failing(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
         """Note the size of contributions (n,) whose expansion fails."""

@@ -14,6 +14,9 @@ from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.geometry.directions import unit_directions
+from creeping.geometry.speed import speed_of
+from creeping.geometry.surface import Surface
+from creeping.rays.reach import AUTO, body_length
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
@@ -226,6 +229,21 @@ def sweep_request(
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen),
         order=_plain(order),
     )
+
+
+def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike) -> float:
+    """Length of the rays of a sweep asked for as a number or as "auto": then for its lowest wavenumber, if it has any.
+
+    What is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes.
+    """
+    if not (isinstance(length, str) and length == AUTO):
+        return length
+    try:
+        known = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
+    except (TypeError, ValueError):
+        known = np.zeros(0)
+    known = known[np.isfinite(known) & (known > 0)]
+    return body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))
 
 
 def _plain(value: Any) -> Any:

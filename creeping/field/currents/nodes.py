@@ -22,6 +22,7 @@ from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
+from creeping.rays.reach import ray_length
 from creeping.rays.tracer import ray_points
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.occlusion import occluded
@@ -33,8 +34,8 @@ VARYING = 6.0
 """-xi up to which the rate of curvature matters."""
 RAYS, GAP, STEPS = 4.0, 0.5, 5.0
 """Rays a wavelength along the line, their largest distance in wavelengths, and steps a wavelength along them."""
-DECAY, LONGEST = 7.5, 4.0
-"""Rays are as long as their wave takes to fall by e^-DECAY, and at most LONGEST body sizes."""
+SLOWEST = 1e-3
+"""Least Im tau: a mode that decays less ends with the longest rays."""
 END = 0.15
 """Share of a ray over which its weight falls to 0 at its end: a cut would radiate."""
 STEP = 1e-4
@@ -206,16 +207,12 @@ def _nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNod
 
 
 def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
-    """Length, L, at which the first mode has fallen by e^-DECAY on all but the tenth of the rays that decay least."""
-    most = LONGEST * size(fan.body)
-    if not len(fan.points):
-        return most
-    rate = float(np.quantile(fan.attenuation[:, -1], 0.1)) / fan.length
-    curvature = rate**1.5
-    if not curvature > 0:
-        return most
-    slowest = float(np.min(modes_of(boundary, fock_scale(wavenumber, np.array(curvature))).tau.imag))
-    return float(min(most, DECAY / (np.cbrt(wavenumber / 2) * rate * max(slowest, 1e-3))))
+    """Length, L, at which the slowest mode of the boundary has died away."""
+    typical = fan.curvature[:, 0]
+    # a boundary's own mode may be slower than the hard one's, by which rays are long by default
+    m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
+    slowest = float(np.min(modes_of(boundary, m).tau.imag)) if np.all(np.isfinite(m)) else 0.0
+    return ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, SLOWEST))
 
 
 def _share_of_rays(
