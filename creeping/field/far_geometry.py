@@ -12,6 +12,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.field.ray_ends import RayEnds
+from creeping.field.reflected_fold import fold_error
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import WITH_JACOBI
 from creeping.geometry.directions import unit_directions
@@ -273,6 +274,10 @@ class FarGeometry:
     def specular(self) -> SpecularPoints:
         """Specular points of the lit side."""
         return specular_points(self.body, self.direction, self.directions, prepared(self.body).coarsest)
+
+    def fold(self, wavenumber: float) -> FloatArray:
+        """What specular points miss at a caustic of the reflected field (n m,), L."""
+        return fold_error(self.body, prepared(self.body).coarsest, self.direction, self.directions, wavenumber)
 
     def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
         """Nodes of the fan integral for the wanted observers, at most APART/k apart on the shadow line."""

@@ -4,8 +4,8 @@ With u the principal direction in which kappa_1 = 0 and g = u.grad kappa_1, a st
 
     dn = u g s^2/2
 
-so that near the image of the parabolic curve on the sphere of normals each normal is taken twice on one side, sign(g) u,
-and not at all on the other.
+so that near the image of the parabolic curve on the sphere of normals each normal is taken twice on one side,
+sign(g) u, and not at all on the other.
 
 Sources: [G05]; Derivations, B12.
 """

@@ -5,9 +5,8 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.boundary import HARD
+from creeping.field.boundary import HARD, scalar_boundaries
 from creeping.field.far_geometry import far_geometry
-from creeping.field.far_rays import lost_wave
 from studies.reference import sphere
 
 ANGLES = np.radians(np.arange(0.0, 181.0, 2.0))
@@ -39,7 +38,9 @@ def test_what_short_rays_lose_is_said(length, wavenumber, boundary):
 def test_long_rays_lose_nothing(boundary):
     fan, far = far_of("auto", 30.0, boundary)
     assert not np.any(far.unresolved)
-    assert not np.any(lost_wave(far_geometry(fan, ALONG), 30.0, boundary))
+    geometry = far_geometry(fan, ALONG)
+    for kind in scalar_boundaries(boundary):
+        assert not np.any(geometry.ends.lost(geometry.directions, geometry.incidence, 30.0, kind))
 
 
 def test_short_rays_are_flagged_where_they_would_leave():

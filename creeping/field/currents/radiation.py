@@ -6,8 +6,8 @@ With G = e^{ikR}/(4 pi R), u and du/dn on the whole body, and J = n x H on a con
     u_s(y) = int (u dG/dn_x - du/dn G) dS
     f(r) = (ik/4 pi) int [J - r (r.J)] e^{-ikr.x} dS,   H_s(y) = int grad_y G x J dS
 
-Directions r are taken one by one, or for a map of many by a nonuniform fast Fourier transform of the third kind [BMK19],
-good to 1e-9 of the largest value, whichever costs less.
+Directions r are taken one by one, or for a map of many by a nonuniform fast Fourier transform of the third kind
+[BMK19], good to 1e-9 of the largest value, whichever costs less.
 
 Inside the body the field of exact currents cancels the incident wave. What is left there, as a share of it, is the
 error of the currents that radiates: if nothing were left, nothing would be wrong outside either, by uniqueness.
@@ -67,9 +67,7 @@ def transformed(nodes: int, directions: int, cells: float) -> bool:
     return cells <= MOST_CELLS and PER_NODE * nodes + PER_CELL * cells < nodes * directions
 
 
-def _by_transform(
-    points: FloatArray, weights: ComplexArray, directions: FloatArray, wavenumber: float
-) -> ComplexArray:
+def _by_transform(points: FloatArray, weights: ComplexArray, directions: FloatArray, wavenumber: float) -> ComplexArray:
     import finufft
 
     x, k = np.ascontiguousarray(points.T), np.ascontiguousarray(wavenumber * directions.T)
