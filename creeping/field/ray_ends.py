@@ -21,7 +21,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geometry.surface import Surface, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.reach import DECAY, LONGEST
-from creeping.shadow.attachment import LaunchPoints, line_tangents
+from creeping.shadow.attachment import LaunchPoints, evenly_chosen, line_tangents
 
 if TYPE_CHECKING:
     from creeping.rays.tracer import RayTracer
@@ -61,12 +61,7 @@ class RayEnds:
 
     def __init__(self, tracer: "RayTracer", launch: LaunchPoints, states: FloatArray, times: FloatArray) -> None:
         self.body, self._tracer = tracer.body, tracer
-        there = launch.there
-        every = np.maximum(there.sum(axis=1), 1) / SOME
-        # evenly spread over the rays of each incidence, none twice
-        number = np.cumsum(there, axis=1) - 1
-        chosen = there & ((np.floor(number / every[:, None]) > np.floor((number - 1) / every[:, None])) | (number == 0))
-        self._incidence, ray = np.nonzero(chosen)
+        self._incidence, ray = np.nonzero(evenly_chosen(launch.there, SOME))
         self._starts = launch.points[self._incidence, ray]
         self._directions = launch.directions[self._incidence]
         self._attenuation = _attenuation(self.body, states[self._incidence, ray], times)

@@ -112,8 +112,19 @@ def body_length(body: Surface, wavenumber: float | None = None) -> float:
     return float(np.max(decayed_lengths(body, launch, wavenumber)))
 
 
+def early_length(body: Surface, wavenumber: float) -> float:
+    """Length, L, beyond which xi > 1 on all rays of INCIDENCES evenly spread incidences."""
+    launch = shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch
+    return float(np.max(decayed_lengths(body, launch, wavenumber, DECAY, spared=0.0)))
+
+
 def decayed_lengths(
-    body: Surface, launch: LaunchPoints, wavenumber: float | None = None, decay: float = HARD_DECAY
+    body: Surface,
+    launch: LaunchPoints,
+    wavenumber: float | None = None,
+    decay: float = HARD_DECAY,
+    *,
+    spared: float = SPARED,
 ) -> FloatArray:
     """Lengths (n,), L, at which waves of n incidences have died away; LONGEST body sizes where no ray is launched."""
     most, there = LONGEST * size(body), launch.there
@@ -130,7 +141,7 @@ def decayed_lengths(
         wanted = DECAY / (np.cbrt(lowest / 2) * decay)
         ends = [np.interp(wanted, ray[:, ATTENUATION], times, right=most) for ray in rays]
         # a wave ends where its ray detaches
-        found[row] = np.quantile(np.minimum(ends, rays[:, -1, DETACHMENT]), 1 - SPARED)
+        found[row] = np.quantile(np.minimum(ends, rays[:, -1, DETACHMENT]), 1 - spared)
     grain = GRAIN * size(body)
     return np.asarray(np.minimum(np.ceil(found / grain - 1e-6) * grain, most))
 

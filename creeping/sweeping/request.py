@@ -62,6 +62,16 @@ RAYS = {
     "spreading_rate": Variable(("ray", "step"), "float64", "1/L", "J'"),
     "attenuation": Variable(("ray", "step"), "float64", "L^(1/3)", "integral of kappa_n^(2/3) along the ray"),
 }
+CURVED = {
+    "least_radius": Variable((), "float64", "L", "least radius of curvature along the direction at the launch points"),
+    "transverse": Variable(
+        (), "float64", "L^(-2/3)", "largest kappa_t rho/m^2 at the launch points times k^(2/3), whatever k"
+    ),
+}
+VALID = {
+    "least_k_rho": Variable(("wavenumber",), "float64", "1", "least k rho on the rays, as creeping.validity"),
+    "largest_transverse": Variable(("wavenumber",), "float64", "1", "largest kappa_t rho/m^2, as creeping.validity"),
+}
 PARTS = {
     "creeping": "far-field amplitude of the creeping rays",
     "reflected": "far-field amplitude of the reflected rays",
@@ -164,10 +174,10 @@ class SweepRequest:
     def variables(self) -> dict[str, Variable]:
         """The arrays of results by name."""
         if self.quantity == "rays":
-            return LINE | RAYS
+            return LINE | CURVED | RAYS
         observer = ("observer",) if self.quantity == "bistatic" else ()
         parts = PARTS if self.quantity == "bistatic" else {k: v for k, v in PARTS.items() if k != "forward"}
-        found = dict(LINE)
+        found = LINE | VALID
         if self.scalar_boundaries:
             dims = ("boundary", "wavenumber", *observer)
             found |= {name: Variable(dims, "complex128", "L", text) for name, text in parts.items()}

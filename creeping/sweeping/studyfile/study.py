@@ -244,7 +244,7 @@ def _request(
     try:
         request = sweep_request(
             quantity,
-            length=1.0 if _length_in(main) == AUTO else main["length"] or main["length_in_body_sizes"],
+            length=1.0 if _length_in(main) == AUTO else main["length_in_body_sizes"] or main["length"],
             n_rays=main["rays"],
             n_steps=main["steps"] or 1,
             wavenumbers=main["wavenumbers_per_length"],
