@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.shed_wave import smoothstep
@@ -100,13 +100,17 @@ def plane_of_incidence(nodes: BodyNodes, direction: FloatArray) -> tuple[FloatAr
 
 def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
     """Nodes of the lit side of an incidence, for far fields at this wavenumber, 1/L, and below."""
-    d = line.direction
     # of the integrand e^{ik(d - r).x}
     whole = body_nodes(body, 2 * wavenumber)
-    cosine = -whole.normals @ d
     # m c is at least PENUMBRA's end where the surface is that dark, unless it is nearly flat
-    near = np.flatnonzero(cosine > -0.6)
+    near = np.flatnonzero(-whole.normals @ line.direction > -0.6)
     nodes = BodyNodes(whole.points[near], whole.normals[near], whole.weights[near], whole.hessians[near], whole.error)
+    return lit_part(body, line, nodes, wavenumber)[1]
+
+
+def lit_part(body: Surface, line: ShadowLine, nodes: BodyNodes, wavenumber: float) -> tuple[IntArray, LitNodes]:
+    """Rows of the nodes that the wave of an incidence reaches, to the end of the penumbra, and what they ask for."""
+    d = line.direction
     cosine, along, across = plane_of_incidence(nodes, d)
     xi = -fock_scale(wavenumber, along) * cosine
     dark = cosine <= 0
@@ -117,7 +121,7 @@ def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
     rate, bend = np.zeros((2, len(at)))
     varies = (along[at] > 0) & (xi[at] > -VARYING)
     rate[varies], bend[varies] = radius_rates(body, nodes.points[at][varies], d, along[at][varies])
-    return LitNodes(
+    return at, LitNodes(
         nodes.points[at], nodes.normals[at], nodes.weights[at] * share, cosine[at], along[at], across[at], rate, bend
     )
 

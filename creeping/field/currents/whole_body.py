@@ -140,6 +140,12 @@ class SurfaceCurrents:
         shape = np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside
         return np.asarray(self.extinction * np.hypot(LEVEL * self.mean_amplitude, SHAPE * shape))
 
+    def changed(self, points: ArrayLike) -> FloatArray:
+        """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
+        x = as_points(points)
+        lit, dark = (self._scattered(np.where(part, self.change, 0.0), x) for part in (self.lit, ~self.lit))
+        return np.asarray(np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside)
+
     @cached_property
     def _change_inside(self) -> float:
         """Rms inside of what the second order adds."""
