@@ -52,7 +52,7 @@ def places(name: str, d: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
     nodes = body_nodes(body, 20.0)
     pick = rng.choice(len(nodes.points), 700, p=nodes.weights / nodes.weights.sum())
     on, normals = nodes.points[pick], nodes.normals[pick]
-    height = np.exp(rng.uniform(*np.log(HEIGHTS), 600))
+    height = np.exp(rng.uniform(np.log(HEIGHTS[0]), np.log(HEIGHTS[1]), 600))
     off = on[:600] + height[:, None] * normals[:600]
     axis = rng.uniform(1.1, 4.0, 100)[:, None] * d + 0.1 * rng.normal(size=(100, 3))
     points = np.concatenate([off, axis])
@@ -81,7 +81,7 @@ def row(name: str, k: float, boundary: Any, seed: int) -> dict[str, float]:
     dark = occluded(body, points, d)
     bright = normals @ d < 0
     bright[bright] = ~occluded(body, on[bright], d)
-    found = {"off": 100 * np.mean(~near.ok), "on": 100 * np.mean(~surface.ok)}
+    found = {"off": 100 * float(np.mean(~near.ok)), "on": 100 * float(np.mean(~surface.ok))}
     parts = {"lit": ~dark, "shadow": dark & ~axis, "axis": dark & axis}
     unit = k if boundary == "soft" else 1.0
     for field, truth, scale, masks in (

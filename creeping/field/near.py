@@ -184,28 +184,35 @@ class _Assembled:
             self.method[at] = "boundary"
             return
         total = total_on(self.fan, self.points[at], self.k, self.kind, self.order)
-        self.creeping[at], self.scattered[at] = total["creeping"], total["lit"]
+        lit = total["method"] != "rays"
+        self.incident[at] = np.where(lit, np.exp(1j * self.k * (self.points[at] @ self.fan.line.direction)), 0.0)
+        self.creeping[at], self.scattered[at] = total["creeping"], total["lit"] - self.incident[at]
         for name in ("error", "error_by", "status", "method"):
             getattr(self, name)[at] = total[name]
 
     def by_currents(self, asked: BoolArray, boundary: BoundaryLike, method: str) -> None:
         """Let currents serve where they are asked for, far enough and, unless they must, better."""
-        if method == "auto" and not affordable(self.fan, int(asked.sum()), self.k):
+        at = np.flatnonzero(asked)
+        if method == "auto" and not affordable(self.fan, len(at), self.k):
             return
         try:
+            at = at[far_enough(self.fan.body, self.k, self.points[at])]
+            if not len(at):
+                return
             currents = kept_currents(self.fan, self.k, boundary)
         except SurfaceError:
             if method == "currents":
                 raise
             return
-        at = np.flatnonzero(asked)
-        at = at[far_enough(currents, self.points[at])]
         incident, scattered, error = total_at(currents, self.points[at], ~self.lit[at])
-        better = (self.status[at] != FieldStatus.OK) | (error < self.error[at]) | (method == "currents")
+        better = (error < self.error[at]) | (np.isfinite(error) & (self.status[at] != FieldStatus.OK))
+        better |= method == "currents"
         at = at[better]
         self.incident[at], self.scattered[at], self.creeping[at] = incident[better], scattered[better], 0.0
-        self.error[at], self.error_by[at], self.method[at] = error[better], "extinction", "currents"
-        self.status[at] = FieldStatus.OK
+        # of a body that is nowhere thick enough to look inside nothing is known but the size of the wave
+        known = np.isfinite(error[better])
+        self.error[at], self.error_by[at] = np.where(known, error[better], 1.0), np.where(known, "extinction", "bound")
+        self.status[at], self.method[at] = FieldStatus.OK, "currents"
 
     def arrays(self) -> dict[str, Any]:
         """What a result is made of, each (n,)."""

@@ -5,7 +5,7 @@
 with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
 w_i of rays that come from afar. The error of lit ground, as a share of u1 and with u2 of second order, is
 
-    [(C |u2/u1 - 1|^2)^2 + (A/m^4)^2 + (B (|rho rho''| + rho'^2)/m^2)^2]^(1/2)
+    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2]^(1/2)
 
 Sources: [F46], [LK59]; Derivations, F9, F16 and F18. The factors were set on four bodies
 (`studies.near_coverage`).
@@ -32,11 +32,12 @@ from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
 from creeping.rays.tracer import ray_points
 
-SQUARED = {"soft": 0.6, "hard": 2.0, "impedance": 0.6}
-LEAST = 0.05
+SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
+LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
 VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
-"""Factors of the error on lit ground: of the square of what the second order adds, of 1/m^4, and of curvature that
-varies, whose second order an impedance leaves out."""
+ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
+"""Factors A, B, C and D of the error on lit ground; an impedance leaves curvature that varies out of its second order.
+"""
 
 
 def surface_field(
@@ -198,7 +199,14 @@ def _lit_error(
     """Error of the lit side's expansion (n,)."""
     size, change = np.abs(u), np.abs(u - other)
     m = fock_scale(k, part.along)
-    varying = (np.abs(part.bend) + part.rate**2) / m**2
-    square = SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2
-    share = np.sqrt(square**2 + (LEAST / m**4) ** 2 + (VARIES[kind.kind] * varying) ** 2)
+    # grazing a flat or concave place m is infinite, and optics alone stands there
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
+    terms = (
+        SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
+        LEAST[kind.kind] / m**4,
+        VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
+        ACROSS[kind.kind] * across**2,
+    )
+    share = np.linalg.norm(terms, axis=0)
     return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))

@@ -4,8 +4,8 @@ With T = J + l J' the width of a ray's tube, T' its slope across the rays, and J
 
     error^2 = (sum |ui| e_i)^2 + sum_i |ui|^2 f_i + (sum_pairs C (|ui| + |uj|)/(k |Li - Lj|))^2 + (sum |ui| g_i)^2
     f = (5/8k) T'^2/T^4/(3 |J'/T| + 1/(s + l)),   g = e^(-a (xi_end - xi))
-    e = [(A/m^2)^2 + (B V)^2]^(1/2) off the body,   [(C |u2/u1 - 1|^2)^2 + (B V)^2]^(1/2) on it
-    V = (|rho rho''| + rho'^2)/m^2,   A/m^2 and V means of both ends
+    e = [(A/m^2)^2 + (B V)^2]^(1/2) off the body,   [(C |u2/u1 - 1|^2)^2 + xi^2 (B V)^2 + xi^2 (D r^2)^2]^(1/2)
+    V = (|rho rho''| + rho'^2)/m^2,   r = rho kappa_t/m^2,   on it; A/m^2, V and r means of both ends
 
 f is the next term of the transport equation, at a fold the 5/(72 zeta) of Airy's function; near caustics the error
 is of its root's size. Two waves of which one has touched a caustic that the other has not are the leading terms of one
@@ -25,20 +25,22 @@ from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.far_geometry import fan_strips
 from creeping.field.point_result import FieldStatus
-from creeping.field.shed_wave import fock_parameter, scales
+from creeping.field.shed_wave import fock_parameter, scales, transverse_ratios
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.strips import Strip
 
-CLOSE, VARIES_NEAR = 0.2, {"soft": 0.4, "hard": 0.3, "impedance": 0.3}
+CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25}
 """A, and B off the body."""
-SQUARED = {"soft": 0.4, "hard": 1.4, "impedance": 1.4}
-VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.2}
+SQUARED = {"soft": 1.0, "hard": 2.2, "impedance": 1.4}
+VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25}
 """C, and B on the body."""
+ACROSS, LEAST_XI = 0.3, 0.7
+"""D, and the least xi that the error on the body grows with."""
 MERGING = 0.3
 """C of pairs: 5/36 at a fold, 1/4 on the axis of a sphere."""
-FOLDED, MERGED = 0.025, 0.04
+FOLDED, MERGED = 0.008, 0.04
 """Shares of the waves from which f and merging make a point one of a caustic."""
 NARROW = 0.25
 """m |T|/(|J| + l |J'|) below which a ray is on a caustic, whatever else there is."""
@@ -135,11 +137,20 @@ def own_error(
         ends = zip(scales(rays, wavenumber), rays.radius_rate, rays.radius_bend, strict=True)
         small, varying = np.mean([[m**-2, (np.abs(bend) + rate**2) / m**2] for m, rate, bend in ends], axis=0)
         if on:
-            share = np.hypot(SQUARED[boundary.kind] * (change / size) ** 2, VARIES_ON[boundary.kind] * varying)
+            across = _mean_across(rays, wavenumber)
+            growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS * across**2)
+            growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
+            share = np.hypot(SQUARED[boundary.kind] * (change / size) ** 2, growing)
         else:
             share = np.hypot(CLOSE * small, VARIES_NEAR[boundary.kind] * varying)
         error = size * np.minimum(share, 1.0) + (change if order == 1 else 0.0)
     return np.asarray(np.where(size > 0, error, 0.0))
+
+
+def _mean_across(rays: RayPoints, wavenumber: float) -> FloatArray:
+    """rho kappa_t/m^2, mean of both ends (...)."""
+    ends = zip(transverse_ratios(rays), scales(rays, wavenumber), strict=True)
+    return np.asarray(np.mean([np.abs(r) / m**2 for r, m in ends], axis=0))
 
 
 def _fold(strips: tuple[Strip, ...], shed: ShedRays, wavenumber: float) -> FloatArray:

@@ -17,8 +17,9 @@ import numpy as np
 from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.geometry.quadrature import body_nodes
+from creeping.geometry.surface import Surface
 
-LIT_LEVEL, DARK_LEVEL, SHAPE = 2.0, 3.0, 2.0
+LIT_LEVEL, DARK_LEVEL, SHAPE = 2.0, 4.0, 2.0
 """Factors L and S of the error."""
 ABSORBING_LEVEL = 1.0
 """L in the light of an impedance: most of what is wrong with its currents stands at the line and radiates ahead."""
@@ -26,15 +27,21 @@ OFF = 0.25
 """Least distance from the body, in wavelengths, at which currents serve."""
 
 
-def far_enough(currents: SurfaceCurrents, points: FloatArray) -> BoolArray:
-    """Whether points (n, 3), L, are so far off the body that sums over nodes are integrals: (n,)."""
+def far_enough(body: Surface, wavenumber: float, points: FloatArray) -> BoolArray:
+    """Whether points (n, 3), L, are so far off the body that sums over nodes are integrals: (n,).
+
+    Raises
+    ------
+    SurfaceError
+        If the wavenumber, 1/L, is too high for any mesh of the body.
+    """
     from scipy.spatial import cKDTree
 
     # the nodes of the lit side, on the whole of the body
-    nodes = body_nodes(currents.body, 2 * currents.wavenumber)
+    nodes = body_nodes(body, 2 * wavenumber)
     apart = 0.5 * float(np.sqrt(np.max(nodes.weights)))
     distance, _ = cKDTree(nodes.points).query(points)
-    return np.asarray(distance**2 - apart**2 > (OFF * 2 * np.pi / currents.wavenumber) ** 2)
+    return np.asarray(distance**2 - apart**2 > (OFF * 2 * np.pi / wavenumber) ** 2)
 
 
 def total_at(
