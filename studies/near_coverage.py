@@ -5,6 +5,7 @@ part of the points whose status is OK: share in which the true error is within t
 true error in the median. Parts:
 
     lit        off the body, where the incident wave comes; by currents
+    close      within a quarter of a wavelength of the body; between currents and the field on it
     shadow     off the body, behind it; by rays or currents, whichever states less
     axis       about the axis behind it, where rays merge
     on lit     on lit ground
@@ -30,7 +31,7 @@ WAVENUMBERS = (10.0, 20.0, 30.0)
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7)
 BODIES = ("sphere", "triaxial", "slender", "flat", "twisted", "peanut")
 HEIGHTS = (0.03, 3.0)
-PARTS = ("lit", "shadow", "axis", "on lit", "on dark")
+PARTS = ("lit", "close", "shadow", "axis", "on lit", "on dark")
 
 
 def exact_fields(
@@ -82,7 +83,8 @@ def row(name: str, k: float, boundary: Any, seed: int) -> dict[str, float]:
     bright = normals @ d < 0
     bright[bright] = ~occluded(body, on[bright], d)
     found = {"off": 100 * float(np.mean(~near.ok)), "on": 100 * float(np.mean(~surface.ok))}
-    parts = {"lit": ~dark, "shadow": dark & ~axis, "axis": dark & axis}
+    close = near.method == "layer"
+    parts = {"lit": ~dark & ~close, "close": close, "shadow": dark & ~axis & ~close, "axis": dark & axis & ~close}
     unit = k if boundary == "soft" else 1.0
     for field, truth, scale, masks in (
         (near, exact, 1.0, parts),

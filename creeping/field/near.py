@@ -4,7 +4,8 @@
     u(y) = sum of the waves of the rays whose tangents pass through y         rays, in the shadow
 
 Currents (`creeping.field.currents`) know no caustics and no shadow boundary, but they err by a share of the incident
-wave, and must be a quarter of a wavelength away. Rays err by a share of what they bring, which in the deep shadow is
+wave, and must be a quarter of a wavelength away; nearer, the field is between theirs and that on the body
+(`creeping.field.near_layer`). Rays err by a share of what they bring, which in the deep shadow is
 far less. So rays serve in the shadow where nothing is the matter with them and their error is the smaller one.
 
 Sources: [LK59], [CK13]; Derivations, F8, F17 and F18.
@@ -19,6 +20,7 @@ from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough, total_at
 from creeping.field.far_geometry import fan_strips
+from creeping.field.near_layer import layer_field
 from creeping.field.near_wave import shed_waves
 from creeping.field.on_body import rays_on, total_on
 from creeping.field.point_result import FieldStatus, NearField
@@ -63,8 +65,9 @@ def near_field(
     method : {"auto", "currents", "rays"}
         The currents of the whole body, or the sum over creeping rays, which on the lit side is not the total field
         (status LIT). "auto" takes, point by point, rays in the shadow where they err less, currents elsewhere, unless
-        these cost more than some ten seconds or the order is 1. Nearer to the body than a quarter of a wavelength rays
-        serve in any case.
+        these cost more than some ten seconds or the order is 1. Nearer to the body than a quarter of a wavelength
+        "layer" stands for currents: what is between them and the field on the body (`creeping.field.near_layer`). Where
+        that has no foot, over bays or ground without rays, rays serve.
 
     Returns
     -------
@@ -196,23 +199,31 @@ class _Assembled:
         if method == "auto" and not affordable(self.fan, len(at), self.k):
             return
         try:
-            at = at[far_enough(self.fan.body, self.k, self.points[at])]
-            if not len(at):
-                return
+            far = far_enough(self.fan.body, self.k, self.points[at])
             currents = kept_currents(self.fan, self.k, boundary)
         except SurfaceError:
             if method == "currents":
                 raise
             return
+        must = method == "currents"
+        at, close = at[far], at[~far]
         incident, scattered, error = total_at(currents, self.points[at], ~self.lit[at])
-        better = (error < self.error[at]) | (np.isfinite(error) & (self.status[at] != FieldStatus.OK))
-        better |= method == "currents"
-        at = at[better]
-        self.incident[at], self.scattered[at], self.creeping[at] = incident[better], scattered[better], 0.0
+        self._prefer(at, incident + scattered, error, "currents", must)
+        if len(close):
+            layer = layer_field(self.fan, currents, self.points[close], self.kind)
+            at = close[layer.there]
+            self._prefer(at, layer.values[layer.there], layer.error[layer.there], "layer", must)
+
+    def _prefer(self, at: IntArray, values: ComplexArray, error: FloatArray, name: str, must: bool) -> None:
+        """Let values serve at some points where they must, or are better than what rays give."""
+        known = np.isfinite(error)
+        better = must | (error < self.error[at]) | (known & (self.status[at] != FieldStatus.OK))
+        at, known = at[better], known[better]
+        self.incident[at] = np.exp(1j * self.k * (self.points[at] @ self.fan.line.direction))
+        self.scattered[at], self.creeping[at] = values[better] - self.incident[at], 0.0
         # of a body that is nowhere thick enough to look inside nothing is known but the size of the wave
-        known = np.isfinite(error[better])
         self.error[at], self.error_by[at] = np.where(known, error[better], 1.0), np.where(known, "extinction", "bound")
-        self.status[at], self.method[at] = FieldStatus.OK, "currents"
+        self.status[at], self.method[at] = FieldStatus.OK, name
 
     def arrays(self) -> dict[str, Any]:
         """What a result is made of, each (n,)."""

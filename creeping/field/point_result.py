@@ -20,7 +20,7 @@ class FieldStatus(IntEnum):
     --------
     >>> import creeping as cr
     >>> cr.FieldStatus.LIT.name, cr.FieldStatus.LIT.remedy
-    ('LIT', 'go a quarter of a wavelength off the body and let currents serve')
+    ('LIT', "let currents serve: method='auto', a quarter of a wavelength off the body")
     """
 
     OK = 0
@@ -41,7 +41,7 @@ class FieldStatus(IntEnum):
         return _REMEDIES[self]
 
 
-_AWAY = "go a quarter of a wavelength off the body and let currents serve"
+_AWAY = "let currents serve: method='auto', a quarter of a wavelength off the body"
 _REMEDIES = {
     FieldStatus.OK: "none needed",
     FieldStatus.LIT: _AWAY,
@@ -118,15 +118,16 @@ class PointField(ArrayResult, Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NearField(PointField):
-    """Field u at points off the body, in units of the incident wave.
+    """Field u at points off the body or on it, in units of the incident wave.
 
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order
-        As of every field at points; ``method`` is "currents" or "rays".
+        As of every field at points; ``method`` is "currents", "layer" between them and the
+        body, or "rays"; on the body "lit", "rays", "lit+rays", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
-        Parts, whose sum the values are: the incident wave and what currents radiate, where they served; the sum over
-        creeping rays, in the shadow the whole field, where those did.
+        Parts, whose sum the values are: where currents or lit ground served, the incident wave and the rest; where rays
+        did, the sum over them, which in the shadow is the whole field.
 
     Examples
     --------

@@ -33,7 +33,7 @@ from creeping.rays.strips import Strip
 
 CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25}
 """A, and B off the body."""
-SQUARED = {"soft": 1.0, "hard": 2.2, "impedance": 1.4}
+SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8}
 VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25}
 """C, and B on the body."""
 ACROSS, LEAST_XI = 0.3, 0.7
