@@ -13,7 +13,10 @@ from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.far import far_field as far_field
 from .field.far_result import FarField as FarField
 from .field.near import near_field as near_field
-from .field.surface import surface_field as surface_field
+from .field.on_body import surface_field as surface_field
+from .field.point_result import FieldStatus as FieldStatus
+from .field.point_result import NearField as NearField
+from .field.point_result import SurfaceField as SurfaceField
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty
 from .field.validity_range import Validity as Validity
 from .field.validity_range import validity as validity

@@ -122,7 +122,7 @@ def surface_errors(name: str, boundary: Any, k: float, incidence: int, order: in
 
 
 def near_errors(name: str, boundary: Any, k: float, incidence: int) -> tuple[list[float], list[float]]:
-    """Total field off the body in the shadow, launched at s = 0.15 to 1.1: medians by reach, and at all reaches.
+    """Total field off the body in the shadow by rays, launched at s = 0.15 to 1.1: medians by reach, and at all.
 
     Points on caustics in space, |J + l J'| < 0.25 on a ray through them, are left out. The second list holds the median
     over all points, the largest error as a share of the largest value, and the least |J + l J'| at that point.
@@ -139,7 +139,7 @@ def near_errors(name: str, boundary: Any, k: float, incidence: int) -> tuple[lis
         tube = np.full(len(y), np.inf)
         np.minimum.at(tube, shed.observer, np.abs(shed.rays.spreading + shed.reach * shed.rays.spreading_rate))
         y, tube = y[tube > 0.25], tube[tube > 0.25]
-        found = cr.near_field(fan, y, wavenumber=k, boundary=boundary)
+        found = cr.near_field(fan, y, wavenumber=k, boundary=boundary, method="rays")
         exact = solution.total(y)[:, incidence]
         errors.append(np.abs(found - exact))
         sizes.append(np.abs(exact))

@@ -89,12 +89,12 @@ def total(fan: RayFan, k: float, boundary: Any, degrees: FloatArray) -> float:
 
 
 def near(fan: RayFan, k: float, boundary: Any) -> float:
-    """Total field in the shadow, 1.1 to 3 radii from the centre and 0.4 or more from the axis, which is a caustic."""
+    """Total field in the shadow by rays, 1.1 to 3 radii from the centre and 0.4 or more from the axis, a caustic."""
     theta = np.radians(np.arange(8, 84, 4.0))
     points = np.concatenate([radius * observers(theta) for radius in (1.1, 1.3, 1.5, 2.0, 3.0)])
     across = np.hypot(points[:, 0], points[:, 1])
     points = points[(across > 0.4) & (across < 0.95)]
-    found = cr.near_field(fan, points, wavenumber=k, boundary=boundary)
+    found = cr.near_field(fan, points, wavenumber=k, boundary=boundary, method="rays").values
     exact = sphere.total_field(k, 1.0, points, np.array([0.0, 0, 1]), boundary)
     return worst(found, exact)
 

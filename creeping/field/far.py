@@ -7,34 +7,22 @@ gives; where the reflected field has a caustic they err, and what they say of it
 Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.currents.assembly import surface_currents
-from creeping.field.currents.radiation import grid_cells, transformed
+from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import far_geometry, observers_of
 from creeping.field.far_rays import error_by_order, field_of
 from creeping.field.far_result import FarField
-from creeping.geometry.quadrature import body_nodes
-from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 
 METHODS = ("auto", "currents", "rays")
-AFFORDABLE = 3e9
-"""Nodes times directions, seen one by one, up to which "auto" takes currents: some ten seconds of one core."""
-MOST_NODES = 1.5e6
-"""Nodes up to which it does, for the memory's sake."""
 UNRESOLVED = 0.1
 """Error, as a share of the largest |f|, from which a direction counts as unresolved."""
-_CURRENTS: "WeakKeyDictionary[RayFan, dict[tuple[float, BoundaryLike], SurfaceCurrents]]" = WeakKeyDictionary()
-KEPT = 2
-"""Currents kept with a fan, of so many wavenumbers and boundaries."""
 
 
 def far_field(
@@ -93,41 +81,15 @@ def far_field(
         raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
     r = observers_of(observation)
     # a conductor's sums are of six columns, those of one scalar problem of one to four
-    affordable = method == "auto" and order == 2 and len(r) and _affordable(fan, len(kinds) * len(r), k)
-    if method == "currents" or affordable:
+    cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
+    if method == "currents" or cheap:
         try:
-            return _by_currents(_currents(fan, k, boundary), r, boundary)
+            return _by_currents(kept_currents(fan, k, boundary), r, boundary)
         except SurfaceError:
             if method == "currents":
                 raise
     geometry = far_geometry(fan, r)
     return error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
-
-
-def _affordable(fan: RayFan, directions: int, wavenumber: float) -> bool:
-    """Whether currents cost little enough, by the area of the body."""
-    if not len(fan.points):
-        return False
-    try:
-        area = float(np.sum(body_nodes(fan.body, 4 / size(fan.body)).weights))
-    except SurfaceError:
-        return False
-    # some six nodes a wavelength on the lit half, and the least that a mesh has
-    nodes = max(3e4, 0.5 * area * (6 * wavenumber / (2 * np.pi)) ** 2)
-    if nodes > MOST_NODES:
-        return False
-    cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
-    return nodes * directions < AFFORDABLE or transformed(int(nodes), directions, cells)
-
-
-def _currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents:
-    kept = _CURRENTS.setdefault(fan, {})
-    key = (wavenumber, boundary)
-    if key not in kept:
-        while len(kept) >= KEPT:
-            kept.pop(next(iter(kept)))
-        kept[key] = surface_currents(fan, wavenumber=wavenumber, boundary=boundary)
-    return kept[key]
 
 
 def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike) -> FarField:

@@ -1,86 +1,85 @@
-"""The diffracted field at points near the body, in its shadow: every ray whose tangent passes through the point.
+"""The total field at points off the body: by the currents of the whole body, or by the creeping rays that come there.
 
-    u = D e^{ik(d.x0 + s + l)} / √(l |J + l J'|) e^{-iπN/2},   D = -√(m1 m2) √(2/k) P̂(ξ, Y),   Y = (m2 l/ρ2)²
-    P̂ = 2i√π e^{iπ/4} Σ_p R_p A_p exp{...} H_p(Y),   H_p the height gain, its end factor to the power Y/(1 + Y)
+    u(y) = e^{ikd.y} + int (u dG/dn_x - du/dn G) dS                          currents, everywhere
+    u(y) = sum of the waves of the rays whose tangents pass through y         rays, in the shadow
 
-Near the body the leading order is Fock's integral of the same modes, which holds down to ξ = 0. Farther off the modes
-add up by themselves but for a last ξ, where UTD's form stands, with X = k l ξ²/(2 m1 m2),
+Currents (`creeping.field.currents`) know no caustics and no shadow boundary, but they err by a share of the incident
+wave, and must be a quarter of a wavelength away; nearer, the field is between theirs and that on the body
+(`creeping.field.near_layer`). Rays err by a share of what they bring, which in the deep shadow is
+far less. So rays serve in the shadow where nothing is the matter with them and their error is the smaller one.
 
-    P̂ = P(ξ) + (e^{iπ/4}/(2√π ξ)) [1 - F_t(X)].
-
-N counts zeros of J on (0, s) and of J + l' J' on (0, l).
-
-Sources: [LK59], [P79], [KP74] for F_t; Derivations, F3 and F8. The power Y/(1 + Y) was found by trial.
+Sources: [LK59], [CK13]; Derivations, F8, F17 and F18.
 """
 
 import numpy as np
 
-from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
-from creeping.errors import InvalidInputError
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked
-from creeping.field.boundary import Boundary, BoundaryLike
-from creeping.field.creeping_modes import modes_of
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
+from creeping.field.currents.kept import affordable, kept_currents
+from creeping.field.currents.total import far_enough, total_at
 from creeping.field.far_geometry import fan_strips
-from creeping.field.shed_wave import (
-    amplitude_factor,
-    end_residue,
-    fock_parameter,
-    mean_scale,
-    mode_waves,
-    scales,
-    smoothstep,
-)
-from creeping.field.special.airy import MODES
-from creeping.field.special.fock import pekeris_star, transition_rate
-from creeping.field.special.height_gain import FAR_HEIGHT, height_gain, near_pekeris
-from creeping.field.surface import scalar_boundary, surface_amplitude, surface_waves
+from creeping.field.near_layer import layer_field
+from creeping.field.near_wave import shed_waves
+from creeping.field.on_body import rays_on, total_on
+from creeping.field.point_result import FieldStatus, NearField
+from creeping.field.ray_sums import own_error, ray_sum
+from creeping.field.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.surface import size
+from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
-from creeping.rays.quantities import RayPoints
-from creeping.rays.shedding import shed_near, shed_on
+from creeping.rays.shedding import shed_near
 from creeping.shadow.occlusion import occluded
 
-SERIES = (0.5, 0.9)
-"""ξ + √Y between which the second order of decay and amplitude comes in: it is what the height gain adds to ξ."""
-ENDS = (0.4, 0.9)
-"""ξ between which the factors of varying curvature come in."""
-DEEP = 3.0
-"""ξ beyond which the sum of modes stands alone."""
-HARD_BY = 0.04
-"""ξ below which, far from the body, even MANY modes do not add up; the shadow boundary is hard by."""
-MANY = 45
+METHODS = ("auto", "currents", "rays")
 ON_BODY = 1e-7
 """Distance from the body, in its sizes, below which a point counts as on it."""
+FINE = 0.01
+"""Error of rays up to which currents are not asked."""
+MISSING = 2.0
+"""Bound of what rays leave out on the lit side, the incident wave and a reflected one; in the shadow it is 1."""
 
 
 def near_field(
-    fan: RayFan, points: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
-) -> ComplexArray:
-    """Diffracted field u at points on or off the body.
-
-    In the shadow this is the total field. On the lit side only rays that have gone round the body count; incident and
-    reflected waves are left out there.
+    fan: RayFan,
+    points: ArrayLike,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+    method: str = "auto",
+) -> NearField:
+    """Total field u at points on or off the body, with its error; it acts as an array.
 
     Parameters
     ----------
     fan : RayFan
+        Long enough to pass where rays leave towards the points.
     points : (..., 3), L
         Outside the body or on it.
     wavenumber : float, 1/L
     boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
+        Second-order creeping waves, or the leading order, which is by rays.
+    method : {"auto", "currents", "rays"}
+        The currents of the whole body, or the sum over creeping rays, which on the lit side is not the total field
+        (status LIT). "auto" takes, point by point, rays in the shadow where they err less, currents elsewhere, unless
+        these cost more than some ten seconds or the order is 1. Nearer to the body than a quarter of a wavelength
+        "layer" stands for currents: what is between them and the field on the body (`creeping.field.near_layer`). Where
+        that has no foot, over bays or ground without rays, rays serve.
 
     Returns
     -------
-    complex, (...), in units of the incident wave
-        All rays through each point summed, 0 where none passes; grows without bound towards a caustic, and has no
-        meaning on one.
+    NearField
+        In units of the incident wave; ``method`` says what served at each point.
 
     Raises
     ------
     InvalidInputError
-        On points inside the body or not finite, a bad wavenumber, boundary or order, and for a weighted body.
+        On points inside the body or not finite, a bad wavenumber, boundary, order or method, and for a weighted body.
+    SurfaceError
+        If currents are asked for and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------
@@ -88,136 +87,146 @@ def near_field(
     >>> import scatterers as sc
     >>> ball = sc.Sphere()
     >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
-    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=24)
-    >>> u = cr.near_field(fan, [(0.3, 0.0, 1.5)], wavenumber=30.0, boundary="soft")
-    >>> u.shape, round(float(abs(u[0])), 2)
-    ((1,), 0.04)
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> u = cr.near_field(fan, [(0.3, 0.0, 1.5), (0.0, 2.0, -0.5)], wavenumber=30.0, boundary="soft")
+    >>> u.shape, round(float(abs(u[0])), 2), u.method.tolist()
+    ((2,), 0.04, ['rays', 'currents'])
     """
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
+    if method not in METHODS:
+        raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
+    if method == "currents" and order != 2:
+        raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
     y = as_points(points)
     flat = y.reshape(-1, 3)
-    strips = fan_strips(fan)
-    height = _height(fan, flat)
-    inside = np.flatnonzero(height < -ON_BODY)
-    if len(inside):
-        raise InvalidInputError(
-            f"{len(inside)} of {len(flat)} points are inside the body (worst: row {inside[np.argmin(height[inside])]}, "
-            f"depth about {-height.min() * size(fan.body):.3g}); give points on it or outside"
-        )
-    total = np.zeros(len(flat), dtype=complex)
-    off = np.flatnonzero(height > ON_BODY)
-    if len(off):
-        shed = shed_near(strips, fan.body, flat[off])
-        wave = shed_waves(shed.rays, shed.reach, k, kind, order)
-        free = ~occluded(fan.body, shed.rays.points, -shed.rays.directions, shed.reach)
-        np.add.at(total, off[shed.observer], np.where(free, wave, 0.0))
-    on = np.flatnonzero(height <= ON_BODY)
-    if len(on) and kind.kind != "soft":
-        found = shed_on(strips, fan.body, flat[on])
-        np.add.at(total, on[found.observer], surface_waves(found.rays, k, kind, order))
-    return total.reshape(y.shape[:-1])
+    on = _checked_height(fan, flat) <= ON_BODY
+    field = _Assembled(fan, flat, on, k, kind, order)
+    if method == "rays":
+        field.rays_on_body()
+    else:
+        field.total_on_body()
+        asked = ~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents"))
+        if order == 2 and np.any(asked):
+            field.by_currents(asked, boundary, method)
+    return NearField(
+        points=y.copy(),
+        wavenumber=k,
+        boundary=boundary_name(boundary),
+        order=order,
+        **{name: value.reshape(y.shape[:-1]) for name, value in field.arrays().items()},
+    )
 
 
-def _height(fan: RayFan, points: FloatArray) -> FloatArray:
+def _checked_height(fan: RayFan, points: FloatArray) -> FloatArray:
     """F/|grad F| in body sizes (n,), about the height above the body near it."""
     gradient = np.linalg.norm(fan.body.gradient(points), axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         # at the centre grad F may vanish: deep inside
-        return np.asarray(np.nan_to_num(fan.body.level(points) / gradient, nan=-1.0) / size(fan.body))
-
-
-def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray (n,) to u at l = reach (n,), L, along its tangent; 0 where the ray has ended."""
-    if not np.all(rays.alive):
-        out = np.zeros(rays.time.shape, dtype=complex)
-        out[rays.alive] = shed_waves(rays[rays.alive], reach[rays.alive], wavenumber, boundary, order)
-        return out
-    m1, m2 = scales(rays, wavenumber)
-    J, rate = rays.spreading, rays.spreading_rate
-    tube = J + reach * rate
-    zeros = rays.caustics + (J * tube < 0)
-    phase = wavenumber * (rays.eikonal + reach) - 0.5 * np.pi * zeros
-    with np.errstate(divide="ignore", over="ignore"):
-        amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / (reach * np.abs(tube)))
-    height = (m2 * reach * rays.curvature[1]) ** 2
-    wave = _uniform(rays, reach, height, wavenumber, boundary, order) * np.exp(1j * phase)
-    return np.asarray(np.where(np.isinf(amplitude), np.inf, np.where(np.isinf(amplitude), 0.0, amplitude) * wave))
-
-
-def _uniform(
-    rays: RayPoints, reach: FloatArray, height: FloatArray, wavenumber: float, boundary: Boundary, order: int
-) -> ComplexArray:
-    """P̂ (n,): near the body Fock's integral and what second order changes in the modes, farther the modes alone."""
-    xi = fock_parameter(rays, wavenumber)
-    m1, m2 = scales(rays, wavenumber)
-    q = boundary.q(np.sqrt(m1 * m2))
-    out = np.zeros(len(xi), dtype=complex)
-    low = (height <= FAR_HEIGHT) & (xi <= DEEP)
-    tall = (height > FAR_HEIGHT) & (xi < HARD_BY)
-    if np.any(low):
-        out[low] = near_pekeris(xi[low], height[low], _part(q, low))
-        if order == 2:
-            out[low] += _second(rays[low], height[low], wavenumber, boundary)
-    if np.any(tall):
-        # P + (1 - F_t(X))/(2 √π ξ) of the edge without the poles of both: F_t(X)/ξ is finite on the shadow boundary
-        per = np.sqrt(wavenumber * reach[tall] / (2 * m1[tall] * m2[tall]))
-        edge = transition_rate(per * xi[tall]) * per / (2 * np.sqrt(np.pi))
-        star = pekeris_star(xi[tall], _part(q, tall))
-        out[tall] = (1 - smoothstep(xi[tall], 0, HARD_BY)) * np.exp(0.25j * np.pi) * (star - edge)
-    series = (~low) & (xi > 0)
-    if np.any(series):
-        part = rays[series]
-        weight = smoothstep(xi[series], *ENDS) if order == 2 else np.zeros(len(part.time))
-        plain, whole = (
-            _series(part, height[series, None], wavenumber, boundary, order, ends=ends, n=MANY)
-            for ends in (False, True)
+        height = np.nan_to_num(fan.body.level(points) / gradient, nan=-1.0) / size(fan.body)
+    inside = np.flatnonzero(height < -ON_BODY)
+    if len(inside):
+        raise InvalidInputError(
+            f"{len(inside)} of {len(points)} points are inside the body (worst: row "
+            f"{inside[np.argmin(height[inside])]}, depth about {-height.min() * size(fan.body):.3g}); give points on "
+            "it or outside"
         )
-        taken = np.where(height[series] > FAR_HEIGHT, smoothstep(xi[series], 0, HARD_BY), 1.0)
-        out[series] += taken * ((1 - weight) * plain + weight * whole)
-    return out
+    return np.asarray(height)
 
 
-def _second(rays: RayPoints, height: FloatArray, wavenumber: float, boundary: Boundary) -> ComplexArray:
-    """What second order changes in the sum of modes (n,): c and amplitudes by ξ + √Y, the ends by ξ."""
-    xi = fock_parameter(rays, wavenumber)
-    total = np.zeros(len(xi), dtype=complex)
-    for by, range_, new, old in (
-        (xi + np.sqrt(height), SERIES, (2, False), (1, False)),
-        (xi, ENDS, (2, True), (2, False)),
-    ):
-        weight = smoothstep(by, *range_)
-        some = weight > 0
-        if np.any(some):
-            part, tall = rays[some], height[some, None]
-            pair = [_series(part, tall, wavenumber, boundary, order, ends=ends) for order, ends in (new, old)]
-            total[some] += weight[some] * (pair[0] - pair[1])
-    return total
+class _Assembled:
+    """Field at points (n, 3), first by rays; parts, error, status and method (n,)."""
 
+    def __init__(self, fan: RayFan, points: FloatArray, on: BoolArray, k: float, kind: Boundary, order: int) -> None:
+        self.fan, self.points, self.on, self.k, self.kind, self.order = fan, points, on, k, kind, order
+        n = len(points)
+        self.incident, self.scattered, self.creeping = np.zeros((3, n), dtype=complex)
+        self.error, self.status = np.zeros(n), np.zeros(n, dtype=np.int64)
+        self.error_by, self.method = np.full(n, "expansion", dtype="<U10"), np.full(n, "rays", dtype="<U8")
+        self.lit = np.zeros(n, dtype=bool)
+        off = np.flatnonzero(~on)
+        if not len(off):
+            return
+        body, d = fan.body, fan.line.direction
+        shed = shed_near(fan_strips(fan), body, points[off])
+        free = ~occluded(body, shed.rays.points, -shed.rays.directions, shed.reach)
+        shed = shed[free]
+        waves, other = (shed_waves(shed.rays, shed.reach, k, kind, o) for o in (order, 3 - order))
+        rays = ray_sum(
+            fan, shed, len(off), waves, own_error(shed.rays, (waves, other), k, kind, order, on=False), k, kind
+        )
+        self.lit[off] = ~occluded(body, points[off], d)
+        self._take(off, rays.values, rays.error, np.where(self.lit[off], FieldStatus.LIT, rays.status))
 
-def _part(q: ComplexArray | float | None, mask: BoolArray) -> ComplexArray | float | None:
-    return q if q is None or np.ndim(q) == 0 else q[mask]  # type: ignore[index]
+    def _take(self, at: IntArray, creeping: ComplexArray, error: FloatArray, status: IntArray) -> None:
+        """Rays at some points."""
+        self.creeping[at], self.status[at] = creeping, status
+        bad = status != FieldStatus.OK
+        # a sum that is not to be trusted has the whole of its waves for a bound already
+        missing = np.where(status == FieldStatus.LIT, MISSING, np.where(error > 0, 0.0, 1.0))
+        self.error[at] = error + np.where(bad, missing, 0.0)
+        self.error_by[at] = np.where(bad, "bound", "expansion")
 
+    def rays_on_body(self) -> None:
+        """Creeping rays alone at points on the body."""
+        at = np.flatnonzero(self.on)
+        if not len(at):
+            return
+        if self.kind.kind == "soft":
+            self.method[at] = "boundary"
+            return
+        rays = rays_on(self.fan, self.points[at], self.k, self.kind, self.order)
+        lit = normal(self.fan.body, self.points[at]) @ self.fan.line.direction < 0
+        lit[lit] = ~occluded(self.fan.body, self.points[at][lit], self.fan.line.direction)
+        self._take(at, rays.values, rays.error, np.where(lit, FieldStatus.LIT, rays.status))
 
-def _series(
-    rays: RayPoints,
-    height: FloatArray,
-    wavenumber: float,
-    boundary: Boundary,
-    order: int,
-    *,
-    ends: bool,
-    n: int = MODES,
-) -> ComplexArray:
-    """Sum of modes with height gain (n,); ``ends`` with the factors of varying curvature at both ends."""
-    modes = modes_of(boundary, mean_scale(rays, wavenumber), n)
-    share = height[..., 0] / (1 + height[..., 0])
-    waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=share if ends else None)
-    terms = end_residue(rays, wavenumber, boundary, "residue", n) * waves
-    if order == 2:
-        # from the amplitude on the body to that far away
-        far = np.sqrt(share)[..., None]
-        amplitude = far * amplitude_factor(rays, modes, wavenumber, boundary, 0.25)
-        terms = terms * (amplitude + (1 - far) * surface_amplitude(rays, modes, wavenumber, boundary))
-    terms = terms * height_gain(modes.tau, height)
-    return np.asarray(2j * np.sqrt(np.pi) * np.exp(0.25j * np.pi) * np.sum(terms, axis=-1))
+    def total_on_body(self) -> None:
+        """Total field at points on the body, the lit side's expansion included."""
+        at = np.flatnonzero(self.on)
+        if not len(at) or self.kind.kind == "soft":
+            self.method[at] = "boundary"
+            return
+        total = total_on(self.fan, self.points[at], self.k, self.kind, self.order)
+        lit = total["method"] != "rays"
+        self.incident[at] = np.where(lit, np.exp(1j * self.k * (self.points[at] @ self.fan.line.direction)), 0.0)
+        self.creeping[at], self.scattered[at] = total["creeping"], total["lit"] - self.incident[at]
+        for name in ("error", "error_by", "status", "method"):
+            getattr(self, name)[at] = total[name]
+
+    def by_currents(self, asked: BoolArray, boundary: BoundaryLike, method: str) -> None:
+        """Let currents serve where they are asked for, far enough and, unless they must, better."""
+        at = np.flatnonzero(asked)
+        if method == "auto" and not affordable(self.fan, len(at), self.k):
+            return
+        try:
+            far = far_enough(self.fan.body, self.k, self.points[at])
+            currents = kept_currents(self.fan, self.k, boundary)
+        except SurfaceError:
+            if method == "currents":
+                raise
+            return
+        must = method == "currents"
+        at, close = at[far], at[~far]
+        incident, scattered, error = total_at(currents, self.points[at], ~self.lit[at])
+        self._prefer(at, incident + scattered, error, "currents", must)
+        if len(close):
+            layer = layer_field(self.fan, currents, self.points[close], self.kind)
+            at = close[layer.there]
+            self._prefer(at, layer.values[layer.there], layer.error[layer.there], "layer", must)
+
+    def _prefer(self, at: IntArray, values: ComplexArray, error: FloatArray, name: str, must: bool) -> None:
+        """Let values serve at some points where they must, or are better than what rays give."""
+        known = np.isfinite(error)
+        better = must | (error < self.error[at]) | (known & (self.status[at] != FieldStatus.OK))
+        at, known = at[better], known[better]
+        self.incident[at] = np.exp(1j * self.k * (self.points[at] @ self.fan.line.direction))
+        self.scattered[at], self.creeping[at] = values[better] - self.incident[at], 0.0
+        # of a body that is nowhere thick enough to look inside nothing is known but the size of the wave
+        self.error[at], self.error_by[at] = np.where(known, error[better], 1.0), np.where(known, "extinction", "bound")
+        self.status[at], self.method[at] = FieldStatus.OK, name
+
+    def arrays(self) -> dict[str, Any]:
+        """What a result is made of, each (n,)."""
+        names = ("incident", "scattered", "creeping", "error", "error_by", "status", "method")
+        arrays = {name: getattr(self, name) for name in names}
+        return arrays | {"values": self.incident + self.scattered + self.creeping}

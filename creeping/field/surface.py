@@ -1,4 +1,4 @@
-"""The field on the body in the shadow: u, or du/dn where u = 0.
+"""The wave of each creeping ray on the body, in the shadow: u, or du/dn where u = 0.
 
     u = e^{ik(d.x0 + s)} (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} g(ξ)          hard, impedance
     du/dn: the same with (k/m2) F(ξ)                                        soft
@@ -17,12 +17,10 @@ Sources: [F46], [LK59]; Derivations, F3 and F9.
 
 import numpy as np
 
-from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping._typing import ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.creeping_modes import modes_of
-from creeping.field.far_geometry import fan_strips
 from creeping.field.shed_wave import (
     SECOND_ORDER,
     end_residue,
@@ -36,64 +34,7 @@ from creeping.field.shed_wave import (
 )
 from creeping.field.special.airy import Modes
 from creeping.field.special.fock import surface_function, surface_slope
-from creeping.geodesics.bundle import as_points, on_body
-from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
-from creeping.rays.shedding import shed_on
-from creeping.rays.tracer import ray_points
-
-
-def surface_field(
-    fan: RayFan,
-    points: ArrayLike | None = None,
-    *,
-    wavenumber: float,
-    boundary: BoundaryLike = "soft",
-    order: int = 2,
-) -> ComplexArray:
-    """Field on the body: u, or du/dn (1/L) of the soft boundary.
-
-    Parameters
-    ----------
-    fan : RayFan
-    points : (..., 3), L, optional
-        Points on the body, in the shadow.
-    wavenumber : float, 1/L
-    boundary : "soft", "hard" or ImpedanceBoundary
-    order : 2 or 1
-
-    Returns
-    -------
-    complex
-        (rays, steps), each ray's own contribution, infinite at its caustics and 0 where it has detached; with points
-        (...), all rays through each of them summed, 0 where none passes.
-
-    Raises
-    ------
-    InvalidInputError
-        On bad points, wavenumber, boundary or order, and for a weighted body.
-
-    Examples
-    --------
-    >>> import creeping as cr
-    >>> import scatterers as sc
-    >>> ball = sc.Sphere()
-    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
-    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=1.5, n_rays=16)
-    >>> u = cr.surface_field(fan, wavenumber=30.0, boundary="hard")
-    >>> u.shape == fan.spreading.shape, bool(abs(u[0, -1]) < abs(u[0, 0]))
-    (True, True)
-    """
-    kind = scalar_boundary(boundary)
-    k = checked(wavenumber, order)
-    if points is None:
-        return surface_waves(ray_points(fan, fan.travel_time)[1], k, kind, order)
-    y = as_points(points)
-    flat = on_body(fan.body, y).reshape(-1, 3)
-    found = shed_on(fan_strips(fan), fan.body, flat)
-    total = np.zeros(len(flat), dtype=complex)
-    np.add.at(total, found.observer, surface_waves(found.rays, k, kind, order))
-    return total.reshape(y.shape[:-1])
 
 
 def scalar_boundary(boundary: BoundaryLike) -> Boundary:

@@ -12,6 +12,7 @@ from creeping.files.far_table import angles_of
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
+    from creeping.field.point_result import PointField
     from creeping.geodesics.direct_flow import DirectFlow
     from creeping.geodesics.integrator import ErrorEstimate
     from creeping.phaseflow.phase_map import PhaseMap
@@ -109,6 +110,22 @@ def of_far(far: "FarField") -> Facts:
         yield "largest 4π|f|²", f"{10 * np.log10(4 * np.pi * largest**2):.2f} dB re 1 L²"
     yield "unresolved", f"{int(far.unresolved.sum())} directions"
     yield from _lost(total)
+
+
+def of_points(field: "PointField") -> Facts:
+    """Facts of a near or surface field."""
+    yield "points", " x ".join(map(str, field.shape)) or "1"
+    yield "wavenumber", f"{field.wavenumber:g} 1/L (wavelength {2 * np.pi / field.wavenumber:.6g} L)"
+    yield "boundary", field.boundary
+    yield "order", str(field.order)
+    for name, count in sorted(Counter(field.method.ravel().tolist()).items()):
+        yield f"served by {name}", f"{count} points"
+    for name, count in field.status_counts.items():
+        yield name, f"{count} points"
+    if np.any(field.ok):
+        yield "largest where OK", f"{np.abs(field.values[field.ok]).max():.6g} {field.unit}"
+        off = field.error[field.ok]
+        yield "error where OK", f"{np.median(off):.2g} in the median, {off.max():.2g} at most"
 
 
 def of_map(flow: "PhaseMap") -> Facts:

@@ -18,8 +18,9 @@ from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.decibels import decibels, shown_range
+from creeping.field.on_body import surface_field
 from creeping.field.special.fock import surface_function
-from creeping.field.surface import scalar_boundary, surface_field
+from creeping.field.surface import scalar_boundary
 from creeping.geometry.surface import normal
 from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays

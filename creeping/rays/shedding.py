@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.quantities import RayPoints
@@ -51,6 +51,10 @@ class ShedRays:
     sigma: FloatArray
     rays: RayPoints
     reach: FloatArray
+
+    def __getitem__(self, index: Any) -> "ShedRays":
+        """Some of them."""
+        return ShedRays(self.observer[index], self.strip[index], self.sigma[index], self.rays[index], self.reach[index])
 
 
 def shed_near(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> ShedRays:

@@ -122,6 +122,11 @@ class Strip:
         where = np.stack([self.wrap(sigma), s], axis=-1)
         return lanes(where, nu=(1, 0))[:, :6], lanes(where, nu=(0, 1))[:, :6]
 
+    def spreading_slopes(self, sigma: FloatArray, s: FloatArray) -> FloatArray:
+        """Derivatives of J and J' in σ, 1/L and 1/L^2: (n,), (n,) -> (n, 2)."""
+        lanes, _ = self._splines
+        return np.asarray(lanes(np.stack([self.wrap(sigma), s], axis=-1), nu=(1, 0))[:, 6:8])
+
     def _alive(self, sigma: FloatArray, s: FloatArray) -> BoolArray:
         """Whether both neighbouring rays are creeping there, at the step before."""
         ray = self.nearest(sigma)

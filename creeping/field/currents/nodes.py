@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.shed_wave import smoothstep
@@ -114,12 +114,16 @@ def axes_of_incidence(normals: FloatArray, direction: FloatArray) -> FloatArray:
 
 def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
     """Nodes of the lit side of an incidence, for far fields at this wavenumber, 1/L, and below."""
-    d = line.direction
     # of the integrand e^{ik(d - r).x}
     whole = body_nodes(body, 2 * wavenumber)
-    cosine = -whole.normals @ d
     # m c is at least PENUMBRA's end where the surface is that dark, unless it is nearly flat
-    nodes = whole.part(np.flatnonzero(cosine > -0.6))
+    nodes = whole.part(np.flatnonzero(-whole.normals @ line.direction > -0.6))
+    return lit_part(body, line, nodes, wavenumber)[1]
+
+
+def lit_part(body: Surface, line: ShadowLine, nodes: BodyNodes, wavenumber: float) -> tuple[IntArray, LitNodes]:
+    """Rows of the nodes that the wave of an incidence reaches, to the end of the penumbra, and what they ask for."""
+    d = line.direction
     cosine, along, across = plane_of_incidence(nodes, d)
     xi = -fock_scale(wavenumber, along) * cosine
     dark = cosine <= 0
@@ -132,7 +136,7 @@ def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
     rate[varies], bend[varies] = radius_rates(body, nodes.points[at][varies], d, along[at][varies])
     taken = nodes.part(at)
     axes = axes_of_incidence(taken.normals, d)
-    return LitNodes(
+    found = LitNodes(
         taken.points,
         taken.normals,
         taken.weights * share,
@@ -144,6 +148,7 @@ def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
         axes,
         taken.twist(axes),
     )
+    return at, found
 
 
 def _out_of_the_wave(line: ShadowLine, points: FloatArray, dark: BoolArray) -> BoolArray:

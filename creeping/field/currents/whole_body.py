@@ -144,6 +144,12 @@ class SurfaceCurrents:
         share = self._amplitude / np.sqrt(1 + np.ndim(self._amplitude))
         return np.asarray(self._left * np.hypot(level * share, shape * change))
 
+    def changed(self, points: ArrayLike) -> FloatArray:
+        """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
+        x = as_points(points)
+        lit, dark = (self._field(np.where(part, self.change, 0.0), x) for part in (self.lit, ~self.lit))
+        return np.asarray(np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside)
+
     @cached_property
     def _left(self) -> FloatArray:
         """What is left inside of each incident wave, rms, as a share of it: () or (2,)."""

@@ -1,0 +1,114 @@
+"""The total field nearer to the body than currents serve: between the field on it and that of currents above.
+
+Along the normal at x, h above the body, t = kh and c = |n.d|, at least 0.15,
+
+    u = a cos ct + b sin(ct)/c + a' t sin(ct)/c + b' 3 (sin ct - ct cos ct)/c^3
+
+with u and du/dn on the body from the surface field and u at 0.27 and 0.54 wavelengths from currents. Incident and
+reflected wave of a plane are a and b; where the wave grazes the four are 1, t, t^2 and t^3. Each weight of a value is 1
+at most; what four terms leave out is about 0.08 |kappa_1 + kappa_2|/k of the incident wave, 0.03 on an impedance.
+
+Sources: Derivations, F18.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping.field.boundary import Boundary
+from creeping.field.currents.total import far_enough, total_at
+from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.on_body import total_on
+from creeping.field.point_result import FieldStatus
+from creeping.geometry.quadrature import BodyNodes, nearest_points
+from creeping.geometry.surface import size
+from creeping.rays.fan import RayFan
+from creeping.shadow.occlusion import occluded
+
+ABOVE = (0.27, 0.54)
+"""Heights, in wavelengths, of the points at which currents are asked."""
+GRAZING = 0.15
+"""Least c: below, the four terms are powers of t to rounding."""
+LEFT_OUT = {"soft": 0.08, "hard": 0.08, "impedance": 0.03}
+"""Error of four terms, in |kappa_1 + kappa_2|/k."""
+FOOT = 1e-6
+"""Distance, in body sizes, up to which a point is above its foot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Total field at some of the points asked for.
+
+    Attributes
+    ----------
+    there : (n,) of bool
+        Where it is given.
+    values, error : (n,)
+        0 elsewhere.
+    """
+
+    there: BoolArray
+    values: ComplexArray
+    error: FloatArray
+
+
+def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind: Boundary) -> Layer:
+    """Total field at points (n, 3), L, off the body and within a quarter of a wavelength or so."""
+    body, k, d = fan.body, currents.wavenumber, currents.direction
+    foot, n, hessians, height = nearest_points(body, points)
+    scale = size(body)
+    there = np.linalg.norm(foot + height[:, None] * n - points, axis=1) < FOOT * scale
+    there &= (height > 0) & (height < ABOVE[1] * 2 * np.pi / k)
+    there &= np.abs(body.level(foot)) <= FOOT * scale * np.linalg.norm(body.gradient(foot), axis=1)
+    tops = [foot + share * 2 * np.pi / k * n for share in ABOVE]
+    for top in tops:
+        at = np.flatnonzero(there)
+        # over a bay they may be in the body or near its other side
+        there[at] = (body.level(top[at]) > 0) & far_enough(body, k, top[at])
+    values, error = np.zeros(len(points), dtype=complex), np.zeros(len(points))
+    at = np.flatnonzero(there)
+    surface = total_on(fan, foot[at], k, kind, 2)
+    good = surface["status"] == FieldStatus.OK
+    at = at[good]
+    there[:] = False
+    there[at] = True
+    if not len(at):
+        return Layer(there, values, error)
+    on, off = (surface["lit"] + surface["creeping"])[good], surface["error"][good]
+    known, errors = _on_body(on, off, k, kind)
+    for top in tops:
+        incident, scattered, its = total_at(currents, top[at], occluded(body, top[at], d))
+        known.append(incident + scattered)
+        errors.append(its)
+    weights = _weights(np.maximum(np.abs(n[at] @ d), GRAZING), k * height[at])
+    curvature = BodyNodes(foot[at], n[at], np.ones(len(at)), hessians[at], 0.0).total_curvature
+    errors = [weights[:, i] * one for i, one in enumerate(errors)]
+    values[at] = np.sum(weights * np.stack(known, axis=1), axis=1)
+    error[at] = np.linalg.norm([*errors, LEFT_OUT[kind.kind] * curvature / k], axis=0)
+    return Layer(there, values, error)
+
+
+def _on_body(
+    on: ComplexArray, off: FloatArray, k: float, kind: Boundary
+) -> tuple[list[ComplexArray], list[FloatArray]]:
+    """The field u and (1/k) du/dn on the body (n,), and their errors."""
+    nothing = np.zeros_like(on)
+    if kind.kind == "soft":
+        return [nothing, on / k], [np.abs(nothing), off / k]
+    slope = np.asarray(-1j * kind.admittance * on)
+    return [on, slope], [off, np.abs(kind.admittance) * off]
+
+
+def _weights(c: FloatArray, t: FloatArray) -> FloatArray:
+    """Weights (n, 4) of u and (1/k) du/dn on the body and of u at both heights above, at kh = t (n,)."""
+
+    def terms(t: ArrayLike) -> FloatArray:
+        a = c * np.asarray(t)
+        sine, cosine = np.sin(a), np.cos(a)
+        return np.stack([cosine, sine / c, t * sine / c, 3 * (sine - a * cosine) / c**3], axis=1)
+
+    slope = np.tile([0.0, 1.0, 0.0, 0.0], (len(c), 1))
+    rows = [terms(np.zeros(len(c))), slope, *(terms(np.full(len(c), 2 * np.pi * share)) for share in ABOVE)]
+    matrix = np.stack(rows, axis=2)
+    return np.asarray(np.linalg.solve(matrix, terms(t)[..., None])[..., 0])

@@ -1,0 +1,212 @@
+"""The field on the body: u, or du/dn where u = 0, of creeping rays in the shadow and of the wave itself on lit ground.
+
+    u = (1 - W) e^{ikd.x} u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
+
+with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
+w_i of rays that come from afar. The error of lit ground, as a share of u1 and with u2 of second order, is
+
+    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2]^(1/2)
+
+Sources: [F46], [LK59]; Derivations, F9, F16 and F18. The factors were set on four bodies
+(`studies.near_coverage`).
+"""
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping.field.arguments import checked
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
+from creeping.field.creeping_modes import fock_scale
+from creeping.field.currents.lit import lit_currents
+from creeping.field.currents.nodes import PENUMBRA, LitNodes, lit_part
+from creeping.field.far_geometry import fan_strips
+from creeping.field.point_result import FieldStatus, SurfaceField
+from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
+from creeping.field.shed_wave import fock_parameter, scales
+from creeping.field.surface import scalar_boundary, surface_waves
+from creeping.geodesics.bundle import as_points, on_body
+from creeping.geometry.evaluators import entries_of
+from creeping.geometry.quadrature import BodyNodes
+from creeping.geometry.surface import normal, size
+from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.shedding import shed_on
+from creeping.rays.tracer import ray_points
+
+SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
+LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
+VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
+ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
+"""Factors A, B, C and D of the error on lit ground; an impedance leaves curvature that varies out of its second order.
+"""
+
+
+def surface_field(
+    fan: RayFan,
+    points: ArrayLike | None = None,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+) -> SurfaceField:
+    """Field on the body: u, or du/dn (1/L) of the soft boundary, with its error; it acts as an array.
+
+    Parameters
+    ----------
+    fan : RayFan
+    points : (..., 3), L, optional
+        Points on the body, lit or in the shadow.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard" or ImpedanceBoundary
+    order : 2 or 1
+
+    Returns
+    -------
+    SurfaceField
+        Of shape (rays, steps): each ray's own contribution, infinite at its caustics (status CAUSTIC) and 0 where it
+        has ended (DETACHED) or was never launched by the wave (NO_RAY). With points (...): the total field; all rays
+        through each of them summed in the shadow, 0 where none passes (NO_RAY or TRUNCATED).
+
+    Raises
+    ------
+    InvalidInputError
+        On bad points, wavenumber, boundary or order, and for a weighted body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=1.5, n_rays=16)
+    >>> u = cr.surface_field(fan, wavenumber=30.0, boundary="hard")
+    >>> u.shape == fan.spreading.shape, bool(abs(u[0, -1]) < abs(u[0, 0]))
+    (True, True)
+    >>> u = cr.surface_field(fan, [(0, 0, -1), (0, 0.8, 0.6)], wavenumber=30.0, boundary="hard")
+    >>> np.abs(u).round(2).tolist(), u.method.tolist(), bool(u.error.max() < 0.05)
+    ([2.0, 0.35], ['lit', 'rays'], True)
+    """
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    if points is None:
+        return _along_rays(fan, k, boundary, kind, order)
+    y = as_points(points)
+    shape = y.shape[:-1]
+    total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)
+    arrays = {name: value.reshape(shape) for name, value in total.items()}
+    return SurfaceField(
+        points=y.copy(),
+        values=arrays["lit"] + arrays["creeping"],
+        wavenumber=k,
+        boundary=boundary_name(boundary),
+        order=order,
+        **arrays,
+    )
+
+
+def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, order: int) -> SurfaceField:
+    """Each ray's own contribution (rays, steps)."""
+    rays = ray_points(fan, fan.travel_time)[1]
+    waves, other = (surface_waves(rays, k, kind, o) for o in (order, 3 - order))
+    m = scales(rays, k)[1]
+    with np.errstate(invalid="ignore"):
+        caustic = tube_share(rays, np.zeros(waves.shape)) * m < NARROW_ALONE
+    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    status = np.select(
+        [np.broadcast_to(~launched[:, None], waves.shape), ~rays.alive, caustic],
+        [FieldStatus.NO_RAY, FieldStatus.DETACHED, FieldStatus.CAUSTIC],
+        FieldStatus.OK,
+    )
+    ok = status == FieldStatus.OK
+    bound = np.where(rays.alive, np.abs(waves), k if kind.kind == "soft" else 1.0)
+    return SurfaceField(
+        points=rays.points.copy(),
+        values=waves,
+        error=np.where(ok, own_error(rays, (waves, other), k, kind, order, on=True), bound),
+        error_by=np.where(ok, "expansion", "bound"),
+        status=status.astype(np.int64),
+        method=np.full(waves.shape, "rays"),
+        lit=np.zeros(waves.shape, dtype=complex),
+        creeping=waves,
+        wavenumber=k,
+        boundary=boundary_name(boundary),
+        order=order,
+    )
+
+
+def rays_on(
+    fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int, share: FloatArray | None = None
+) -> RaySum:
+    """Creeping rays at points of the body (n, 3); ``share`` (n,) is that of rays that have just left the line."""
+    found = shed_on(fan_strips(fan), fan.body, points)
+    waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
+    if share is not None:
+        # twice the end, for m at the launch point is not m here
+        young = fock_parameter(found.rays, k) < 2 * PENUMBRA[1]
+        weight = np.where(young, share[found.observer], 1.0)
+        # a wave may be infinite
+        waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
+    return ray_sum(
+        fan, found, len(points), waves, own_error(found.rays, (waves, other), k, kind, order, on=True), k, kind
+    )
+
+
+def total_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int) -> dict[str, Any]:
+    """Total field at points of the body (n, 3): lit, creeping, error, error_by, status and method, each (n,)."""
+    lit, lit_error, share = _lit_at(fan, points, k, kind, order)
+    rays = rays_on(fan, points, k, kind, order, 1 - share)
+    unit = k if kind.kind == "soft" else 1.0
+    creeping, error, status = rays.values, rays.error, rays.status
+    bare = (status != FieldStatus.OK) & (error == 0)
+    error = np.where(bare, unit, error)
+    # on lit ground rays that come from afar have decayed: those that are not to be trusted are left out, and no more
+    # than what an axis makes of them, sqrt(2 pi k a)
+    out = (share == 1) & (status != FieldStatus.OK)
+    most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
+    creeping, error = np.where(out, 0.0, creeping), np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
+    status = np.where(share == 1, FieldStatus.OK, status)
+    ok = status == FieldStatus.OK
+    return {
+        "lit": lit,
+        "creeping": creeping,
+        "error": np.where(ok, np.hypot(error, lit_error), error),
+        "error_by": np.where(ok, "expansion", "bound"),
+        "status": status.astype(np.int64),
+        "method": np.where(share == 1, "lit", np.where(share > 0, "lit+rays", "rays")),
+    }
+
+
+def _lit_at(
+    fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """The lit side's part of the field at points of the body (n, 3), its error, and its share: (n,) each."""
+    body, d = fan.body, fan.line.direction
+    hessian = body.hessian(points) / np.linalg.norm(body.gradient(points), axis=-1)[:, None, None]
+    nodes = BodyNodes(points, normal(body, points), np.ones(len(points)), entries_of(hessian).T, 0.0)
+    at, part = lit_part(body, fan.line, nodes, k)
+    geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
+    u, other = (lit_currents(*geometry, k, kind, o) for o in (order, 3 - order))
+    values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))
+    share[at] = part.weights
+    values[at] = part.weights * u * np.exp(1j * k * (part.points @ d))
+    error[at] = part.weights * _lit_error(part, u, other, k, kind, order)
+    return values, error, share
+
+
+def _lit_error(
+    part: LitNodes, u: ComplexArray, other: ComplexArray, k: float, kind: Boundary, order: int
+) -> FloatArray:
+    """Error of the lit side's expansion (n,)."""
+    size, change = np.abs(u), np.abs(u - other)
+    m = fock_scale(k, part.along)
+    # grazing a flat or concave place m is infinite, and optics alone stands there
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
+    terms = (
+        SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
+        LEAST[kind.kind] / m**4,
+        VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
+        ACROSS[kind.kind] * across**2,
+    )
+    share = np.linalg.norm(terms, axis=0)
+    return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))

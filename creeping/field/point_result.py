@@ -1,0 +1,179 @@
+"""What a field at points is: complex values with their error, and what is the matter where they are not to be trusted.
+
+Results act as arrays of their values (`creeping.field.array_result`).
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from creeping._presenting import Shown
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.field.array_result import ArrayResult
+
+
+class FieldStatus(IntEnum):
+    """What is to be thought of a field at a point; all but OK stand at values whose error is a mere bound.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> cr.FieldStatus.LIT.name, cr.FieldStatus.LIT.remedy
+    ('LIT', "let currents serve: method='auto', a quarter of a wavelength off the body")
+    """
+
+    OK = 0
+    LIT = 1
+    """Creeping rays alone count on the lit side: incident and reflected waves are missing."""
+    CAUSTIC = 2
+    """Rays merge: the sum over them grows without bound towards it."""
+    NO_RAY = 3
+    """In the shadow no creeping ray comes: behind ground that launches none, or where rays have decayed to nothing."""
+    DETACHED = 4
+    """A ray that comes here has ended before, over concave or rough ground, and may have mattered."""
+    TRUNCATED = 5
+    """The fan ends before its rays could come here."""
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it."""
+        return _REMEDIES[self]
+
+
+_AWAY = "let currents serve: method='auto', a quarter of a wavelength off the body"
+_REMEDIES = {
+    FieldStatus.OK: "none needed",
+    FieldStatus.LIT: _AWAY,
+    FieldStatus.CAUSTIC: _AWAY,
+    FieldStatus.NO_RAY: f"{_AWAY}; what no ray brings their error holds",
+    FieldStatus.DETACHED: f"{_AWAY}; what rays that have ended bring no more their error holds",
+    FieldStatus.TRUNCATED: "launch longer rays: length= of launch",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointField(ArrayResult, Shown):
+    """Field at points (...), in arrays of their shape; it acts as the array of its values.
+
+    Attributes
+    ----------
+    points : (..., 3), L
+    values : (...) complex
+    error : (...)
+        Of the values, in their unit, meant to hold at 95 of 100 points whose status is OK; at others a bound, infinite
+        where the values are.
+    error_by : (...) of str
+        What gave its level: "extinction", measured inside the body; "expansion", what the next
+        terms of the expansions are worth; "bound", no
+        more than what is missing may be.
+    status : (...) of int
+        Codes of `FieldStatus`.
+    method : (...) of str
+        What served, joined by "+" where two were blended.
+    wavenumber : float, 1/L
+    boundary : str
+    order : int
+    """
+
+    points: FloatArray
+    values: ComplexArray
+    error: FloatArray
+    error_by: np.ndarray[Any, np.dtype[np.str_]]
+    status: IntArray
+    method: np.ndarray[Any, np.dtype[np.str_]]
+    wavenumber: float
+    boundary: str
+    order: int
+
+    @property
+    def ok(self) -> BoolArray:
+        """Where the status is OK (...)."""
+        return np.asarray(self.status == FieldStatus.OK)
+
+    @property
+    def status_counts(self) -> dict[str, int]:
+        """Number of points of each status that occurs, by name."""
+        return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return "of the incident wave"
+
+    def __repr__(self) -> str:
+        names, counts = np.unique(self.method, return_counts=True)
+        served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
+        states = ", ".join(f"{n} {name}" for name, n in self.status_counts.items())
+        size = np.abs(self.values[self.ok])
+        off = self.error[self.ok]
+        error = f", error {np.median(off):.2g} in the median, {off.max():.2g} at most" if off.size else ""
+        return (
+            f"{type(self).__name__}({' x '.join(map(str, self.shape)) or 'one'} points, k = {self.wavenumber:g}, "
+            f"{self.boundary}, order {self.order})\n"
+            f"  {served or 'none'}; {states or 'no status'}\n"
+            f"  where OK up to {np.max(size, initial=0.0):.4g} {self.unit}{error}"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NearField(PointField):
+    """Field u at points off the body or on it, in units of the incident wave.
+
+    Attributes
+    ----------
+    points, values, error, error_by, status, method, wavenumber, boundary, order
+        As of every field at points; ``method`` is "currents", "layer" between them and the
+        body, or "rays"; on the body "lit", "rays", "lit+rays", or "boundary", where u = 0.
+    incident, scattered, creeping : (...) complex
+        Parts, whose sum the values are: where currents or lit ground served, the incident wave and the rest; where rays
+        did, the sum over them, which in the shadow is the whole field.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> u = cr.near_field(fan, [(0.3, 0.0, 1.5), (0, 0, -1.5)], wavenumber=30.0, boundary="soft")
+    >>> u.method.tolist(), u.status_counts, np.abs(u).shape
+    (['rays', 'currents'], {'OK': 2}, (2,))
+    """
+
+    incident: ComplexArray
+    scattered: ComplexArray
+    creeping: ComplexArray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceField(PointField):
+    """Field u on the body, or du/dn (1/L) of the soft boundary.
+
+    Attributes
+    ----------
+    points, values, error, error_by, status, method, wavenumber, boundary, order
+        As of every field at points; ``method`` is "lit", "rays" or, in the penumbra, "lit+rays".
+    lit, creeping : (...) complex
+        Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> u = cr.surface_field(fan, [(0, 0.6, 0.8), (0, 0, -1)], wavenumber=30.0, boundary="hard")
+    >>> u.method.tolist(), u.status_counts, bool(abs(abs(u[1]) - 2) < 0.01)         # twice the wave on a mirror
+    (['rays', 'lit'], {'OK': 2}, True)
+    """
+
+    lit: ComplexArray
+    creeping: ComplexArray
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return "1/L" if self.boundary == "soft" else super().unit

@@ -1,0 +1,216 @@
+"""Sums of creeping rays' waves at points, with their error and with what is the matter.
+
+With T = J + l J' the width of a ray's tube, T' its slope across the rays, and J' along them, L the length of a ray,
+
+    error^2 = (sum |ui| e_i)^2 + sum_i |ui|^2 f_i + (sum_pairs C (|ui| + |uj|)/(k |Li - Lj|))^2 + (sum |ui| g_i)^2
+    f = (5/8k) T'^2/T^4/(3 |J'/T| + 1/(s + l)),   g = e^(-a (xi_end - xi))
+    e = [(A/m^2)^2 + (B V)^2]^(1/2) off the body,   [(C |u2/u1 - 1|^2)^2 + xi^2 (B V)^2 + xi^2 (D r^2)^2]^(1/2)
+    V = (|rho rho''| + rho'^2)/m^2,   r = rho kappa_t/m^2,   on it; A/m^2, V and r means of both ends
+
+f is the next term of the transport equation, at a fold the 5/(72 zeta) of Airy's function; near caustics the error
+is of its root's size. Two waves of which one has touched a caustic that the other has not are the leading terms of one
+Airy or Bessel function, whose next terms fall with their difference in phase. A ray beyond the end of the fan is weaker
+than one found by the decay a of the first mode, g.
+
+Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F18. A, B and C were set on four bodies
+(`studies.near_coverage`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.field.boundary import Boundary
+from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.far_geometry import fan_strips
+from creeping.field.point_result import FieldStatus
+from creeping.field.shed_wave import fock_parameter, scales, transverse_ratios
+from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.quantities import RayPoints
+from creeping.rays.shedding import ShedRays
+from creeping.rays.strips import Strip
+
+CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25}
+"""A, and B off the body."""
+SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8}
+VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25}
+"""C, and B on the body."""
+ACROSS, LEAST_XI = 0.3, 0.7
+"""D, and the least xi that the error on the body grows with."""
+MERGING = 0.3
+"""C of pairs: 5/36 at a fold, 1/4 on the axis of a sphere."""
+FOLDED, MERGED = 0.008, 0.04
+"""Shares of the waves from which f and merging make a point one of a caustic."""
+NARROW = 0.25
+"""m |T|/(|J| + l |J'|) below which a ray is on a caustic, whatever else there is."""
+NARROW_ALONE = 1.0
+"""The same of a ray that is looked at alone."""
+LOST = 0.3
+"""Share of the waves that rays beyond the end of the fan may have at a point that is still OK."""
+FADED = 1e-3
+"""Wave at the end of the rays below which no longer ones are asked for."""
+SHORT = 0.1
+"""Share of the rays, those that decay least, by which the end of a fan is judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class RaySum:
+    """Sum of the waves at points (n,).
+
+    Attributes
+    ----------
+    values : (n,) complex
+        Infinite on a caustic.
+    error : (n,)
+        The whole of the waves, in magnitude, where the status is not OK; 0 where no ray comes.
+    status : (n,) of int
+        Codes of `FieldStatus`, LIT not among them.
+    faded : (n,)
+        What decay alone has left of the waves.
+    """
+
+    values: ComplexArray
+    error: FloatArray
+    status: IntArray
+    faded: FloatArray
+
+
+def ray_sum(
+    fan: RayFan,
+    shed: ShedRays,
+    count: int,
+    waves: ComplexArray,
+    own_error: FloatArray,
+    wavenumber: float,
+    boundary: Boundary,
+) -> RaySum:
+    """Sum over the rays found (m,) of their waves, each with its own error, at ``count`` points."""
+    rays, observer = shed.rays, shed.observer
+    size = np.abs(waves)
+    values = np.zeros(count, dtype=complex)
+    np.add.at(values, observer, waves)
+    strength = _total(size, observer, count)
+    decay, end = fan_decay(fan, wavenumber, boundary)
+    xi = fock_parameter(rays, wavenumber)
+    # a wave may be infinite
+    with np.errstate(invalid="ignore", over="ignore"):
+        lost = _total(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
+        merging = _merging(shed, size, wavenumber, count)
+        bent = np.minimum(_fold(fan_strips(fan), shed, wavenumber), 1.0)
+        folded = _total(np.where(size > 0, size * bent, 0.0), observer, count)
+        root = _total(np.where(size > 0, size**2 * bent, 0.0), observer, count)
+        narrow = (size > 0) & (tube_share(rays, shed.reach) * fock_scale(wavenumber, rays.curvature[1]) < NARROW)
+        caustic = (merging > MERGED * strength) | (folded > FOLDED * strength)
+        error = np.sqrt(_total(own_error, observer, count) ** 2 + root + merging**2 + lost**2)
+    caustic[observer[narrow]] = True
+    ended = np.zeros(count, dtype=bool)
+    ended[observer[~rays.alive]] = True
+    status = np.select(
+        [ended, strength == 0, caustic, lost > LOST * strength],
+        [
+            FieldStatus.DETACHED,
+            FieldStatus.TRUNCATED if np.exp(-decay * end) > FADED else FieldStatus.NO_RAY,
+            FieldStatus.CAUSTIC,
+            FieldStatus.TRUNCATED,
+        ],
+        FieldStatus.OK,
+    )
+    error = np.where(status == FieldStatus.OK, error, np.fmax(error, strength))
+    return RaySum(values, error, status.astype(np.int64), _total(np.exp(-decay * xi), observer, count))
+
+
+def own_error(
+    rays: RayPoints,
+    waves: tuple[ComplexArray, ComplexArray],
+    wavenumber: float,
+    boundary: Boundary,
+    order: int,
+    *,
+    on: bool,
+) -> FloatArray:
+    """Error of each ray's own wave (...), on the body or off it, from the wave in this and in the other order."""
+    size = np.abs(waves[0])
+    # a wave may be infinite
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        change = np.abs(waves[0] - waves[1])
+        ends = zip(scales(rays, wavenumber), rays.radius_rate, rays.radius_bend, strict=True)
+        small, varying = np.mean([[m**-2, (np.abs(bend) + rate**2) / m**2] for m, rate, bend in ends], axis=0)
+        if on:
+            across = _mean_across(rays, wavenumber)
+            growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS * across**2)
+            growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
+            share = np.hypot(SQUARED[boundary.kind] * (change / size) ** 2, growing)
+        else:
+            share = np.hypot(CLOSE * small, VARIES_NEAR[boundary.kind] * varying)
+        error = size * np.minimum(share, 1.0) + (change if order == 1 else 0.0)
+    return np.asarray(np.where(size > 0, error, 0.0))
+
+
+def _mean_across(rays: RayPoints, wavenumber: float) -> FloatArray:
+    """rho kappa_t/m^2, mean of both ends (...)."""
+    ends = zip(transverse_ratios(rays), scales(rays, wavenumber), strict=True)
+    return np.asarray(np.mean([np.abs(r) / m**2 for r, m in ends], axis=0))
+
+
+def _fold(strips: tuple[Strip, ...], shed: ShedRays, wavenumber: float) -> FloatArray:
+    """f of each ray (n,)."""
+    rays, reach = shed.rays, shed.reach
+    slope = np.zeros(len(reach))
+    for number, strip in enumerate(strips):
+        mine = np.flatnonzero(shed.strip == number)
+        if len(mine):
+            bend = strip.spreading_slopes(shed.sigma[mine], rays.time[mine])
+            slope[mine] = (bend[:, 0] + reach[mine] * bend[:, 1]) / rays.width[mine]
+    tube = rays.spreading + reach * rays.spreading_rate
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        near = 3 * np.abs(rays.spreading_rate / tube) + 1 / (rays.time + reach)
+        return np.nan_to_num(5 / 8 / wavenumber * slope**2 / tube**4 / near, nan=0.0, posinf=1.0)
+
+
+def tube_share(rays: RayPoints, reach: FloatArray) -> FloatArray:
+    """|J + l J'| as a share of |J| + l |J'|, on the body of |J| + rho |J'| (...): 0 on a caustic."""
+    J, rate = rays.spreading, rays.spreading_rate
+    with np.errstate(divide="ignore", invalid="ignore"):
+        length = np.where(reach > 0, reach, 1 / rays.curvature[1])
+        share = np.abs(J + reach * rate) / (np.abs(J) + length * np.abs(rate))
+    return np.asarray(np.nan_to_num(share))
+
+
+def _total(values: FloatArray, observer: IntArray, count: int) -> FloatArray:
+    out = np.zeros(count)
+    np.add.at(out, observer, values)
+    return out
+
+
+def _merging(shed: ShedRays, size: FloatArray, wavenumber: float, count: int) -> FloatArray:
+    """Error of pairs of waves (count,) that have an odd number of caustics between them."""
+    rays = shed.rays
+    zeros = rays.caustics + (rays.spreading * (rays.spreading + shed.reach * rays.spreading_rate) < 0)
+    by = np.argsort(shed.observer, kind="stable")
+    by = by[size[by] > 0]
+    observer, parity, length, size = shed.observer[by], zeros[by] % 2, (rays.eikonal + shed.reach)[by], size[by]
+    out = np.zeros(count)
+    apart = 1
+    # pairs of one observer stand at most as far apart as it has rays
+    while apart < len(by):
+        first = np.flatnonzero(observer[apart:] == observer[:-apart])
+        if not len(first):
+            break
+        first = first[parity[first] != parity[first + apart]]
+        other = first + apart
+        with np.errstate(divide="ignore"):
+            share = np.minimum(MERGING / (wavenumber * np.abs(length[first] - length[other])), 1.0)
+        np.add.at(out, observer[first], share * (size[first] + size[other]))
+        apart += 1
+    return out
+
+
+def fan_decay(fan: RayFan, wavenumber: float, boundary: Boundary) -> tuple[float, float]:
+    """Decay of the first mode by xi, and xi at the end of the rays that decay least; infinite if none goes so far."""
+    whole = fan.status == RayStatus.OK
+    if not np.any(whole):
+        return 1.0, np.inf
+    curvature = np.array(np.median(np.maximum(fan.curvature[whole, 0], 0.0)))
+    decay = float(np.min(modes_of(boundary, fock_scale(wavenumber, curvature)).tau.imag))
+    return decay, float(np.cbrt(wavenumber / 2) * np.quantile(fan.attenuation[whole, -1], SHORT))

@@ -1,0 +1,88 @@
+"""The field on the body against the sphere's series: the total field, lit, in the penumbra and in the shadow."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.point_result import FieldStatus
+from studies.reference import sphere
+
+
+def fan_of(length=4.0):
+    ball = sc.Sphere()
+    return cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, (0, 0, 1)), length=length, n_rays=64)
+
+
+@pytest.fixture(scope="module")
+def fan():
+    return fan_of()
+
+
+def at(degrees):
+    """Points of the sphere by their angle from the lit pole."""
+    t = np.radians(np.atleast_1d(degrees))
+    return np.stack([np.sin(t) * np.cos(0.3), np.sin(t) * np.sin(0.3), -np.cos(t)], axis=-1)
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard", 0.7])
+@pytest.mark.parametrize("k", [12.0, 40.0])
+def test_the_total_field_on_the_sphere(fan, boundary, k):
+    kind = cr.ImpedanceBoundary(boundary) if boundary == 0.7 else boundary
+    angles = np.arange(0.0, 146.0, 1.0)
+    u = cr.surface_field(fan, at(angles), wavenumber=k, boundary=kind)
+    exact = (sphere.surface_derivative if boundary == "soft" else sphere.surface_field)(
+        k, 1.0, -np.cos(np.radians(angles)), boundary
+    )
+    assert np.all(u.ok[angles < 120])
+    off = np.abs(u - exact)
+    assert np.mean(off[u.ok] < u.error[u.ok]) > 0.95
+    # largest error as a share of the largest value: that of currents (tests/field/currents/test_lit.py)
+    assert np.max(off[u.ok]) < (0.025 if k < 20 else 5e-3) * np.abs(exact).max()
+    assert [*dict.fromkeys(u.method)] == ["lit", "lit+rays", "rays"]
+
+
+def test_nothing_jumps_in_the_penumbra(fan):
+    angles = np.linspace(88, 115, 400)
+    u = cr.surface_field(fan, at(angles), wavenumber=20.0, boundary="hard")
+    steps = np.abs(np.diff(u.values))
+    assert steps.max() < 3 * np.median(steps)
+
+
+def test_each_ray_has_its_own_status():
+    fan = fan_of(2.2)
+    u = cr.surface_field(fan, wavenumber=20.0, boundary="hard")
+    assert u.shape == fan.spreading.shape
+    # great circles meet after a quarter turn
+    s = fan.travel_time
+    assert np.all(u.status[:, np.abs(s - np.pi / 2) < 0.05] == FieldStatus.CAUSTIC)
+    assert np.all(u.ok[:, s < 0.7])
+    body = sc.TwistedEllipsoid()
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 1, 1)), length=2.0, n_rays=24)
+    u = cr.surface_field(fan, wavenumber=20.0, boundary="hard")
+    ended = fan.travel_time > fan.detachment[:, None]
+    assert ended.any() and np.all(u.status[ended] == FieldStatus.DETACHED) and np.all(u[ended] == 0)
+    assert np.all(np.isfinite(u.error[u.ok])) and np.all(np.isfinite(u[u.ok]))
+
+
+def test_ground_without_rays_is_not_zero_in_silence():
+    peanut = sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.9**4")
+    line = cr.shadow_line(peanut, (1, 0.05, 0.02))
+    fan = cr.launch(cr.DirectFlow(peanut), line, length=3.0, n_rays=48)
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(400, 3)) * [1.2, 0.5, 0.5]
+    from creeping.geometry.surface import project
+
+    u = cr.surface_field(fan, project(peanut, x), wavenumber=20.0, boundary="hard")
+    bare = u == 0
+    assert bare.any() and not np.any(u.ok[bare]) and np.all(u.error[bare] == 1)
+    short = fan_of(0.3)
+    u = cr.surface_field(short, at([60.0, 170.0]), wavenumber=20.0, boundary="soft")
+    assert u.status.tolist() == [FieldStatus.OK, FieldStatus.TRUNCATED] and u.error[1] == 20.0
+
+
+def test_first_order_states_a_larger_error(fan):
+    first, second = (
+        cr.surface_field(fan, at([30.0, 80.0, 120.0]), wavenumber=20.0, boundary="hard", order=o) for o in (1, 2)
+    )
+    assert np.all(first.error > 2 * second.error)

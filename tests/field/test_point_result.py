@@ -1,0 +1,91 @@
+"""Results of fields at points: arrays to numpy, with statuses that say what is the matter and what to do."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.point_result import FieldStatus
+
+K = 20.0
+AT = np.array([(0.3, 0.1, 1.6), (0.0, 0.0, 1.5), (0.0, 0.2, -1.05), (0.0, 0.5, -2.0), (1.4, 0.0, 1.0)])
+
+
+@pytest.fixture(scope="module")
+def fan():
+    ball = sc.Sphere()
+    return cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, (0, 0, 1)), length=4.0, n_rays=48)
+
+
+@pytest.fixture(scope="module")
+def fields(fan):
+    on = AT / np.linalg.norm(AT, axis=1, keepdims=True)
+    return (
+        cr.near_field(fan, AT, wavenumber=K, boundary="hard"),
+        cr.surface_field(fan, on, wavenumber=K, boundary="soft"),
+        cr.surface_field(fan, wavenumber=K, boundary="soft"),
+    )
+
+
+def test_they_act_as_arrays(fields):
+    for u in fields:
+        values = u.values
+        assert (u.shape, u.ndim, u.size, u.dtype, len(u)) == (
+            values.shape,
+            values.ndim,
+            values.size,
+            values.dtype,
+            len(values),
+        )
+        for mine, plain in (
+            (np.abs(u), np.abs(values)),
+            (2 * u - 1, 2 * values - 1),
+            (u + u, 2 * values),
+            (u.real, values.real),
+            (np.asarray(u), values),
+            (np.concatenate([u, u]), np.concatenate([values, values])),
+            (u[1], values[1]),
+            (u[..., None], values[..., None]),
+            (np.array(list(u)), values),
+            (np.sum(u), np.sum(values)),
+            (u.ravel(), values.ravel()),
+            (u.conj(), np.conj(values)),
+        ):
+            np.testing.assert_array_equal(mine, plain)
+            assert not isinstance(mine, type(u))
+        assert np.all(u == values)
+    first = fields[0]
+    assert complex(first[0]) == first.values[0]
+    # a copy where one is asked for, the same memory otherwise
+    assert np.shares_memory(np.asarray(first), first.values)
+    assert not np.shares_memory(np.array(first, copy=True), first.values)
+
+
+def test_arrays_of_a_result_have_its_shape_and_parts_add_up(fields):
+    near, *surface = fields
+    for u in fields:
+        for name in ("error", "error_by", "status", "method"):
+            assert getattr(u, name).shape == u.shape
+        assert u.points.shape == (*u.shape, 3)
+    np.testing.assert_array_equal(near.values, near.incident + near.scattered + near.creeping)
+    for u in surface:
+        np.testing.assert_array_equal(u.values, u.lit + u.creeping)
+
+
+def test_they_show_themselves_in_three_lines_and_pickle(fields):
+    for u in fields:
+        lines = repr(u).splitlines()
+        assert len(lines) == 3 and max(map(len, lines)) < 120
+        assert lines[0].startswith(type(u).__name__)
+        assert all(f"{count} {name}" in lines[1] for name, count in u.status_counts.items())
+        again = pickle.loads(pickle.dumps(u))
+        assert repr(again) == repr(u)
+        assert f">{type(u).__name__}</caption>" in u._repr_html_()
+
+
+def test_every_status_has_a_remedy():
+    assert [int(status) for status in FieldStatus] == list(range(len(FieldStatus)))
+    assert all(len(status.remedy) > 5 for status in FieldStatus)
+    assert "length" in FieldStatus.TRUNCATED.remedy
