@@ -7,6 +7,7 @@ gives; where the reflected field has a caustic they err, and what they say of it
 Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
+from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,6 +20,7 @@ from creeping.field.currents.whole_body import SurfaceCurrents, surface_currents
 from creeping.field.far_geometry import far_geometry, observers_of
 from creeping.field.far_rays import error_by_order, field_of
 from creeping.field.far_result import FarField
+from creeping.field.validity_range import validity
 from creeping.geometry.quadrature import body_nodes
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
@@ -94,12 +96,14 @@ def far_field(
     r = observers_of(observation)
     if method == "currents" or (method == "auto" and able and len(r) and _affordable(fan, len(r), k)):
         try:
-            return _by_currents(_currents(fan, k, boundary), r, boundary)
+            far = _by_currents(_currents(fan, k, boundary), r, boundary)
+            return replace(far, validity=validity(fan, wavenumber=k))
         except SurfaceError:
             if method == "currents":
                 raise
     geometry = far_geometry(fan, r)
-    return error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
+    far = error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
+    return replace(far, validity=validity(fan, wavenumber=k))
 
 
 def _affordable(fan: RayFan, directions: int, wavenumber: float) -> bool:

@@ -179,7 +179,7 @@ def validity_words(found: Validity, *, measured: bool = False) -> str:
     >>> validity_words(Validity(7.7, 0.7), measured=True)
     'k rho >= 7.7, kappa_t rho/m^2 <= 0.7; at the edge of the range of the expansion, go by the error measured'
     """
-    numbers = f"k rho >= {found.least_k_rho:.3g}, kappa_t rho/m^2 <= {found.largest_transverse:.2g}"
+    numbers = validity_numbers(found)
     inside, near = (
         found.least_k_rho >= k_rho and found.largest_transverse <= across for k_rho, across in (WITHIN, EDGE)
     )
@@ -188,6 +188,11 @@ def validity_words(found: Validity, *, measured: bool = False) -> str:
     where = "at the edge of" if near else "on some rays beyond"
     said = "go by the error measured" if measured else "errors may be " + ("some per cent" if near else "of any size")
     return f"{numbers}; {where} the range of the expansion, {said}"
+
+
+def validity_numbers(found: Validity) -> str:
+    """Both numbers as a reader sees them."""
+    return f"k rho >= {found.least_k_rho:.3g}, kappa_t rho/m^2 <= {found.largest_transverse:.2g}"
 
 
 def _across(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:

@@ -177,7 +177,7 @@ class SweepRequest:
             return LINE | CURVED | RAYS
         observer = ("observer",) if self.quantity == "bistatic" else ()
         parts = PARTS if self.quantity == "bistatic" else {k: v for k, v in PARTS.items() if k != "forward"}
-        found = LINE | VALID
+        found = dict(LINE)
         if self.scalar_boundaries:
             dims = ("boundary", "wavenumber", *observer)
             found |= {name: Variable(dims, "complex128", "L", text) for name, text in parts.items()}
@@ -188,7 +188,7 @@ class SweepRequest:
             words = ", theta and phi scattered by theta and phi incident"
             found |= {f"{name}_pec": Variable(matrix, "complex128", "L", text + words) for name, text in parts.items()}
             found["unresolved_pec"] = Variable(dims, "bool", "1", "whether an expansion fails there")
-        return found
+        return found | VALID
 
     def empty(self, count: int) -> dict[str, np.ndarray[Any, Any]]:
         """Arrays of results for so many incidences, filled with what stands for nothing; FAILED."""

@@ -12,6 +12,7 @@ from creeping.field.validity_range import (
     body_validity,
     launch_validity,
     validities,
+    validity_numbers,
     validity_words,
 )
 from creeping.geodesics.equations import sharpest_curvature
@@ -83,6 +84,12 @@ def test_a_body_has_the_worst_of_its_incidences():
     found = body_validity(body, wavenumber=30.0)
     assert found.least_k_rho == pytest.approx(each[:, 0].min(), rel=0.05)
     assert found.largest_transverse == pytest.approx(each[:, 1].max(), rel=0.1)
+
+
+def test_a_far_field_has_that_of_its_fan(ball_fan):
+    far = cr.far_field(ball_fan, [(0, 1, 0)], wavenumber=20.0, method="rays")
+    assert far.validity == cr.validity(ball_fan, wavenumber=20.0)
+    assert validity_numbers(far.validity) in repr(far)
 
 
 def test_words_are_graded():
