@@ -100,4 +100,4 @@ def test_words_are_graded():
     assert ["edge" in w for w in words] == [False, True, True, False, False]
     assert ["beyond" in w for w in words] == [False, False, False, True, True]
     measured = validity_words(Validity(3.0, 0.1), measured=True)
-    assert "go by the error measured" in measured and "any size" not in measured
+    assert "go by the error measured" in measured and "large" not in measured
