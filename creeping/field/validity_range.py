@@ -33,8 +33,8 @@ EARLY = 1.0
 SOME, TURN = 32, 0.25
 """Rays of an incidence that stand for all in `validities`, and the largest angle by which they turn in a step."""
 WITHIN, EDGE = (10.0, 1.0), (4.0, 2.0)
-"""Least k rho and largest kappa_t rho/m^2 within the range of the expansions, and at its edge: there currents erred by 0.1
-to 2 % rms of the largest |f| on sphere, ellipsoid and twisted ellipsoid, rays by 1 to 9 %; beyond, by up to 20 and 40 %."""
+"""Least k rho and largest kappa_t rho/m^2 within the range of the expansions, and at its edge: there currents erred by
+0.1 to 2 % rms of the largest |f| on a sphere and an ellipsoid, rays by 0.5 to 5 %; beyond, by up to 19 and 42 %."""
 
 
 class Validity(NamedTuple):
