@@ -96,6 +96,22 @@ def test_run_of_a_conductor_has_no_picture_of_the_body(tmp_path, capsys):
     assert summary["field"]["boundary"] == "pec"
 
 
+def test_a_cut_of_a_conductor_passes_the_poles_smoothly():
+    # at the poles the components are those of the cut, not those of phi = 0
+    import creeping as cr
+    import scatterers as sc
+
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    job = _field_run.job(10.0, "pec", ["cut:90"], (1.0, 1.0, 1.0))
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (1.0, 1.0, 1.0)), n_rays=32)
+    far, _ = job.far_field(fan)
+    size = np.abs(far.total)
+    plain = np.abs(cr.far_field(fan, [(0, 0, 1)], wavenumber=10.0, boundary="pec").total[0])
+    near = 0.02 * size.max()
+    np.testing.assert_allclose(size[[0, 180, 180, 360]], size[[1, 179, 181, 359]], atol=near)
+    assert np.max(np.abs(plain - size[181])) > 3 * near
+
+
 def test_a_field_needs_a_good_request():
     job = _field_run.job(20.0, None, None, (1.0, 1.0, 0.0))
     assert (job.boundary, [target.text for target in job.targets]) == ("soft", ["cut:45"])
