@@ -8,8 +8,8 @@ from .errors import StoredMapError as StoredMapError
 from .errors import SurfaceError as SurfaceError
 from .errors import ToleranceError as ToleranceError
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
+from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
-from .field.currents.whole_body import surface_currents as surface_currents
 from .field.far import far_field as far_field
 from .field.far_result import FarField as FarField
 from .field.near import near_field as near_field

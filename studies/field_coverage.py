@@ -23,7 +23,7 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import SingularIncidenceError
-from creeping.field.currents.whole_body import surface_currents
+from creeping.field.currents.assembly import surface_currents
 from studies.reference import clouds, fundamental, sphere
 
 WAVENUMBERS = (8.0, 14.0, 24.0)

@@ -7,10 +7,12 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping.commands.body import CAD, MESHES, AllowRough, Body, SpeedOption, Units, parse_body
+from creeping.commands.body import MESHES, AllowRough, Body, SpeedOption, Units, parse_body
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
-Wavenumber = Annotated[float | None, Parameter(help="k, 1/L: the size of a file's body in wavelengths, too.")]
+Wavenumber = Annotated[
+    float | None, Parameter(help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths.")
+]
 Output = Annotated[
     Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")
 ]
@@ -37,8 +39,8 @@ def check(
     suffix = Path(body).suffix.lower()
     if output is not None and suffix not in MESHES:
         raise InvalidInputError(f"-o is for the picture of a mesh ({', '.join(MESHES)}); {body!r} is none")
-    if wavenumber is not None and suffix not in MESHES + CAD:
-        raise InvalidInputError(f"--wavenumber tells the size of a file's body; {body!r} is no file")
+    if wavenumber is not None and speed is not None:
+        raise InvalidInputError("--wavenumber is for rays of constant speed; leave out one of --speed and --wavenumber")
     answer: dict[str, Any] = {}
     texts: list[str] = []
     shape, refusal = None, None
@@ -73,7 +75,24 @@ def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts
             texts += [*shape.repairs, shape.quality.summary(wavenumber)]
         texts.append(str(shape.fit))
     texts.append(str(report))
+    if wavenumber is not None:
+        _range(shape, wavenumber, answer, texts)
     return report.ok
+
+
+def _range(shape: Any, wavenumber: float, answer: dict[str, Any], texts: list[str]) -> None:
+    """Whether the field's expansions hold, on rays of evenly spread incidences."""
+    from math import isfinite
+
+    from creeping.field.validity_range import body_validity, validity_words
+    from creeping.rays.reach import INCIDENCES
+
+    found = body_validity(shape, wavenumber=wavenumber)
+    answer["validity"] = {name: value if isfinite(value) else None for name, value in found._asdict().items()}
+    if isfinite(found.least_k_rho):
+        texts.append(f"k = {wavenumber:g}, on rays of {INCIDENCES} incidences: {validity_words(found)}")
+    else:
+        texts.append(f"k = {wavenumber:g}: none of {INCIDENCES} incidences launches a creeping ray")
 
 
 def _mesh(

@@ -18,7 +18,7 @@ def explore(
     body: Body,
     *,
     direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels at first.")] = (1, 1, 1),
-    length: Annotated[float | None, Parameter(help="Travel time of the rays; 1.5 body sizes.")] = None,
+    length: Annotated[float | None, Parameter(help="Travel time of the rays; where the waves have died away.")] = None,
     rays: Annotated[int, Parameter(help="Rays of the fan, 16 to 1024.")] = 256,
     spacing: Annotated[
         float | None, Parameter(help="Of iso-phase curves; an eighth of the length, 0 for none.")
@@ -41,6 +41,7 @@ def explore(
     from creeping.explorer.request import ViewRequest, angles
     from creeping.geometry.directions import unit_direction
     from creeping.geometry.surface import size
+    from creeping.rays.reach import body_length
 
     def progress(text: str) -> None:
         print(f"creeping: {text}", file=sys.stderr)
@@ -54,9 +55,9 @@ def explore(
     shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
     extent = size(shape)
     theta, phi = angles(unit_direction(direction))
-    far = _round(1.5 * extent) if length is None else length
-    gap = _round(far / 8) if spacing is None else spacing
     k = _round(40 / extent) if wavenumber is None else wavenumber
+    far = _round(body_length(shape, k if k > 0 and speed is None else None)) if length is None else length
+    gap = _round(far / 8) if spacing is None else spacing
     # the cut runs through the direction of the wave
     request = ViewRequest(theta, phi, rays, far, gap, k, boundary, cut=float(round(phi)))
     flow = _flow(shape, request, MOVES if export is None else 1, tolerance, cache, progress)

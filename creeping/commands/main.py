@@ -61,7 +61,10 @@ def run(
     *,
     direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels; need not be unit.")],
     output: Folder,
-    length: Annotated[float | None, Parameter(help="Travel time of the rays; 1.5 body sizes, 3 with a field.")] = None,
+    length: Annotated[
+        float | Literal["auto"],
+        Parameter(help="Travel time of the rays; auto is where the wave has died away, at k rho = 10 without a field."),
+    ] = "auto",
     rays: Annotated[int, Parameter(help="Rays at the start; more are inserted where neighbours part.")] = 256,
     spacing: Annotated[float | None, Parameter(help="Spacing of iso-phase curves; length/16 if not given.")] = None,
     of: Annotated[
@@ -104,18 +107,18 @@ def run(
     import creeping as cr
     from creeping.commands import run_field as _field_run
     from creeping.commands import run_report as _run_results
-    from creeping.geometry.surface import size
+    from creeping.rays.reach import ray_length
 
     started = time.perf_counter()
     for name, value in (("length", length), ("spacing", spacing)):
-        if value is not None and not (np.isfinite(value) and value > 0):
+        if isinstance(value, float) and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
     job = _field_run.job(wavenumber, boundary, observe, direction, weighted=speed is not None)
     with _Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
         progress("shadow line")
         line = cr.shadow_line(shape, direction)
-        length = length or (3 if job else 1.5) * size(shape)
+        length = ray_length(line, length, wavenumber=wavenumber)
         progress("flow")
         carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, progress)
         progress("creeping rays")

@@ -88,6 +88,8 @@ def write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend:
 
 def readable(summary: dict[str, Any], output: Path) -> str:
     """The summary as a person reads it."""
+    from creeping.field.validity_range import Validity, validity_words
+
     rows = [f"{summary['body']}, d = ({', '.join(f'{v:.4f}' for v in summary['direction'])})"]
     for k, curve in enumerate(summary["shadow_line"]):
         shares = ", ".join(f"{100 * v:.1f} % {name}" for name, v in curve["fractions"].items() if v > 0)
@@ -126,8 +128,8 @@ def readable(summary: dict[str, Any], output: Path) -> str:
         )
         k_rho, transverse = f["validity"]["least_k_rho"], f["validity"]["largest_transverse"]
         if k_rho is not None:
-            warning = "; the expansion is beyond its range" if k_rho < 10 or transverse > 1 else ""
-            rows.append(f"on its rays k rho >= {k_rho:.3g}, kappa_t rho/m^2 <= {transverse:.2g}{warning}")
+            measured = f["error"]["by"] == "extinction"
+            rows.append(f"on its rays {validity_words(Validity(k_rho, transverse), measured=measured)}")
         if f["error"]["by"] is not None:
             off = f["error"]
             rows.append(f"error of the field by {off['by']}: rms {off['rms']:.1e}, max {off['max']:.1e}")

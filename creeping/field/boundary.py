@@ -62,15 +62,15 @@ BoundaryLike = Literal["soft", "hard", "pec"] | ImpedanceBoundary
 
 @dataclass(frozen=True)
 class Boundary:
-    """One scalar boundary: ``kind`` is "soft", "hard", "impedance", "electric soft" or "electric hard"."""
+    """One scalar boundary: ``kind`` is "soft", "hard", "impedance", "electric soft", "electric hard" or "conductor"."""
 
     kind: str
     admittance: complex = 0j
 
     @property
     def sign(self) -> float:
-        """Sign of the transverse curvature's term."""
-        return -1.0 if self.kind == "electric hard" else 1.0
+        """Sign of the transverse curvature's term in dg/dq and in optics."""
+        return -1.0 if self.kind.startswith("electric") else 1.0
 
     def q(self, m: FloatArray) -> ComplexArray | float | None:
         """Parameter q of the Airy functions at a Fock scale m (...): None if soft, 0 if hard, else (...)."""
@@ -80,6 +80,8 @@ class Boundary:
 
 
 SOFT, HARD = Boundary("soft"), Boundary("hard")
+CONDUCTOR = Boundary("conductor")
+"""A conductor's vector problem, where its two scalar ones are not told apart."""
 ELECTRIC_SOFT, ELECTRIC_HARD = Boundary("electric soft"), Boundary("electric hard")
 
 

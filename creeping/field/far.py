@@ -13,7 +13,8 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.currents.kept import affordable, kept_currents
+from creeping.field.currents.kept import AFFORDABLE, MOST_NODES, kept_currents, likely_nodes
+from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import far_geometry, observers_of
 from creeping.field.far_rays import error_by_order, field_of
@@ -48,7 +49,7 @@ def far_field(
         Second-order creeping waves, or the leading order, which is by rays.
     method : {"auto", "currents", "rays"}
         The currents of the whole body, or isolated rays. "auto" takes currents unless they cost more than some ten
-        seconds, the boundary is "pec" or the order 1.
+        seconds or the order is 1.
 
     Returns
     -------
@@ -77,12 +78,12 @@ def far_field(
     k = checked(wavenumber, order)
     if method not in METHODS:
         raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
-    able = len(kinds) == 1 and order == 2
-    if method == "currents" and not able:
-        what = f"order {order}" if order != 2 else f"boundary {boundary!r}"
-        raise InvalidInputError(f"method 'currents' has no {what}; give method='rays'")
+    if method == "currents" and order != 2:
+        raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
     r = observers_of(observation)
-    if method == "currents" or (method == "auto" and able and len(r) and affordable(fan, len(r), k)):
+    # a conductor's sums are of six columns, those of one scalar problem of one to four
+    affordable = method == "auto" and order == 2 and len(r) and _affordable(fan, len(kinds) * len(r), k)
+    if method == "currents" or affordable:
         try:
             return _by_currents(kept_currents(fan, k, boundary), r, boundary)
         except SurfaceError:
@@ -92,17 +93,27 @@ def far_field(
     return error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
 
 
+def _affordable(fan: RayFan, directions: int, wavenumber: float) -> bool:
+    """Whether currents cost little enough in so many directions, one by one or together."""
+    nodes = likely_nodes(fan, wavenumber)
+    if nodes > MOST_NODES:
+        return False
+    cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
+    return nodes * directions < AFFORDABLE or transformed(int(nodes), directions, cells)
+
+
 def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike) -> FarField:
     lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
     error = currents.error(r)
-    largest = max(float(np.max(np.abs(lit + dark), initial=0.0)), abs(currents.far(currents.direction[None])[0]))
+    largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
+    off = ~(error < UNRESOLVED * largest)
     return FarField(
         directions=r.copy(),
         creeping=dark,
         reflected=lit,
-        forward=np.zeros(len(r), dtype=complex),
+        forward=np.zeros(lit.shape, dtype=complex),
         method=np.full(len(r), "currents", dtype="<U16"),
-        unresolved=~(error < UNRESOLVED * largest),
+        unresolved=off.reshape(len(r), -1).any(axis=1),
         error=error,
         error_by="extinction",
         wavenumber=currents.wavenumber,

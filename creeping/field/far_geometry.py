@@ -11,6 +11,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
+from creeping.field.ray_ends import RayEnds
+from creeping.field.reflected_fold import fold_error
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import WITH_JACOBI
 from creeping.geometry.directions import unit_directions
@@ -153,6 +155,8 @@ class FarGeometry:
     directions, direction : (n m, 3)
         r and d of each observer.
     incidence : (n m,) of int
+    ends : RayEnds
+        Of the rays.
     """
 
     def __init__(
@@ -194,6 +198,7 @@ class FarGeometry:
         cells, crossings = 64, 2 + int(self.tracer.steps * TURN / np.pi)
         most = len(times) * PARTS
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
+        self.ends = RayEnds(self.tracer, launch, states, times)
         while rays:
             found, places = np.empty((cells * n * many, 4), np.int64), np.empty((cells * n * many, 2))
             crossed = np.empty((crossings * rays * max(1, int(back.sum())), 4))
@@ -269,6 +274,10 @@ class FarGeometry:
     def specular(self) -> SpecularPoints:
         """Specular points of the lit side."""
         return specular_points(self.body, self.direction, self.directions, prepared(self.body).coarsest)
+
+    def fold(self, wavenumber: float) -> FloatArray:
+        """What specular points miss at a caustic of the reflected field (n m,), L."""
+        return fold_error(self.body, prepared(self.body).coarsest, self.direction, self.directions, wavenumber)
 
     def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
         """Nodes of the fan integral for the wanted observers, at most APART/k apart on the shadow line."""

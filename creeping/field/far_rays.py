@@ -50,7 +50,7 @@ MERGED = (0.38, 0.52)
 def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int) -> FarField:
     """Far field of a geometry, one row for each observer of each incidence."""
     kinds = scalar_boundaries(boundary)
-    parts = _Parts(geometry, len(kinds), k, order)
+    parts = _Parts(geometry, kinds, k, order)
     for number, kind in enumerate(kinds):
         parts.add(number, kind)
     return FarField(
@@ -60,7 +60,7 @@ def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
         forward=parts.forward,
         method=_methods(parts.in_forward, parts.in_fan),
         unresolved=parts.unresolved(),
-        error=np.full(parts.creeping.shape, np.nan),
+        error=parts.error(),
         error_by="",
         wavenumber=k,
         boundary=boundary_name(boundary),
@@ -69,10 +69,10 @@ def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
 
 
 def error_by_order(far: FarField, geometry: FarGeometry, boundary: BoundaryLike) -> FarField:
-    """A far field with the difference of both orders as its error."""
+    """A far field whose error has the difference of both orders too."""
     other = field_of(geometry, far.wavenumber, boundary, 3 - far.order)
     with np.errstate(invalid="ignore"):
-        error = np.abs(far.total - other.total)
+        error = np.hypot(np.abs(far.total - other.total), far.error)
     return replace(far, error=np.where(np.isfinite(error), error, np.nan), error_by="order")
 
 
@@ -126,10 +126,10 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
 class _Parts:
     """Weighted parts of the far field, summed contribution by contribution."""
 
-    def __init__(self, geometry: FarGeometry, kinds: int, wavenumber: float, order: int) -> None:
+    def __init__(self, geometry: FarGeometry, kinds: tuple[Boundary, ...], wavenumber: float, order: int) -> None:
         self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
         self.incident = geometry.direction
-        self.vector = kinds == 2
+        self.vector = len(kinds) == 2
         m = len(geometry.directions)
         self.creeping, self.reflected, self.forward = (
             np.zeros((m, 2, 2) if self.vector else m, dtype=complex) for _ in range(3)
@@ -141,12 +141,22 @@ class _Parts:
         self.beyond_axis = smoothstep(m_theta, *NEAR_AXIS)
         self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.least_merging, *MERGED), 0.0)
         self.long_rays = self.in_forward * smoothstep(theta, *LONG_RAYS)
+        # of the worse polarisation
+        ends = [geometry.ends.lost(geometry.directions, geometry.incidence, wavenumber, kind) for kind in kinds]
+        lost, fold = np.max(ends, axis=0), geometry.fold(wavenumber)
+        self.left_out = (1 - self.in_forward) * np.hypot(lost, fold)
 
     def unresolved(self) -> BoolArray:
-        """Directions in which an expansion fails for what matters there (m,)."""
+        """Directions in which an expansion fails, or something is left out, that matters there (m,)."""
         total = np.abs(self.creeping + self.reflected + self.forward)
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
-        return np.asarray((self.missing & (self.in_forward > 0)) | (self.failing_size > MATTERS * largest))
+        failing = np.maximum(self.failing_size, self.left_out)
+        return np.asarray((self.missing & (self.in_forward > 0)) | (failing > MATTERS * largest))
+
+    def error(self) -> FloatArray:
+        """Size of what is left out, and of what has an expansion that fails (m,) or (m, 2, 2), L."""
+        error = np.hypot(self.left_out, self.failing_size)
+        return np.broadcast_to(error.reshape(-1, *(1,) * (self.creeping.ndim - 1)), self.creeping.shape).copy()
 
     def _note_failing(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
         """Note the size of contributions (n,) whose expansion fails."""

@@ -24,13 +24,15 @@ class FarField(Drawn):
     unresolved : (m,) of bool
         Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
         fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
-        forward lobe with no bisector contour (a concave region) or with a rim that the body hides in part. With
+        forward lobe with no bisector contour (a concave region) or with a rim that the body hides in part; or whether
+        rays that end too early may lack so much there (`creeping.field.ray_ends`). With
         currents, whether the error is more than a tenth of the largest |f|.
     error : (m,) or (m, 2, 2), L
         Of |f|, meant to hold in 95 of 100 directions if ``error_by`` is "extinction"; NaN where it is not known.
     error_by : str
         "extinction", measured inside the body (`creeping.field.currents.whole_body`); "order", the size of what the
-        second order adds, which does not see caustics of the reflected field; "" for none.
+        second order adds and what rays that end too early may lack, which does not see caustics of the reflected
+        field; "" for none.
     wavenumber : float, 1/L
     boundary : str
     order : int

@@ -184,7 +184,7 @@ def _lit_at(
     hessian = body.hessian(points) / np.linalg.norm(body.gradient(points), axis=-1)[:, None, None]
     nodes = BodyNodes(points, normal(body, points), np.ones(len(points)), entries_of(hessian).T, 0.0)
     at, part = lit_part(body, fan.line, nodes, k)
-    geometry = part.cosine, part.along, part.across, part.rate, part.bend
+    geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
     u, other = (lit_currents(*geometry, k, kind, o) for o in (order, 3 - order))
     values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))
     share[at] = part.weights

@@ -69,11 +69,18 @@ def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order:
         wave[early] += (1 - weight[early]) * limited(change, 0.5 * np.abs(wave[early]))
         part = rays[late]
         wave[late] += weight[late] * (_series(part, wavenumber, boundary, 2) - _series(part, wavenumber, boundary, 1))
+    return np.asarray(
+        wave * ray_factor(rays, wavenumber) * (wavenumber / m2 if boundary.kind.endswith("soft") else 1.0)
+    )
+
+
+def ray_factor(rays: RayPoints, wavenumber: float) -> ComplexArray:
+    """e^{ik(d.x0 + s)} (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} of rays that are alive (...), infinite on their caustics."""
     first, last = rays.curvature
     phase = wavenumber * rays.eikonal - 0.5 * np.pi * rays.caustics
     with np.errstate(divide="ignore", over="ignore"):
         factor = np.cbrt(np.sqrt(last / first)) / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * phase)
-    return np.asarray(wave * factor * (wavenumber / m2 if boundary.kind == "soft" else 1.0))
+    return np.asarray(factor)
 
 
 def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
@@ -120,7 +127,7 @@ def surface_amplitude(rays: RayPoints, modes: Modes, wavenumber: float, boundary
     tau, m0, q_m0 = modes.tau, modes.m0, modes.q_m0
     bend = varying_curvature(rays)[..., None]
     attached = rays.radius_rate[0][..., None] ** 2 / 36
-    if boundary.kind == "soft":
+    if boundary.kind.endswith("soft"):
         bracket = tau * (1 / 10 + r / 4 - bend / 60 + attached)
     else:
         # q² M0 = τ M0 - 1

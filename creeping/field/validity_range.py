@@ -13,14 +13,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from creeping._typing import FloatArray
 from creeping.field.arguments import checked
 from creeping.field.creeping_modes import fock_scale
+from creeping.geodesics.attenuation import curvature_values
+from creeping.geodesics.equations import sharpest_curvature
+from creeping.geodesics.integrator import runge_kutta_4, trace_states
+from creeping.geodesics.states import ATTENUATION, P, X, pack
 from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.surface import normal
+from creeping.geometry.directions import fibonacci_directions
+from creeping.geometry.surface import Surface, normal
 from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.reach import INCIDENCES, TRIALS, early_length
+from creeping.shadow.attachment import LaunchPoints, evenly_chosen
+from creeping.shadow.many import shadow_lines
 
 EARLY = 1.0
 """xi up to which a ray matters."""
+SOME, TURN = 32, 0.25
+"""Rays of an incidence that stand for all in `validities`, and the largest angle by which they turn in a step."""
+WITHIN, EDGE = (10.0, 1.0), (4.0, 2.0)
+"""Least k rho and largest kappa_t rho/m^2 within the range of the expansions, and at its edge."""
 
 
 class Validity(NamedTuple):
@@ -60,12 +73,123 @@ def validity(fan: RayFan, *, wavenumber: float) -> Validity:
     (54.0, 0.111111)
     """
     k = checked(wavenumber, 2)
-    early = np.cbrt(k / 2) * fan.attenuation < EARLY
     launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
-    there = early & (fan.curvature > 0) & (fan.travel_time < fan.detachment[:, None]) & launched[:, None]
+    there = (fan.curvature > 0) & (fan.travel_time < fan.detachment[:, None]) & launched[:, None]
+    there &= np.cbrt(k / 2) * fan.attenuation < EARLY
     if not np.any(there):
         return Validity(np.nan, np.nan)
-    points, along = fan.points[there], fan.curvature[there]
-    across = np.cross(normal(fan.body, points), fan.directions[there])
-    transverse = np.abs(normal_curvature(fan.body, points, across)) / along / fock_scale(k, along) ** 2
-    return Validity(float(k / along.max()), float(transverse.max()))
+    along, across = fan.curvature[there], _across(fan.body, fan.points[there], fan.directions[there])
+    return Validity(float(k / along.max()), float((across / along / fock_scale(k, along) ** 2).max()))
+
+
+def validities(
+    body: Surface, launch: LaunchPoints, until: float, wavenumbers: tuple[float, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Both numbers for n incidences and k wavenumbers, at all launch points and along SOME rays of each: twice (n, k).
+
+    Equal to `validity` of a fan of those rays; where curvature changes within their spacing, as at the tip of a slender
+    body, or falls to 0 beside a concave region, a fan of more rays finds more extreme ones.
+
+    Parameters
+    ----------
+    body : Surface
+        Plain.
+    launch : LaunchPoints
+        Of n incidences.
+    until : float, L
+        Length of the rays, such as `creeping.rays.reach.early_length` at the lowest wavenumber.
+    wavenumbers : tuple of float, 1/L
+    """
+    radius, transverse = launch_validity(body, launch)
+    ks = np.array(wavenumbers)
+    least, largest = radius[:, None] * ks, transverse[:, None] / np.cbrt(ks) ** 2
+    incidence, ray = np.nonzero(evenly_chosen(launch.there, SOME))
+    if not len(ray):
+        return least, largest
+    starts = pack(launch.points[incidence, ray], launch.directions[incidence], jacobi=True)
+    starts = np.concatenate([starts, np.zeros((len(starts), 1))], axis=1)
+    # equal steps: a ray comes out the same in whatever company
+    steps = max(8, int(np.ceil(until * sharpest_curvature(body) / TURN)))
+    times: FloatArray = until * np.arange(steps + 1, dtype=float) / steps
+    states = trace_states(body, starts, times, rtol=0.0, step=times[1], tableau=runge_kutta_4())
+    early = np.cbrt(min(wavenumbers) / 2) * states[..., ATTENUATION] < EARLY
+    row, step = np.nonzero(early)
+    some = states[row, step]
+    along, across = np.zeros(early.shape), np.zeros(early.shape)
+    along[row, step], across[row, step] = curvature_values(body, some), _across(body, some[:, X], some[:, P])
+    early &= np.logical_and.accumulate(along > 0, axis=1)
+    first = np.flatnonzero(np.diff(incidence, prepend=-1))
+    rows = incidence[first]
+    for j, k in enumerate(wavenumbers):
+        mine = early & (np.cbrt(k / 2) * states[..., ATTENUATION] < EARLY)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(mine, across / along / fock_scale(k, along) ** 2, -np.inf).max(axis=1)
+        sharpest = np.where(mine, along, 0.0).max(axis=1)
+        sharpest, ratio = np.maximum.reduceat(sharpest, first), np.maximum.reduceat(ratio, first)
+        known = sharpest > 0
+        mine_of = rows[known]
+        least[mine_of, j] = np.fmin(least[mine_of, j], k / sharpest[known])
+        largest[mine_of, j] = np.fmax(largest[mine_of, j], ratio[known])
+    return least, largest
+
+
+def launch_validity(body: Surface, launch: LaunchPoints) -> tuple[FloatArray, FloatArray]:
+    """Least rho, L, and largest 2^(2/3) |kappa_t| rho^(1/3), L^(-2/3), at launch points of n incidences: twice (n,).
+
+    They give the two numbers at the start of the rays for any k, as k rho and k^(-2/3) times the second.
+    """
+    incidence, ray = np.nonzero(launch.there)
+    least, largest = np.full(len(launch.directions), np.nan), np.full(len(launch.directions), np.nan)
+    points, directions = launch.points[incidence, ray], launch.directions[incidence]
+    along, across = normal_curvature(body, points, directions), _across(body, points, directions)
+    kept = along > 0
+    incidence, along, across = incidence[kept], along[kept], across[kept]
+    first = np.flatnonzero(np.diff(incidence, prepend=-1))
+    if len(first):
+        least[incidence[first]] = 1 / np.maximum.reduceat(along, first)
+        largest[incidence[first]] = np.maximum.reduceat(np.cbrt(4 / along) * across, first)
+    return least, largest
+
+
+def body_validity(body: Surface, *, wavenumber: float) -> Validity:
+    """The worse of both numbers over INCIDENCES evenly spread incidences; NaN if none launches a ray.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> round(body_validity(sc.Sphere(radius=2.0), wavenumber=27.0).least_k_rho, 6)
+    54.0
+    """
+    k = checked(wavenumber, 2)
+    launch = shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch
+    least, largest = validities(body, launch, early_length(body, k), (k,))
+    known = np.isfinite(least)
+    return (
+        Validity(float(least[known].min()), float(largest[known].max())) if np.any(known) else Validity(np.nan, np.nan)
+    )
+
+
+def validity_words(found: Validity, *, measured: bool = False) -> str:
+    """What both numbers say of a field, for a reader; ``measured`` if its error is, which then counts for more.
+
+    Examples
+    --------
+    >>> validity_words(Validity(24.0, 0.8))
+    'k rho >= 24, kappa_t rho/m^2 <= 0.8; within the range of the expansion'
+    >>> validity_words(Validity(7.7, 0.7), measured=True)
+    'k rho >= 7.7, kappa_t rho/m^2 <= 0.7; at the edge of the range of the expansion, go by the error measured'
+    """
+    numbers = f"k rho >= {found.least_k_rho:.3g}, kappa_t rho/m^2 <= {found.largest_transverse:.2g}"
+    inside, near = (
+        found.least_k_rho >= k_rho and found.largest_transverse <= across for k_rho, across in (WITHIN, EDGE)
+    )
+    if inside:
+        return f"{numbers}; within the range of the expansion"
+    where = "at the edge of" if near else "on some rays beyond"
+    said = "go by the error measured" if measured else "errors may be " + ("some per cent" if near else "of any size")
+    return f"{numbers}; {where} the range of the expansion, {said}"
+
+
+def _across(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:
+    """|kappa_t| (n,), 1/L, at points (n, 3) of rays in the directions (n, 3)."""
+    return np.abs(normal_curvature(body, points, np.cross(normal(body, points), directions)))

@@ -101,6 +101,16 @@ def _check_grid(far: "FarField", theta: FloatArray, phi: FloatArray) -> None:
         )
 
 
+def _trust(far: "FarField") -> Iterator[str]:
+    """Comments on the errors, which the format has no columns for."""
+    served = ", ".join(sorted({str(name) for name in far.method}))
+    doubtful = f"{int(np.sum(far.unresolved))} of {len(far.method)} directions"
+    yield f"** computed by {served or 'nothing'}; unresolved in {doubtful}"
+    if far.stated_error is not None:
+        rms, worst = far.stated_error
+        yield f"** error of |f| by {far.error_by}: {rms:.3e} m rms over the directions, {worst:.3e} m at most"
+
+
 def _lines(far: "FarField", theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:
     vector = np.ndim(far.total) == 3
     yield "##File Type: Far field"
@@ -109,6 +119,7 @@ def _lines(far: "FarField", theta: FloatArray, phi: FloatArray, direction: Array
     yield f"** {far.boundary} boundary, order {far.order}, k = {far.wavenumber!r} 1/L"
     yield "** frequency: L is taken as the metre and the wave's speed as that of light"
     yield "** time factor exp(+jwt): complex conjugates of the far field f of creeping, exp(-iwt)"
+    yield from _trust(far)
     if not vector:
         yield "** SCALAR field: f stands in the columns of Etheta, those of Ephi are 0"
     for number, name in enumerate(("theta", "phi") if vector else ("scalar",)):

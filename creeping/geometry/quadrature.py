@@ -62,9 +62,18 @@ class BodyNodes:
     hessians: FloatArray
     error: float
 
+    def part(self, at: IntArray) -> "BodyNodes":
+        """Some of the nodes, by their numbers."""
+        return BodyNodes(self.points[at], self.normals[at], self.weights[at], self.hessians[at], self.error)
+
     def curvature(self, directions: FloatArray) -> FloatArray:
         """Normal curvature, 1/L, along unit tangents (n, 3): (n,)."""
         return second_form(directions, self.hessians[:, SYMMETRIC])
+
+    def twist(self, directions: FloatArray) -> FloatArray:
+        """Off-diagonal entry of the shape operator, 1/L, between unit tangents p (n, 3) and n x p: (n,)."""
+        across = np.cross(self.normals, directions)
+        return np.asarray(np.einsum("ni,nij,nj->n", directions, self.hessians[:, SYMMETRIC], across))
 
     @property
     def total_curvature(self) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import cross_section_decibels, decibels, shown_range
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
@@ -25,19 +25,23 @@ COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
 COLOURS = ("#0b6fb8", "#d1495b", "#2a9d4e", "#8e5ea2", "#e08e0b", "#5a6872")
 PARTS = {"creeping": "--", "reflected": "-.", "forward": ":"}
 EXACT = "#111111"
+HATCHED: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
+"""Of angles at which a field is unresolved."""
 
 
 @dataclass(frozen=True)
 class Curve:
     """One curve of a cut: ``levels`` (m,) in dB, NaN where the field is not finite.
 
-    ``band`` (2, m) is the range of its error in dB, down to -inf, NaN where that is not known.
+    ``band`` (2, m) is the range of its error in dB, down to -inf, NaN where that is not known; ``doubt`` (m,) the
+    directions that are unresolved.
     """
 
     label: str
     levels: FloatArray
     style: dict[str, Any]
     band: FloatArray | None = None
+    doubt: BoolArray | None = None
 
     @property
     def thick(self) -> bool:
@@ -47,7 +51,8 @@ class Curve:
     def ordered(self, order: IntArray, label: str) -> "Curve":
         """The same with its points in another order, and another label."""
         band = None if self.band is None else self.band[:, order]
-        return Curve(label, self.levels[order], self.style, band)
+        doubt = None if self.doubt is None else self.doubt[order]
+        return Curve(label, self.levels[order], self.style, band, doubt)
 
 
 def far_cut_picture(
@@ -65,7 +70,9 @@ def far_cut_picture(
     title: str | None = None,
     dpi: int = 300,
 ) -> None:
-    """Write a PNG of far fields against the angle in one plane.
+    """Write a PNG of far fields against the angle in one plane, with the bands of their errors.
+
+    Angles at which a field is unresolved are hatched.
 
     Parameters
     ----------
@@ -146,6 +153,24 @@ def draw_cut(
             band = np.maximum(curve.band, low if polar else low - (high - low))
             ax.fill_between(across, *band, color=curve.style["color"], alpha=0.18, linewidth=0, zorder=0.5)
         ax.plot(across, levels, label=curve.label, **curve.style)
+    _hatch(ax, angle, curves)
+
+
+def _hatch(ax: Any, angle: FloatArray, curves: Sequence[Curve]) -> None:
+    """Hatch the angles at which a curve is unresolved, half a step to both sides of each direction."""
+    doubts = [curve.doubt for curve in curves if curve.doubt is not None]
+    if not doubts or not np.any(doubts):
+        return
+    doubtful = np.any(doubts, axis=0)
+    across = angle if ax.name == "polar" else np.degrees(angle)
+    middles = 0.5 * (across[1:] + across[:-1])
+    starts, ends = np.append(across[:1], middles), np.append(middles, across[-1:])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], doubtful.astype(int), [0]])))
+    label = "unresolved"
+    for first, after in edges.reshape(-1, 2):
+        span = sorted((starts[first], ends[after - 1]))
+        ax.axvspan(*span, label=label, **HATCHED)
+        label = "_one entry is enough"
 
 
 def level_name(quantity: str, unit: str) -> str:
@@ -179,7 +204,9 @@ def cut_curves(
         for suffix, pick in _picks(label, whole, count, components):
             colour = COLOURS[len(thick) % len(COLOURS)]
             style = {"color": colour, "linewidth": 1.3}
-            thick.append(Curve(label + suffix, _levels(pick(whole), quantity), style, _band(field, pick, quantity)))
+            doubt = getattr(field, "unresolved", None)
+            levels, band = _levels(pick(whole), quantity), _band(field, pick, quantity)
+            thick.append(Curve(label + suffix, levels, style, band, doubt))
             for number, (part, dashes) in enumerate(PARTS.items() if parts and hasattr(field, "total") else ()):
                 # of one curve alone the parts have colours of their own, of several that of their curve
                 own = COLOURS[1 + number] if len(fields) == 1 and not suffix else colour

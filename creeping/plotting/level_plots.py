@@ -36,7 +36,7 @@ def plot_far(
 ) -> Any:
     """Draw a cut of the far field in decibels against the angle in degrees, round a circle on polar axes.
 
-    Circles mark directions that are unresolved, crosses at the upper edge those where the field is not finite.
+    Directions that are unresolved are hatched; crosses at the upper edge mark those where the field is not finite.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def plot_far(
     curves = [curve.ordered(cut.order, curve.label.removeprefix("total, ")) for curve in curves]
     fresh, ax = axes_or_new(ax, PAGE)
     draw_cut(ax, cut.values[cut.order], curves, heights, quantity=quantity, unit=unit, angle_name=cut.name)
-    _mark(ax, cut.values[cut.order], curves, np.asarray(far.unresolved)[cut.order], heights[1])
+    _mark(ax, cut.values[cut.order], curves, heights[1])
     if fresh:
         # a boundary's name is the user's and no formula
         ax.set_title(f"k = {far.wavenumber:g}/L, {far.boundary} boundary", fontsize=9, parse_math=False)
@@ -88,19 +88,11 @@ def plot_far(
     return ax
 
 
-def _mark(ax: Any, angle: FloatArray, curves: Sequence[Curve], unresolved: Any, high: float) -> None:
-    """Mark what is not to be trusted: circles on the curves, crosses where there is no curve."""
+def _mark(ax: Any, angle: FloatArray, curves: Sequence[Curve], high: float) -> None:
+    """Crosses where there is no curve."""
     x = angle if ax.name == "polar" else np.degrees(angle)
-    whole = [curve for curve in curves if curve.thick]
     look: dict[str, Any] = {"linestyle": "none", "markersize": 4, "markeredgewidth": 0.8, "zorder": 4}
-    label = "unresolved"
-    for curve in whole:
-        at = unresolved & np.isfinite(curve.levels)
-        if np.any(at):
-            colour = curve.style["color"]
-            ax.plot(x[at], curve.levels[at], marker="o", mfc="none", mec=colour, label=label, **look)
-            label = "_one entry is enough"
-    gone = np.any([np.isnan(curve.levels) for curve in whole], axis=0)
+    gone = np.any([np.isnan(curve.levels) for curve in curves if curve.thick], axis=0)
     if np.any(gone):
         height = np.full(int(gone.sum()), high)
         ax.plot(x[gone], height, marker="x", color=GREY, label="not finite", clip_on=False, **look)

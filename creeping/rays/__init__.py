@@ -1,1 +1,1 @@
-"""Shadow lines, fans of creeping rays and their iso-phase curves; knows nothing of wavenumbers."""
+"""Shadow lines, fans of creeping rays and their iso-phase curves; of wavenumbers only how long rays have to be."""

@@ -13,7 +13,7 @@ Sources: Derivations, R3 and R4.
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
 from creeping.rays.nonsmooth import non_smooth_from
+from creeping.rays.reach import AUTO, IN_RANGE, ray_length
 from creeping.rays.spreading import spread, zeros_passed
 from creeping.rays.starts import Starts
 from creeping.rays.transport import Flow, carried
@@ -153,14 +154,31 @@ class RayFan(DrawnOnBody):
         """Number of rays of each status that occurs, by name."""
         return {s.name: int(np.sum(self.status == s)) for s in RayStatus if np.any(self.status == s)}
 
+    @property
+    def least_radius(self) -> float:
+        """Least 1/kappa_n, L, where the rays matter most; NaN without rays, or for a weighted body, which has no field.
+
+        That is up to xi = 1 at the wavenumber where k rho is 10 at the median of the launch points.
+        """
+        creeping = np.isin(self.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+        if speed_of(self.body) is not None or not np.any(creeping):
+            return float("nan")
+        curvature = self.curvature[creeping]
+        k = IN_RANGE * float(np.median(curvature[:, 0]))
+        largest = float(np.max(curvature, initial=0.0, where=np.cbrt(k / 2) * self.attenuation[creeping] < 1))
+        return 1 / largest if largest > 0 else float("nan")
+
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
         error = f"rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
         arcs = len(self.closed_arcs)
+        least = self.least_radius
+        sharpest = "" if np.isnan(least) else f"; radius of curvature {least:.3g} L at least"
         return (
             f"RayFan({len(self.points)} rays x {len(self.travel_time)} steps to {self.length:g}, "
             f"{arcs} arc{'s' * (arcs != 1)}, on {brief(self.body)})\n"
-            f"  {counts or 'no rays'}; caustics passed: up to {int(self.caustic_index[:, -1:].max(initial=0))}\n"
+            f"  {counts or 'no rays'}; caustics passed: up to {int(self.caustic_index[:, -1:].max(initial=0))}"
+            f"{sharpest}\n"
             f"  error at the end: {error if self.error.samples else 'not measured'}"
         )
 
@@ -169,7 +187,8 @@ def launch(
     flow: Flow,
     line: ShadowLine,
     *,
-    length: float,
+    length: float | Literal["auto"] = AUTO,
+    wavenumber: float | None = None,
     n_rays: int | None = None,
     n_steps: int | None = None,
     launch_from: str = "attached",
@@ -183,7 +202,11 @@ def launch(
     flow : PhaseMap or DirectFlow
         Of the body of the line.
     line : ShadowLine
-    length : float, L (travel time for a weighted body)
+    length : float or "auto", L (travel time for a weighted body)
+        "auto" is where the wave has died away at ``wavenumber``, whatever the boundary (`creeping.rays.reach`), at most
+        4 body sizes; for a weighted body the time that 1.5 body sizes take.
+    wavenumber : float, optional, 1/L
+        Lowest that "auto" is to serve; where the median k rho at the launch points is 10 if not given.
     n_rays : int, optional
         Rays, shared among the arcs by length; one per point of the line if not given.
     n_steps : int, optional
@@ -211,15 +234,15 @@ def launch(
     >>> import scatterers as sc
     >>> ball = sc.Sphere()
     >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
-    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, wavenumber=30.0, n_rays=16)
     >>> len(fan.points) >= 16, fan.error.rms < 1e-6             # rays are inserted where neighbours are far apart
     (True, True)
+    >>> round(fan.length, 1)                                    # beyond, less than e^-7.5 is left of the wave
+    3.5
     """
     body = line.body
     if flow.body is not body and fingerprint(flow.body) != fingerprint(body):
         raise InvalidInputError(f"the flow is of {flow.body!r}, the line of {body!r}; use one body for both")
-    if not (np.isfinite(length) and length > 0):
-        raise InvalidInputError(f"length = {length!r} is not a positive finite number")
     if launch_from not in ("attached", "all"):
         raise InvalidInputError(f"launch_from = {launch_from!r} is neither 'attached' nor 'all'")
     for name, number in (("n_rays", n_rays), ("n_steps", n_steps)):
@@ -228,6 +251,7 @@ def launch(
     gap = 0.1 * size(body) if max_gap is None else float(max_gap)
     if not gap > 0:
         raise InvalidInputError(f"max_gap = {max_gap!r} is not positive; give inf for no refinement")
+    length = ray_length(line, length, wavenumber=wavenumber)
     times = np.linspace(0.0, length, (n_steps or enough_steps(body, length)) + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)

@@ -77,6 +77,19 @@ class LaunchPoints:
         return LaunchPoints(*(getattr(self, part.name)[rows] for part in fields(self)))
 
 
+def evenly_chosen(there: BoolArray, most: int) -> BoolArray:
+    """At most so many of the places of each row that hold a ray, evenly spread over them: (n, rays) -> (n, rays).
+
+    Examples
+    --------
+    >>> evenly_chosen(np.array([[True, False, True, True, True]]), 2).astype(int)
+    array([[1, 0, 0, 1, 0]])
+    """
+    every = np.maximum(there.sum(axis=1, keepdims=True) / most, 1.0)
+    number = np.cumsum(there, axis=1) - 1
+    return np.asarray(there & ((np.floor(number / every) > np.floor((number - 1) / every)) | (number == 0)))
+
+
 def parting_positions(
     points: FloatArray, arcs: list[Arc], arc: IntArray, arclength: FloatArray, gap: float
 ) -> tuple[IntArray, FloatArray]:

@@ -14,6 +14,9 @@ from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.geometry.directions import unit_directions
+from creeping.geometry.speed import speed_of
+from creeping.geometry.surface import Surface
+from creeping.rays.reach import AUTO, body_length
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
@@ -58,6 +61,16 @@ RAYS = {
     "spreading": Variable(("ray", "step"), "float64", "1", "J"),
     "spreading_rate": Variable(("ray", "step"), "float64", "1/L", "J'"),
     "attenuation": Variable(("ray", "step"), "float64", "L^(1/3)", "integral of kappa_n^(2/3) along the ray"),
+}
+CURVED = {
+    "least_radius": Variable((), "float64", "L", "least radius of curvature along the direction at the launch points"),
+    "transverse": Variable(
+        (), "float64", "L^(-2/3)", "largest kappa_t rho/m^2 at the launch points times k^(2/3), whatever k"
+    ),
+}
+VALID = {
+    "least_k_rho": Variable(("wavenumber",), "float64", "1", "least k rho on the rays, as creeping.validity"),
+    "largest_transverse": Variable(("wavenumber",), "float64", "1", "largest kappa_t rho/m^2, as creeping.validity"),
 }
 PARTS = {
     "creeping": "far-field amplitude of the creeping rays",
@@ -161,10 +174,10 @@ class SweepRequest:
     def variables(self) -> dict[str, Variable]:
         """The arrays of results by name."""
         if self.quantity == "rays":
-            return LINE | RAYS
+            return LINE | CURVED | RAYS
         observer = ("observer",) if self.quantity == "bistatic" else ()
         parts = PARTS if self.quantity == "bistatic" else {k: v for k, v in PARTS.items() if k != "forward"}
-        found = dict(LINE)
+        found = LINE | VALID
         if self.scalar_boundaries:
             dims = ("boundary", "wavenumber", *observer)
             found |= {name: Variable(dims, "complex128", "L", text) for name, text in parts.items()}
@@ -226,6 +239,21 @@ def sweep_request(
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen),
         order=_plain(order),
     )
+
+
+def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike) -> float:
+    """Length of the rays of a sweep asked for as a number or as "auto": then for its lowest wavenumber, if it has any.
+
+    What is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes.
+    """
+    if not (isinstance(length, str) and length == AUTO):
+        return length
+    try:
+        known = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
+    except (TypeError, ValueError):
+        known = np.zeros(0)
+    known = known[np.isfinite(known) & (known > 0)]
+    return body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))
 
 
 def _plain(value: Any) -> Any:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,10 +12,10 @@ from creeping._typing import Any, ArrayLike
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike, ImpedanceBoundary
 from creeping.geometry.directions import unit_directions
-from creeping.geometry.surface import size
+from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
-from creeping.sweeping.request import Quantity, sweep_request
+from creeping.sweeping.request import Quantity, sweep_length, sweep_request
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.store import SweepStore
@@ -37,7 +37,7 @@ def sweep_directions(
     quantity: Quantity = "monostatic",
     observation: ArrayLike | None = None,
     boundary: BoundaryLike | Sequence[BoundaryLike] | None = None,
-    length: float | None = None,
+    length: float | Literal["auto"] = AUTO,
     n_rays: int = 256,
     n_steps: int = 1,
     order: int = 2,
@@ -63,8 +63,9 @@ def sweep_directions(
         Directions of "bistatic".
     boundary : {"soft", "hard", "pec"}, ImpedanceBoundary or a list of them
         "soft" if not given.
-    length : float, optional, L (travel time for a weighted body)
-        Of the rays, 3 body sizes if not given.
+    length : float or "auto", L (travel time for a weighted body)
+        Of the rays. "auto" is one number for all incidences, kept with the results: where waves have died away at the
+        lowest of the wavenumbers, on whichever of twelve incidences that takes longest; see `creeping.launch`.
     n_rays : int
         Rays of an incidence.
     n_steps : int
@@ -109,7 +110,7 @@ def sweep_directions(
     several = [boundary] if isinstance(boundary, (str, ImpedanceBoundary)) else list(boundary)
     request = sweep_request(
         quantity,
-        length=3 * size(flow.body) if length is None else length,
+        length=sweep_length(flow.body, length, wavenumbers),
         n_rays=n_rays,
         n_steps=n_steps,
         wavenumbers=wavenumbers,

@@ -6,17 +6,19 @@ from creeping._typing import Any, FloatArray
 from creeping.field.boundary import parse_boundary
 from creeping.field.far_geometry import FarGeometry
 from creeping.field.far_rays import field_of
+from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, WHOLE, P, X
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import launch, ray_arrays
+from creeping.rays.reach import early_length
 from creeping.rays.strips import Strip, strips_of
 from creeping.rays.tracer import RayTracer
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.many import ShadowLines, shadow_lines
 from creeping.shadow.status import SINGULAR
-from creeping.sweeping.request import SweepRequest
+from creeping.sweeping.request import CURVED, VALID, SweepRequest
 
 BATCH, FIELD_BATCH = 16_384, 65_536
 """Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
@@ -49,6 +51,9 @@ class Sweeper:
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
         self._tracer = None if request.quantity == "rays" else RayTracer(flow.body, request.length)
+        self._early = 0.0
+        if request.quantity != "rays":
+            self._early = min(request.length, early_length(flow.body, min(request.wavenumbers)))
 
     @property
     def body(self) -> Surface:
@@ -79,6 +84,10 @@ class Sweeper:
         if not len(rows):
             return
         request, directions = self.request, lines.directions[rows]
+        for name, found in zip(
+            VALID, validities(self.body, lines.launch.of(rows), self._early, request.wavenumbers), strict=True
+        ):
+            out[name][rows] = found
         bistatic = request.quantity == "bistatic"
         observers = -directions[:, None]
         if bistatic:
@@ -114,6 +123,8 @@ def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:
 def fill_rays(flow: Flow, lines: ShadowLines, times: FloatArray, out: dict[str, Any]) -> None:
     """Results of the rays."""
     launch = lines.launch
+    for name, values in zip(CURVED, launch_validity(flow.body, launch), strict=True):
+        out[name][:] = values
     states, there = carried(flow, launch, times, components=WHOLE), launch.there
     rays = ray_arrays(flow.body, launch, states, times)
     out["ray_status"][:], out["detachment"][:] = rays.status, rays.detachment

@@ -8,6 +8,11 @@ With x = ka, phi from the forward direction, alpha u + (beta/k) ∂u/∂n = 0, �
 and on the surface, by the Wronskian,
 
     u = beta (2i/πx) Σ εₙ iⁿ cos(n phi)/Dₙ,    ∂u/∂n = -alpha k (2i/πx) Σ εₙ iⁿ cos(n phi)/Dₙ
+
+A wave that comes at an angle gamma to the axis z, sin gamma = s, is that across it with k s in place of k, times
+e^{ikz cos gamma}. On a perfect conductor H_z is hard and E_z soft, and along l, against phi, on the surface
+
+    H_l = (i/(k s²)) [cos(gamma) ∂H_z/∂l - ∂E_z/∂n],    J = n x H:  J_l = H_z,  J_z = -H_l
 """
 
 import numpy as np
@@ -90,3 +95,20 @@ def _surface_sum(wavenumber: float, radius: float, phi: ArrayLike, boundary: Bou
     _, denominators = _coefficients(x, boundary)
     turns = 1j ** (np.arange(len(denominators)) % 4)
     return np.asarray(2j / (np.pi * x) * _angular_sum(turns / denominators, phi))
+
+
+def pec_currents(
+    wavenumber: float, radius: float, phi: ArrayLike, gamma: float, electric: complex, magnetic: complex
+) -> tuple[ComplexArray, ComplexArray]:
+    """J_l and J_z on a perfect conductor at z = 0 for a wave whose E_z and H_z are given: (m,) -> (m,), (m,)."""
+    s, phi = np.sin(gamma), np.asarray(phi, dtype=float)
+    k = wavenumber * s
+    x = k * radius
+    _, denominators = _coefficients(x, "hard")
+    n = np.arange(len(denominators))
+    weights = 2j / (np.pi * x) * np.where(n == 0, 1.0, 2.0) * 1j ** (n % 4) / denominators
+    along = magnetic * surface_field(k, radius, phi, "hard")
+    # d/dl is -(1/a) d/dphi
+    rate = magnetic / radius * np.sin(np.multiply.outer(phi, n)) @ (n * weights)
+    slope = electric * surface_derivative(k, radius, phi, "soft")
+    return along, -1j / (wavenumber * s * s) * (np.cos(gamma) * rate - slope)

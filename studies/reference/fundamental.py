@@ -101,7 +101,7 @@ def _incident(cloud: Cloud, k: float, directions: FloatArray, alpha: complex, be
     return np.asarray(wave * (alpha + 1j * beta * (cloud.normals @ directions.T)))
 
 
-def _least_squares(matrix: ComplexArray, right: ComplexArray) -> ComplexArray:
+def least_squares(matrix: ComplexArray, right: ComplexArray) -> ComplexArray:
     """Columns of least |matrix q - right|, by QR of both together: Q is never formed."""
     n = matrix.shape[1]
     (upper,) = qr(np.hstack([matrix, right]), mode="r", overwrite_a=True, check_finite=False)
@@ -160,7 +160,7 @@ def solve(
         for sign, block in zip(signs, blocks, strict=True):
             matrix += sign * block
         right = np.asarray(-np.tensordot(signs, waves, axes=1) / len(group), dtype=complex)
-        classes.append(_least_squares(matrix, right))
+        classes.append(least_squares(matrix, right))
     # q at the image g y: Σ_s chi_s(g) q_s
     strengths = np.concatenate([np.tensordot(signs, np.stack(classes), axes=1) for signs in characters.T])
     everywhere = np.concatenate([y * g for g in group])

@@ -187,3 +187,26 @@ def pec_far_field(wavenumber: float, radius: float, cos_theta: ArrayLike) -> tup
     """Far fields f⊥ and f∥ of a perfectly conducting sphere, L: (m,) -> (m,), (m,)."""
     s1, s2 = pec_amplitudes(wavenumber, radius, cos_theta)
     return 1j / wavenumber * s1, 1j / wavenumber * s2
+
+
+def pec_surface_field(wavenumber: float, radius: float, cos_theta: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+    """Total H on a perfectly conducting sphere: (m,) -> (m,), (m,).
+
+    With the wave along z, E0 along x and H0 = 1 along y, H_theta = sin(phi) times the first, H_phi = cos(phi) times the
+    second, by the Wronskian psi xi' - psi' xi = i:
+
+        Σ iⁿ (2n+1)/(n(n+1)) [(i/x) πₙ/xi' - tauₙ/(x xi)],   Σ iⁿ (2n+1)/(n(n+1)) [(i/x) tauₙ/xi' - πₙ/(x xi)]
+    """
+    positive(wavenumber=wavenumber, radius=radius)
+    x, c = wavenumber * radius, _cosines(cos_theta)
+    n, _, _, h, dh = _radial(x)
+    first, second = np.zeros(c.shape, dtype=complex), np.zeros(c.shape, dtype=complex)
+    before, pi = np.zeros_like(c), np.ones_like(c)
+    for m in n[1:]:
+        tau = m * c * pi - (m + 1) * before
+        xi, slope = x * h[int(m)], h[int(m)] + x * dh[int(m)]
+        weight = 1j ** (m % 4) * (2 * m + 1) / (m * (m + 1)) / x
+        first += weight * (1j * pi / slope - tau / xi)
+        second += weight * (1j * tau / slope - pi / xi)
+        before, pi = pi, ((2 * m + 1) * c * pi - (m + 1) * before) / m
+    return first, second

@@ -59,7 +59,7 @@ def test_slopes_of_soft_and_hard_in_closed_form():
 
 def test_boundaries_by_name():
     assert [b.kind for b in scalar_boundaries("pec")] == ["electric soft", "electric hard"]
-    assert [b.sign for b in (*scalar_boundaries("pec"), SOFT, HARD)] == [1.0, -1.0, 1.0, 1.0]
+    assert [b.sign for b in (*scalar_boundaries("pec"), SOFT, HARD)] == [-1.0, -1.0, 1.0, 1.0]
     m = np.array([1.5, 3.0])
     assert SOFT.q(m) is None
     assert HARD.q(m) == 0

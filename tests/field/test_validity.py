@@ -5,6 +5,19 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
+from creeping.field.validity_range import (
+    SOME,
+    TURN,
+    Validity,
+    body_validity,
+    launch_validity,
+    validities,
+    validity_words,
+)
+from creeping.geodesics.equations import sharpest_curvature
+from creeping.rays.reach import early_length
+from creeping.shadow.many import shadow_lines
+from creeping.shadow.status import SINGULAR
 
 
 def fan_of(body, d, length=2.0):
@@ -34,3 +47,50 @@ def test_a_fan_without_rays(dark_fan):
 def test_bad_wavenumbers_are_named(ball_fan):
     with pytest.raises(cr.InvalidInputError, match="wavenumber"):
         cr.validity(ball_fan, wavenumber=-1.0)
+
+
+@pytest.mark.parametrize(
+    "body", [sc.TwistedEllipsoid(), sc.Ellipsoid(1.0, 0.6, 0.4), sc.Ellipsoid(2.0, 0.4, 0.4), sc.Torus()], ids=repr
+)
+def test_many_incidences_have_what_each_has(body):
+    # the same rays at the same points, carried by the flow of order 8
+    directions, ks = cr.fibonacci_directions(6), (20.0, 45.0)
+    lines = shadow_lines(body, directions, SOME)
+    until = 0.6 * early_length(body, ks[0])
+    least, largest = validities(body, lines.launch, until, ks)
+    steps = max(8, int(np.ceil(until * sharpest_curvature(body) / TURN)))
+    for row in np.flatnonzero(lines.status != SINGULAR):
+        line = cr.shadow_line(body, directions[row])
+        options = {"length": until, "n_rays": SOME, "n_steps": steps, "max_gap": np.inf}
+        fan = cr.launch(cr.DirectFlow(body), line, **options)
+        for j, k in enumerate(ks):
+            assert (least[row, j], largest[row, j]) == pytest.approx(cr.validity(fan, wavenumber=k), rel=2e-3)
+
+
+def test_the_start_of_the_rays_serves_every_wavenumber():
+    body = sc.Ellipsoid(1.0, 0.6, 0.4)
+    fan = fan_of(body, (1, 2, 3), 1e-3)
+    radius, transverse = launch_validity(body, fan.line.launch_points(32))
+    for k in (7.0, 300.0):
+        found = cr.validity(fan, wavenumber=k)
+        assert k * radius[0] == pytest.approx(found.least_k_rho, rel=1e-2)
+        assert transverse[0] / k ** (2 / 3) == pytest.approx(found.largest_transverse, rel=1e-2)
+
+
+def test_a_body_has_the_worst_of_its_incidences():
+    body = sc.Ellipsoid(1.0, 0.6, 0.4)
+    each = np.array([cr.validity(fan_of(body, d), wavenumber=30.0) for d in cr.fibonacci_directions(12)])
+    found = body_validity(body, wavenumber=30.0)
+    assert found.least_k_rho == pytest.approx(each[:, 0].min(), rel=0.05)
+    assert found.largest_transverse == pytest.approx(each[:, 1].max(), rel=0.1)
+
+
+def test_words_are_graded():
+    words = [
+        validity_words(Validity(*numbers)) for numbers in ((10.0, 1.0), (7.7, 0.7), (30.0, 1.5), (3.0, 0.1), (50, 3))
+    ]
+    assert ["within" in w for w in words] == [True, False, False, False, False]
+    assert ["edge" in w for w in words] == [False, True, True, False, False]
+    assert ["beyond" in w for w in words] == [False, False, False, True, True]
+    measured = validity_words(Validity(3.0, 0.1), measured=True)
+    assert "go by the error measured" in measured and "any size" not in measured

@@ -90,6 +90,7 @@ def test_ffe_of_a_scalar_field_is_conjugated(tmp_path):
     ((keys, rows),), comments = read_ffe(tmp_path / "far.ffe")
     assert any("SCALAR" in line for line in comments)
     assert any("exp(+jwt)" in line for line in comments)
+    assert any("unresolved in 1 of 20 directions" in line for line in comments)
     assert (keys["No. of Theta Samples"], keys["No. of Phi Samples"]) == ("5", "4")
     assert keys["Coordinate System"] == "Spherical"
     assert keys["Result Type"] == "RCS"

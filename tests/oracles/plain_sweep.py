@@ -6,8 +6,10 @@ from creeping._typing import Any, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.field.boundary import parse_boundary
 from creeping.field.far import far_field
+from creeping.field.validity_range import launch_validity, validities
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch
+from creeping.rays.reach import early_length
 from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.nodes import finished
@@ -80,6 +82,8 @@ class PlainSweeper:
             "spreading_rate": fan.spreading_rate[:, 1:],
             "attenuation": fan.attenuation[:, 1:],
         }
+        found = launch_validity(self.body, line.launch_points(request.n_rays))
+        out["least_radius"][row], out["transverse"][row] = (values[0] for values in found)
         out["ray_status"][row] = NO_RAY
         for name, value in values.items():
             out[name][row, :n] = value[:n]
@@ -87,6 +91,9 @@ class PlainSweeper:
     def _fields(self, line: ShadowLine, row: int, out: dict[str, Any]) -> None:
         request = self.request
         fan = self._fan(line)
+        until = min(request.length, early_length(self.body, min(request.wavenumbers)))
+        found = validities(self.body, line.launch_points(request.n_rays), until, request.wavenumbers)
+        out["least_k_rho"][row], out["largest_transverse"][row] = (values[0] for values in found)
         bistatic = request.quantity == "bistatic"
         observation = np.array(request.observation) if bistatic else -line.direction[None]
         # boundaries outermost would lose the geometry that far_field keeps for each wavenumber

@@ -54,9 +54,11 @@ def test_what_is_not_to_be_trusted_is_marked(ball_cut):
     creeping[10] = np.nan
     ax = replace(ball_cut, unresolved=lost, creeping=creeping).plot()
     marks = {line.get_label(): line for line in ax.lines}
-    np.testing.assert_allclose(marks["unresolved"].get_xdata(), [-25.0, 110.0])
-    expected = 10 * np.log10(ball_cut.cross_section[lost])
-    np.testing.assert_allclose(marks["unresolved"].get_ydata(), expected)
+    # hatched half a step to both sides
+    spans = [patch.get_extents().transformed(ax.transData.inverted()) for patch in ax.patches if patch.get_hatch()]
+    np.testing.assert_allclose([span.width for span in spans], 5.0)
+    np.testing.assert_allclose([span.x0 + span.width / 2 for span in spans], [-25.0, 110.0])
+    assert "unresolved" in ax.get_legend_handles_labels()[1]
     np.testing.assert_allclose(marks["not finite"].get_xdata(), [10.0])
     ax.figure.draw_without_rendering()
 

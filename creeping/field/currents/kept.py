@@ -11,13 +11,14 @@ import numpy as np
 
 from creeping.errors import SurfaceError
 from creeping.field.boundary import BoundaryLike
-from creeping.field.currents.whole_body import SurfaceCurrents, surface_currents
+from creeping.field.currents.assembly import surface_currents
+from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.geometry.quadrature import body_nodes
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 
 AFFORDABLE = 3e9
-"""Nodes times directions or points up to which "auto" takes currents: some ten seconds of one core."""
+"""Nodes times directions or points, seen one by one, up to which "auto" takes currents: ten seconds or so."""
 MOST_NODES = 1.5e6
 """Nodes up to which it does, for the memory's sake."""
 KEPT = 2
@@ -25,17 +26,22 @@ KEPT = 2
 _CURRENTS: "WeakKeyDictionary[RayFan, dict[tuple[float, BoundaryLike], SurfaceCurrents]]" = WeakKeyDictionary()
 
 
-def affordable(fan: RayFan, places: int, wavenumber: float) -> bool:
-    """Whether currents cost little enough for so many directions or points, by the area of the body."""
+def likely_nodes(fan: RayFan, wavenumber: float) -> float:
+    """About as many nodes as currents have, by the area of the body; infinite where there are none."""
     if not len(fan.points):
-        return False
+        return np.inf
     try:
         area = float(np.sum(body_nodes(fan.body, 4 / size(fan.body)).weights))
     except SurfaceError:
-        return False
+        return np.inf
     # some six nodes a wavelength on the lit half, and the least that a mesh has
-    nodes = max(3e4, 0.5 * area * (6 * wavenumber / (2 * np.pi)) ** 2)
-    return nodes < MOST_NODES and nodes * places < AFFORDABLE
+    return max(3e4, 0.5 * area * (6 * wavenumber / (2 * np.pi)) ** 2)
+
+
+def affordable(fan: RayFan, points: int, wavenumber: float) -> bool:
+    """Whether currents cost little enough at so many points."""
+    nodes = likely_nodes(fan, wavenumber)
+    return nodes < MOST_NODES and nodes * points < AFFORDABLE
 
 
 def kept_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents:

@@ -1,30 +1,36 @@
 """Currents of a plane wave on the lit side, uniform up to and a little beyond the shadow line.
 
 With c = -n.d, kappa_a and kappa_b the normal curvatures along and across the plane of incidence, rho' the rate of
-rho = 1/kappa_a along it, m = (k rho/2)^(1/3), xi = -m c, r = kappa_b/kappa_a and an admittance eta (0 hard), all times
-e^{ikd.x}:
+rho = 1/kappa_a along it, t the entry of the shape operator between both directions, m = (k rho/2)^(1/3), xi = -m c,
+r = kappa_b/kappa_a, T = (t rho)^2 and an admittance eta (0 hard), all times e^{ikd.x}:
 
-    optics    u = 2c/(c + eta) + [R (kappa_a/c^2 + kappa_b) - kappa_a (1 - c^2) R'/c]/(ik(c + eta)),
+    optics    u = 2c/(c + eta) + [R (kappa_a/c^2 + e kappa_b) - kappa_a (1 - c^2) R'/c]/(ik(c + eta)),
               R = (c - eta)/(c + eta), R' = 2 eta/(c + eta)^2
-              soft  du/dn = -2ikc [1 + i (kappa_a/c^2 + kappa_b)/(2kc)]
+              soft  du/dn = -2ikc [1 + i (kappa_a/c^2 + e kappa_b)/(2kc)]
     Fock      u = e^{i xi^3/3} [g + (rho'/m) E + D/m^2],   soft  du/dn = (k/m) times the same with F in place of g
               E = -i (xi^4/12) g - i (xi^2/6) Dg - (xi/6) g - (i/12) D^2 g
               D = i (3/20) xi^5 g + i (xi^3/6) Dg + i (xi/60) D^2 g - Dg/30 - g_q/10 - (2/15) q (Dg)_q
-                  + (r/4)(xi^2 g + Dg - g_q)
+                  + (r/4)(xi^2 g + Dg - e g_q)
                   + rho rho'' [i (xi^5/60) g + i (xi^3/18) Dg + (xi^2/12) g + i (7 xi/180) D^2 g + Dg/180 + g_q/60]
                   + rho'^2 [(-xi^8/288 + i (11/360) xi^5 + xi^2/72) g + (-xi^6/72 + i (5/108) xi^3) Dg
                             + (-xi^4/48 + i (17/1080) xi) D^2 g - (xi^2/72) D^3 g - D^4 g/288 + (13/540) Dg - g_q/90]
-              soft  Dg times 1/10, -1/60 and 7/180 for -1/30, 1/180 and 13/540, and nothing that has g_q
+                  + T [-i (xi^5/20) g + i (xi^3/18) Dg - (xi^2/12) g + i (19 xi/180) D^2 g - (53/180) Dg + (7/60) g_q]
+              soft  Dg times 1/10, -1/60, 7/180 and -7/60 for -1/30, 1/180, 13/540 and -53/180, xi^2 g/4 in T, nothing
+                    that has g_q; of a conductor - (r/2) g(xi; 0)
 
-g(xi; q) is Fock's function, D^n g it with t^n under its integral, g_q = dg/dq. Optics is the series of
-Luneburg and Kline on the boundary: with psi the reflected eikonal, Lap psi = 2 kappa_a/c + 2 c kappa_b there. Fock's
-current is that of the shadow (`creeping.field.surface`) with the arclength behind the line replaced by c, and its
-|J|^(-1/2) by 1 + r xi^2/(4m^2). E and D must then fall off towards the light, where D/m^2 becomes the term of optics in
-kappa_b, which gives the factors of Dg and g_q that the shadow leaves open. So it holds wherever kappa_a > 0; optics
-alone stands elsewhere. Of an impedance the terms in rho'' and rho'^2 are left out.
+e is 1, of a conductor's polarisations -1 (`creeping.field.currents.lit_conductor`). g(xi; q) is Fock's function, D^n g
+it with t^n under its integral, g_q = dg/dq. Optics is the series of Luneburg and Kline on the boundary: with psi the
+reflected eikonal, Lap psi = 2 kappa_a/c + 2 c kappa_b there. Fock's current is that of the shadow
+(`creeping.field.surface`) with the arclength behind the line replaced by c, and its |J|^(-1/2) by 1 + r xi^2/(4m^2). E
+and D must then fall off towards the light, where D/m^2 becomes the term of optics in kappa_b, which gives the factors
+of Dg and g_q that the shadow leaves open; the term in T is what the circular cylinder asks for, met obliquely. So it
+holds wherever kappa_a > 0; optics alone stands elsewhere. Of an impedance the terms in rho'', rho'^2 and T are left
+out.
 
 Sources: [KLS56], [F46]; Derivations, F16.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,6 +55,7 @@ def lit_currents(
     cosine: FloatArray,
     along: FloatArray,
     across: FloatArray,
+    twist: FloatArray,
     rate: FloatArray,
     bend: FloatArray,
     wavenumber: float,
@@ -61,8 +68,8 @@ def lit_currents(
     ----------
     cosine : (n,)
         C = -n.d, to a little below 0.
-    along, across : (n,), 1/L
-        Normal curvatures kappa_a and kappa_b.
+    along, across, twist : (n,), 1/L
+        Normal curvatures kappa_a and kappa_b, and the entry t of the shape operator between both directions.
     rate, bend : (n,)
         rho' and rho rho'', without unit; read where kappa_a > 0.
     wavenumber : float, 1/L
@@ -72,7 +79,7 @@ def lit_currents(
     Examples
     --------
     >>> from creeping.field.boundary import HARD
-    >>> lit_currents(np.array([1.0]), *np.zeros((4, 1)), 10.0, HARD)             # twice the wave on a plane
+    >>> lit_currents(np.array([1.0]), *np.zeros((5, 1)), 10.0, HARD)             # twice the wave on a plane
     array([2.+0.j])
     """
     m = fock_scale(wavenumber, along)
@@ -82,9 +89,8 @@ def lit_currents(
     flat = ~curved
     out[flat] = _optics(cosine[flat], along[flat], across[flat], wavenumber, boundary, order)
     at = np.flatnonzero(curved)
-    out[at] = _near_grazing(
-        cosine[at], along[at], across[at], rate[at], bend[at], m[at], xi[at], wavenumber, boundary, order
-    )
+    local = _Local(*(v[at] for v in (cosine, along, across, twist, rate, bend, m, xi)))
+    out[at] = _near_grazing(local, wavenumber, boundary, order)
     return out
 
 
@@ -94,54 +100,51 @@ def _optics(
     c = np.maximum(cosine, 1e-9)
     k = wavenumber
     if boundary.kind.endswith("soft"):
-        second = np.asarray(1j * (along / c**2 + across) / (2 * k * c), dtype=complex)
+        second = np.asarray(1j * (along / c**2 + boundary.sign * across) / (2 * k * c), dtype=complex)
         return np.asarray(-2j * k * c * (1 + (order == 2) * limited(second, BOUND)))
     eta = boundary.admittance
     R, slope = plane_reflection(c, boundary), 2 * eta / (c + eta) ** 2
-    second = (R * (along / c**2 + across) - along * (1 - c * c) * slope / c) / (2j * k * c)
+    second = (R * (along / c**2 + boundary.sign * across) - along * (1 - c * c) * slope / c) / (2j * k * c)
     return np.asarray(2 * c / (c + eta) * (1 + (order == 2) * limited(second, BOUND)))
 
 
-def _near_grazing(
-    cosine: FloatArray,
-    along: FloatArray,
-    across: FloatArray,
-    rate: FloatArray,
-    bend: FloatArray,
-    m: FloatArray,
-    xi: FloatArray,
-    wavenumber: float,
-    boundary: Boundary,
-    order: int,
-) -> ComplexArray:
+class _Local(NamedTuple):
+    """What the current near grazing depends on, each (n,)."""
+
+    cosine: FloatArray
+    along: FloatArray
+    across: FloatArray
+    twist: FloatArray
+    rate: FloatArray
+    bend: FloatArray
+    m: FloatArray
+    xi: FloatArray
+
+
+def _near_grazing(at: _Local, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """Fock's current, of second order at grazing, passing into optics: (n,)."""
+    m, xi = at.m, at.xi
     q = boundary.q(m)
     scale = (wavenumber / m) * np.exp(1j * xi**3 / 3) if q is None else np.exp(1j * xi**3 / 3)
     g = surface_function(xi, q)
     out = g
     if order == 2:
-        change = _corrections(xi, q, across / along, rate, bend, np.maximum(m, LEAST_SCALE), g, boundary)
+        change = _corrections(at, q, g, boundary)
         out = g + limited(change, BOUND * np.abs(g))
     out = out * scale
     far = smoothstep(-xi, *OPTICS)
     beyond = far > 0
-    ray = _optics(cosine[beyond], along[beyond], across[beyond], wavenumber, boundary, order)
+    ray = _optics(at.cosine[beyond], at.along[beyond], at.across[beyond], wavenumber, boundary, order)
     out[beyond] = (1 - far[beyond]) * out[beyond] + far[beyond] * ray
     return np.asarray(out)
 
 
-def _corrections(
-    xi: FloatArray,
-    q: ComplexArray | float | None,
-    ratio: FloatArray,
-    rate: FloatArray,
-    bend: FloatArray,
-    m: FloatArray,
-    g: ComplexArray,
-    boundary: Boundary,
-) -> ComplexArray:
+def _corrections(at: _Local, q: ComplexArray | float | None, g: ComplexArray, boundary: Boundary) -> ComplexArray:
     """(rho'/m) E + D/m^2 (n,)."""
-    r = np.clip(ratio, -STEEPEST, STEEPEST)
+    xi, rate, bend = at.xi, at.rate, at.bend
+    m = np.maximum(at.m, LEAST_SCALE)
+    r = np.clip(at.across / at.along, -STEEPEST, STEEPEST)
+    T = np.minimum((at.twist / at.along) ** 2, STEEPEST)
     soft, constant = q is None, not isinstance(q, np.ndarray)
     one, two = (surface_function(xi, q, n) for n in (1, 2))
     varying = -1j * (xi**4 / 12 * g + xi**2 / 6 * one + two / 12) - xi / 6 * g
@@ -161,8 +164,16 @@ def _corrections(
             - xi**2 / 72 * three
             - four / 288
         )
+        curved = curved + T * (
+            (-1j / 20 * xi**5 + xi**2 * (1 / 4 if soft else -1 / 12)) * g
+            + (1j / 18 * xi**3 - (7 / 60 if soft else 53 / 180)) * one
+            + 19j / 180 * xi * two
+        )
+    if boundary.kind == "electric soft":
+        # the wave of the other polarisation, whose amplitude varies across the rays
+        curved = curved - r / 2 * surface_function(xi, 0.0)
     if q is not None:
-        varies = bend / 60 - rate**2 / 90 if constant else 0.0
+        varies = bend / 60 - rate**2 / 90 + 7 / 60 * T if constant else 0.0
         curved = curved + (varies - 0.1 - 0.25 * boundary.sign * r) * surface_slope(xi, q)
         if not constant:
             curved = curved - 2 / 15 * q * surface_slope(xi, q, 1)

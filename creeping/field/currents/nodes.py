@@ -22,6 +22,7 @@ from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
+from creeping.rays.reach import ray_length
 from creeping.rays.tracer import ray_points
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.occlusion import occluded
@@ -33,8 +34,8 @@ VARYING = 6.0
 """-xi up to which the rate of curvature matters."""
 RAYS, GAP, STEPS = 4.0, 0.5, 5.0
 """Rays a wavelength along the line, their largest distance in wavelengths, and steps a wavelength along them."""
-DECAY, LONGEST = 7.5, 4.0
-"""Rays are as long as their wave takes to fall by e^-DECAY, and at most LONGEST body sizes."""
+SLOWEST = 1e-3
+"""Least Im tau: a mode that decays less ends with the longest rays."""
 END = 0.15
 """Share of a ray over which its weight falls to 0 at its end: a cut would radiate."""
 STEP = 1e-4
@@ -56,6 +57,10 @@ class LitNodes:
         Normal curvatures along and across the plane of incidence.
     rate, bend : (n,)
         rho' and rho rho'' of rho = 1/kappa_a along it.
+    axes : (n, 3)
+        Unit tangents a in the plane of incidence, with d.a >= 0.
+    twist : (n,), 1/L
+        Entry of the shape operator between a and b = n x a.
     """
 
     points: FloatArray
@@ -66,6 +71,8 @@ class LitNodes:
     across: FloatArray
     rate: FloatArray
     bend: FloatArray
+    axes: FloatArray
+    twist: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,23 +86,30 @@ class RayNodes:
     normals : (n, 3)
     weights : (n,), L^2
         |J| ds dsigma_perp, times the share of the rays.
+    twist : (n,), 1/L
+        Entry of the shape operator between p and n x p, the torsion of the rays.
     """
 
     rays: RayPoints
     normals: FloatArray
     weights: FloatArray
+    twist: FloatArray
 
 
 def plane_of_incidence(nodes: BodyNodes, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """C = -n.d and the normal curvatures, 1/L, along and across the plane of incidence (n,)."""
-    cosine = -nodes.normals @ direction
-    along_axis = direction + cosine[:, None] * nodes.normals
-    length = np.linalg.norm(along_axis, axis=1, keepdims=True)
+    along = nodes.curvature(axes_of_incidence(nodes.normals, direction))
+    return -nodes.normals @ direction, along, nodes.total_curvature - along
+
+
+def axes_of_incidence(normals: FloatArray, direction: FloatArray) -> FloatArray:
+    """Unit tangents in the plane of incidence (n, 3)."""
+    along = direction - (normals @ direction)[:, None] * normals
+    length = np.linalg.norm(along, axis=1, keepdims=True)
     # at normal incidence any plane will do: kappa_a/c^2 + kappa_b is the sum of both there
-    spare = np.cross(nodes.normals, np.eye(3)[np.argmin(np.abs(nodes.normals), axis=1)])
+    spare = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
     spare /= np.linalg.norm(spare, axis=1, keepdims=True)
-    along = nodes.curvature(np.where(length > 1e-6, along_axis / np.maximum(length, 1e-300), spare))
-    return cosine, along, nodes.total_curvature - along
+    return np.where(length > 1e-6, along / np.maximum(length, 1e-300), spare)
 
 
 def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
@@ -103,8 +117,7 @@ def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:
     # of the integrand e^{ik(d - r).x}
     whole = body_nodes(body, 2 * wavenumber)
     # m c is at least PENUMBRA's end where the surface is that dark, unless it is nearly flat
-    near = np.flatnonzero(-whole.normals @ line.direction > -0.6)
-    nodes = BodyNodes(whole.points[near], whole.normals[near], whole.weights[near], whole.hessians[near], whole.error)
+    nodes = whole.part(np.flatnonzero(-whole.normals @ line.direction > -0.6))
     return lit_part(body, line, nodes, wavenumber)[1]
 
 
@@ -121,8 +134,19 @@ def lit_part(body: Surface, line: ShadowLine, nodes: BodyNodes, wavenumber: floa
     rate, bend = np.zeros((2, len(at)))
     varies = (along[at] > 0) & (xi[at] > -VARYING)
     rate[varies], bend[varies] = radius_rates(body, nodes.points[at][varies], d, along[at][varies])
+    taken = nodes.part(at)
+    axes = axes_of_incidence(taken.normals, d)
     return at, LitNodes(
-        nodes.points[at], nodes.normals[at], nodes.weights[at] * share, cosine[at], along[at], across[at], rate, bend
+        taken.points,
+        taken.normals,
+        taken.weights * share,
+        cosine[at],
+        along[at],
+        across[at],
+        rate,
+        bend,
+        axes,
+        taken.twist(axes),
     )
 
 
@@ -175,20 +199,24 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     normals = normal(fan.body, points).reshape(*shape, 3)
     weights = weights * _share_of_rays(fan.body, rays, normals, fan.line.direction, wavenumber)
     there = rays.alive & np.isfinite(weights) & (weights > 0)
-    return RayNodes(rays[there], normals[there], weights[there])
+    rays, normals, weights = rays[there], normals[there], weights[there]
+    return RayNodes(rays, normals, weights, _nodes_at(fan.body, rays.points, normals).twist(rays.directions))
+
+
+def _nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:
+    """Points (n, 3) of the body, L, as nodes of weight 1."""
+    g, h = body.gradient(points), body.hessian(points)
+    entries = entries_of(h / np.linalg.norm(g, axis=-1)[:, None, None]).T
+    return BodyNodes(points, normals, np.ones(len(points)), entries, 0.0)
 
 
 def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
-    """Length, L, at which the first mode has fallen by e^-DECAY on all but the tenth of the rays that decay least."""
-    most = LONGEST * size(fan.body)
-    if not len(fan.points):
-        return most
-    rate = float(np.quantile(fan.attenuation[:, -1], 0.1)) / fan.length
-    curvature = rate**1.5
-    if not curvature > 0:
-        return most
-    slowest = float(np.min(modes_of(boundary, fock_scale(wavenumber, np.array(curvature))).tau.imag))
-    return float(min(most, DECAY / (np.cbrt(wavenumber / 2) * rate * max(slowest, 1e-3))))
+    """Length, L, at which the slowest mode of the boundary has died away."""
+    typical = fan.curvature[:, 0]
+    # a boundary's own mode may be slower than the hard one's, by which rays are long by default
+    m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
+    slowest = float(np.min(modes_of(boundary, m).tau.imag)) if np.all(np.isfinite(m)) else 0.0
+    return ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, SLOWEST))
 
 
 def _share_of_rays(
@@ -200,11 +228,7 @@ def _share_of_rays(
     # twice the end, for m at the launch point is not m here
     near = -cosine * fock_scale(wavenumber, np.maximum(rays.curvature[0], 1e-300)) < 2 * PENUMBRA[1]
     near &= np.logical_and.accumulate(near, axis=1)
-    points = rays.points[near]
-    g, h = body.gradient(points), body.hessian(points)
-    h = h / np.linalg.norm(g, axis=-1)[:, None, None]
-    entries = entries_of(h).T
-    _, along, _ = plane_of_incidence(BodyNodes(points, normals[near], np.ones(len(points)), entries, 0.0), direction)
+    _, along, _ = plane_of_incidence(_nodes_at(body, rays.points[near], normals[near]), direction)
     with np.errstate(invalid="ignore"):
         xi = np.where(along > 0, -fock_scale(wavenumber, along) * cosine[near], np.inf)
     share[near] = smoothstep(xi, *PENUMBRA)

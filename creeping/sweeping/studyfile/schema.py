@@ -20,6 +20,7 @@ WORDS = {
     "count": "a whole number >= 1",
     "number": "a finite number",
     "positive": "a positive finite number",
+    "length": 'a positive finite number or "auto"',
     "wavenumbers": f"a positive number from {LEAST_WAVENUMBER:g} to {LARGEST_WAVENUMBER:g}, a list of them, or "
     "{ first = ..., last = ..., count = ... } with a count up to 100000",
     "vector": "three finite numbers, [x, y, z]",
@@ -30,7 +31,7 @@ WORDS = {
 class Key:
     """One key of a table: kind of its value, default, the only values allowed, and the largest count or length."""
 
-    kind: Literal["text", "texts", "flag", "count", "number", "positive", "wavenumbers", "vector", "vectors"]
+    kind: Literal["text", "texts", "flag", "count", "number", "positive", "length", "wavenumbers", "vector", "vectors"]
     default: Any = None
     required: bool = False
     choices: tuple[str, ...] = ()
@@ -73,6 +74,7 @@ def _mistake(value: Any, key: Key) -> str | None:
         "count": lambda: isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= key.most,
         "number": lambda: _finite(value),
         "positive": lambda: _finite(value) and value > 0,
+        "length": lambda: value == "auto" or (_finite(value) and value > 0),
         "wavenumbers": lambda: _wavenumbers(value),
         "vector": lambda: _vector(value),
         "vectors": lambda: _list_of(value, _vector) and len(value) <= key.most,

@@ -6,13 +6,15 @@ All mistakes are told at once, with the key that may have been meant. See `EXAMP
 import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.surface import Surface, size
+from creeping.rays.reach import AUTO
 from creeping.storage.folder import content_digest
 from creeping.sweeping.plan import array_digest, too_large
-from creeping.sweeping.request import MOST_RAYS, MOST_STEPS, QUANTITIES, SweepRequest, sweep_request
+from creeping.sweeping.request import MOST_RAYS, MOST_STEPS, QUANTITIES, SweepRequest, sweep_length, sweep_request
 from creeping.sweeping.studyfile.directions import read_directions
 from creeping.sweeping.studyfile.schema import Key, nearest, read_table
 
@@ -24,7 +26,7 @@ quantity = "monostatic"               # or "bistatic", "rays"
 boundary = ["soft", "hard"]
 wavenumbers_per_length = [20.0, 40.0] # 1/L; or { first = 10.0, last = 40.0, count = 31 }
 rays = 256
-length_in_body_sizes = 3.0            # or length = 6.0
+length = "auto"                       # till waves have died away; or 6.0, or length_in_body_sizes = 3.0
 
 [incidences]
 kind = "fibonacci"
@@ -49,7 +51,7 @@ STUDY = {
     "rays": Key("count", 256, most=MOST_RAYS),
     "steps": Key("count", most=MOST_STEPS),
     "order": Key("count", most=2),
-    "length": Key("positive"),
+    "length": Key("length"),
     "length_in_body_sizes": Key("positive"),
 }
 _AS_LIST = 'write [{}] and below it kind = "list" and directions = [[x, y, z], ...], or another kind'
@@ -71,8 +73,8 @@ class Study:
     body : str
         As on the command line; with ``units``, ``speed`` and ``allow_rough``.
     request : SweepRequest
-        Its ``length`` in body sizes if ``in_body_sizes``.
-    in_body_sizes : bool
+        Its ``length`` as ``length_in`` says, and 1 if that is "auto".
+    length_in : {"L", "body sizes", "auto"}
     incidences : (n, 3)
         Unit directions.
     flow, tolerance : str, float
@@ -91,7 +93,7 @@ class Study:
     speed: str | None
     allow_rough: bool
     request: SweepRequest
-    in_body_sizes: bool
+    length_in: Literal["L", "body sizes", "auto"]
     incidences: FloatArray
     flow: str
     tolerance: float
@@ -114,14 +116,17 @@ class Study:
             {
                 **self.asked,
                 "request": repr(self.request),
-                "in_body_sizes": self.in_body_sizes,
+                "length_in": self.length_in,
                 "incidences": array_digest(self.incidences),
             }
         )
 
     def request_for(self, body: Surface) -> SweepRequest:
         """Request with the length of the rays in L."""
-        return replace(self.request, length=self.request.length * size(body)) if self.in_body_sizes else self.request
+        if self.length_in == AUTO:
+            return replace(self.request, length=sweep_length(body, AUTO, self.request.wavenumbers))
+        unit = 1.0 if self.length_in == "L" else size(body)
+        return replace(self.request, length=self.request.length * unit)
 
 
 def read_study(path: str | Path) -> Study:
@@ -198,7 +203,7 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
     return Study(
         **kept,
         request=request,
-        in_body_sizes=main["length"] is None,
+        length_in=_length_in(main),
         incidences=incidences,
         flow=flow["kind"],
         tolerance=flow["tolerance"],
@@ -206,6 +211,12 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
         text=text,
         folder=folder,
     )
+
+
+def _length_in(main: dict[str, Any]) -> Literal["L", "body sizes", "auto"]:
+    if main["length_in_body_sizes"] is not None:
+        return "body sizes"
+    return AUTO if main["length"] in (None, AUTO) else "L"
 
 
 def _request(
@@ -233,7 +244,7 @@ def _request(
     try:
         request = sweep_request(
             quantity,
-            length=main["length"] or main["length_in_body_sizes"] or 3.0,
+            length=1.0 if _length_in(main) == AUTO else main["length_in_body_sizes"] or main["length"],
             n_rays=main["rays"],
             n_steps=main["steps"] or 1,
             wavenumbers=main["wavenumbers_per_length"],

@@ -8,8 +8,10 @@ from creeping.field.currents.radiation import (
     far_of_scalar,
     far_of_vector,
     field_of_scalar,
+    grid_cells,
     magnetic_field_of_vector,
     phase_sums,
+    transformed,
 )
 from creeping.geometry.quadrature import body_nodes
 from studies.reference import sphere
@@ -27,6 +29,19 @@ def test_phase_sums_are_the_plain_ones(rng):
     x, w, r = rng.normal(size=(3000, 3)) * 50, rng.normal(size=(4, 3000, 2)) @ [1, 1j], directions(rng, 70)
     plain = np.exp(-1j * K * (r @ x.T)) @ w.T
     np.testing.assert_allclose(phase_sums(x, w, r, K), plain, atol=1e-10)
+
+
+def test_a_map_of_many_directions_is_the_plain_one(rng):
+    # by a transform: 4000 nodes, 3000 directions, a long body
+    x = rng.uniform(-1, 1, size=(4000, 3)) * [0.3, 0.5, 2.0] + [5.0, 0.0, -3.0]
+    w, r = rng.normal(size=(3, 4000, 2)) @ [1, 1j], directions(rng, 3000)
+    cells = grid_cells(np.ptp(x, axis=0), K)
+    assert transformed(4000, 3000, cells) and not transformed(4000, 300, cells)
+    assert not transformed(4000, 3000, grid_cells(np.ptp(x, axis=0), 1e4))
+    plain = np.exp(-1j * K * (r @ x.T)) @ w.T
+    np.testing.assert_allclose(phase_sums(x, w, r, K), plain, atol=1e-8 * np.abs(plain).max())
+    one_by_one = np.concatenate([phase_sums(x, w, part, K) for part in np.split(r, 10)])
+    np.testing.assert_allclose(phase_sums(x, w, r, K), one_by_one, atol=1e-8 * np.abs(plain).max())
 
 
 def test_vector_sums_are_the_plain_ones(rng):

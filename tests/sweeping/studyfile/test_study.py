@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 
+import creeping as cr
 import scatterers as sc
 from creeping import InvalidInputError
 from creeping.geometry.directions import angles_of, azimuth_elevation_of
+from creeping.rays.reach import ray_length
 from creeping.sweeping.studyfile import directions as study_directions
 from creeping.sweeping.studyfile.directions import KINDS
 from creeping.sweeping.studyfile.study import EXAMPLE, parse_study, read_study
@@ -30,8 +32,8 @@ def test_the_example_says_what_it_means(tmp_path):
     study = read_study(tmp_path / "a.toml")
     request = study.request_for(sc.TwistedEllipsoid())
     assert request.boundaries == ("soft", "hard") and request.wavenumbers == (20.0, 40.0) and request.n_rays == 256
-    low, high = sc.TwistedEllipsoid().bounds
-    assert request.length == pytest.approx(1.5 * np.linalg.norm(high - low))
+    lines = [cr.shadow_line(sc.TwistedEllipsoid(), d) for d in cr.fibonacci_directions(12)]
+    assert request.length == max(ray_length(line, wavenumber=20.0) for line in lines)
     assert (study.output, study.workers, study.text, study.folder) == ("sweep.zarr", None, EXAMPLE, tmp_path)
 
 
@@ -119,7 +121,9 @@ workers = true
         (('"soft", "hard"', '"soft", "soft"'), "repeat themselves"),
         (("[flow]", '[observation]\nkind = "fibonacci"\ncount = 3\n[flow]'), 'observation. goes with "bistatic"'),
         (('"monostatic"  ', '"bistatic"  '), 'observation. is missing: quantity "bistatic" needs it'),
-        (("rays = 256", "length = 2.0"), "both given"),
+        (('length = "auto" ', "length_in_body_sizes = 2.0\nlength = 2.0 "), "both given"),
+        (('length = "auto" ', "length_in_body_sizes = 2.0\nlength = 'auto' "), "both given"),
+        (('length = "auto" ', 'length = "long" '), r'\[study\] length = "long" is not a positive .* or "auto"'),
         (("rays = 256", 'speed = "1 + x"'), 'speed goes with quantity "rays"'),
         (("[20.0, 40.0]", "{ first = 1.0, last = 2.0 }"), "wavenumbers_per_length = .* is not"),
         (("wavenumbers_per_length = [20.0, 40.0]", ""), "needs wavenumbers_per_length"),
@@ -224,9 +228,21 @@ def test_the_digest_changes_with_what_changes_results(tmp_path):
         return parse_study(text, folder=tmp_path).digest
 
     same = [("twisted ellipsoid", "another name"), ("sweep.zarr", "x.zarr"), ("[run]", "[run]\nworkers = 4\nchunk = 9")]
-    other = [("1000", "999"), ("1e-6", "1e-5"), ("40.0", "41.0"), ('"auto"', '"map"'), ("256", "128"), ("3.0", "2.0")]
+    other = [("1000", "999"), ("1e-6", "1e-5"), ("40.0", "41.0"), ('kind = "auto"', 'kind = "map"'), ("256", "128")]
+    other += [('length = "auto"', f"length{what} = 2.0") for what in ("", "_in_body_sizes")]
     assert {digest(*change) for change in same} == {digest()}
     assert len({digest(*change) for change in other} | {digest()}) == len(other) + 1
+
+
+def test_lengths_of_rays(tmp_path):
+    body = sc.Sphere(radius=2.0)
+    for given, wanted in ((" = 2.5", 2.5), ("_in_body_sizes = 2.0", 4 * np.sqrt(3)), (' = "auto"', "auto")):
+        study = parse_study(EXAMPLE.replace(' = "auto" ', f"{given} ", 1), folder=tmp_path)
+        # k a = 40 at the lowest wavenumber: the first hard mode falls by e^-7.5
+        exact = 2 * 7.5 / (20 ** (1 / 3) * 1.01879297 * np.sin(np.pi / 3)) if wanted == "auto" else wanted
+        assert study.request_for(body).length == pytest.approx(exact, rel=1e-2 if wanted == "auto" else 1e-12)
+    without = EXAMPLE.replace('length = "auto"', "# nothing")
+    assert parse_study(without, folder=tmp_path).digest == parse_study(EXAMPLE, folder=tmp_path).digest
 
 
 def test_a_study_that_is_not_there(tmp_path):

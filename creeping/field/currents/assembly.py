@@ -1,0 +1,85 @@
+"""The currents of the whole body of a fan: nodes for its lit side and its rays, and each boundary's waves on them.
+
+Sources: Derivations, F16 to F18.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.arguments import checked
+from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
+from creeping.field.currents.lit import lit_currents
+from creeping.field.currents.nodes import LitNodes, RayNodes, lit_nodes, ray_nodes
+from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.surface import surface_waves
+from creeping.rays.fan import RayFan
+
+
+def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> SurfaceCurrents:
+    """Currents of the whole body of a fan.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Its flow and its line are used; rays are as long and as dense as the wavenumber asks for.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard", "pec" or ImpedanceBoundary
+
+    Returns
+    -------
+    SurfaceCurrents
+
+    Raises
+    ------
+    InvalidInputError
+        On a bad wavenumber or boundary, and for a weighted body.
+    SurfaceError
+        If the wavenumber is too high for any mesh of the body.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=3.0, n_rays=16)
+    >>> currents = cr.surface_currents(fan, wavenumber=12.0, boundary="hard")
+    >>> currents.extinction < 0.02, bool(currents.error([(0, 1, 0)])[0] < 0.05)
+    (True, True)
+    """
+    kinds = scalar_boundaries(boundary)
+    k = checked(wavenumber, 2)
+    # a conductor's rays are as long as its wave that decays less
+    lit, shadow = lit_nodes(fan.body, fan.line, k), ray_nodes(fan, k, kinds[-1])
+    make: type[SurfaceCurrents]
+    if len(kinds) == 2:
+        make, kind = ConductorCurrents, CONDUCTOR
+        values, first = (conductor_waves(lit, shadow, fan.line.direction, k, order) for order in (2, 1))
+    else:
+        make, kind = SurfaceCurrents, kinds[0]
+        values, first = (_waves(lit, shadow, fan.line.direction, k, kind, order) for order in (2, 1))
+    return make(
+        body=fan.body,
+        direction=fan.line.direction,
+        points=np.concatenate([lit.points, shadow.rays.points]),
+        normals=np.concatenate([lit.normals, shadow.normals]),
+        weights=np.concatenate([lit.weights, shadow.weights]),
+        values=values,
+        change=values - first,
+        lit=np.arange(len(values)) < len(lit.points),
+        unserved=1.0 - float(fan.line.fractions["attached"]),
+        wavenumber=k,
+        boundary=kind,
+    )
+
+
+def _waves(
+    lit: LitNodes, shadow: RayNodes, direction: FloatArray, k: float, kind: Boundary, order: int
+) -> ComplexArray:
+    """Currents of a scalar boundary at the nodes of the lit side, then at those of the rays (n,)."""
+    wave = np.exp(1j * k * (lit.points @ direction))
+    bright = wave * lit_currents(lit.cosine, lit.along, lit.across, lit.twist, lit.rate, lit.bend, k, kind, order)
+    dark = surface_waves(shadow.rays, k, kind, order)
+    # on a caustic of the body the current is infinite and its weight 0
+    return np.concatenate([bright, np.where(np.isfinite(dark), dark, 0.0)])

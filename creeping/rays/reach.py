@@ -1,0 +1,160 @@
+"""How long creeping rays have to be: until what the wave on them can still do has died away.
+
+    |exp{i ξ τ}| = exp{-ξ Im τ},   ξ = (k/2)^(1/3) ∫ κₙ^(2/3) ds,   τ = |α'₁| e^{iπ/3} of the slowest mode, hard
+
+The length "auto" is that at which this has fallen by e^-7.5 on all but the tenth of the rays that decay least, and at
+most four body sizes. It comes of trial rays of its own: it depends on body, incidence and wavenumber alone. A weighted
+body has no field: its rays take the time that 1.5 body sizes take at its median speed.
+
+Sources: [LK59], [AS64, sec. 10.4]; Derivations, F4.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.errors import InvalidInputError
+from creeping.geodesics.attenuation import curvature_values
+from creeping.geodesics.direct_flow import DirectFlow
+from creeping.geodesics.equations import points_of_charts
+from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, pack
+from creeping.geometry.directions import fibonacci_directions
+from creeping.geometry.speed import speed_of, speed_values
+from creeping.geometry.surface import Surface, size
+from creeping.rays.transport import carried
+from creeping.shadow.attachment import LaunchPoints
+from creeping.shadow.line import ShadowLine
+from creeping.shadow.many import shadow_lines
+
+AUTO: Final = "auto"
+HARD_DECAY = 1.0187929716474710 * float(np.sin(np.pi / 3))
+"""Im τ of the slowest mode, that of the hard boundary: α'₁ is the first zero of Ai' [AS64, table 10.13]."""
+DECAY, SPARED, LONGEST = 7.5, 0.1, 4.0
+"""Exponent by which the wave falls, share of the rays that need not, and body sizes after which it does not matter."""
+IN_RANGE = 10.0
+"""k rho from which the expansions serve; at it, rho the median at the launch points, is k where none is given."""
+WEIGHTED = 1.5
+"""Body sizes that the rays of a weighted body cross, at its median speed."""
+TRIALS, SAMPLES, RTOL = 64, 64, 1e-6
+"""Trial rays of an incidence, their equal steps, and the tolerance of each: lengths are rounded to GRAIN."""
+GRAIN = 0.01
+"""Lengths are multiples of this, in body sizes, so that machines that round differently agree."""
+INCIDENCES = 12
+"""Directions that stand for all, spread evenly over the sphere."""
+
+
+def ray_length(
+    line: ShadowLine,
+    length: float | str = AUTO,
+    *,
+    wavenumber: float | None = None,
+    decay: float = HARD_DECAY,
+) -> float:
+    """Length of the rays of one incidence, asked for as a number or as "auto".
+
+    Parameters
+    ----------
+    line : ShadowLine
+    length : float or "auto", L (travel time for a weighted body)
+    wavenumber : float, optional, 1/L
+        Lowest that the rays are for; k rho = 10 at the median radius of curvature of the launch points if not given.
+    decay : float
+        Im τ of the slowest mode, without unit.
+
+    Returns
+    -------
+    float, L (travel time for a weighted body)
+
+    Raises
+    ------
+    InvalidInputError
+        If length or wavenumber is no positive finite number, or a wavenumber is given for a weighted body.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> line = cr.shadow_line(sc.Sphere(), direction=(0, 0, 1))
+    >>> far = 7.5 / (15 ** (1 / 3) * HARD_DECAY)            # xi Im tau = 7.5 on a ball of radius 1
+    >>> bool(0 <= ray_length(line, wavenumber=30.0) - far < 0.02)
+    True
+    """
+    if length != AUTO:
+        return _positive("length", length, ", nor 'auto'")
+    body = line.body
+    if speed_of(body) is not None:
+        if wavenumber is not None:
+            raise InvalidInputError(f"wavenumber = {wavenumber!r} is for rays of constant speed; {body!r} has a speed")
+        return weighted_length(body)
+    launch = line.launch_points(TRIALS)
+    return float(decayed_lengths(body, launch, wavenumber, decay)[0])
+
+
+def body_length(body: Surface, wavenumber: float | None = None) -> float:
+    """The length "auto" for rays of all incidences: the largest of INCIDENCES evenly spread ones.
+
+    Parameters
+    ----------
+    body : Surface
+    wavenumber : float, optional, 1/L
+        As for `ray_length`.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> bool(abs(body_length(sc.Sphere(), 30.0) - 7.5 / (15 ** (1 / 3) * HARD_DECAY)) < 0.02)
+    True
+    """
+    if speed_of(body) is not None:
+        return weighted_length(body)
+    launch = shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch
+    return float(np.max(decayed_lengths(body, launch, wavenumber)))
+
+
+def early_length(body: Surface, wavenumber: float) -> float:
+    """Length, L, beyond which xi > 1 on all rays of INCIDENCES evenly spread incidences."""
+    launch = shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch
+    return float(np.max(decayed_lengths(body, launch, wavenumber, DECAY, spared=0.0)))
+
+
+def decayed_lengths(
+    body: Surface,
+    launch: LaunchPoints,
+    wavenumber: float | None = None,
+    decay: float = HARD_DECAY,
+    *,
+    spared: float = SPARED,
+) -> FloatArray:
+    """Lengths (n,), L, at which waves of n incidences have died away; LONGEST body sizes where no ray is launched."""
+    most, there = LONGEST * size(body), launch.there
+    starts = pack(launch.points[there], np.broadcast_to(launch.directions[:, None], launch.points.shape)[there])
+    curvature = np.full(there.shape, np.nan)
+    curvature[there] = curvature_values(body, starts)
+    times: FloatArray = np.linspace(0.0, most, SAMPLES + 1)
+    states = carried(DirectFlow(body, rtol=RTOL), launch, times, components=WHOLE)
+    k = None if wavenumber is None else _positive("wavenumber", wavenumber)
+    found = np.full(len(there), most)
+    for row in np.flatnonzero(there.any(axis=1)):
+        rays, typical = states[row, there[row]], float(np.median(curvature[row, there[row]]))
+        lowest = IN_RANGE * typical if k is None else k
+        wanted = DECAY / (np.cbrt(lowest / 2) * decay)
+        ends = [np.interp(wanted, ray[:, ATTENUATION], times, right=most) for ray in rays]
+        # a wave ends where its ray detaches
+        found[row] = np.quantile(np.minimum(ends, rays[:, -1, DETACHMENT]), 1 - spared)
+    grain = GRAIN * size(body)
+    return np.asarray(np.minimum(np.ceil(found / grain - 1e-6) * grain, most))
+
+
+def weighted_length(body: Surface) -> float:
+    """Travel time in which the rays of a weighted body cross 1.5 body sizes at its median speed."""
+    speeds = speed_values(body, points_of_charts(body))
+    moving = speeds[speeds > 0]
+    return WEIGHTED * size(body) / (float(np.median(moving)) if len(moving) else 1.0)
+
+
+def _positive(name: str, value: float | str, alternative: str = "") -> float:
+    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not (number and np.isfinite(value) and value > 0):  # type: ignore[operator]
+        raise InvalidInputError(f"{name} = {value!r} is not a positive finite number{alternative}")
+    return float(value)
