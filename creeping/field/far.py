@@ -13,8 +13,7 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.currents.kept import AFFORDABLE, MOST_NODES, kept_currents, likely_nodes
-from creeping.field.currents.radiation import grid_cells, transformed
+from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import far_geometry, observers_of
 from creeping.field.far_rays import error_by_order, field_of
@@ -82,8 +81,8 @@ def far_field(
         raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
     r = observers_of(observation)
     # a conductor's sums are of six columns, those of one scalar problem of one to four
-    affordable = method == "auto" and order == 2 and len(r) and _affordable(fan, len(kinds) * len(r), k)
-    if method == "currents" or affordable:
+    cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
+    if method == "currents" or cheap:
         try:
             return _by_currents(kept_currents(fan, k, boundary), r, boundary)
         except SurfaceError:
@@ -91,15 +90,6 @@ def far_field(
                 raise
     geometry = far_geometry(fan, r)
     return error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
-
-
-def _affordable(fan: RayFan, directions: int, wavenumber: float) -> bool:
-    """Whether currents cost little enough in so many directions, one by one or together."""
-    nodes = likely_nodes(fan, wavenumber)
-    if nodes > MOST_NODES:
-        return False
-    cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
-    return nodes * directions < AFFORDABLE or transformed(int(nodes), directions, cells)
 
 
 def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike) -> FarField:

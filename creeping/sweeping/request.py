@@ -21,6 +21,7 @@ from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
+METHODS = ("rays", "auto", "currents")
 MOST_RAYS, MOST_STEPS = 65_536, 4096
 
 
@@ -100,6 +101,8 @@ class SweepRequest:
         Unit directions of "bistatic".
     order : 2 or 1
         Of the creeping waves.
+    method : {"rays", "auto", "currents"}
+        Of the fields: isolated rays, currents of the whole body where rays do not resolve an incidence, or for all.
     """
 
     quantity: Quantity
@@ -110,6 +113,7 @@ class SweepRequest:
     boundaries: tuple[str, ...] = ()
     observation: tuple[tuple[float, float, float], ...] = ()
     order: int = 2
+    method: str = "rays"
 
     def __post_init__(self) -> None:
         mistakes = list(self._mistakes())
@@ -132,6 +136,8 @@ class SweepRequest:
             for name in ("wavenumbers", "boundaries", "observation"):
                 if getattr(self, name):
                     yield f"{name} belong to a field; quantity 'rays' has none"
+            if self.method != "rays":
+                yield f"method = {self.method!r} is of a field; quantity 'rays' has none"
             return
         for name in ("wavenumbers", "boundaries"):
             if not getattr(self, name):
@@ -144,6 +150,10 @@ class SweepRequest:
                 yield str(error)
         if len(set(self.boundaries)) < len(self.boundaries):
             yield f"boundaries {list(self.boundaries)} repeat themselves"
+        if self.method not in METHODS:
+            yield f"method = {self.method!r} is none of {', '.join(METHODS)}"
+        elif self.method != "rays" and self.order != 2:
+            yield f"method = {self.method!r} has no order {self.order}; give method 'rays'"
         if (self.quantity == "bistatic") != bool(self.observation):
             yield "observation directions go with quantity 'bistatic', and with no other"
 
@@ -181,13 +191,25 @@ class SweepRequest:
         if self.scalar_boundaries:
             dims = ("boundary", "wavenumber", *observer)
             found |= {name: Variable(dims, "complex128", "L", text) for name, text in parts.items()}
-            found["unresolved"] = Variable(dims, "bool", "1", "whether an expansion fails there")
+            found |= {name: Variable(dims, *of) for name, of in self._judged.items()}
         if "pec" in self.boundaries:
             dims = ("wavenumber", *observer)
             matrix = (*dims, "scattered", "incident")
             words = ", theta and phi scattered by theta and phi incident"
             found |= {f"{name}_pec": Variable(matrix, "complex128", "L", text + words) for name, text in parts.items()}
-            found["unresolved_pec"] = Variable(dims, "bool", "1", "whether an expansion fails there")
+            sizes = {name: matrix if name == "error" else dims for name in self._judged}
+            found |= {f"{name}_pec": Variable(sizes[name], *of) for name, of in self._judged.items()}
+        return found
+
+    @property
+    def _judged(self) -> dict[str, tuple[str, str, str]]:
+        """Type, unit and meaning of what is said of a field."""
+        found = {
+            "error": ("float64", "L", "error of the amplitude's magnitude, as creeping.FarField.error"),
+            "unresolved": ("bool", "1", "whether an expansion fails there, or the error is large"),
+        }
+        if self.method != "rays":
+            found["by_currents"] = ("bool", "1", "whether currents of the whole body served, else isolated rays")
         return found
 
     def empty(self, count: int) -> dict[str, np.ndarray[Any, Any]]:
@@ -211,6 +233,7 @@ def sweep_request(
     boundary: BoundaryLike | list[BoundaryLike] | tuple[BoundaryLike, ...] = (),
     observation: ArrayLike | None = None,
     order: int = 2,
+    method: str = "rays",
 ) -> SweepRequest:
     """Make a request of what users write: one boundary or a list, numbers or arrays.
 
@@ -238,6 +261,7 @@ def sweep_request(
         ),
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen),
         order=_plain(order),
+        method=method,
     )
 
 

@@ -41,6 +41,7 @@ def sweep_directions(
     n_rays: int = 256,
     n_steps: int = 1,
     order: int = 2,
+    method: str = "rays",
     store: str | Path | None = None,
     resume: bool = False,
     client: Any = None,
@@ -72,6 +73,9 @@ def sweep_directions(
         Points kept of each ray of "rays".
     order : 2 or 1
         Of the creeping waves.
+    method : {"rays", "auto", "currents"}
+        Of the fields. "auto" computes an incidence again by the currents of the whole body where isolated rays leave a
+        direction unresolved, a tenth of a second or so for each boundary and wavenumber, "currents" every one.
     store : path, optional
         Folder for the results (zarr), written task by task; the dataset is read from it when it is used. Without it
         results are in memory.
@@ -117,6 +121,7 @@ def sweep_directions(
         boundary=several,
         observation=observation,
         order=order,
+        method=method,
     )
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:

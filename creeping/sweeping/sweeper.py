@@ -3,14 +3,17 @@
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.field.boundary import parse_boundary
+from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundaries
+from creeping.field.currents.kept import affordable
+from creeping.field.far import far_field
 from creeping.field.far_geometry import FarGeometry
-from creeping.field.far_rays import field_of
+from creeping.field.far_rays import error_by_order, field_of
+from creeping.field.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, WHOLE, P, X
 from creeping.geometry.surface import Surface
-from creeping.rays.fan import launch, ray_arrays
+from creeping.rays.fan import RayFan, launch, ray_arrays
 from creeping.rays.reach import early_length
 from creeping.rays.strips import Strip, strips_of
 from creeping.rays.tracer import RayTracer
@@ -18,6 +21,7 @@ from creeping.rays.transport import Flow, carried
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.many import ShadowLines, shadow_lines
 from creeping.shadow.status import SINGULAR
+from creeping.sweeping.field_arrays import FieldArrays
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
 
 BATCH, FIELD_BATCH = 16_384, 65_536
@@ -94,20 +98,38 @@ class Sweeper:
             observers = np.broadcast_to(np.array(request.observation), (len(rows), len(request.observation), 3))
 
         def forward(number: int) -> tuple[ShadowLine, tuple[Strip, ...]]:
-            line = shadow_line(self.body, directions[number])
-            fan = launch(self.flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
-            return line, tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1)
+            fan = self._fan(directions[number])
+            return fan.line, tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1)
 
         geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, forward)
         for name, which, suffix in request.problems:
+            boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
-                field = field_of(geometry, wavenumber, parse_boundary(name), request.order)
-                for part in ("creeping", "reflected", "forward", "unresolved"):
+                by_rays = field_of(geometry, wavenumber, boundary, request.order)
+                field = FieldArrays.of(error_by_order(by_rays, geometry, boundary), len(rows))
+                if request.method != "rays":
+                    again = np.arange(len(rows)) if request.method == "currents" else field.unclear
+                    for number in again:
+                        field.replace(
+                            number, self._by_currents(directions[number], observers[number], wavenumber, boundary)
+                        )
+                for part, values in field.arrays.items():
                     if part + suffix in out:
-                        values = getattr(field, part)
-                        if bistatic:
-                            values = values.reshape(len(rows), -1, *values.shape[1:])
-                        out[part + suffix][(rows, *which, k)] = values
+                        out[part + suffix][(rows, *which, k)] = values if bistatic else values[:, 0]
+
+    def _by_currents(
+        self, direction: FloatArray, observers: FloatArray, wavenumber: float, boundary: BoundaryLike
+    ) -> FarField | None:
+        """Far field of one incidence by currents, if they are affordable."""
+        fan = self._fan(direction)
+        sums = len(scalar_boundaries(boundary)) * len(observers)
+        if not affordable(fan, sums, wavenumber, distant=True):
+            return None
+        return far_field(fan, observers, wavenumber=wavenumber, boundary=boundary, method="currents")
+
+    def _fan(self, direction: FloatArray) -> RayFan:
+        line, request = shadow_line(self.body, direction), self.request
+        return launch(self.flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
 
 
 def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What rays say of their own sums: at a fold by Airy's function, at a caustic point by Bessel's, at the end of a fan."""
+"""What rays say of their own sums: at a fold by Airy's function, at a caustic point by Bessel's, beyond a fan's end."""
 
 import numpy as np
 import pytest

@@ -16,7 +16,7 @@ from creeping.shadow.nodes import finished
 from creeping.shadow.status import NO_RAY, OK, SINGULAR
 from creeping.sweeping.request import SweepRequest
 
-PARTS_OF_FIELD = ("creeping", "reflected", "forward", "unresolved")
+PARTS_OF_FIELD = ("creeping", "reflected", "forward", "unresolved", "error")
 
 
 class PlainSweeper:

@@ -136,7 +136,7 @@ def lit_part(body: Surface, line: ShadowLine, nodes: BodyNodes, wavenumber: floa
     rate[varies], bend[varies] = radius_rates(body, nodes.points[at][varies], d, along[at][varies])
     taken = nodes.part(at)
     axes = axes_of_incidence(taken.normals, d)
-    return at, LitNodes(
+    found = LitNodes(
         taken.points,
         taken.normals,
         taken.weights * share,
@@ -148,6 +148,7 @@ def lit_part(body: Surface, line: ShadowLine, nodes: BodyNodes, wavenumber: floa
         axes,
         taken.twist(axes),
     )
+    return at, found
 
 
 def _out_of_the_wave(line: ShadowLine, points: FloatArray, dark: BoolArray) -> BoolArray:

@@ -14,7 +14,15 @@ from creeping.geometry.surface import Surface, size
 from creeping.rays.reach import AUTO
 from creeping.storage.folder import content_digest
 from creeping.sweeping.plan import array_digest, too_large
-from creeping.sweeping.request import MOST_RAYS, MOST_STEPS, QUANTITIES, SweepRequest, sweep_length, sweep_request
+from creeping.sweeping.request import (
+    METHODS,
+    MOST_RAYS,
+    MOST_STEPS,
+    QUANTITIES,
+    SweepRequest,
+    sweep_length,
+    sweep_request,
+)
 from creeping.sweeping.studyfile.directions import read_directions
 from creeping.sweeping.studyfile.schema import Key, nearest, read_table
 
@@ -51,6 +59,7 @@ STUDY = {
     "rays": Key("count", 256, most=MOST_RAYS),
     "steps": Key("count", most=MOST_STEPS),
     "order": Key("count", most=2),
+    "method": Key("text", choices=METHODS),
     "length": Key("length"),
     "length_in_body_sizes": Key("positive"),
 }
@@ -231,6 +240,8 @@ def _request(
         mistakes.append(f'[study] steps goes with quantity "rays"; "{quantity}" chooses its own')
     if quantity == "rays" and main["order"] is not None:
         mistakes.append('[study] order goes with a field; quantity "rays" has none')
+    if quantity == "rays" and main["method"] is not None:
+        mistakes.append('[study] method goes with a field; quantity "rays" has none')
     if quantity != "rays" and main["speed"] is not None:
         mistakes.append(f'[study] speed goes with quantity "rays"; a field ("{quantity}") is for constant speed')
     if observed is not None and (quantity == "bistatic") != observed:
@@ -252,6 +263,7 @@ def _request(
             # a mistake of its own is told already
             observation=seen if seen is not None or quantity != "bistatic" else (0, 0, 1),
             order=main["order"] or 2,
+            method="rays" if quantity == "rays" else main["method"] or "rays",
         )
     except InvalidInputError as error:
         reasons = getattr(error, "mistakes", [str(error)])

@@ -1,0 +1,48 @@
+"""Far fields of n incidences with m observers each, as a sweep stores them; those of one incidence may be replaced."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, IntArray
+from creeping.field.far_result import FarField
+
+PARTS = ("creeping", "reflected", "forward", "error", "unresolved")
+UNCLEAR = 0.1
+"""Error, as a share of the largest |f| of an incidence, from which isolated rays do not resolve it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FieldArrays:
+    """Arrays (n, m) or (n, m, 2, 2), by name.
+
+    Attributes
+    ----------
+    arrays : dict
+        Parts of the field, L, its error, L, ``unresolved`` and ``by_currents``.
+    """
+
+    arrays: dict[str, np.ndarray[Any, Any]]
+
+    @classmethod
+    def of(cls, field: FarField, incidences: int) -> "FieldArrays":
+        """Arrays of a far field whose rows are the observers of one incidence after the other."""
+        arrays = {name: getattr(field, name) for name in PARTS}
+        arrays = {name: np.array(v).reshape(incidences, -1, *v.shape[1:]) for name, v in arrays.items()}
+        return cls(arrays | {"by_currents": np.zeros(arrays["unresolved"].shape, dtype=bool)})
+
+    @property
+    def unclear(self) -> IntArray:
+        """Incidences with an observer that is unresolved, or whose error is large or not known."""
+        total = np.abs(self.arrays["creeping"] + self.arrays["reflected"] + self.arrays["forward"])
+        size, error = (v.reshape(*v.shape[:2], -1).max(axis=2, initial=0.0) for v in (total, self.arrays["error"]))
+        off = ~(error < UNCLEAR * size.max(axis=1, keepdims=True, initial=0.0))
+        return np.flatnonzero(np.any(off | self.arrays["unresolved"], axis=1))
+
+    def replace(self, number: int, field: FarField | None) -> None:
+        """Put another far field in the place of one incidence's; nothing if there is none."""
+        if field is None:
+            return
+        for name in PARTS:
+            self.arrays[name][number] = getattr(field, name)
+        self.arrays["by_currents"][number] = True
