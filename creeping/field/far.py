@@ -7,6 +7,8 @@ gives; where the reflected field has a caustic they err, and what they say of it
 Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
@@ -18,6 +20,7 @@ from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import far_geometry, observers_of
 from creeping.field.far_rays import error_by_order, field_of
 from creeping.field.far_result import FarField
+from creeping.field.validity_range import validity
 from creeping.rays.fan import RayFan
 
 METHODS = ("auto", "currents", "rays")
@@ -84,12 +87,14 @@ def far_field(
     cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
     if method == "currents" or cheap:
         try:
-            return _by_currents(kept_currents(fan, k, boundary), r, boundary)
+            far = _by_currents(kept_currents(fan, k, boundary), r, boundary)
+            return replace(far, validity=validity(fan, wavenumber=k))
         except SurfaceError:
             if method == "currents":
                 raise
     geometry = far_geometry(fan, r)
-    return error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
+    far = error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
+    return replace(far, validity=validity(fan, wavenumber=k))
 
 
 def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike) -> FarField:

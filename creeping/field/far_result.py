@@ -6,6 +6,7 @@ import numpy as np
 
 from creeping._presenting import Drawn
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping.field.validity_range import Validity, validity_numbers
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,6 +37,8 @@ class FarField(Drawn):
     wavenumber : float, 1/L
     boundary : str
     order : int
+    validity : Validity, optional
+        Least k rho and largest kappa_t rho/m^2 on the fan's rays; of `far_field`.
 
     Examples
     --------
@@ -61,6 +64,7 @@ class FarField(Drawn):
     wavenumber: float
     boundary: str
     order: int
+    validity: Validity | None = None
 
     @property
     def total(self) -> ComplexArray:
@@ -83,10 +87,17 @@ class FarField(Drawn):
         error = "" if off is None else f"; error by {self.error_by} {off[0]:.2g} L rms, {off[1]:.2g} L at most"
         return (
             f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
-            f"order {self.order})\n"
+            f"order {self.order}{self._range})\n"
             f"  {served or 'none'}; {int(self.unresolved.sum())} unresolved{missing}\n"
             f"  |f| up to {largest:.4g} L{error}"
         )
+
+    @property
+    def _range(self) -> str:
+        """What its text says of how far the wave is from the limit of short waves."""
+        if self.validity is None or not np.isfinite(self.validity.least_k_rho):
+            return ""
+        return f"; {validity_numbers(self.validity)}"
 
     @property
     def stated_error(self) -> tuple[float, float] | None:

@@ -33,7 +33,8 @@ EARLY = 1.0
 SOME, TURN = 32, 0.25
 """Rays of an incidence that stand for all in `validities`, and the largest angle by which they turn in a step."""
 WITHIN, EDGE = (10.0, 1.0), (4.0, 2.0)
-"""Least k rho and largest kappa_t rho/m^2 within the range of the expansions, and at its edge."""
+"""Least k rho and largest kappa_t rho/m^2 within the range of the expansions, and at its edge: there currents erred by
+0.1 to 2 % rms of the largest |f| on a sphere and an ellipsoid, rays by 0.5 to 5 %; beyond, by up to 19 and 42 %."""
 
 
 class Validity(NamedTuple):
@@ -73,6 +74,8 @@ def validity(fan: RayFan, *, wavenumber: float) -> Validity:
     (54.0, 0.111111)
     """
     k = checked(wavenumber, 2)
+    if not len(fan.points):
+        return Validity(np.nan, np.nan)
     launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
     there = (fan.curvature > 0) & (fan.travel_time < fan.detachment[:, None]) & launched[:, None]
     there &= np.cbrt(k / 2) * fan.attenuation < EARLY
@@ -179,15 +182,20 @@ def validity_words(found: Validity, *, measured: bool = False) -> str:
     >>> validity_words(Validity(7.7, 0.7), measured=True)
     'k rho >= 7.7, kappa_t rho/m^2 <= 0.7; at the edge of the range of the expansion, go by the error measured'
     """
-    numbers = f"k rho >= {found.least_k_rho:.3g}, kappa_t rho/m^2 <= {found.largest_transverse:.2g}"
+    numbers = validity_numbers(found)
     inside, near = (
         found.least_k_rho >= k_rho and found.largest_transverse <= across for k_rho, across in (WITHIN, EDGE)
     )
     if inside:
         return f"{numbers}; within the range of the expansion"
     where = "at the edge of" if near else "on some rays beyond"
-    said = "go by the error measured" if measured else "errors may be " + ("some per cent" if near else "of any size")
+    said = "go by the error measured" if measured else "errors may be " + ("some per cent" if near else "large")
     return f"{numbers}; {where} the range of the expansion, {said}"
+
+
+def validity_numbers(found: Validity) -> str:
+    """Both numbers as a reader sees them."""
+    return f"k rho >= {found.least_k_rho:.3g}, kappa_t rho/m^2 <= {found.largest_transverse:.2g}"
 
 
 def _across(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:

@@ -187,7 +187,7 @@ class SweepRequest:
             return LINE | CURVED | RAYS
         observer = ("observer",) if self.quantity == "bistatic" else ()
         parts = PARTS if self.quantity == "bistatic" else {k: v for k, v in PARTS.items() if k != "forward"}
-        found = LINE | VALID
+        found = dict(LINE)
         if self.scalar_boundaries:
             dims = ("boundary", "wavenumber", *observer)
             found |= {name: Variable(dims, "complex128", "L", text) for name, text in parts.items()}
@@ -199,7 +199,7 @@ class SweepRequest:
             found |= {f"{name}_pec": Variable(matrix, "complex128", "L", text + words) for name, text in parts.items()}
             sizes = {name: matrix if name == "error" else dims for name in self._judged}
             found |= {f"{name}_pec": Variable(sizes[name], *of) for name, of in self._judged.items()}
-        return found
+        return found | VALID
 
     @property
     def _judged(self) -> dict[str, tuple[str, str, str]]:

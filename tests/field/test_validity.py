@@ -12,6 +12,7 @@ from creeping.field.validity_range import (
     body_validity,
     launch_validity,
     validities,
+    validity_numbers,
     validity_words,
 )
 from creeping.geodesics.equations import sharpest_curvature
@@ -85,6 +86,12 @@ def test_a_body_has_the_worst_of_its_incidences():
     assert found.largest_transverse == pytest.approx(each[:, 1].max(), rel=0.1)
 
 
+def test_a_far_field_has_that_of_its_fan(ball_fan):
+    far = cr.far_field(ball_fan, [(0, 1, 0)], wavenumber=20.0, method="rays")
+    assert far.validity == cr.validity(ball_fan, wavenumber=20.0)
+    assert validity_numbers(far.validity) in repr(far)
+
+
 def test_words_are_graded():
     words = [
         validity_words(Validity(*numbers)) for numbers in ((10.0, 1.0), (7.7, 0.7), (30.0, 1.5), (3.0, 0.1), (50, 3))
@@ -93,4 +100,4 @@ def test_words_are_graded():
     assert ["edge" in w for w in words] == [False, True, True, False, False]
     assert ["beyond" in w for w in words] == [False, False, False, True, True]
     measured = validity_words(Validity(3.0, 0.1), measured=True)
-    assert "go by the error measured" in measured and "any size" not in measured
+    assert "go by the error measured" in measured and "large" not in measured

@@ -132,3 +132,20 @@ def test_a_field_on_a_weighted_body_is_refused():
     flow = cr.DirectFlow(sc.Sphere(speed="1 + x"))
     with pytest.raises(cr.InvalidInputError, match="constant speed"):
         cr.sweep_directions(flow, [(0, 0, 1)], wavenumbers=1.0)
+
+
+def test_rays_of_a_sweep_are_as_long_as_the_lowest_wavenumber_asks():
+    ball = sc.Sphere(radius=2.0)
+    flow = cr.DirectFlow(ball, rtol=1e-6)
+    ds = cr.sweep_directions(flow, [(0, 0, 1), (1, 2, 3)], wavenumbers=[40.0, 15.0], n_rays=16)
+    line = cr.shadow_line(ball, (0, 1, 0))
+    assert ds.attrs["length"] == pytest.approx(cr.launch(flow, line, wavenumber=15.0).length, rel=1e-12)
+    assert not np.any(ds.unresolved)
+    assert ds.least_k_rho.values == pytest.approx(np.array([[80.0, 30.0]] * 2), rel=1e-6)
+    assert ds.largest_transverse.values == pytest.approx((2 / np.array([[80.0, 30.0]] * 2)) ** (2 / 3), rel=1e-6)
+    rays = cr.sweep_directions(flow, [(0, 0, 1)], quantity="rays", n_rays=16)
+    assert rays.attrs["length"] == pytest.approx(cr.launch(flow, line).length, rel=1e-12)
+    assert rays.least_radius.values == pytest.approx(2.0) and rays.transverse.values == pytest.approx(8 ** (1 / 3) / 2)
+    short = {"length": 0.4, "n_rays": 16, "wavenumbers": 40.0, "boundary": "hard"}
+    seen = cr.sweep_directions(flow, [(0, 0, 1)], quantity="bistatic", observation=[(0, 4, 3), (0, 0, -1)], **short)
+    assert seen.unresolved.values.ravel().tolist() == [True, False]
