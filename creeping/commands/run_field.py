@@ -13,6 +13,7 @@ from creeping._typing import FloatArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, parse_boundary
+from creeping.field.currents.kept import kept_currents
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.field.polarisation import turned_to_azimuth
@@ -124,7 +125,11 @@ class Job:
                 where = output / "far.ffe"
                 files.write_ffe(where, piece, target.theta, target.phi, direction=fan.line.direction)
                 names.append(where.name)
-        if self.boundary != "pec":
+        if far.error_by == "extinction":
+            currents = kept_currents(fan, self.wavenumber, self.boundary)
+            plotting.currents_picture(output / "field.png", currents, backend=backend)
+            names.append("field.png")
+        elif self.boundary != "pec":
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
             plotting.surface_field_picture(output / "field.png", fan, backend=backend, **options)
             names.append("field.png")

@@ -86,13 +86,13 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     assert (round(float(rows[-1]["theta"])), round(float(rows[-1]["phi"]))) == (150, 20)
 
 
-def test_run_of_a_conductor_has_no_picture_of_the_body(tmp_path, capsys):
+def test_run_of_a_conductor_shows_its_currents(tmp_path, capsys):
     options = ["--direction", 1, 1, 0, "--flow", "direct", "--rays", 32, "--length", 3.2, "--backend", "matplotlib"]
     field = ["--wavenumber", 10, "--boundary", "pec", "--observe", "backscatter"]
     code, out, _ = creeping("run", "sphere", *options, *field, "--json", "-o", tmp_path, capsys=capsys)
     assert code == 0
     summary = json.loads(out)
-    assert set(summary["files"]) & {"far.csv", "far.png", "far.ffe", "field.png"} == {"far.csv"}
+    assert set(summary["files"]) & {"far.csv", "far.png", "far.ffe", "field.png"} == {"far.csv", "field.png"}
     assert summary["field"]["boundary"] == "pec"
 
 

@@ -50,6 +50,8 @@ class SurfaceCurrents:
     points, normals : (n, 3), L and 1
     weights : (n,), L^2
         Where two expansions share a region, each node has its share of the area.
+    travel : (n, 3)
+        Where the phase runs: d on the lit side, the ray's tangent on rays.
     values : (n,) complex
         Field u, or du/dn (1/L) of the soft boundary; of a conductor (n, 3, 2), n x H for an incident wave of unit E
         along theta and phi.
@@ -79,6 +81,7 @@ class SurfaceCurrents:
     points: FloatArray
     normals: FloatArray
     weights: FloatArray
+    travel: FloatArray
     values: ComplexArray
     change: ComplexArray
     lit: BoolArray
