@@ -11,11 +11,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
+from creeping.field.arguments import observers_of
 from creeping.field.ray_ends import RayEnds
 from creeping.field.reflected_fold import fold_error
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import WITH_JACOBI
-from creeping.geometry.directions import unit_directions
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import normal, project, size
@@ -68,18 +68,6 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
         geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], lambda _: (line, make()))
         _KEPT[fan] = kept = (key, geometry)
     return kept[1]
-
-
-def observers_of(observation: ArrayLike) -> FloatArray:
-    """Unit directions of a caller's observers (m, 3), of which there may be none."""
-    try:
-        nothing = np.shape(observation) == (0, 3)
-    except (TypeError, ValueError):
-        # what it is not is said below
-        nothing = False
-    if nothing:
-        return np.zeros((0, 3))
-    return unit_directions(observation, "observation directions").reshape(-1, 3)
 
 
 def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":
