@@ -21,7 +21,8 @@ DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
 
 def geometry_of(flow, d, n_rays, length):
     launch = shadow_lines(flow.body, d, n_rays).launch
-    return FarGeometry(flow, launch, RayTracer(flow.body, length), -d[:, None], lambda _: pytest.fail("no lobe here"))
+    tracer, attached = RayTracer(flow.body, length), np.ones(len(d))
+    return FarGeometry(flow, launch, tracer, -d[:, None], attached, lambda _: pytest.fail("no lobe here"))
 
 
 @pytest.mark.parametrize("body", [TRIAXIAL, TWISTED, sc.Torus()])

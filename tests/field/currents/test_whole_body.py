@@ -144,3 +144,15 @@ def test_an_impedance_on_varying_curvature(rng):
     assert currents.extinction < 0.005
     assert off.max() < 0.02 * np.abs(exact).max()
     assert np.mean(off <= currents.error(r)) > 0.95
+
+
+def test_what_is_asked_of_currents_is_checked(ball_fan):
+    currents = cr.surface_currents(ball_fan, wavenumber=10.0, boundary="soft")
+    np.testing.assert_allclose(currents.far((0, 0, 2)), currents.far([(0, 0, 1)]), rtol=1e-12)
+    assert currents.far(np.zeros((0, 3))).shape == (0,) and currents.error(np.zeros((0, 3))).shape == (0,)
+    with pytest.raises(InvalidInputError, match=r"1 of 2 points are within 0\.12 wavelengths"):
+        currents.scattered([(0, 0, 2), (0, 0, 1.01)])
+    with pytest.raises(InvalidInputError, match="outside the body"):
+        currents.left_inside([(0, 0, 2)])
+    far = cr.far_field(ball_fan, np.zeros((0, 3)), wavenumber=10.0, method="currents")
+    assert far.total.shape == (0,) and far.unresolved.shape == (0,)
