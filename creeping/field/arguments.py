@@ -35,6 +35,8 @@ def checked(wavenumber: float, order: int) -> float:
     """The wavenumber, if it and the order are usable."""
     if isinstance(wavenumber, complex | np.complexfloating):
         raise InvalidInputError(f"wavenumber = {wavenumber!r} is complex; give a real one: losses belong to the medium")
+    if isinstance(wavenumber, bool | str | bytes):
+        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a number")
     try:
         k = float(wavenumber)
     except (TypeError, ValueError) as error:

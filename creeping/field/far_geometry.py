@@ -32,6 +32,7 @@ from creeping.shadow.line import ShadowLine
 from creeping.shadow.nodes import prepared, shares_of
 from creeping.shadow.occlusion import occluded
 from creeping.shadow.status import ATTACHED, NO_RAY
+from creeping.storage.memory import within_budget
 
 _KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionary()
 _STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()
@@ -45,6 +46,8 @@ TAPERED = 0.2
 """p.r up to which a crossing is no node of the fan integral: its taper starts at 0.3."""
 ALIKE = 1e-2
 """Distance, in cells, below which two rays found are one: searches end within 1e-4 or so of each other."""
+LOBE_BYTES = 600.0
+"""Memory that a node of the forward integral takes."""
 APART = 2.0
 """Spacing of the nodes of a fan integral, in 1/k: a periodic integrand sampled so errs by less than 1e-6 of itself."""
 
@@ -327,7 +330,13 @@ class FarGeometry:
                 # the lobe is flat at both to second order
                 r = off_axis(off_axis(self.directions, line.direction), -line.direction)
                 reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
-                counts = (48 + 1.5 * reach).astype(np.int64)
+                wanted_nodes = 48 + 1.5 * reach
+                within_budget(
+                    LOBE_BYTES * float(np.sum(wanted_nodes)),
+                    f"{np.sum(wanted_nodes):.2g} nodes of the forward integral",
+                    "lower the wavenumber, or ask for fewer directions near d",
+                )
+                counts = wanted_nodes.astype(np.int64)
                 parts.append(forward_nodes(strips, line, rows, r, counts))
             shadow, lit, missing = zip(*parts, strict=True)
             self._lobes[key] = HorizonRays.joined(shadow), MidHorizon.joined(lit), np.concatenate(missing)

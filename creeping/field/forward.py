@@ -21,6 +21,7 @@ from creeping.field.special.fock import pekeris_slope, pekeris_star
 from creeping.rays.observer_contour import HorizonRays, MidHorizon
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.line import ShadowLine
+from creeping.storage.memory import within_budget
 
 TAPER = (0.3, 0.7)
 """p.r between which a crossing comes to count."""
@@ -126,6 +127,8 @@ def silhouette(line: ShadowLine, observers: FloatArray, wavenumber: float) -> Co
     area = 0.0
     for curve in line.curves:
         count = max(len(curve.points), int(np.ceil(wavenumber * curve.length)))
+        what = f"{count:.2g} points of the rim at k = {wavenumber:g}"
+        within_budget(200.0 * count, what, "lower the wavenumber, or ask for no direction near d")
         s = (np.arange(count) + 0.5) * (curve.length / count)
         x = curve.at(s)
         t = line_tangents(line.body, x, d)

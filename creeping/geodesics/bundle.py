@@ -78,9 +78,13 @@ def as_points(points: ArrayLike) -> FloatArray:
         If they are not numbers, of another shape, or not finite.
     """
     try:
-        x = np.asarray(points, dtype=float)
+        given = np.asarray(points)
+        complex_valued = np.iscomplexobj(given)
+        x = np.zeros(0) if complex_valued else np.asarray(given, dtype=float)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"points are not an array of numbers: {error}") from error
+    if complex_valued:
+        raise InvalidInputError("points are complex; give real ones")
     if x.ndim == 0 or x.shape[-1] != 3:
         raise InvalidInputError(f"points have shape {x.shape}; the last axis must hold x, y, z")
     bad = ~np.all(np.isfinite(x), axis=-1)

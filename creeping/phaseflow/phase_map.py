@@ -24,6 +24,9 @@ from creeping.phaseflow.coordinates.base import Model
 from creeping.phaseflow.grid import Grid, Leap
 from creeping.storage.folder import write_folder
 
+MOST_LEAPS = 1e5
+"""Leaps of the horizon that a ray may take: some seconds for a thousand rays."""
+
 
 @dataclass(frozen=True)
 class ErrorGrowth:
@@ -197,6 +200,11 @@ class PhaseMap(Drawn):
         times = np.asarray(times, dtype=float)
         if states.shape[1] > 10 and not self._attenuates_at(times):
             return with_attenuation(self.body, states, times, rtol=self._rtol, transport=self.transport)
+        if len(times) and times.max() > MOST_LEAPS * self.horizon:
+            raise InvalidInputError(
+                f"times up to {times.max():.3g} take {times.max() / self.horizon:.2g} leaps of {self.horizon:.3g}, "
+                f"more than {MOST_LEAPS:g}; give shorter ones"
+            )
         # a time that misses a multiple of the horizon by rounding is that multiple
         whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12).astype(np.int64)
         rest = np.maximum(times - whole * self.horizon, 0.0)

@@ -36,6 +36,7 @@ from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED
+from creeping.storage.memory import within_budget
 
 MAX_RAYS = 200_000
 """Rays beyond which refinement stops."""
@@ -252,7 +253,11 @@ def launch(
     if not gap > 0:
         raise InvalidInputError(f"max_gap = {max_gap!r} is not positive; give inf for no refinement")
     length = ray_length(line, length, wavenumber=wavenumber)
-    times = np.linspace(0.0, length, (n_steps or enough_steps(body, length)) + 1)
+    steps = n_steps or enough_steps(body, length)
+    # states, and what is made of them
+    size_of = 3.0 * 8 * WHOLE * (n_rays or sum(len(curve.points) for curve in line.curves)) * steps
+    within_budget(size_of, f"{steps} steps of the rays", "ask for fewer rays or steps, or a shorter length")
+    times = np.linspace(0.0, length, steps + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
     while np.isfinite(gap):

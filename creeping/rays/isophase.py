@@ -20,6 +20,9 @@ from creeping.geometry.surface import project
 from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
 
+MOST_LEVELS = 100_000
+"""Levels of one call."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IsoPhaseCurve(DrawnOnBody):
@@ -118,6 +121,8 @@ def iso_phase_curves(
     values = np.atleast_1d(np.asarray(levels, dtype=float))
     if values.ndim != 1 or not np.all(np.isfinite(values)):
         raise InvalidInputError("levels must be finite numbers, one or a list of them")
+    if len(values) > MOST_LEVELS:
+        raise InvalidInputError(f"{len(values)} levels are more than {MOST_LEVELS}; ask for fewer")
     if not len(fan.points):
         return []
     hermite = _Hermite(fan)

@@ -23,6 +23,7 @@ from creeping.shadow.following import followed
 from creeping.shadow.nodes import Finished, LineNodes, finished, line_nodes, polished
 from creeping.shadow.panels import PanelCurve, fit_panels
 from creeping.shadow.status import CONCAVE, NEAR_SINGULAR, STATUSES
+from creeping.storage.memory import within_budget
 
 HALF = 6
 """Nodes on either side that a polynomial along a curve goes through."""
@@ -230,6 +231,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     d = unit_direction(direction)
     if isinstance(n_points, bool) or not isinstance(n_points, (int, np.integer)) or n_points < 16:
         raise InvalidInputError(f"n_points = {n_points!r} is not a whole number >= 16")
+    within_budget(150.0 * n_points, f"{n_points} points of the shadow line", "ask for fewer")
     nodes, code, distance = line_nodes(body, d)
     panels: tuple[PanelCurve, ...] = ()
     if nodes is None or code == NEAR_SINGULAR:

@@ -9,7 +9,7 @@ import numpy as np
 from creeping._typing import Any
 from creeping.errors import InvalidInputError, SurfaceError, ToleranceError
 from creeping.geodesics.equations import natural_horizon
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import (
     Plan,
     Progress,
@@ -23,6 +23,12 @@ from creeping.phaseflow.coordinates.base import model_of
 from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.tuning.search import RAYS, tuned_map
+from creeping.storage.memory import within_budget
+
+MOST_HORIZON, MOST_LENGTH = 256.0, 1e5
+"""Longest horizon of a map and longest rays that one is tuned for, in natural horizons of the body."""
+NODE_BYTES = 1000.0
+"""Memory that a node takes while a map is built."""
 
 
 def build_phase_map(
@@ -158,6 +164,13 @@ class MapSpec:
         for name, value in (("horizon", self.horizon), ("length", self.length)):
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
+        for name, value, most in (("horizon", self.horizon, MOST_HORIZON), ("length", self.length, MOST_LENGTH)):
+            # a length of some sizes need not wait for what the curvature of the body says
+            if value is not None and value > 8 * size(self.body) and value > most * natural_horizon(self.body):
+                raise InvalidInputError(
+                    f"{name} = {value:g} is more than {most:g} times the {natural_horizon(self.body):.3g} over which "
+                    "a ray turns; give a shorter one"
+                )
         if self.length is not None and tolerance is None:
             raise InvalidInputError("length belongs to a tolerance: give both, or horizon and grid alone")
         n_steps, n_rays = self.n_steps, self.n_rays
@@ -177,7 +190,9 @@ class MapSpec:
         object.__setattr__(self, "n_steps", int(n_steps))
         object.__setattr__(self, "n_rays", int(n_rays))
         # what is wrong with the grid or the tower is found here
-        _ = self.nodes
+        if self.nodes is not None:
+            cells = float(np.prod(self.nodes, dtype=float))
+            within_budget(NODE_BYTES * cells, f"a grid of {self.nodes}", "give a coarser one")
         if self.method == "tower":
             if None in (self.horizon, self.grid, self.time_step, self.stages):
                 raise InvalidInputError("method='tower' needs horizon, grid, time_step and stages")
