@@ -17,7 +17,7 @@ Run ``python -m studies.field_coverage`` (twenty minutes), ``--quick`` for the l
 
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -26,6 +26,7 @@ import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.field.currents.kept import kept_currents
+from creeping.rays.fan import RayFan
 from studies.reference import clouds, dipoles, fundamental, sphere
 
 WAVENUMBERS = (8.0, 14.0, 24.0)
@@ -151,17 +152,22 @@ def row(name: str, k: float, boundary: Any, seed: int) -> list[FloatArray]:
     return [columns for columns in found if columns is not None]
 
 
+@lru_cache(INCIDENCES * len(WAVENUMBERS))
+def _fan(name: str, d: tuple[float, float, float]) -> RayFan:
+    """Fan of an incidence, the same for every boundary: it keeps where its rays leave towards the observers."""
+    body = bodies()[name][0]
+    return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, direction=d), length=4.0, n_rays=128)
+
+
 def _columns(
     name: str, k: float, boundary: Any, d: FloatArray, r: FloatArray, exact: ComplexArray, residual: float
 ) -> FloatArray | None:
     """The columns of `row` for one incidence; None where it is singular."""
-    body = bodies()[name][0]
     kind: Any = boundary if isinstance(boundary, str) else cr.ImpedanceBoundary(boundary)
     try:
-        line = cr.shadow_line(body, direction=d)
+        fan = _fan(name, tuple(d))
     except SingularIncidenceError:
         return None
-    fan = cr.launch(cr.DirectFlow(body), line, length=4.0, n_rays=128)
     far = cr.far_field(fan, r, wavenumber=k, boundary=kind, method="currents")
     rays = cr.far_field(fan, r, wavenumber=k, boundary=kind, method="rays").total
     off, largest = np.abs(far.total - exact), np.abs(exact).max()
