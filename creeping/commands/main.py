@@ -52,6 +52,16 @@ def main(arguments: list[str] | None = None) -> None:
         code = 130
     except BrokenPipeError:
         code = 0
+    except (MemoryError, OverflowError) as error:
+        reason = str(error) or "an array is too large"
+        print(
+            f"creeping: not enough memory ({reason}); ask for fewer or shorter rays, or fewer directions",
+            file=sys.stderr,
+        )
+        code = 3
+    except OSError as error:
+        print(f"creeping: {error}", file=sys.stderr)
+        code = 3
     raise SystemExit(code if isinstance(code, int) else 0)
 
 

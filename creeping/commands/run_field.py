@@ -13,8 +13,10 @@ from creeping._typing import FloatArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, parse_boundary
+from creeping.field.currents.kept import kept_currents
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
+from creeping.field.polarisation import turned_to_azimuth
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
@@ -22,6 +24,7 @@ from creeping.geometry.directions import unit_direction
 from creeping.rays.fan import RayFan
 
 ORDER = 2
+PARTS = ("creeping", "reflected", "forward")
 MOST = 200_000
 """Directions of one run."""
 FORMS = "cut:PHI, grid:STEP, THETA,PHI or backscatter, in degrees"
@@ -37,6 +40,13 @@ class Target:
     phi: FloatArray
     directions: FloatArray
 
+    @property
+    def frames(self) -> FloatArray:
+        """Matrices (m, 2, 2) from the frames of `FarField` to that of a cut, which differs at the poles."""
+        if self.kind != "cut":
+            return np.broadcast_to(np.eye(2), (len(self.directions), 2, 2))
+        return turned_to_azimuth(self.directions, np.broadcast_to(self.phi, len(self.directions)))
+
 
 @dataclass(frozen=True)
 class Job:
@@ -51,6 +61,12 @@ class Job:
         started = time.perf_counter()
         directions = np.concatenate([target.directions for target in self.targets])
         far = far_field(fan, directions, wavenumber=self.wavenumber, boundary=self.boundary, order=ORDER)
+        if far.total.ndim == 3:
+            turn = np.concatenate([target.frames for target in self.targets])
+            parts: dict[str, Any] = {name: np.einsum("nab,nbc->nac", turn, getattr(far, name)) for name in PARTS}
+            # of a component and of the other at a pole, which the turn may exchange
+            error = np.sqrt(np.einsum("nab,nbc->nac", turn**2, far.error**2))
+            far = replace(far, **parts, error=error)
         return far, round(time.perf_counter() - started, 2)
 
     def write(self, far: FarField, fan: RayFan, output: Path, backend: str) -> tuple[dict[str, Any], list[str]]:
@@ -109,7 +125,11 @@ class Job:
                 where = output / "far.ffe"
                 files.write_ffe(where, piece, target.theta, target.phi, direction=fan.line.direction)
                 names.append(where.name)
-        if self.boundary != "pec":
+        if far.error_by == "extinction":
+            currents = kept_currents(fan, self.wavenumber, self.boundary)
+            plotting.currents_picture(output / "field.png", currents, backend=backend)
+            names.append("field.png")
+        elif self.boundary != "pec":
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
             plotting.surface_field_picture(output / "field.png", fan, backend=backend, **options)
             names.append("field.png")

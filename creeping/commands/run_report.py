@@ -132,7 +132,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             rows.append(f"on its rays {validity_words(Validity(k_rho, transverse), measured=measured)}")
         if f["error"]["by"] is not None:
             off = f["error"]
-            rows.append(f"error of the field by {off['by']}: rms {off['rms']:.1e}, max {off['max']:.1e}")
+            rows.append(f"error of |f| by {off['by']}: rms {off['rms']:.1e}, max {off['max']:.1e}")
         if "uncertain_by" in f:
             off = f["uncertain_by"]
             known = off["reason"] or f"rms {off['rms']:.1e}, max {off['max']:.1e}"

@@ -74,24 +74,27 @@ def verify_maps() -> int:
 
 
 def clear_maps() -> int:
-    """Remove every stored map, fitted body and choice between flows."""
-    import shutil
+    """Remove every stored map, fitted body and choice between flows; what is not ours, or damaged, is left and named.
 
+    Exit code 3 if anything is left.
+    """
     from creeping.phaseflow.tuning.choice_record import choice_files
+    from creeping.storage.folder import remove_folder
     from scatterers.spline import cache as _fit_cache
 
     folders, files, choices = _stored(), _fits(), choice_files()
-    for file in choices:
-        file.unlink(missing_ok=True)
-    for folder in folders:
-        shutil.rmtree(folder)
-    for file in files:
-        file.unlink(missing_ok=True)
+    left = [reason for folder in folders if (reason := remove_folder(folder))]
+    ours = [file for file in files if not file.is_symlink() and _fit_cache.load(file.parent, file.stem) is not None]
+    left += [f"{file} is no fitted body of ours" for file in files if file not in ours]
     # of processes that were ended while they wrote
-    for file in _fit_cache.cache_folder().glob(".writing-*"):
+    halves = [file for file in _fit_cache.cache_folder().glob(".writing-*") if file.is_file() and not file.is_symlink()]
+    for file in (*choices, *ours, *halves):
         file.unlink(missing_ok=True)
-    print(f"removed {len(folders)} maps, {len(files)} fitted bodies and {len(choices)} choices of flows")
-    return 0
+    maps = len(folders) - sum(1 for folder in folders if folder.exists() or folder.is_symlink())
+    print(f"removed {maps} maps, {len(ours)} fitted bodies and {len(choices)} choices of flows")
+    for reason in left:
+        print(f"left: {reason}")
+    return 3 if left else 0
 
 
 def _stored() -> list[Path]:

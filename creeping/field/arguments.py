@@ -2,7 +2,33 @@
 
 import numpy as np
 
+from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.directions import unit_directions
+
+METHODS = ("auto", "currents", "rays")
+UNRESOLVED = 0.1
+"""Error, as a share of the largest |f|, from which a direction counts as unresolved."""
+
+
+def checked_method(method: str, order: int) -> None:
+    """Refuse a method that is none, and currents of the first order."""
+    if method not in METHODS:
+        raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
+    if method == "currents" and order != 2:
+        raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
+
+
+def observers_of(observation: ArrayLike) -> FloatArray:
+    """Unit directions of a caller's observers (m, 3), of which there may be none."""
+    try:
+        nothing = np.shape(observation) == (0, 3)
+    except (TypeError, ValueError):
+        # what it is not is said below
+        nothing = False
+    if nothing:
+        return np.zeros((0, 3))
+    return unit_directions(observation, "observation directions").reshape(-1, 3)
 
 
 def checked(wavenumber: float, order: int) -> float:

@@ -104,8 +104,18 @@ def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
 
 
 def boundary_name(boundary: BoundaryLike) -> str:
-    """Text of a boundary, as `parse_boundary` takes it."""
-    return boundary if isinstance(boundary, str) else f"impedance:{boundary.admittance:g}"
+    """Text of a boundary, from which `parse_boundary` makes it again.
+
+    Examples
+    --------
+    >>> boundary_name(ImpedanceBoundary(1 / 3)), parse_boundary("impedance:0.5+0.2j").admittance
+    ('impedance:0.3333333333333333', (0.5+0.2j))
+    """
+    if isinstance(boundary, str):
+        return boundary
+    eta = boundary.admittance
+    number = repr(eta.real) if eta.imag == 0 else repr(eta).strip("()")
+    return f"impedance:{number}"
 
 
 def parse_boundary(text: str) -> BoundaryLike:

@@ -8,7 +8,7 @@ Y2 = (4τ Y1 - M0)/5 and r = ρ κ_t,
 (+ in acoustics, - for the magnetic field: electric "hard"). Soft is M0 = 0; c = τ²/60 there for constant curvature.
 Ends, 1 attachment and 2 shedding:
 
-    A = exp{-i τ² ρ1'/(12 m1)} exp{+i τ² ρ2'/(12 m2)}
+    A = exp{-i a ρ1'/(12 m1)} exp{+i a ρ2'/(12 m2)},   a = τ² + 2 q M0 (τ - q M0)
     1 + (1/2) Σ_{i=1,2} [∂c/∂τ + ω r_i τ + β τ ρ_i ρ_i'']/m_i²,   ω = 1/4 (one ray), 1/2 (fan integral)
 
 The term of varying curvature is that of [KL59], those of constant curvature agree with the zeros of Hankel functions

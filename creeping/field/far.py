@@ -12,20 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
-from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.arguments import checked
+from creeping.errors import SurfaceError
+from creeping.field.arguments import UNRESOLVED, checked, checked_method, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.far_geometry import far_geometry, observers_of
+from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import error_by_order, field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.rays.fan import RayFan
-
-METHODS = ("auto", "currents", "rays")
-UNRESOLVED = 0.1
-"""Error, as a share of the largest |f|, from which a direction counts as unresolved."""
 
 
 def far_field(
@@ -78,10 +74,7 @@ def far_field(
     """
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, order)
-    if method not in METHODS:
-        raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
-    if method == "currents" and order != 2:
-        raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
+    checked_method(method, order)
     r = observers_of(observation)
     # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
@@ -108,7 +101,7 @@ def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLik
         reflected=lit,
         forward=np.zeros(lit.shape, dtype=complex),
         method=np.full(len(r), "currents", dtype="<U16"),
-        unresolved=off.reshape(len(r), -1).any(axis=1),
+        unresolved=off.any(axis=tuple(range(1, off.ndim))),
         error=error,
         error_by="extinction",
         wavenumber=currents.wavenumber,

@@ -11,11 +11,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
+from creeping.field.arguments import observers_of
 from creeping.field.ray_ends import RayEnds
 from creeping.field.reflected_fold import fold_error
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import WITH_JACOBI
-from creeping.geometry.directions import unit_directions
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import normal, project, size
@@ -29,7 +29,7 @@ from creeping.rays.tracer import TURN, RayTracer
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine
-from creeping.shadow.nodes import prepared
+from creeping.shadow.nodes import prepared, shares_of
 from creeping.shadow.occlusion import occluded
 from creeping.shadow.status import ATTACHED, NO_RAY
 
@@ -65,21 +65,10 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
         tracer = RayTracer(fan.body, fan.length)
         # not the fan itself: this is kept as long as the fan lives
         line, make = fan.line, _forward_parts(fan)
-        geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], lambda _: (line, make()))
+        attached = np.array([shares_of(line)["attached"]])
+        geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, lambda _: (line, make()))
         _KEPT[fan] = kept = (key, geometry)
     return kept[1]
-
-
-def observers_of(observation: ArrayLike) -> FloatArray:
-    """Unit directions of a caller's observers (m, 3), of which there may be none."""
-    try:
-        nothing = np.shape(observation) == (0, 3)
-    except (TypeError, ValueError):
-        # what it is not is said below
-        nothing = False
-    if nothing:
-        return np.zeros((0, 3))
-    return unit_directions(observation, "observation directions").reshape(-1, 3)
 
 
 def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":
@@ -147,6 +136,8 @@ class FarGeometry:
         Its length is that of the rays.
     observers : (n, m, 3)
         Unit directions r.
+    attached : (n,)
+        Share of each shadow line that launches rays.
     forward : callable
         The shadow line and the strips of the fan of an incidence, for its forward lobe.
 
@@ -157,6 +148,8 @@ class FarGeometry:
     incidence : (n m,) of int
     ends : RayEnds
         Of the rays.
+    unserved : (n m,)
+        Share of the shadow line that launches none.
     """
 
     def __init__(
@@ -165,6 +158,7 @@ class FarGeometry:
         launch: LaunchPoints,
         tracer: RayTracer,
         observers: FloatArray,
+        attached: FloatArray,
         forward: Callable[[int], tuple[ShadowLine, tuple[Strip, ...]]],
     ) -> None:
         self.flow, self.body, self.launch, self.tracer = flow, flow.body, launch, tracer
@@ -173,6 +167,7 @@ class FarGeometry:
         self.directions = self.observers.reshape(-1, 3)
         self.incidence = np.repeat(np.arange(n), m)
         self.direction = launch.directions[self.incidence]
+        self.unserved = 1 - attached[self.incidence]
         self._forward = forward
         self._lobes: dict[tuple[int, bytes], tuple[HorizonRays, MidHorizon, IntArray]] = {}
         self._nodes: dict[bytes, HorizonRays] = {}
@@ -278,6 +273,11 @@ class FarGeometry:
     def fold(self, wavenumber: float) -> FloatArray:
         """What specular points miss at a caustic of the reflected field (n m,), L."""
         return fold_error(self.body, prepared(self.body).coarsest, self.direction, self.directions, wavenumber)
+
+    @cached_property
+    def typical(self) -> float:
+        """Rms of |f| over all directions, L, of a body that scatters twice its mean silhouette: sqrt(A/(8 pi))."""
+        return float(np.sqrt(prepared(self.body).coarsest.area / (8 * np.pi)))
 
     def fan_nodes(self, wavenumber: float, wanted: BoolArray) -> HorizonRays:
         """Nodes of the fan integral for the wanted observers, at most APART/k apart on the shadow line."""

@@ -41,6 +41,8 @@ CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)
 """Polarisations of a conductor and the other of each, with the sign of their coupling."""
 MATTERS = 0.05
 """Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
+DARK = 0.5
+"""Share of the field that ground without rays may have before a direction is unresolved."""
 HIDDEN = 0.01
 """Share of the shadow line from which hidden parts leave the forward lobe unresolved."""
 MERGED = (0.38, 0.52)
@@ -145,17 +147,20 @@ class _Parts:
         ends = [geometry.ends.lost(geometry.directions, geometry.incidence, wavenumber, kind) for kind in kinds]
         lost, fold = np.max(ends, axis=0), geometry.fold(wavenumber)
         self.left_out = (1 - self.in_forward) * np.hypot(lost, fold)
+        # ground behind the rest of the line has no wave: its share of a field that is nowhere in particular
+        self.dark = geometry.unserved * geometry.typical
 
     def unresolved(self) -> BoolArray:
         """Directions in which an expansion fails, or something is left out, that matters there (m,)."""
         total = np.abs(self.creeping + self.reflected + self.forward)
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
         failing = np.maximum(self.failing_size, self.left_out)
-        return np.asarray((self.missing & (self.in_forward > 0)) | (failing > MATTERS * largest))
+        without = self.dark > DARK * largest
+        return np.asarray((self.missing & (self.in_forward > 0)) | (failing > MATTERS * largest) | without)
 
     def error(self) -> FloatArray:
         """Size of what is left out, and of what has an expansion that fails (m,) or (m, 2, 2), L."""
-        error = np.hypot(self.left_out, self.failing_size)
+        error = np.hypot(np.hypot(self.left_out, self.failing_size), self.dark)
         return np.broadcast_to(error.reshape(-1, *(1,) * (self.creeping.ndim - 1)), self.creeping.shape).copy()
 
     def _note_failing(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:

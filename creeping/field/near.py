@@ -8,7 +8,7 @@ wave, and must be a quarter of a wavelength away; nearer, the field is between t
 (`creeping.field.near_layer`). Rays err by a share of what they bring, which in the deep shadow is
 far less. So rays serve in the shadow where nothing is the matter with them and their error is the smaller one.
 
-Sources: [LK59], [CK13]; Derivations, F8, F17 and F18.
+Sources: [LK59], [CK13]; Derivations, F8, F17 and F20.
 """
 
 import numpy as np

@@ -8,7 +8,7 @@ with u and du/dn on the body from the surface field and u at 0.27 and 0.54 wavel
 reflected wave of a plane are a and b; where the wave grazes the four are 1, t, t^2 and t^3. Each weight of a value is 1
 at most; what four terms leave out is about 0.08 |kappa_1 + kappa_2|/k of the incident wave, 0.03 on an impedance.
 
-Sources: Derivations, F18.
+Sources: Derivations, F20.
 """
 
 from dataclasses import dataclass

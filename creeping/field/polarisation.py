@@ -29,6 +29,26 @@ def spherical_frame(directions: FloatArray) -> FloatArray:
     return np.stack([theta, phi], axis=-2)
 
 
+def turned_to_azimuth(directions: FloatArray, phi: FloatArray) -> FloatArray:
+    """Matrices (m, 2, 2) that give components along θ̂ and φ̂ of the azimuths φ (m,), radians, from those of here.
+
+    They differ at the poles alone, where θ̂ and φ̂ are those of the azimuth from which a cut or a grid comes there.
+
+    Examples
+    --------
+    >>> turned_to_azimuth(np.array([[0.0, 0.0, 1.0]]), np.array([np.pi / 2])).round(12)[0].tolist()
+    [[0.0, 1.0], [-1.0, 0.0]]
+    """
+    cosine = directions[:, 2]
+    theta = np.stack(
+        [cosine * np.cos(phi), cosine * np.sin(phi), -np.hypot(directions[:, 0], directions[:, 1])], axis=-1
+    )
+    own = np.stack([theta, np.stack([-np.sin(phi), np.cos(phi), np.zeros_like(phi)], axis=-1)], axis=1)
+    polar = np.hypot(directions[:, 0], directions[:, 1]) < 1e-12
+    turn = np.einsum("nac,nbc->nab", own, spherical_frame(directions))
+    return np.where(polar[:, None, None], turn, np.eye(2))
+
+
 def wave_frame(normals: FloatArray, directions: FloatArray, spare: FloatArray) -> FloatArray:
     """Vectors s and h of waves that travel along unit directions, (n, 3) each: (n, 2, 3).
 

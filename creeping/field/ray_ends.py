@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.shed_wave import scales, shed_wave
@@ -65,7 +65,7 @@ class RayEnds:
         self._starts = launch.points[self._incidence, ray]
         self._directions = launch.directions[self._incidence]
         self._attenuation = _attenuation(self.body, states[self._incidence, ray], times)
-        self._beyond: dict[bytes, Beyond] = {}
+        self._traced: tuple[IntArray, RayPoints | None] = (np.full(len(self._starts), -1), None)
 
     def lost(self, directions: FloatArray, incidence: IntArray, wavenumber: float, boundary: Boundary) -> FloatArray:
         """T(r) of observers (m,) of the incidences (m,), L: 0 where nothing is lost."""
@@ -92,18 +92,24 @@ class RayEnds:
                 out[some] = np.max(np.where(near, amplitude[there], 0.0), axis=1, initial=0.0)
         return out
 
-    def _traced_on(self, late: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Beyond:
-        key = late.tobytes()
-        if key not in self._beyond:
-            rays = np.flatnonzero(late)
-            starts, directions = self._starts[rays], self._directions[rays]
+    def _traced_on(self, late: BoolArray) -> Beyond:
+        """Some rays beyond their ends, each traced once."""
+        place, points = self._traced
+        new = np.flatnonzero(late & (place < 0))
+        if len(new):
+            starts, directions = self._starts[new], self._directions[new]
             more = LONGEST * size(self.body) * np.arange(SAMPLES) / SAMPLES
             tangents = line_tangents(self.body, starts, directions)
-            owner, times = np.repeat(np.arange(len(rays)), SAMPLES), np.tile(self._tracer.length + more, len(rays))
+            owner, times = np.repeat(np.arange(len(new)), SAMPLES), np.tile(self._tracer.length + more, len(new))
             found = self._tracer.at(directions, starts, tangents, times, owner).rays
-            index = np.arange(len(times)).reshape(len(rays), SAMPLES)
-            self._beyond[key] = Beyond(self._incidence[rays], found[index])
-        return self._beyond[key]
+            known = int(place.max(initial=-1)) + 1
+            place = place.copy()
+            place[new] = known + np.arange(len(new))
+            points = found if points is None else RayPoints.joined([points, found])
+            self._traced = place, points
+        assert points is not None
+        rows = place[late]
+        return Beyond(self._incidence[late], points[rows[:, None] * SAMPLES + np.arange(SAMPLES)])
 
 
 def _attenuation(body: Surface, states: FloatArray, times: FloatArray) -> FloatArray:

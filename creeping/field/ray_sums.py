@@ -12,7 +12,7 @@ is of its root's size. Two waves of which one has touched a caustic that the oth
 Airy or Bessel function, whose next terms fall with their difference in phase. A ray beyond the end of the fan is weaker
 than one found by the decay a of the first mode, g.
 
-Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F18. A, B and C were set on four bodies
+Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F20. A, B and C were set on four bodies
 (`studies.near_coverage`).
 """
 

@@ -84,7 +84,8 @@ def mode_waves(
     change = np.cbrt(2 / wavenumber) * (plain * i[..., 2, :] + across * i[..., 3, :] + varying * i[..., 4, :])
     if shed_share is not None:
         (rate1, rate2), (m1, m2) = rays.radius_rate, scales(rays, wavenumber)
-        change = change + modes.tau**2 * ((shed_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
+        ends = ((shed_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
+        change = change + (modes.tau**2 + 2 * modes.q_m0 * (modes.tau - modes.q_m0)) * ends
     return np.asarray(np.exp(1j * (leading + limited(change, 0.5 * leading))))
 
 

@@ -8,9 +8,11 @@ both ends:
 
     soft          τ (1/10 + r/4)
     otherwise     τ (r/4 - 1/30) - (1/10 ± r/4 + (2/15) q τ) d/dq
+    attachment    -(ρ1'/m1) [i τ²/12 + (i/6) q (1 + q d/dq)], in modes exp{-i a ρ1'/(12 m1) + q M0 (q2 - q)}
 
 from the expansions of Hankel functions in the transition region [AS64, sec. 9.3] for the circular cylinder
-and the sphere; the decay c and the attachment factor exp{-i τ² ρ1'/(12 m1)} are those of `creeping.field.boundary`.
+and the sphere; the decay c and a are those of `creeping.field.creeping_modes`; q is the geometric mean of both ends, q2
+that of the point.
 
 Sources: [F46], [LK59]; Derivations, F3 and F9.
 """
@@ -89,6 +91,11 @@ def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) 
     waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=0.0)
     terms = end_residue(rays, wavenumber, boundary, "surface") * waves
     if order == 2:
+        if boundary.kind == "impedance":
+            # the mode's height at the point, of the admittance there
+            m1, m2 = scales(rays, wavenumber)
+            shift = boundary.q(m2) - boundary.q(np.sqrt(m1 * m2))  # type: ignore[operator]
+            terms = terms * np.exp(limited(np.asarray(modes.q_m0 * np.asarray(shift)[..., None]), 1.0))
         terms = terms * surface_amplitude(rays, modes, wavenumber, boundary)
     return np.asarray(np.sum(terms, axis=-1) * (2j * np.sqrt(np.pi)))
 
@@ -107,8 +114,10 @@ def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) ->
     linear = (1 / 10 - bend / 60 if q is None else -1 / 30 + bend / 180) + r / 4 + rays.radius_rate[0] ** 2 / 36
     total = 1j * turn * surface_function(xi, q, 2) + linear / (m1 * m2) * surface_function(xi, q, 1)
     if q is not None:
-        total = total - (0.1 + 0.25 * boundary.sign * r - bend / 60) / (m1 * m2) * surface_slope(xi, q)
+        slope = surface_slope(xi, q)
+        total = total - (0.1 + 0.25 * boundary.sign * r - bend / 60) / (m1 * m2) * slope
         if np.ndim(q):
+            total = total - 2j * attachment * q * (surface_function(xi, q) + q * slope)
             total = total - 2 / 15 * q / (m1 * m2) * surface_slope(xi, q, 1)
     return np.asarray(total)
 

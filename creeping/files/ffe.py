@@ -16,7 +16,7 @@ import numpy as np
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
-from creeping.field.polarisation import spherical_frame
+from creeping.field.polarisation import turned_to_azimuth
 from creeping.files.far_table import angles_of
 from creeping.geometry.directions import unit_direction
 from creeping.storage.atomic import written_aside
@@ -152,8 +152,6 @@ def _components(far: "FarField", theta: FloatArray, phi: FloatArray, incident: i
     total = np.asarray(far.total)
     if total.ndim == 1:
         return np.stack([total, np.zeros_like(total)], axis=-1).reshape(len(theta), len(phi), 2)
-    t, p = (grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij"))
-    theta_unit = np.stack([np.cos(t) * np.cos(p), np.cos(t) * np.sin(p), -np.sin(t)], axis=-1)
-    phi_unit = np.stack([-np.sin(p), np.cos(p), np.zeros_like(p)], axis=-1)
-    turn = np.einsum("nac,nbc->nab", np.stack([theta_unit, phi_unit], axis=1), spherical_frame(far.directions))
+    p = np.tile(phi, len(theta))
+    turn = turned_to_azimuth(far.directions, p)
     return np.asarray(np.einsum("nab,nb->na", turn, total[:, :, incident])).reshape(len(theta), len(phi), 2)

@@ -100,12 +100,7 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     """
     found = kept(body, "quadratures", lambda: _Rules(body))
     while found.cells:
-        edge, tiles = found.size(body, found.cells)
-        points, cells = _points_for(0.5 * rate * edge), found.cells
-        while points > MOST and cells < MOST_CELLS:
-            cells = _finer(cells)
-            edge, tiles = found.size(body, cells)
-            points = _points_for(0.5 * rate * edge)
+        cells, points, tiles = found.rule(body, rate)
         if points > MOST or tiles * points**2 > MOST_NODES:
             if points == FEWEST:
                 break
@@ -130,6 +125,23 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     )
 
 
+def node_count(body: Surface, rate: float) -> int:
+    """Nodes that `body_nodes` would have, without making them; more than MOST_NODES if no mesh will do.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> node_count(ball, 20.0) == len(body_nodes(ball, 20.0).points)
+    True
+    """
+    found = kept(body, "quadratures", lambda: _Rules(body))
+    if not found.cells:
+        return MOST_NODES + 1
+    _, points, tiles = found.rule(body, rate)
+    return MOST_NODES + 1 if points > MOST else tiles * points**2
+
+
 class _Rules:
     """Rules of a body, sizes of its meshes, and the last mesh.
 
@@ -144,6 +156,17 @@ class _Rules:
         vertices, tiles = self.mesh(body, CELLS)
         wanted = CELLS * float(np.median(_sides(vertices, tiles))) * principal_curvature_bound(body, vertices)
         self.cells = 0 if wanted > 2 * MOST_CELLS else max(CELLS, min(MOST_CELLS, round(0.3 * wanted)))
+
+    def rule(self, body: Surface, rate: float) -> tuple[int, int, int]:
+        """Cells of the mesh, points along a side of its tiles, and the number of these, for a rate, 1/L."""
+        cells = self.cells
+        edge, tiles = self.size(body, cells)
+        points = _points_for(0.5 * rate * edge)
+        while points > MOST and cells < MOST_CELLS:
+            cells = _finer(cells)
+            edge, tiles = self.size(body, cells)
+            points = _points_for(0.5 * rate * edge)
+        return cells, points, tiles
 
     def mesh(self, body: Surface, cells: int) -> tuple[FloatArray, IntArray]:
         """Vertices and quadrilaterals of a mesh."""

@@ -41,6 +41,12 @@ class Triangulation:
         return float(np.sqrt(np.mean(np.sum((corners - np.roll(corners, 1, axis=1)) ** 2, axis=-1))))
 
     @property
+    def area(self) -> float:
+        """Sum of the triangles' areas, L^2."""
+        a, b, c = np.moveaxis(self.vertices[self.triangles], 1, 0)
+        return float(0.5 * np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
+
+    @property
     def components(self) -> int:
         """Number of connected bodies."""
         from scipy.sparse import coo_array

@@ -15,7 +15,7 @@ from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import Grid, Leap
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
-from creeping.storage.folder import SCHEMA, content_digest, open_array, read_manifest
+from creeping.storage.folder import SCHEMA, content_digest, open_array, private_folder, read_manifest
 
 
 def cache_folder() -> Path:
@@ -126,10 +126,10 @@ def cached_phase_map(
     place = cached_place(body, key, folder)
     root = place.parent
     try:
-        root.mkdir(parents=True, exist_ok=True)
+        private_folder(root)
         lock = FileLock(root / f".{place.name}.lock")
         lock.acquire()
-    except OSError as error:
+    except (OSError, StoredMapError) as error:
         progress(f"no cache in {root} ({error}); building without it")
         return build()
     try:

@@ -1,4 +1,5 @@
 # Public names and where they are: read by type checkers, and by lazy_loader when the package is imported.
+from .coloured_body import currents_picture as currents_picture
 from .display import GLProbe as GLProbe
 from .display import gl_available as gl_available
 from .far_cuts import far_cut_picture as far_cut_picture

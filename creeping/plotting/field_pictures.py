@@ -1,41 +1,30 @@
 """Pictures of the field on the body: decibels as colours of the surface, and along rays.
 
-Shown is |u|, or |du/dn|/k where u = 0. On the lit side it is Fock's surface function at ξ = m n.d < 0, which is
-geometrical optics away from the shadow line: 2, 2|n.d| if soft, 2 cos θ/(cos θ + η) on an impedance. On a sphere at
-ka = 30 it is within 0.4 dB of the series, where geometrical optics alone is 3 dB off, 20 if soft.
+Shown is |u|, or |du/dn|/k where u = 0, as `creeping.field.on_body.surface_field` has it, lit and in the shadow.
 
-Sources: [F46], [F65]; Derivations, F3.
+Sources: Derivations, F9 and F16.
 """
 
 import os
-from dataclasses import replace
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
-from creeping.field.creeping_modes import fock_scale
 from creeping.field.decibels import decibels, shown_range
 from creeping.field.on_body import surface_field
-from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary
-from creeping.geometry.surface import normal
 from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays
 from creeping.plotting._view import View
+from creeping.plotting.coloured_body import NOTHING, cells_of, painted
 from creeping.plotting.far_cuts import COLOURS
-from creeping.plotting.pictures import chosen_backend, drawn_page, new_figure, save_figure
+from creeping.plotting.pictures import chosen_backend, new_figure, save_figure
 from creeping.rays.fan import RayFan
-from creeping.shadow.occlusion import occluded
 
-NO_RAY = "#b4b9bd"
-PENUMBRA = -8.0
-"""ξ below which geometrical optics stands on the lit side, to 0.01 dB."""
 CAUSTIC: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
-LEAST_CELLS, MOST_CELLS = 48, 96
-"""Of the body along each side of its box."""
 
 
 def surface_field_picture(
@@ -87,31 +76,10 @@ def surface_field_picture(
     backend = chosen_backend(backend)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
-    if cells is None:
-        side = float(np.cbrt(np.prod(np.diff(fan.body.bounds, axis=0))))
-        cells = int(np.clip(8 * side * k / (2 * np.pi), LEAST_CELLS, MOST_CELLS))
-    drawing = compose(fan.line, view=view, cells=cells)
+    drawing = compose(fan.line, view=view, cells=cells or cells_of(fan.body, k))
     levels = surface_levels(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
-    finite = levels[np.isfinite(levels)]
-    # neither a null nor a caustic of a few points stretches the colours
-    ends = np.percentile(finite, [1.0, 99.8]) if len(finite) else (-np.inf, np.inf)
-    low, high = shown_range([np.clip(finite, *ends)], span, step=2.0)
-    colours = _colours(low, high)
-    paint = colours.to_rgba(np.nan_to_num(levels, nan=low, posinf=high, neginf=low))[:, :3]
-    bare = np.isnan(levels)
-    if np.any(bare):
-        from matplotlib.colors import to_rgb
-
-        paint[bare] = to_rgb(NO_RAY)
-    figure, place = drawn_page(replace(drawing, paint=np.asarray(paint)), backend, dpi)
-    drawing.add_legend(figure, *(_patches() if np.any(bare) else ()))
-    beyond = ("min" if np.any(levels < low) else "") + ("max" if np.any(levels > high) else "")
-    bar = figure.colorbar(
-        colours, cax=figure.add_axes(place), extend={"": "neither", "minmax": "both"}.get(beyond, beyond)
-    )
-    bar.set_label(f"{_name(kind)}\nk = {k:g}/L, {_boundary_name(kind)}", fontsize=8)
-    bar.ax.tick_params(labelsize=8, width=0.5)
-    bar.outline.set_linewidth(0.5)
+    label = f"{_name(kind)}\nk = {k:g}/L, {_boundary_name(kind)}"
+    figure = painted(drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
     save_figure(figure, path, dpi)
     return backend
 
@@ -124,47 +92,10 @@ def surface_levels(
     |u|, or |du/dn|/k of the soft boundary; NaN in the shadow where no ray passes, inf on a caustic.
     """
     kind = scalar_boundary(boundary)
-    k = checked(wavenumber, order)
-    points = np.asarray(points, dtype=float)
-    lit = lit_points(fan, points)
-    magnitude = np.full(len(points), np.nan)
-    magnitude[lit] = _lit_magnitude(fan, points[lit], k, kind)
-    if np.any(~lit):
-        shadow = np.abs(surface_field(fan, points[~lit], wavenumber=k, boundary=boundary, order=order))
-        shadow = np.where(np.isnan(shadow), np.inf, shadow)
-        magnitude[~lit] = np.where(shadow > 0, shadow / (k if kind.kind == "soft" else 1.0), np.nan)
-    return decibels(magnitude)
-
-
-def lit_points(fan: RayFan, points: FloatArray) -> BoolArray:
-    """Whether the incident wave reaches points of the body (n, 3) from outside, unobstructed: (n,)."""
-    direction = fan.line.direction
-    lit = np.asarray(normal(fan.body, points) @ direction < 0)
-    lit[lit] = ~occluded(fan.body, points[lit], direction)
-    return lit
-
-
-def _lit_magnitude(fan: RayFan, points: FloatArray, wavenumber: float, kind: Boundary) -> FloatArray:
-    """|u| or |du/dn|/k where n.d < 0 (n,)."""
-    body, d = fan.body, fan.line.direction
-    n = normal(body, points)
-    cosine = -n @ d
-    along = d + cosine[:, None] * n
-    square = np.sum(along**2, axis=1)
-    bend = np.einsum("ni,nij,nj->n", along, body.hessian(points), along)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # at normal incidence every plane is one of incidence, and all give geometrical optics
-        kappa = np.nan_to_num(bend / square / np.linalg.norm(body.gradient(points), axis=1))
-    m = fock_scale(wavenumber, kappa)
-    # a hard boundary is an impedance with eta = 0
-    near = -m * cosine > PENUMBRA
-    if kind.kind == "soft":
-        out = 2 * cosine
-        out[near] = np.abs(surface_function(-m[near] * cosine[near], None)) / m[near]
-        return np.asarray(out)
-    out = np.abs(2 * cosine / (cosine + kind.admittance))
-    out[near] = np.abs(surface_function(-m[near] * cosine[near], kind.q(m[near])))
-    return np.asarray(out)
+    field = surface_field(fan, points, wavenumber=wavenumber, boundary=boundary, order=order)
+    size = np.abs(field.values) / (wavenumber if kind.kind == "soft" else 1.0)
+    size = np.where(np.isnan(size), np.inf, size)
+    return decibels(np.where(size > 0, size, np.nan))
 
 
 def decay_picture(
@@ -229,7 +160,7 @@ def decay_picture(
     if np.any(fan.caustic_index[picked]):
         from matplotlib.lines import Line2D
 
-        handles.append(Line2D([], [], color=NO_RAY, label="caustic", **CAUSTIC))
+        handles.append(Line2D([], [], color=NOTHING, label="caustic", **CAUSTIC))
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     save_figure(figure, path, dpi)
 
@@ -242,19 +173,6 @@ def _draw_decay(ax: Any, fan: RayFan, ray: int, level: FloatArray, colour: str) 
         share = J[0] / (J[0] - J[1]) if J[0] * J[1] < 0 else 0.5
         at = fan.travel_time[step] + share * (fan.travel_time[step + 1] - fan.travel_time[step])
         ax.axvline(at, color=colour, alpha=0.7, **CAUSTIC)
-
-
-def _colours(low: float, high: float) -> Any:
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    return ScalarMappable(Normalize(low, high), "magma")
-
-
-def _patches() -> tuple[Any, ...]:
-    from matplotlib.patches import Patch
-
-    return (Patch(color=NO_RAY, label="no ray passes"),)
 
 
 def _name(kind: Boundary) -> str:

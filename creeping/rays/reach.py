@@ -80,12 +80,14 @@ def ray_length(
     >>> bool(0 <= ray_length(line, wavenumber=30.0) - far < 0.02)
     True
     """
+    body = line.body
+    if wavenumber is not None:
+        _positive("wavenumber", wavenumber)
+        if speed_of(body) is not None:
+            raise InvalidInputError(f"wavenumber = {wavenumber!r} is for rays of constant speed; {body!r} has a speed")
     if length != AUTO:
         return _positive("length", length, ", nor 'auto'")
-    body = line.body
     if speed_of(body) is not None:
-        if wavenumber is not None:
-            raise InvalidInputError(f"wavenumber = {wavenumber!r} is for rays of constant speed; {body!r} has a speed")
         return weighted_length(body)
     launch = line.launch_points(TRIALS)
     return float(decayed_lengths(body, launch, wavenumber, decay)[0])

@@ -7,6 +7,7 @@ Sources: Derivations, R6 and R8.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
+
+if TYPE_CHECKING:
+    from creeping.shadow.line import ShadowLine
 
 NEAR = 1e-3
 """Longest step, in body sizes, that brings an interpolated point onto the line."""
@@ -164,3 +168,9 @@ def finished(body: Surface, direction: FloatArray, nodes: LineNodes, n_rays: int
         )  # fmt: skip
     shares = summary[SHARES : SHARES + 3]
     return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, bool(certain))
+
+
+def shares_of(line: "ShadowLine") -> dict[str, float]:
+    """Shares of a line's length by state, as its kernel adds them."""
+    found = finished(line.body, line.direction, line.nodes, 0)
+    return dict(zip(line.fractions, (float(share) for share in found.shares), strict=True))

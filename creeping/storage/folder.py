@@ -6,6 +6,7 @@ manifest, whose own digest is checked first. Folders are written aside and renam
 
 import hashlib
 import json
+import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -57,8 +58,8 @@ def write_folder(folder: str | Path, content: dict[str, Any], arrays: dict[str, 
     return folder
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """Content of a folder's manifest, its own digest checked.
+def read_manifest(folder: Path, *, any_schema: bool = False) -> dict[str, Any]:
+    """Content of a folder's manifest, its own digest checked; ``any_schema`` takes those of other versions too.
 
     Raises
     ------
@@ -78,9 +79,55 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise StoredMapError(f"{folder} holds no readable phase map ({error!r}); rebuild it") from error
     if not intact:
         raise StoredMapError(f"{path} is damaged: its digest differs; rebuild the map")
-    if content.get("schema") != SCHEMA:
+    if content.get("schema") != SCHEMA and not any_schema:
         raise StoredMapError(f"{folder} has schema {content.get('schema')!r}, this version reads {SCHEMA}; rebuild it")
     return dict(content)
+
+
+def remove_folder(folder: Path) -> str:
+    """Remove a stored map: the files that its manifest names, and the folder if nothing else is in it.
+
+    Returns
+    -------
+    str
+        What was left and why; nothing if all is gone. A folder without an intact manifest of ours is left alone.
+    """
+    if folder.is_symlink():
+        return f"{folder} is a link"
+    try:
+        content = read_manifest(folder, any_schema=True)
+    except StoredMapError as error:
+        return str(error)
+    try:
+        for name in (*content["files"], MANIFEST):
+            if Path(name).name == name:
+                (folder / name).unlink(missing_ok=True)
+        left = sorted(path.name for path in folder.iterdir())
+        if left:
+            return f"{folder} has files of others: {', '.join(left[:5])}"
+        folder.rmdir()
+    except OSError as error:
+        return f"{folder} cannot be removed: {error}"
+    return ""
+
+
+def private_folder(folder: Path) -> Path:
+    """Make a folder that only its owner can write, or check one that is there.
+
+    Raises
+    ------
+    StoredMapError
+        If it is another user's, or others can write it.
+    OSError
+        If it cannot be made.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+    status = folder.stat()
+    if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
+        whose = f"belongs to user {status.st_uid}" if status.st_uid != os.getuid() else "can be written by other users"
+        raise StoredMapError(f"{folder} {whose}; make it yours alone (chmod go-w), or name another by CREEPING_CACHE")
+    return folder
 
 
 def verify_files(folder: Path) -> dict[str, Any]:

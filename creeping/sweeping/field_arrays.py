@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, IntArray
+from creeping.field.arguments import UNRESOLVED
 from creeping.field.far_result import FarField
 
 PARTS = ("creeping", "reflected", "forward", "error", "unresolved")
-UNCLEAR = 0.1
-"""Error, as a share of the largest |f| of an incidence, from which isolated rays do not resolve it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +35,16 @@ class FieldArrays:
         """Incidences with an observer that is unresolved, or whose error is large or not known."""
         total = np.abs(self.arrays["creeping"] + self.arrays["reflected"] + self.arrays["forward"])
         size, error = (v.reshape(*v.shape[:2], -1).max(axis=2, initial=0.0) for v in (total, self.arrays["error"]))
-        off = ~(error < UNCLEAR * size.max(axis=1, keepdims=True, initial=0.0))
+        off = ~(error < UNRESOLVED * size.max(axis=1, keepdims=True, initial=0.0))
         return np.flatnonzero(np.any(off | self.arrays["unresolved"], axis=1))
 
-    def replace(self, number: int, field: FarField | None) -> None:
-        """Put another far field in the place of one incidence's; nothing if there is none."""
-        if field is None:
-            return
+    def improved_by(self, number: int, field: FarField) -> bool:
+        """Whether another far field has the smaller error, rms over the observers, than that of an incidence."""
+        mine, its = (np.sqrt(np.mean(np.asarray(error) ** 2)) for error in (self.arrays["error"][number], field.error))
+        return bool(its < mine) or not np.isfinite(mine)
+
+    def replace(self, number: int, field: FarField) -> None:
+        """Put another far field in the place of one incidence's."""
         for name in PARTS:
             self.arrays[name][number] = getattr(field, name)
         self.arrays["by_currents"][number] = True

@@ -12,7 +12,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
-from creeping.field.boundary import BoundaryLike, parse_boundary
+from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
@@ -256,9 +256,7 @@ def sweep_request(
         n_rays=_plain(n_rays),
         n_steps=_plain(n_steps),
         wavenumbers=numbers,
-        boundaries=tuple(
-            b if isinstance(b, str) else f"impedance:{b.admittance}".replace("(", "").replace(")", "") for b in several
-        ),
+        boundaries=tuple(boundary_name(b) for b in several),
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen),
         order=_plain(order),
         method=method,

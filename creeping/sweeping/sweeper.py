@@ -3,6 +3,7 @@
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.errors import SurfaceError
 from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundaries
 from creeping.field.currents.kept import affordable
 from creeping.field.far import far_field
@@ -101,35 +102,45 @@ class Sweeper:
             fan = self._fan(directions[number])
             return fan.line, tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1)
 
-        geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, forward)
+        fans: dict[int, RayFan] = {}
+
+        def fan_of(number: int) -> RayFan:
+            if number not in fans:
+                fans[number] = self._fan(directions[number])
+            return fans[number]
+
+        geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, lines.attached[rows], forward)
         for name, which, suffix in request.problems:
             boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
                 by_rays = field_of(geometry, wavenumber, boundary, request.order)
                 field = FieldArrays.of(error_by_order(by_rays, geometry, boundary), len(rows))
-                if request.method != "rays":
-                    again = np.arange(len(rows)) if request.method == "currents" else field.unclear
-                    for number in again:
-                        field.replace(
-                            number, self._by_currents(directions[number], observers[number], wavenumber, boundary)
-                        )
+                if request.method == "currents":
+                    for number in range(len(rows)):
+                        asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "method": "currents"}
+                        field.replace(number, far_field(fan_of(number), observers[number], **asked))
+                elif request.method == "auto":
+                    for number in field.unclear:
+                        other = _by_currents(fan_of(number), observers[number], wavenumber, boundary)
+                        if other is not None and field.improved_by(number, other):
+                            field.replace(number, other)
                 for part, values in field.arrays.items():
                     if part + suffix in out:
                         out[part + suffix][(rows, *which, k)] = values if bistatic else values[:, 0]
 
-    def _by_currents(
-        self, direction: FloatArray, observers: FloatArray, wavenumber: float, boundary: BoundaryLike
-    ) -> FarField | None:
-        """Far field of one incidence by currents, if they are affordable."""
-        fan = self._fan(direction)
-        sums = len(scalar_boundaries(boundary)) * len(observers)
-        if not affordable(fan, sums, wavenumber, distant=True):
-            return None
-        return far_field(fan, observers, wavenumber=wavenumber, boundary=boundary, method="currents")
-
     def _fan(self, direction: FloatArray) -> RayFan:
         line, request = shadow_line(self.body, direction), self.request
         return launch(self.flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
+
+
+def _by_currents(fan: RayFan, observers: FloatArray, wavenumber: float, boundary: BoundaryLike) -> FarField | None:
+    """Far field of one incidence by currents, if there are any that are affordable."""
+    if not affordable(fan, len(scalar_boundaries(boundary)) * len(observers), wavenumber, distant=True):
+        return None
+    try:
+        return far_field(fan, observers, wavenumber=wavenumber, boundary=boundary, method="currents")
+    except SurfaceError:
+        return None
 
 
 def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:

@@ -62,7 +62,11 @@ def store(folder: Path, key: str, arrays: dict[str, FloatArray], text: dict[str,
     content = packed.getvalue()
     aside = None
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.stat()
+        if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
+            return f"the fit is not cached: other users can write {folder}"
         with tempfile.NamedTemporaryFile(dir=folder, prefix=".writing-", delete=False) as file:
             aside = Path(file.name)
             file.write(hashlib.blake2b(content, digest_size=DIGEST).digest() + content)

@@ -86,14 +86,30 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     assert (round(float(rows[-1]["theta"])), round(float(rows[-1]["phi"]))) == (150, 20)
 
 
-def test_run_of_a_conductor_has_no_picture_of_the_body(tmp_path, capsys):
+def test_run_of_a_conductor_shows_its_currents(tmp_path, capsys):
     options = ["--direction", 1, 1, 0, "--flow", "direct", "--rays", 32, "--length", 3.2, "--backend", "matplotlib"]
     field = ["--wavenumber", 10, "--boundary", "pec", "--observe", "backscatter"]
     code, out, _ = creeping("run", "sphere", *options, *field, "--json", "-o", tmp_path, capsys=capsys)
     assert code == 0
     summary = json.loads(out)
-    assert set(summary["files"]) & {"far.csv", "far.png", "far.ffe", "field.png"} == {"far.csv"}
+    assert set(summary["files"]) & {"far.csv", "far.png", "far.ffe", "field.png"} == {"far.csv", "field.png"}
     assert summary["field"]["boundary"] == "pec"
+
+
+def test_a_cut_of_a_conductor_passes_the_poles_smoothly():
+    # at the poles the components are those of the cut, not those of phi = 0
+    import creeping as cr
+    import scatterers as sc
+
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    job = _field_run.job(10.0, "pec", ["cut:90"], (1.0, 0.1, 0.4))
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (1.0, 0.1, 0.4)), n_rays=32)
+    far, _ = job.far_field(fan)
+    size = np.abs(far.total)
+    plain = np.abs(cr.far_field(fan, [(0, 0, 1)], wavenumber=10.0, boundary="pec").total[0])
+    near = 0.06 * size.max()
+    np.testing.assert_allclose(size[[0, 180, 180, 360]], size[[1, 179, 181, 359]], atol=near)
+    assert np.max(np.abs(plain - size[181])) > near
 
 
 def test_a_field_needs_a_good_request():
@@ -204,6 +220,67 @@ def test_cache_commands(tmp_path, capsys, monkeypatch):
     assert "DAMAGED" in out
     assert "removed 1" in creeping("cache", "clear", capsys=capsys)[1]
     assert "0 maps" in creeping("cache", "ls", capsys=capsys)[1]
+
+
+def test_cache_clear_leaves_what_is_not_ours(tmp_path, capsys, monkeypatch):
+    # a folder with a file manifest.json was removed whatever was in it, and a link ended in a traceback
+    import scatterers as sc
+    from creeping import build_phase_map
+
+    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "maps"))
+    build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), degree=3, cache=True)
+    build_phase_map(sc.Sphere(radius=2.0), horizon=0.5, grid=(16, 16), degree=3, cache=True)
+    first, second = sorted(folder for folder in (tmp_path / "maps").iterdir() if folder.is_dir())
+    (second / "notes.txt").write_text("mine")
+    foreign = tmp_path / "maps" / "project"
+    foreign.mkdir()
+    (foreign / "manifest.json").write_text('{"name": "an app"}')
+    (foreign / "thesis.tex").write_text("ten years")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "manifest.json").write_text("{}")
+    (tmp_path / "maps" / "link").symlink_to(elsewhere)
+    (tmp_path / "maps" / "fits").mkdir()
+    (tmp_path / "maps" / "fits" / "data.npz").write_bytes(b"measured")
+    code, out, _ = creeping("cache", "clear", capsys=capsys)
+    assert code == 3 and "removed 1 maps, 0 fitted bodies" in out
+    for name in ("project", "link", "notes.txt", "data.npz"):
+        assert name in out
+    assert (foreign / "thesis.tex").exists() and (elsewhere / "manifest.json").exists()
+    assert (tmp_path / "maps" / "fits" / "data.npz").exists()
+    assert not first.exists() and [path.name for path in second.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
+def test_a_cache_that_others_can_write_is_not_used(tmp_path, monkeypatch):
+    import scatterers as sc
+    from creeping import build_phase_map
+
+    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "new" / "maps"))
+    asked = {"horizon": 0.5, "grid": (16, 16), "degree": 3, "cache": True}
+    build_phase_map(sc.Sphere(), **asked)
+    assert (tmp_path / "new" / "maps").stat().st_mode & 0o777 == 0o700
+    (tmp_path / "new" / "maps").chmod(0o777)
+    said = []
+    build_phase_map(sc.Sphere(), **asked, progress=said.append)
+    assert any("can be written by other users" in text for text in said)
+
+
+@pytest.mark.parametrize(
+    "error, words",
+    [
+        (MemoryError(), "not enough memory (an array is too large)"),
+        (OverflowError("int too large"), "not enough memory (int too large)"),
+        (PermissionError(13, "Permission denied", "/nowhere"), "Permission denied: '/nowhere'"),
+    ],
+)
+def test_what_the_machine_refuses_is_one_line(error, words, capsys, monkeypatch):
+    def fails():
+        raise error
+
+    monkeypatch.setattr("creeping.commands.upkeep._stored", fails)
+    code, _, err = creeping("cache", "ls", capsys=capsys)
+    assert code == 3 and words in err and err.count("\n") == 1
 
 
 def test_doctor(capsys):

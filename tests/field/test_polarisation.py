@@ -4,7 +4,7 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.polarisation import dyads, spherical_frame, wave_frame
+from creeping.field.polarisation import dyads, spherical_frame, turned_to_azimuth, wave_frame
 
 
 def unit(v):
@@ -110,3 +110,15 @@ def test_the_field_of_a_conductor_does_not_depend_on_the_unit_of_length():
         fan = cr.launch(cr.DirectFlow(body, rtol=1e-10), line, length=4.0 * scale, n_rays=64, max_gap=np.inf)
         found.append(cr.far_field(fan, r, wavenumber=15.0 / scale, boundary="pec").total / scale)
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-6 * np.abs(found[0]).max())
+
+
+def test_frames_of_a_cut_pass_through_the_poles():
+    # just beside a pole the components of a cut are those at the pole itself
+    phi = np.radians(70.0)
+    angle = np.array([1e-7, 0.0])
+    r = np.stack([np.sin(angle) * np.cos(phi), np.sin(angle) * np.sin(phi), np.cos(angle)], axis=1)
+    turn = turned_to_azimuth(r, np.full(2, phi))
+    E = np.array([0.3, -0.5, 0.0])
+    beside, at = np.einsum("nab,nbc,c->na", turn, spherical_frame(r), E)
+    np.testing.assert_allclose(at, beside, atol=1e-6)
+    np.testing.assert_array_equal(turn[0], np.eye(2))

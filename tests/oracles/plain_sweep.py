@@ -12,7 +12,7 @@ from creeping.rays.fan import RayFan, launch
 from creeping.rays.reach import early_length
 from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
-from creeping.shadow.nodes import finished
+from creeping.shadow.nodes import shares_of
 from creeping.shadow.status import NO_RAY, OK, SINGULAR
 from creeping.sweeping.request import SweepRequest
 
@@ -58,8 +58,7 @@ class PlainSweeper:
         out["curves"][row] = len(line.curves)
         out["line_length"][row] = line.length
         out["line_error"][row] = line.nodes.error
-        shares = finished(line.body, line.direction, line.nodes, 0).shares
-        for name, share in zip(line.fractions, shares, strict=True):
+        for name, share in shares_of(line).items():
             out[name][row] = share
         out["singular_distance"][row] = line.singular_distance
 

@@ -6,6 +6,7 @@ from oracles.plain_sweep import PlainSweeper
 
 import creeping as cr
 import scatterers as sc
+from creeping.errors import InvalidInputError
 from creeping.field.far_geometry import FarGeometry
 from creeping.rays.tracer import RayTracer
 from creeping.shadow.many import shadow_lines
@@ -20,7 +21,8 @@ DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
 
 def geometry_of(flow, d, n_rays, length):
     launch = shadow_lines(flow.body, d, n_rays).launch
-    return FarGeometry(flow, launch, RayTracer(flow.body, length), -d[:, None], lambda _: pytest.fail("no lobe here"))
+    tracer, attached = RayTracer(flow.body, length), np.ones(len(d))
+    return FarGeometry(flow, launch, tracer, -d[:, None], attached, lambda _: pytest.fail("no lobe here"))
 
 
 @pytest.mark.parametrize("body", [TRIAXIAL, TWISTED, sc.Torus()])
@@ -142,3 +144,33 @@ def test_very_long_rays_of_a_sphere():
     once = Sweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-8), short)(DIRECTIONS[:1])
     # the second time round the wave is gone
     np.testing.assert_allclose(found["creeping"], once["creeping"], rtol=1e-3)
+
+
+def test_currents_serve_the_incidences_that_rays_do_not_resolve():
+    # on the twisted ellipsoid the reflected field folds over, on the triaxial one it does not
+    seen = cr.fibonacci_directions(40)
+    for body, k, some in ((TWISTED, 20.0, True), (TRIAXIAL, 60.0, False)):
+        flow = cr.DirectFlow(body, rtol=1e-8)
+        options = {"length": 6.0, "n_rays": 64, "wavenumbers": [k], "boundary": ["soft", "pec"], "observation": seen}
+        found = Sweeper(flow, sweep_request("bistatic", **options, method="auto"))(DIRECTIONS)
+        assert found["by_currents"].any() == some
+        for row, d in enumerate(DIRECTIONS):
+            fan = cr.launch(flow, cr.shadow_line(body, d), length=6.0, n_rays=64, max_gap=np.inf)
+            for suffix, boundary, at in (("", "soft", (row, 0, 0)), ("_pec", "pec", (row, 0))):
+                taken = found["by_currents" + suffix][at]
+                # all of an incidence or nothing
+                assert taken.all() or not taken.any()
+                method = "currents" if taken.all() else "rays"
+                far = cr.far_field(fan, seen, wavenumber=k, boundary=boundary, method=method)
+                np.testing.assert_array_equal(found["creeping" + suffix][at], far.creeping)
+                np.testing.assert_array_equal(found["error" + suffix][at], far.error)
+
+
+def test_methods_of_a_sweep_are_checked():
+    for asked, words in (({"method": "both"}, "none of rays, auto, currents"), ({"order": 1}, "has no order 1")):
+        with pytest.raises(InvalidInputError, match=words):
+            sweep_request(
+                "monostatic", **{"length": 3.0, "wavenumbers": [20.0], "boundary": "soft", "method": "auto"} | asked
+            )
+    with pytest.raises(InvalidInputError, match="quantity 'rays' has none"):
+        sweep_request("rays", length=3.0, method="auto")

@@ -65,6 +65,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         points=np.concatenate([lit.points, shadow.rays.points]),
         normals=np.concatenate([lit.normals, shadow.normals]),
         weights=np.concatenate([lit.weights, shadow.weights]),
+        travel=np.concatenate([np.broadcast_to(fan.line.direction, lit.points.shape), shadow.rays.directions]),
         values=values,
         change=values - first,
         lit=np.arange(len(values)) < len(lit.points),

@@ -10,38 +10,44 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping.errors import SurfaceError
 from creeping.field.boundary import BoundaryLike
 from creeping.field.currents.assembly import surface_currents
+from creeping.field.currents.nodes import RAYS, STEPS
 from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.geometry.quadrature import body_nodes
-from creeping.geometry.surface import size
+from creeping.geometry.quadrature import node_count
 from creeping.rays.fan import RayFan
+from creeping.rays.reach import ray_length
 
 AFFORDABLE = 3e9
 """Nodes times directions or points, one by one, up to which "auto" takes currents: some ten seconds of one core."""
-MOST_NODES = 1.5e6
+MOST_NODES = 1_500_000
 """Nodes up to which it does, for the memory's sake."""
+MAKING = 2700.0
+"""What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
+LIT = 0.6
+"""Share of a body's nodes that are lit or in the penumbra."""
 KEPT = 2
 """Currents kept with a fan, of so many wavenumbers and boundaries."""
 _CURRENTS: "WeakKeyDictionary[RayFan, dict[tuple[float, BoundaryLike], SurfaceCurrents]]" = WeakKeyDictionary()
 
 
 def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = False) -> bool:
-    """Whether currents cost little enough for so many points, or directions if ``distant``, by the body's area."""
-    if not len(fan.points):
-        return False
-    try:
-        area = float(np.sum(body_nodes(fan.body, 4 / size(fan.body)).weights))
-    except SurfaceError:
-        return False
-    # some six nodes a wavelength on the lit half, and the least that a mesh has
-    nodes = max(3e4, 0.5 * area * (6 * wavenumber / (2 * np.pi)) ** 2)
+    """Whether currents cost little enough for so many points, or directions if ``distant``."""
+    nodes = expected_nodes(fan, wavenumber)
     if nodes > MOST_NODES:
         return False
     cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
-    return nodes * places < AFFORDABLE or (distant and transformed(int(nodes), places, cells))
+    by_transform = distant and transformed(nodes, places, cells)
+    return nodes * (MAKING + (0 if by_transform else places)) < AFFORDABLE
+
+
+def expected_nodes(fan: RayFan, wavenumber: float) -> int:
+    """About how many nodes the currents of a fan's incidence have."""
+    wavelength = 2 * np.pi / wavenumber
+    line = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
+    rays = RAYS * STEPS * line * ray_length(fan.line, wavenumber=wavenumber) / wavelength**2
+    return int(LIT * node_count(fan.body, 2 * wavenumber) + rays)
 
 
 def kept_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents:

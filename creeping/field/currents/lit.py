@@ -8,7 +8,7 @@ r = kappa_b/kappa_a, T = (t rho)^2 and an admittance eta (0 hard), all times e^{
               R = (c - eta)/(c + eta), R' = 2 eta/(c + eta)^2
               soft  du/dn = -2ikc [1 + i (kappa_a/c^2 + e kappa_b)/(2kc)]
     Fock      u = e^{i xi^3/3} [g + (rho'/m) E + D/m^2],   soft  du/dn = (k/m) times the same with F in place of g
-              E = -i (xi^4/12) g - i (xi^2/6) Dg - (xi/6) g - (i/12) D^2 g
+              E = -i (xi^4/12) g - i (xi^2/6) Dg - (xi/6) g - (i/12) D^2 g - (q/6)[xi g_q + i g + i q g_q]
               D = i (3/20) xi^5 g + i (xi^3/6) Dg + i (xi/60) D^2 g - Dg/30 - g_q/10 - (2/15) q (Dg)_q
                   + (r/4)(xi^2 g + Dg - e g_q)
                   + rho rho'' [i (xi^5/60) g + i (xi^3/18) Dg + (xi^2/12) g + i (7 xi/180) D^2 g + Dg/180 + g_q/60]
@@ -173,8 +173,10 @@ def _corrections(at: _Local, q: ComplexArray | float | None, g: ComplexArray, bo
         # the wave of the other polarisation, whose amplitude varies across the rays
         curved = curved - r / 2 * surface_function(xi, 0.0)
     if q is not None:
+        slope = surface_slope(xi, q)
+        varying = varying - q / 6 * (xi * slope + 1j * (g + q * slope))
         varies = bend / 60 - rate**2 / 90 + 7 / 60 * T if constant else 0.0
-        curved = curved + (varies - 0.1 - 0.25 * boundary.sign * r) * surface_slope(xi, q)
+        curved = curved + (varies - 0.1 - 0.25 * boundary.sign * r) * slope
         if not constant:
             curved = curved - 2 / 15 * q * surface_slope(xi, q, 1)
     return np.asarray(rate / m * varying + curved / m**2)

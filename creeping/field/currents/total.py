@@ -9,7 +9,7 @@ R the distance from the body's middle and f_rms the rms of the far field,
 since the scattered field is f_rms/R, rms over all directions, and f(d)/R = k f_rms^2/R at most, straight ahead, where
 it is no more than the incident wave itself.
 
-Sources: [CK13, sec. 3.2]; Derivations, F17 and F18. L and S were set on four bodies (`studies.near_coverage`).
+Sources: [CK13, sec. 3.2]; Derivations, F17 and F20. L and S were set on four bodies (`studies.near_coverage`).
 """
 
 import numpy as np

@@ -23,7 +23,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar
 from creeping.geodesics.bundle import as_points
@@ -50,6 +52,8 @@ class SurfaceCurrents:
     points, normals : (n, 3), L and 1
     weights : (n,), L^2
         Where two expansions share a region, each node has its share of the area.
+    travel : (n, 3)
+        Where the phase runs: d on the lit side, the ray's tangent on rays.
     values : (n,) complex
         Field u, or du/dn (1/L) of the soft boundary; of a conductor (n, 3, 2), n x H for an incident wave of unit E
         along theta and phi.
@@ -79,6 +83,7 @@ class SurfaceCurrents:
     points: FloatArray
     normals: FloatArray
     weights: FloatArray
+    travel: FloatArray
     values: ComplexArray
     change: ComplexArray
     lit: BoolArray
@@ -96,20 +101,39 @@ class SurfaceCurrents:
         )
 
     def far(self, directions: ArrayLike) -> ComplexArray:
-        """Far-field amplitude f, L, in unit directions (m, 3): (m,)."""
+        """Far-field amplitude f, L, in directions (m, 3): (m,)."""
         return self.far_of(np.ones(len(self.lit), dtype=bool), directions)
 
     def far_of(self, part: BoolArray, directions: ArrayLike) -> ComplexArray:
         """What some of the nodes (n,) give to `far`, L: (m, 3) -> (m,)."""
-        return self._radiated(self.values, part, np.asarray(directions, dtype=float))
+        return self._radiated(self.values, part, observers_of(directions))
 
     def scattered(self, points: ArrayLike) -> ComplexArray:
-        """Scattered field at points (m, 3), L, at least a quarter of a wavelength off the surface: (m,)."""
-        return self._field(self.values, as_points(points))
+        """Scattered field at points (m, 3), L, at least a quarter of a wavelength off the surface: (m,).
+
+        Raises
+        ------
+        InvalidInputError
+            If a point is nearer to a node than an eighth of a wavelength, where sums over nodes are no integrals.
+        """
+        x = as_points(points).reshape(-1, 3)
+        wavelength = 2 * np.pi / self.wavenumber
+        near, _ = self._nodes.query(x, distance_upper_bound=SHALLOW * wavelength)
+        close = np.flatnonzero(np.isfinite(near))
+        if len(close):
+            raise InvalidInputError(
+                f"{len(close)} of {len(x)} points are within {SHALLOW:g} wavelengths of the body "
+                f"(first: row {close[0]}); "
+                "near_field and surface_field give the field there"
+            )
+        return self._field(self.values, x)
 
     def left_inside(self, points: ArrayLike) -> ComplexArray:
         """What is left of the incident wave at points (m, 3), L, inside the body, as a share of it: (m,)."""
-        x = as_points(points)
+        x = as_points(points).reshape(-1, 3)
+        out = np.flatnonzero(self.body.level(x) > 0)
+        if len(out):
+            raise InvalidInputError(f"{len(out)} of {len(x)} points are outside the body (first: row {out[0]})")
         wave = np.exp(1j * self.wavenumber * (x @ self.direction))
         return np.asarray(self.scattered(x) + np.multiply.outer(wave, self._incident))
 
@@ -136,7 +160,7 @@ class SurfaceCurrents:
 
     def error(self, directions: ArrayLike) -> FloatArray:
         """Error of f, L, that 95 of 100 directions keep to: (m, 3) -> (m,), of a conductor (m, 2, 2)."""
-        r = np.asarray(directions, dtype=float)
+        r = observers_of(directions)
         level, shape = self._factors
         lit, dark = (self._radiated(self.change, part, r) for part in (self.lit, ~self.lit))
         change = np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside
@@ -149,6 +173,12 @@ class SurfaceCurrents:
         x = as_points(points)
         lit, dark = (self._field(np.where(part, self.change, 0.0), x) for part in (self.lit, ~self.lit))
         return np.asarray(np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside)
+
+    @cached_property
+    def _nodes(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points)
 
     @cached_property
     def _left(self) -> FloatArray:

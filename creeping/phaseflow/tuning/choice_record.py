@@ -9,12 +9,13 @@ import os
 from pathlib import Path
 
 from creeping._typing import Any
+from creeping.errors import StoredMapError
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.surface import Surface
 from creeping.phaseflow.cache import cache_folder, cached_place
 from creeping.phaseflow.phase_map import PhaseMap
-from creeping.storage.folder import content_digest
+from creeping.storage.folder import content_digest, private_folder
 
 SUFFIX = ".choice.json"
 
@@ -27,9 +28,7 @@ def remembered_choice(
     A map that is ``stored`` now and was not then reopens the choice.
     """
     try:
-        content = json.loads(_file(body, key, folder).read_text(encoding="utf-8"))
-        if content.pop("digest") != content_digest(content):
-            return None
+        content = _read(_file(body, key, folder))
         if content["kind"] == "map":
             return "map"
         if stored and not content["stored"]:
@@ -52,18 +51,27 @@ def remember_choice(
         content = {"kind": "direct", "rtol": flow.rtol, "step": flow.step, "error": error_estimate, "stored": stored}
     place = _file(body, key, folder)
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
+        private_folder(place.parent)
         part = place.with_name(f".{place.name}.{os.getpid()}")
         part.write_text(json.dumps(content | {"digest": content_digest(content)}), encoding="utf-8")
         part.replace(place)
-    except OSError:
+    except (OSError, StoredMapError):
         return
 
 
 def choice_files() -> list[Path]:
-    """Files of choices in the user's cache, those of processes ended while they wrote among them."""
+    """Files of choices in the user's cache."""
     root = cache_folder()
-    return sorted([*root.glob(f"*{SUFFIX}"), *root.glob(f".*{SUFFIX}.*")]) if root.is_dir() else []
+    return sorted(file for file in root.glob(f"*{SUFFIX}") if _read(file)) if root.is_dir() else []
+
+
+def _read(file: Path) -> dict[str, Any]:
+    """Content of a file of ours, empty if it is damaged or none."""
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        return dict(content) if content.pop("digest") == content_digest(content) else {}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
 
 
 def _file(body: Surface, key: dict[str, Any], folder: bool | str | Path) -> Path:

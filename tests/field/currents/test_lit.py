@@ -57,7 +57,7 @@ def test_cylinder(name):
         assert np.max(np.abs(mine - exact)) < limit * np.max(np.abs(exact))
 
 
-@pytest.mark.parametrize("kind", [SOFT, HARD])
+@pytest.mark.parametrize("kind", [SOFT, HARD, Boundary("impedance", 0.02), Boundary("impedance", 0.01 - 0.02j)])
 def test_what_varying_curvature_adds_falls_off_towards_the_light(kind):
     # the factors of Dg and g_q follow from this; each term alone grows like xi^8
     k, c = 1e6, np.array([0.1, 0.2])

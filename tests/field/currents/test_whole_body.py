@@ -130,3 +130,29 @@ def test_who_serves(ball_fan):
 def test_bad_methods_are_named(ball_fan, asked, message):
     with pytest.raises(InvalidInputError, match=message):
         cr.far_field(ball_fan, [(0, 1, 0)], wavenumber=20.0, **asked)
+
+
+def test_an_impedance_on_varying_curvature(rng):
+    # without what rho' does to q the error is two and a half times as large, and stands ahead
+    k, r = 20.0, directions(rng, 200)
+    d = np.array([[0.6, 0.3, 0.74]]) / np.linalg.norm([0.6, 0.3, 0.74])
+    exact = fundamental.scatter(clouds.ellipsoid(1.0, 0.8, 0.6), k, d, 0.7, depth=0.12).far_field(r)[:, 0]
+    currents = cr.surface_currents(
+        fan_of(sc.Ellipsoid(1.0, 0.8, 0.6), d[0]), wavenumber=k, boundary=cr.ImpedanceBoundary(0.7)
+    )
+    off = np.abs(currents.far(r) - exact)
+    assert currents.extinction < 0.005
+    assert off.max() < 0.02 * np.abs(exact).max()
+    assert np.mean(off <= currents.error(r)) > 0.95
+
+
+def test_what_is_asked_of_currents_is_checked(ball_fan):
+    currents = cr.surface_currents(ball_fan, wavenumber=10.0, boundary="soft")
+    np.testing.assert_allclose(currents.far((0, 0, 2)), currents.far([(0, 0, 1)]), rtol=1e-12)
+    assert currents.far(np.zeros((0, 3))).shape == (0,) and currents.error(np.zeros((0, 3))).shape == (0,)
+    with pytest.raises(InvalidInputError, match=r"1 of 2 points are within 0\.12 wavelengths"):
+        currents.scattered([(0, 0, 2), (0, 0, 1.01)])
+    with pytest.raises(InvalidInputError, match="outside the body"):
+        currents.left_inside([(0, 0, 2)])
+    far = cr.far_field(ball_fan, np.zeros((0, 3)), wavenumber=10.0, method="currents")
+    assert far.total.shape == (0,) and far.unresolved.shape == (0,)
