@@ -13,6 +13,9 @@ import numpy as np
 
 from creeping._typing import FloatArray
 
+CLEAR = 1e-6
+"""Least |n × d| that has a direction: normals are known to 1e-11, and d and r share ``spare`` to this angle."""
+
 
 def spherical_frame(directions: FloatArray) -> FloatArray:
     """θ̂ and φ̂ at unit directions (..., 3), φ = 0 at the poles: (..., 2, 3)."""
@@ -53,7 +56,8 @@ def wave_frame(normals: FloatArray, directions: FloatArray, spare: FloatArray) -
     """
     s = np.cross(normals, directions)
     long = np.linalg.norm(s, axis=-1, keepdims=True)
-    s = np.where(long > 1e-9, s / np.where(long > 1e-9, long, 1.0), spare)
+    clear = long > CLEAR
+    s = np.where(clear, s / np.where(clear, long, 1.0), spare)
     return np.stack([s, np.cross(s, directions)], axis=-2)
 
 

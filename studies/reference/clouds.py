@@ -5,13 +5,14 @@ of area h times its length, evenly by area in every band, so that each point ans
 
     dA = |x_z x x_phi| dz dphi,    X = (sqrt(1 - z²) cos phi, sqrt(1 - z²) sin phi, z)
 
-A body that is its own mirror image in the planes x_i = 0, i in mirrors, has points on the sides x_i > 0 only, none on a
-plane; the other points are their images.
+A torus is no such map; it has bands of its own. A body that is its own mirror image in the planes x_i = 0, i in
+mirrors, has points on the sides x_i > 0 only, none on a plane; the other points are their images.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise, product
+from typing import Protocol
 
 import numpy as np
 
@@ -36,6 +37,20 @@ class Cloud:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+class Spread(Protocol):
+    """What references ask of a body: its area, points on it and its mirrors."""
+
+    @property
+    def mirrors(self) -> tuple[int, ...]:
+        """Axes i whose plane x_i = 0 is a mirror of the body."""
+
+    def area(self) -> float:
+        """Area of the whole body, L²."""
+
+    def spread(self, spacing: float) -> Cloud:
+        """Points a spacing apart, L, on the sides x_i > 0 of the mirrors."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +111,33 @@ class Body:
         height = np.concatenate([[0.0], np.cumsum(steps)])
         bands = max(1, round(height[-1] / spacing))
         return np.asarray(np.interp(np.linspace(0, height[-1], bands + 1), height, z))
+
+
+@dataclass(frozen=True)
+class Torus:
+    """Torus about z with a centre circle of radius R and a tube of radius r, L."""
+
+    R: float
+    r: float
+    mirrors: tuple[int, ...] = (0, 1, 2)
+
+    def area(self) -> float:
+        """Area of the whole body, L²."""
+        return 4 * np.pi**2 * self.R * self.r
+
+    def spread(self, spacing: float) -> Cloud:
+        """Points a spacing h apart, L, on the sides x_i > 0 of all three mirrors."""
+        bands = max(1, round(np.pi * self.r / spacing))
+        points, normals = [], []
+        for theta in (np.arange(bands) + 0.5) * np.pi / bands:
+            reach = self.R + self.r * np.cos(theta)
+            count = max(1, round(0.5 * np.pi**2 * self.r * reach / bands / spacing**2))
+            psi = (np.arange(count) + 0.5) * 0.5 * np.pi / count
+            around = np.stack([np.cos(psi), np.sin(psi), 0 * psi], axis=-1)
+            up = np.array([0.0, 0.0, np.sin(theta)])
+            points.append(reach * around + self.r * up)
+            normals.append(np.cos(theta) * around + up)
+        return Cloud(np.concatenate(points), np.concatenate(normals))
 
 
 def _unit(z: FloatArray, phi: FloatArray) -> FloatArray:

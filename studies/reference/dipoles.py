@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from studies.reference._boundary import ComplexArray, FloatArray, positive
-from studies.reference.clouds import Body, Cloud, images
+from studies.reference.clouds import Cloud, Spread, images
 from studies.reference.fundamental import BLOCK, least_squares
 
 
@@ -97,7 +97,7 @@ def _wave(cloud: Cloud, directions: FloatArray, amplitudes: FloatArray, k: float
 
 
 def scatter(
-    body: Body,
+    body: Spread,
     wavenumber: float,
     directions: ArrayLike,
     *,

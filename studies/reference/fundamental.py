@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import qr, solve_triangular
 
 from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
-from studies.reference.clouds import Body, Cloud, images
+from studies.reference.clouds import Cloud, Spread, images
 
 BLOCK = 4_000_000
 """Entries of a kernel matrix held at once, 64 MB."""
@@ -177,7 +177,7 @@ def solve(
 
 
 def scatter(
-    body: Body,
+    body: Spread,
     wavenumber: float,
     directions: ArrayLike,
     boundary: Boundary,
@@ -190,7 +190,7 @@ def scatter(
 
     Parameters
     ----------
-    body : Body
+    body : Spread
     wavenumber : float, 1/L
     directions : (d, 3)
     boundary : "soft", "hard" or complex
