@@ -102,7 +102,7 @@ def _serve(flow: Any, request: Any, port: int, browser: bool, progress: Any) -> 
     progress("preparing the page; kernels are compiled once, which takes about a minute")
     page = Explorer(flow, request, port=port)
     try:
-        if not page.address.endswith(f":{port}"):
+        if page.server.get_port() != port:
             progress(f"port {port} is in use")
         progress(f"{page.address} (Ctrl+C ends it)")
         if browser:

@@ -1,7 +1,7 @@
 """The page itself: controls, two workers, and what the server lets in.
 
 One worker follows the hand, from the latest request to the preview; another follows up when no newer request has come.
-The server listens on the loopback address, and turns away connections that a page of another site opens.
+The server listens on the loopback address, behind `creeping.explorer.door`.
 """
 
 import html
@@ -12,7 +12,6 @@ from collections import deque
 from contextlib import redirect_stdout, suppress
 from io import StringIO
 from threading import RLock, Thread
-from urllib.parse import urlsplit
 
 import numpy as np
 import viser
@@ -20,6 +19,7 @@ import viser
 from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.explorer.colours import RANGE
+from creeping.explorer.door import Door
 from creeping.explorer.latest import Latest
 from creeping.explorer.preview import Preview, preview_of, step_of
 from creeping.explorer.refined import refined_view
@@ -33,26 +33,16 @@ from creeping.rays.transport import Flow
 HOST = "127.0.0.1"
 REST = 0.4
 """Seconds for which the hand rests before work begins that would hold up its next move."""
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 class LocalServer(viser.ViserServer):  # type: ignore[misc]
     """A quiet server for this machine alone."""
 
     def __init__(self, port: int) -> None:
+        self.door = Door(lambda: len(self._websock_server._live_connections))
         # the address is shown by whoever starts it
-        with redirect_stdout(StringIO()):
+        with redirect_stdout(StringIO()), self.door.installed():
             super().__init__(HOST, port, label="creeping", verbose=False)
-        # viser offers no door before the scene is sent but this one
-        self._websock_server.on_client_connect(self._admit)
-
-    async def _admit(self, client: Any) -> None:
-        """Turn away a connection opened by another site's page, or that came by another name than this machine's."""
-        connection = self._websock_server._live_connections[client.client_id]
-        headers = connection.request.headers
-        # a browser always names the site; "null" is that of a sandboxed page of any
-        if not ("Origin" not in headers or local(headers["Origin"])) or not local(f"//{headers.get('Host', '')}"):
-            await connection.close()
 
     def stop(self) -> None:
         """End the server and its threads."""
@@ -108,8 +98,8 @@ class Explorer:
 
     @property
     def address(self) -> str:
-        """Where a browser finds the page."""
-        return f"http://{HOST}:{self.server.get_port()}"
+        """Where a browser finds the page, with the token that lets it in."""
+        return f"http://{HOST}:{self.server.get_port()}/?token={self.server.door.token}"
 
     def ask(self, **values: Any) -> bool:
         """Change the request; what is out of range is named on the page and changes nothing."""
@@ -222,14 +212,6 @@ class Explorer:
             except Exception as error:
                 with self._drawing:
                     self.found.content, self.plane.content, self.cut.content = error_text(error), "", ""
-
-
-def local(address: str) -> bool:
-    """Whether an address is one of this machine."""
-    try:
-        return urlsplit(address).hostname in LOOPBACK
-    except ValueError:
-        return False
 
 
 def error_text(error: Exception) -> str:

@@ -105,35 +105,88 @@ def test_a_singular_incidence_is_named():
         made.close()
 
 
-@pytest.mark.parametrize(
-    "origin, let_in",
-    [
-        ("http://127.0.0.1:8123", True),
-        (None, True),
-        ("http://a.example", False),
-        ("null", False),
-        ("file://", False),
-        ("http://[::1", False),
-        ("http://127.0.0.1.a.example", False),
-    ],
-)
-def test_another_site_is_turned_away(page, origin, let_in):
+def opened(page, *, origin=None, cookie=True, host=None):
+    """Connection to the page as a browser makes it, or with what another would bring."""
     import viser
-    from websockets.exceptions import ConnectionClosed
     from websockets.sync.client import connect
 
-    address = page.address.replace("http", "ws")
+    port, token = page.server.get_port(), page.server.door.token
+    headers = {"Cookie": f"creeping-{port}={token if cookie is True else cookie}"} if cookie else {}
+    if host is not None:
+        headers["Host"] = host
     protocol = [f"viser-v{viser.__version__}"]
-    with connect(address, origin=origin, subprotocols=protocol, max_size=None) as socket:
-        until, closed = time.monotonic() + 3, False
-        while time.monotonic() < until and not closed:
-            try:
-                socket.recv(timeout=0.5)
-            except TimeoutError:
-                pass
-            except ConnectionClosed:
-                closed = True
-    assert closed is not let_in
+    return connect(
+        f"ws://127.0.0.1:{port}", origin=origin, subprotocols=protocol, max_size=None, additional_headers=headers
+    )
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"origin": "http://a.example"},
+        {"origin": "null"},
+        {"origin": "file://"},
+        {"origin": "http://[::1"},
+        {"origin": "http://127.0.0.1.a.example"},
+        {"origin": "http://127.0.0.1:9999"},
+        {"origin": "http://localhost"},
+        {"host": "a.example"},
+        {"host": "127.0.0.1:9999"},
+        {"cookie": None},
+        {"cookie": "wrong"},
+        {"cookie": "\u00e9" * 3},
+    ],
+)
+def test_others_are_turned_away_before_the_upgrade(page, options):
+    from websockets.exceptions import InvalidStatus
+
+    with pytest.raises(InvalidStatus) as refused:
+        opened(page, **options)
+    assert refused.value.response.status_code == 403
+    assert page.server.get_clients() == {}
+
+
+@pytest.mark.parametrize("origin", ["http://127.0.0.1:8123", "http://localhost:8123", None])
+def test_the_page_itself_is_let_in(page, origin):
+    with opened(page, origin=origin) as socket:
+        assert len(socket.recv(timeout=5)) > 0
+
+
+def test_two_hosts_are_none(page):
+    import socket as sockets
+
+    port = page.server.get_port()
+    with sockets.create_connection(("127.0.0.1", port), timeout=5) as raw:
+        raw.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nHost: a.example\r\n\r\n".encode())
+        assert b" 403 " in raw.recv(200)
+
+
+def test_the_files_of_the_page_ask_for_the_token(page):
+    from urllib.error import HTTPError
+    from urllib.request import Request, urlopen
+
+    port, token = page.server.get_port(), page.server.door.token
+    with pytest.raises(HTTPError, match="403"):
+        urlopen(f"http://127.0.0.1:{port}/")
+    with urlopen(page.address) as answer:
+        cookie = answer.headers["Set-Cookie"]
+    assert token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
+    with urlopen(Request(f"http://127.0.0.1:{port}/", headers={"Cookie": cookie.split(";")[0]})) as answer:
+        assert answer.status == 200 and answer.headers["Set-Cookie"] is None
+
+
+def test_only_so_many_pages_are_let_in(page):
+    from contextlib import ExitStack
+
+    from websockets.exceptions import InvalidStatus
+
+    from creeping.explorer.door import CLIENTS
+
+    with ExitStack() as open_pages:
+        for _ in range(CLIENTS):
+            open_pages.enter_context(opened(page)).recv(timeout=5)
+        with pytest.raises(InvalidStatus):
+            opened(page)
 
 
 def test_nothing_is_shared_with_the_world(page, monkeypatch):

@@ -1,0 +1,122 @@
+"""Who may come in: the check of a connection to the page before anything is sent, upgraded or carried out.
+
+A request is let in if
+
+    its only Host is this machine's, with the port of the page
+    its Origin, where a browser names one, is the page itself
+    it brings the token: in the address when the page is opened, in a cookie from there on
+
+so that neither the page of another site nor another user of this machine can drive the program. An upgrade that is
+refused never becomes a connection.
+"""
+
+import hmac
+import http
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.cookies import CookieError, SimpleCookie
+from threading import Lock
+from urllib.parse import parse_qs, urlsplit
+
+from websockets.asyncio import server as websocket_server
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from creeping._typing import Any
+
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+LARGEST = 1_000_000
+"""Bytes of a message from a page: a slider's are hundreds."""
+CLIENTS = 16
+"""Pages that may be open."""
+_PATCHING = Lock()
+
+
+class Door:
+    """The check of one page.
+
+    Parameters
+    ----------
+    clients : callable
+        Number of connections that are open.
+
+    Attributes
+    ----------
+    token : str
+        Random; to know it is to be let in.
+    """
+
+    def __init__(self, clients: Callable[[], int]) -> None:
+        self.token = secrets.token_urlsafe(24)
+        self._clients = clients
+
+    def refusal(self, request: Request, port: int) -> str:
+        """Why a request is not let in; nothing if it is."""
+        own = {f"{name}:{port}" for name in LOOPBACK}
+        hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
+        if len(hosts) != 1 or hosts[0].lower() not in own:
+            return "this page is for this machine, by its own name"
+        if len(origins) > 1 or any(origin.lower() not in {f"http://{name}" for name in own} for origin in origins):
+            return "this page does not serve other sites"
+        if not (self._brought(request, port) or self.opened_by(request)):
+            return "open the page by the address that creeping explore prints: it has a token"
+        if upgrades(request) and self._clients() >= CLIENTS:
+            return f"{CLIENTS} pages are open; close one"
+        return ""
+
+    def opened_by(self, request: Request) -> bool:
+        """Whether the token stands in the address of a request that is no upgrade."""
+        given = parse_qs(urlsplit(request.path).query).get("token", [])
+        return not upgrades(request) and len(given) == 1 and self._is_token(given[0])
+
+    def cookie(self, port: int) -> str:
+        """Header that has a browser bring the token from there on."""
+        return f"{_name(port)}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+
+    def _brought(self, request: Request, port: int) -> bool:
+        try:
+            jar = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
+        except CookieError:
+            return False
+        return _name(port) in jar and self._is_token(jar[_name(port)].value)
+
+    def _is_token(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(), self.token.encode())
+
+    @contextmanager
+    def installed(self) -> Iterator[None]:
+        """Stand before the server that is started inside: viser has no other place before the upgrade."""
+        serve = websocket_server.serve
+
+        def guarded(*arguments: Any, process_request: Any = None, max_size: Any = None, **options: Any) -> Any:
+            def checked(connection: Any, request: Request) -> Response | None:
+                port = int(connection.local_address[1])
+                reason = self.refusal(request, port)
+                if reason:
+                    body = reason.encode()
+                    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body))})
+                    return Response(http.HTTPStatus.FORBIDDEN.value, "Forbidden", headers, body)
+                found: Response | None = process_request(connection, request)
+                if found is not None and self.opened_by(request):
+                    found.headers["Set-Cookie"] = self.cookie(port)
+                return found
+
+            return serve(*arguments, process_request=checked, max_size=LARGEST, **options)
+
+        with _PATCHING:
+            websocket_server.serve = guarded  # type: ignore[assignment, misc]
+            try:
+                yield
+            finally:
+                websocket_server.serve = serve  # type: ignore[misc]
+
+
+def upgrades(request: Request) -> bool:
+    """Whether a request is to become a websocket."""
+    return any("websocket" in value.lower() for value in request.headers.get_all("Upgrade"))
+
+
+def _name(port: int) -> str:
+    """Of the cookie: cookies do not tell ports apart."""
+    return f"creeping-{port}"
