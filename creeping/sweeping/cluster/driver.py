@@ -122,8 +122,10 @@ def local_client(workers: int) -> Iterator[Any]:
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            # any free port: 8787 may be taken by a cluster of the user
-            dashboard_address=":0",
+            # any free port, of this machine alone: 8787 may be taken by a cluster of the user
+            dashboard_address="127.0.0.1:0",
+            # a scheduler carries out what it is sent: certificates of this run alone keep other users out
+            security=True,
             env=dict.fromkeys(THREADS, "1"),
             silence_logs=50,
         ) as cluster,

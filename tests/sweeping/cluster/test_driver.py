@@ -36,8 +36,10 @@ def test_one_and_two_workers_and_none_give_the_same_bytes(two, tmp_path):
     in_flight = []
     fill(plan, stores["two"], client=two, progress=lambda *_: in_flight.append(len(two.futures)))
     # and by the address, as of a scheduler elsewhere
-    with cluster.local_client(1) as client:
-        fill(plan, stores["one"], client=client.scheduler.address)
+    import distributed
+
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as elsewhere:
+        fill(plan, stores["one"], client=elsewhere.scheduler_address)
     first = fake.bytes_of(stores["none"].folder)
     assert len(first) > 14 * len(plan.request.variables)
     assert first == fake.bytes_of(stores["one"].folder) == fake.bytes_of(stores["two"].folder)
@@ -123,3 +125,23 @@ def test_no_scheduler_there(tmp_path, monkeypatch):
     store = SweepStore.create(tmp_path / "s.zarr", plan)
     with pytest.raises(CreepingError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         fill(plan, store, client="tcp://127.0.0.1:9")
+
+
+def test_the_cluster_is_for_this_user_of_this_machine(two):
+    import distributed
+    import psutil
+
+    # nothing listens to the world
+    mine = psutil.Process()
+    listening = [
+        connection.laddr.ip
+        for process in (mine, *mine.children(recursive=True))
+        for connection in process.net_connections(kind="inet")
+        if connection.status == psutil.CONN_LISTEN
+    ]
+    assert len(listening) >= 3 and set(listening) <= {"127.0.0.1", "::1"}
+    # and nobody without the certificates of this run gets anything carried out
+    address = two.scheduler.address
+    for tried in (address, address.replace("tls", "tcp")):
+        with pytest.raises((OSError, TypeError, AssertionError)):
+            distributed.Client(tried, timeout=3, set_as_default=False)
