@@ -1,5 +1,6 @@
 """The BODY of a command: a name with parameters, a file, or an expression. Part of the command line."""
 
+import inspect
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -96,18 +97,28 @@ def _named(name: str, rest: str, speed: str | None) -> Any:
     import scatterers
     from creeping.errors import InvalidInputError
 
+    make = getattr(scatterers, BODIES[name])
+    known = {key: p for key, p in inspect.signature(make).parameters.items() if key != "speed"}
     values: dict[str, Any] = {}
     for item in filter(None, rest.split(",")):
-        key, equals, number = item.partition("=")
+        key, equals, number = (part.strip() for part in item.partition("="))
         try:
-            values[key.strip()] = float(number)
+            value = float(number)
         except ValueError:
             equals = ""
         if not equals:
             raise InvalidInputError(f"body parameter {item!r} is not of the form name=number")
+        if key not in known:
+            raise InvalidInputError(f"{name} has no parameter {key!r}; it has {', '.join(known)}")
+        if key in values:
+            raise InvalidInputError(f"parameter {key!r} of {name} is given twice: {values[key]:g} and {value:g}")
+        values[key] = value
+    missing = [key for key, p in known.items() if p.default is p.empty and key not in values]
+    if missing:
+        raise InvalidInputError(f"{name} needs {', '.join(f'{key}=' for key in missing)}")
     if speed is not None:
         values["speed"] = speed
-    return getattr(scatterers, BODIES[name])(**values)
+    return make(**values)
 
 
 def _like_expression(text: str) -> bool:

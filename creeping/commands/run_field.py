@@ -177,7 +177,8 @@ def _boundary(text: str) -> BoundaryLike:
     try:
         return parse_boundary(text)
     except InvalidInputError as error:
-        raise InvalidInputError(f"--{error}") from error
+        named = str(error).startswith("boundary")
+        raise InvalidInputError(f"--{error}" if named else f"--boundary {text!r}: {error}") from error
 
 
 def parse_target(text: str, direction: FloatArray) -> Target:

@@ -84,7 +84,8 @@ def clear_maps() -> int:
 
     folders, files, choices = _stored(), _fits(), choice_files()
     left = [reason for folder in folders if (reason := remove_folder(folder))]
-    ours = [file for file in files if not file.is_symlink() and _fit_cache.load(file.parent, file.stem) is not None]
+    # by their names, for a damaged one is to go too
+    ours = [file for file in files if not file.is_symlink() and _fit_cache.NAME.fullmatch(file.name)]
     left += [f"{file} is no fitted body of ours" for file in files if file not in ours]
     # of processes that were ended while they wrote
     halves = [file for file in _fit_cache.cache_folder().glob(".writing-*") if file.is_file() and not file.is_symlink()]

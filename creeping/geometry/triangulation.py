@@ -18,6 +18,8 @@ from creeping.geometry.surface import step_onto
 
 MAX_POINTS = 12_000_000
 """Grid points of the finest triangulation."""
+LARGEST = 1e40
+"""Extent of a body, and inverse of the least one, beyond which powers of lengths leave the range of numbers."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,6 +117,12 @@ def quadrilaterals(
     box = np.asarray(bounds, dtype=float)
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
         raise SurfaceError(f"bounds {box.tolist()} are not two corners of a box; give [[xmin, ...], [xmax, ...]]")
+    extent = float(np.max(box[1] - box[0]))
+    if not 1 / LARGEST < extent < LARGEST:
+        raise SurfaceError(
+            f"the body's box is {extent:.3g} L wide; take a unit of length in which it is from {1 / LARGEST:g} "
+            f"to {LARGEST:g}"
+        )
     while True:
         axes = _grid_axes(box, cells)
         values = _grid_values(level, axes)

@@ -8,6 +8,7 @@ import hashlib
 import io
 import json
 import os
+import re
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ FloatArray = NDArray[np.float64]
 SCHEMA = 6
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
+NAME = re.compile(r"[a-z]+-[0-9a-f]{24}\.npz")
 ARRAYS = {"rough", "badness", "fine-coefficients", "fine-grid", "coarse-coefficients", "coarse-grid"}
 
 

@@ -120,3 +120,9 @@ def test_report_lists_every_check():
     report = cr.check_surface(Changed(gradient=lambda x: 2.01 * x))
     assert "BAD gradient against differences of F" in repr(report)
     assert len(repr(report).splitlines()) == 1 + len(report.checks)
+
+
+@pytest.mark.parametrize("radius", [1e-150, 1e150])
+def test_a_body_of_no_size_or_every_size_is_refused(radius):
+    with pytest.raises(cr.CreepingError, match="take a unit of length"):
+        cr.shadow_line(sc.Sphere(radius), (0, 0, 1))
