@@ -1,6 +1,7 @@
 """Results of fields at points: arrays to numpy, with statuses that say what is the matter and what to do."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +62,35 @@ def test_they_act_as_arrays(fields):
     # a copy where one is asked for, the same memory otherwise
     assert np.shares_memory(np.asarray(first), first.values)
     assert not np.shares_memory(np.array(first, copy=True), first.values)
+
+
+def test_arithmetic_in_place_gives_plain_arrays_and_leaves_the_result(fields):
+    for u in fields:
+        values, kept = u.values, u.values.copy()
+        v = u
+        v *= 2
+        v += 1
+        assert type(v) is np.ndarray
+        np.testing.assert_array_equal(v, 2 * values + 1)
+        plain = np.zeros(u.shape, dtype=complex)
+        plain += u
+        np.testing.assert_array_equal(plain, values)
+        with pytest.raises(TypeError, match=r"\.values"):
+            np.add(u, 1, out=u)
+        np.testing.assert_array_equal(u.values, kept)
+        np.testing.assert_array_equal(np.add(u, 1, out=plain), values + 1)
+
+
+def test_they_have_the_methods_of_arrays(fields):
+    u = fields[2]
+    finite = np.nan_to_num(u)
+    v = replace(u, values=finite)
+    for name in ("sum", "mean", "max", "min", "ravel", "flatten", "copy", "conj", "transpose", "squeeze", "std", "all"):
+        np.testing.assert_array_equal(getattr(v, name)(), getattr(finite, name)())
+    np.testing.assert_array_equal(v.T, finite.T)
+    np.testing.assert_array_equal(v.sum(axis=0), finite.sum(axis=0))
+    np.testing.assert_array_equal(v.astype(np.complex64), finite.astype(np.complex64))
+    assert v.tolist() == finite.tolist() and v.reshape(-1).shape == (v.size,)
 
 
 def test_arrays_of_a_result_have_its_shape_and_parts_add_up(fields):
