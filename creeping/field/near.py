@@ -23,7 +23,7 @@ from creeping.field.far_geometry import fan_strips
 from creeping.field.near_layer import layer_field
 from creeping.field.near_wave import shed_waves
 from creeping.field.on_body import rays_on, total_on
-from creeping.field.point_result import FieldStatus, NearField
+from creeping.field.point_result import FieldStatus, NearField, judged
 from creeping.field.ray_sums import own_error, ray_sum
 from creeping.field.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
@@ -109,12 +109,14 @@ def near_field(
         asked = ~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents"))
         if order == 2 and np.any(asked):
             field.by_currents(asked, boundary, method)
+    arrays = field.arrays()
+    arrays["status"] = judged(arrays["status"], arrays["values"], arrays["error"], arrays["error_by"], 1.0)
     return NearField(
         points=y.copy(),
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
-        **{name: value.reshape(y.shape[:-1]) for name, value in field.arrays().items()},
+        **{name: value.reshape(y.shape[:-1]) for name, value in arrays.items()},
     )
 
 

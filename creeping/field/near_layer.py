@@ -68,7 +68,7 @@ def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind
         there[at] = (body.level(top[at]) > 0) & far_enough(body, k, top[at])
     values, error = np.zeros(len(points), dtype=complex), np.zeros(len(points))
     at = np.flatnonzero(there)
-    surface = total_on(fan, foot[at], k, kind, 2)
+    surface = total_on(fan, foot[at], k, kind, 2, currents)
     good = surface["status"] == FieldStatus.OK
     at = at[good]
     there[:] = False

@@ -7,8 +7,9 @@ w_i of rays that come from afar. The error of lit ground, as a share of u1 and w
 
     [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2]^(1/2)
 
-and, where rays end or the body hides part of its line, 2 epsilon more: waves that come to lit ground from elsewhere on
-the body are left out, and what currents leave inside (`creeping.field.currents.whole_body`) tells how large they are.
+and, where rays end or the body hides part of its line, 2 epsilon more at points over whose tangent plane some of the
+body stands: waves that come to lit ground from elsewhere on the body are left out, and what currents leave inside
+(`creeping.field.currents.whole_body`) tells how large they are. Where that cannot be measured the error is a bound.
 
 Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on four bodies
 (`studies.near_coverage`).
@@ -16,7 +17,7 @@ Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on fo
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
@@ -25,15 +26,16 @@ from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.lit import lit_currents
 from creeping.field.currents.nodes import PENUMBRA, LitNodes, lit_part
 from creeping.field.currents.whole_body import POINTS as INNER
+from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
-from creeping.field.point_result import FieldStatus, SurfaceField
+from creeping.field.point_result import FieldStatus, SurfaceField, judged
 from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
 from creeping.field.shed_wave import fock_parameter, scales
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.evaluators import entries_of
-from creeping.geometry.quadrature import BodyNodes
-from creeping.geometry.surface import normal, size
+from creeping.geometry.quadrature import BodyNodes, body_nodes
+from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
 from creeping.rays.tracer import ray_points
@@ -45,8 +47,13 @@ ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
 """Factors A, B, C and D of the error on lit ground; an impedance leaves curvature that varies out of its second order.
 """
 
-LEFT = 2.0
-"""Factor of what currents leave inside: of waves that come to lit ground from elsewhere on the body."""
+LEFT, UNKNOWN = 2.0, 2.0
+"""Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
+reflected wave and its image."""
+FLUSH = 1e-9
+"""Height over a tangent plane, in body sizes, from which ground stands above it."""
+ROWS = 1000
+"""Points whose tangent planes are looked at together."""
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 
 
@@ -103,10 +110,13 @@ def surface_field(
     y = as_points(points)
     shape = y.shape[:-1]
     total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)
+    unit = k if kind.kind == "soft" else 1.0
+    values = total["lit"] + total["creeping"]
+    total["status"] = judged(total["status"], values, total["error"], total["error_by"], unit)
     arrays = {name: value.reshape(shape) for name, value in total.items()}
     return SurfaceField(
         points=y.copy(),
-        values=arrays["lit"] + arrays["creeping"],
+        values=values.reshape(shape),
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
@@ -128,13 +138,16 @@ def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, o
         FieldStatus.OK,
     )
     ok = status == FieldStatus.OK
-    bound = np.where(rays.alive, np.abs(waves), k if kind.kind == "soft" else 1.0)
+    unit = k if kind.kind == "soft" else 1.0
+    error = own_error(rays, (waves, other), k, kind, order, on=True)
+    error = np.where(ok, error, np.where(rays.alive, np.abs(waves), unit))
+    error_by = np.where(ok, "expansion", "bound")
     return SurfaceField(
         points=rays.points.copy(),
         values=waves,
-        error=np.where(ok, own_error(rays, (waves, other), k, kind, order, on=True), bound),
-        error_by=np.where(ok, "expansion", "bound"),
-        status=status.astype(np.int64),
+        error=error,
+        error_by=error_by,
+        status=judged(status, waves, error, error_by, unit),
         method=np.full(waves.shape, "rays"),
         lit=np.zeros(waves.shape, dtype=complex),
         creeping=waves,
@@ -161,13 +174,31 @@ def rays_on(
     )
 
 
-def total_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int) -> dict[str, Any]:
-    """Total field at points of the body (n, 3): lit, creeping, error, error_by, status and method, each (n,)."""
+def total_on(
+    fan: RayFan,
+    points: FloatArray,
+    k: float,
+    kind: Boundary,
+    order: int,
+    currents: SurfaceCurrents | None = None,
+) -> dict[str, Any]:
+    """Total field at points of the body (n, 3): lit, creeping, error, error_by, status and method, each (n,).
+
+    ``currents`` are those of the wavenumber and boundary, if they are at hand.
+    """
     lit, lit_error, share = _lit_at(fan, points, k, kind, order)
     rays = rays_on(fan, points, k, kind, order, 1 - share)
     unit = k if kind.kind == "soft" else 1.0
-    if order == 2 and np.any(share > 0):
-        lit_error = np.hypot(lit_error, share * unit * LEFT * _left_inside(fan, k, kind))
+    faced = np.zeros(len(points), dtype=bool)
+    if not _convex(fan):
+        at = np.flatnonzero(share > 0)
+        faced[at] = _faced(fan.body, points[at])
+    left = 0.0
+    if np.any(faced):
+        left = _left_inside(fan, k, kind) if currents is None else currents.extinction
+    unknown = faced & (not np.isfinite(left))
+    others = UNKNOWN if np.any(unknown) else LEFT * left
+    lit_error = np.hypot(lit_error, np.where(faced, share * unit * others, 0.0))
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
     error = np.where(bare, unit, error)
@@ -177,28 +208,41 @@ def total_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: i
     most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
     creeping, error = np.where(out, 0.0, creeping), np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
     status = np.where(share == 1, FieldStatus.OK, status)
-    ok = status == FieldStatus.OK
+    bound = unknown | (status != FieldStatus.OK)
     return {
         "lit": lit,
         "creeping": creeping,
-        "error": np.where(ok, np.hypot(error, lit_error), error),
-        "error_by": np.where(ok, "expansion", "bound"),
-        "status": status.astype(np.int64),
+        "error": np.hypot(error, lit_error),
+        "error_by": np.where(bound, "bound", "expansion"),
+        "status": np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
         "method": np.where(share == 1, "lit", np.where(share > 0, "lit+rays", "rays")),
     }
 
 
+def _convex(fan: RayFan) -> bool:
+    """Whether nothing on the rays or along the line says that the body may reflect onto itself."""
+    return fan.line.fractions["attached"] == 1.0 and bool(np.all(fan.status == RayStatus.OK))
+
+
+def _faced(body: Surface, points: FloatArray) -> BoolArray:
+    """Whether some of the body stands above the tangent plane at points of it (n, 3): straight rays come from there."""
+    try:
+        nodes = body_nodes(body, 4 / size(body)).points
+    except SurfaceError:
+        return np.ones(len(points), dtype=bool)
+    n = normal(body, points)
+    highest = [np.max(n[at : at + ROWS] @ nodes.T, axis=1) for at in range(0, len(n), ROWS)]
+    return np.asarray(np.concatenate([np.zeros(0), *highest]) - np.sum(n * points, axis=1) > FLUSH * size(body))
+
+
 def _left_inside(fan: RayFan, k: float, kind: Boundary) -> float:
-    """What currents leave of the wave inside a body that may reflect onto itself; 0 of one that looks convex."""
-    if fan.line.fractions["attached"] == 1.0 and np.all(fan.status == RayStatus.OK):
-        return 0.0
+    """What currents leave of the wave inside the body; NaN if they cost too much or it is not to be measured."""
     boundary: BoundaryLike = ImpedanceBoundary(kind.admittance) if kind.kind == "impedance" else SCALAR[kind.kind]
     try:
         # as many points as it is measured at
-        left = kept_currents(fan, k, boundary).extinction if affordable(fan, INNER, k) else 0.0
+        return kept_currents(fan, k, boundary).extinction if affordable(fan, INNER, k) else np.nan
     except SurfaceError:
-        return 0.0
-    return float(left) if np.isfinite(left) else 0.0
+        return np.nan
 
 
 def _lit_at(

@@ -34,6 +34,8 @@ class FieldStatus(IntEnum):
     """A ray that comes here has ended before, over concave or rough ground, and may have mattered."""
     TRUNCATED = 5
     """The fan ends before its rays could come here."""
+    UNRESOLVED = 6
+    """The error, or a bound in its place, is above 0.3 of the value and above 0.1 of the incident wave."""
 
     @property
     def remedy(self) -> str:
@@ -49,7 +51,19 @@ _REMEDIES = {
     FieldStatus.NO_RAY: f"{_AWAY}; what no ray brings their error holds",
     FieldStatus.DETACHED: f"{_AWAY}; what rays that have ended bring no more their error holds",
     FieldStatus.TRUNCATED: "launch longer rays: length= of launch",
+    FieldStatus.UNRESOLVED: "none at this wavenumber but another method=: the value is hardly known beyond its error",
 }
+WORTH, LEAST_WORTH = 0.3, 0.1
+"""Error from which a value is unresolved: both this share of it, and this one of the incident wave."""
+
+
+def judged(
+    status: IntArray, values: ComplexArray, error: FloatArray, error_by: np.ndarray[Any, Any], unit: float
+) -> IntArray:
+    """Status (...) with UNRESOLVED in place of OK; ``unit`` is the incident wave's amplitude, k (1/L) for du/dn."""
+    with np.errstate(invalid="ignore"):
+        enough = (error <= np.maximum(WORTH * np.abs(values), LEAST_WORTH * unit)) & (error_by != "bound")
+    return np.where((status == FieldStatus.OK) & ~enough, FieldStatus.UNRESOLVED, status).astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,9 +78,8 @@ class PointField(ArrayResult, Shown):
         Of the values, in their unit, meant to hold at 95 of 100 points whose status is OK; at others a bound, infinite
         where the values are.
     error_by : (...) of str
-        What gave its level: "extinction", measured inside the body; "expansion", what the next
-        terms of the expansions are worth; "bound", no
-        more than what is missing may be.
+        What gave its level: "extinction", measured inside the body; "expansion", what the next terms of the expansions
+        are worth; "bound", no more than what is missing may be.
     status : (...) of int
         Codes of `FieldStatus`.
     method : (...) of str

@@ -86,3 +86,35 @@ def test_first_order_states_a_larger_error(fan):
         cr.surface_field(fan, at([30.0, 80.0, 120.0]), wavenumber=20.0, boundary="hard", order=o) for o in (1, 2)
     )
     assert np.all(first.error > 2 * second.error)
+
+
+@pytest.fixture(scope="module")
+def torus():
+    body = sc.Torus(1.0, 0.5)
+    return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1.0, 0.1, 0.3)), length=3.0, n_rays=64)
+
+
+def test_what_comes_from_elsewhere_is_bounded_where_it_cannot_be_measured(torus):
+    """2026-11: at wavenumbers at which currents cost too much it counted as nothing, and the status was OK."""
+    angle = 2.5
+    facing = [1 + 0.5 * np.cos(angle), 0.0, -0.5 * np.sin(angle)]
+    x = [(-1.5, 0.0, 0.0), facing]
+    low, high = (cr.surface_field(torus, x, wavenumber=k, boundary="hard") for k in (40.0, 420.0))
+    assert low.method.tolist() == high.method.tolist() == ["lit", "lit"]
+    # the second point sees the other side of the hole
+    assert high.status.tolist() == [FieldStatus.OK, FieldStatus.UNRESOLVED]
+    assert high.error_by.tolist() == ["expansion", "bound"] and high.error[1] >= 2
+    # nothing stands above the tangent plane at the first
+    assert low.error_by[1] == "expansion" and low.error[1] > 5 * low.error[0]
+
+
+def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
+    import creeping.field.on_body as module
+
+    class Unknown:
+        extinction = float("nan")
+
+    monkeypatch.setattr(module, "kept_currents", lambda *_: Unknown())
+    x = [(1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
+    u = cr.surface_field(torus, x, wavenumber=30.0, boundary="soft")
+    assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound" and u.error[0] >= 2 * 30.0

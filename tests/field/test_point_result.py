@@ -8,7 +8,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.point_result import FieldStatus
+from creeping.field.point_result import FieldStatus, judged
 
 K = 20.0
 AT = np.array([(0.3, 0.1, 1.6), (0.0, 0.0, 1.5), (0.0, 0.2, -1.05), (0.0, 0.5, -2.0), (1.4, 0.0, 1.0)])
@@ -119,3 +119,33 @@ def test_every_status_has_a_remedy():
     assert [int(status) for status in FieldStatus] == list(range(len(FieldStatus)))
     assert all(len(status.remedy) > 5 for status in FieldStatus)
     assert "length" in FieldStatus.TRUNCATED.remedy
+
+
+def test_values_of_the_size_of_their_error_are_not_ok():
+    values = np.array([5.0, 5.0, 0.01, 0.01, 1.0, 1.0, 1.0])
+    error = np.array([1.4, 1.6, 0.09, 0.11, np.nan, 0.01, 5.0])
+    by = np.array(["expansion"] * 5 + ["bound", "bound"])
+    status = np.array([FieldStatus.OK] * 6 + [FieldStatus.CAUSTIC])
+    ok, off = FieldStatus.OK, FieldStatus.UNRESOLVED
+    found = judged(status, values, error, by, 1.0)
+    assert found.tolist() == [ok, off, ok, off, off, off, FieldStatus.CAUSTIC]
+    # du/dn is measured by k
+    assert judged(status[:1], 0.1 * values[:1], error[:1], by[:1], 30.0).tolist() == [ok]
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
+def test_the_axis_of_a_torus_is_unresolved(boundary):
+    """2026-11: |u| = 5.03 with an error of 4.03 was OK."""
+    body = sc.Torus(1.0, 0.5)
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=3.0, n_rays=64)
+    u = cr.near_field(fan, [(0.0, 0.0, z) for z in (0.5, 1.5, 3.0)], wavenumber=30.0, boundary=boundary)
+    assert u.status_counts == {"UNRESOLVED": 3} and np.all(np.isfinite(u)) and np.all(u.error > 0.3 * np.abs(u))
+
+
+def test_an_error_that_is_not_known_is_not_ok(fan, monkeypatch):
+    import creeping.field.near as module
+
+    taken = module.total_at
+    monkeypatch.setattr(module, "total_at", lambda *given: (*taken(*given)[:2], np.full(len(given[1]), np.nan)))
+    u = cr.near_field(fan, [(0.0, 0.0, -2.0)], wavenumber=K, boundary="hard", method="currents")
+    assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound"
