@@ -5,19 +5,22 @@
 with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
 w_i of rays that come from afar. The error of lit ground, as a share of u1 and with u2 of second order, is
 
-    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2]^(1/2)
+    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
+    E = F max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
 
-and, where rays end or the body hides part of its line, 2 epsilon more at points over whose tangent plane some of the
-body stands: waves that come to lit ground from elsewhere on the body are left out, and what currents leave inside
-(`creeping.field.currents.whole_body`) tells how large they are. Where that cannot be measured the error is a bound.
+E is for ground that is flat by the measure of the body's size a: the second order kappa_a/(2kc^3) of optics knows
+nothing there of the curvature at its end, which on a closed body is 1/a in the mean. Where rays end or the body hides
+part of its line, 2 epsilon more: waves that come to lit ground from elsewhere on the body are left out, and what
+currents leave inside (`creeping.field.currents.whole_body`) tells how large they are; where that cannot be measured the
+error is a bound.
 
-Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on four bodies
-(`studies.near_coverage`).
+Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on four bodies (`studies.near_coverage`), F
+on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
@@ -34,8 +37,8 @@ from creeping.field.shed_wave import fock_parameter, scales
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.evaluators import entries_of
-from creeping.geometry.quadrature import BodyNodes, body_nodes
-from creeping.geometry.surface import Surface, normal, size
+from creeping.geometry.quadrature import BodyNodes
+from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
 from creeping.rays.tracer import ray_points
@@ -47,13 +50,11 @@ ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
 """Factors A, B, C and D of the error on lit ground; an impedance leaves curvature that varies out of its second order.
 """
 
+FLAT, ENDS = 2.0, 0.7
+"""1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
 LEFT, UNKNOWN = 2.0, 2.0
 """Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
 reflected wave and its image."""
-FLUSH = 1e-9
-"""Height over a tangent plane, in body sizes, from which ground stands above it."""
-ROWS = 1000
-"""Points whose tangent planes are looked at together."""
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 
 
@@ -189,16 +190,11 @@ def total_on(
     lit, lit_error, share = _lit_at(fan, points, k, kind, order)
     rays = rays_on(fan, points, k, kind, order, 1 - share)
     unit = k if kind.kind == "soft" else 1.0
-    faced = np.zeros(len(points), dtype=bool)
-    if not _convex(fan):
-        at = np.flatnonzero(share > 0)
-        faced[at] = _faced(fan.body, points[at])
     left = 0.0
-    if np.any(faced):
+    if np.any(share > 0) and not _convex(fan):
         left = _left_inside(fan, k, kind) if currents is None else currents.extinction
-    unknown = faced & (not np.isfinite(left))
-    others = UNKNOWN if np.any(unknown) else LEFT * left
-    lit_error = np.hypot(lit_error, np.where(faced, share * unit * others, 0.0))
+    unknown = (share > 0) & (not np.isfinite(left))
+    lit_error = np.hypot(lit_error, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
     error = np.where(bare, unit, error)
@@ -224,17 +220,6 @@ def _convex(fan: RayFan) -> bool:
     return fan.line.fractions["attached"] == 1.0 and bool(np.all(fan.status == RayStatus.OK))
 
 
-def _faced(body: Surface, points: FloatArray) -> BoolArray:
-    """Whether some of the body stands above the tangent plane at points of it (n, 3): straight rays come from there."""
-    try:
-        nodes = body_nodes(body, 4 / size(body)).points
-    except SurfaceError:
-        return np.ones(len(points), dtype=bool)
-    n = normal(body, points)
-    highest = [np.max(n[at : at + ROWS] @ nodes.T, axis=1) for at in range(0, len(n), ROWS)]
-    return np.asarray(np.concatenate([np.zeros(0), *highest]) - np.sum(n * points, axis=1) > FLUSH * size(body))
-
-
 def _left_inside(fan: RayFan, k: float, kind: Boundary) -> float:
     """What currents leave of the wave inside the body; NaN if they cost too much or it is not to be measured."""
     boundary: BoundaryLike = ImpedanceBoundary(kind.admittance) if kind.kind == "impedance" else SCALAR[kind.kind]
@@ -258,14 +243,14 @@ def _lit_at(
     values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))
     share[at] = part.weights
     values[at] = part.weights * u * np.exp(1j * k * (part.points @ d))
-    error[at] = part.weights * _lit_error(part, u, other, k, kind, order)
+    error[at] = part.weights * _lit_error(part, u, other, k, kind, order, size(body))
     return values, error, share
 
 
 def _lit_error(
-    part: LitNodes, u: ComplexArray, other: ComplexArray, k: float, kind: Boundary, order: int
+    part: LitNodes, u: ComplexArray, other: ComplexArray, k: float, kind: Boundary, order: int, extent: float
 ) -> FloatArray:
-    """Error of the lit side's expansion (n,)."""
+    """Error of the lit side's expansion (n,) on a body of size ``extent``, L."""
     size, change = np.abs(u), np.abs(u - other)
     m = fock_scale(k, part.along)
     # grazing a flat or concave place m is infinite, and optics alone stands there
@@ -276,6 +261,14 @@ def _lit_error(
         LEAST[kind.kind] / m**4,
         VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
         ACROSS[kind.kind] * across**2,
+        _flat_error(part, k, extent),
     )
     share = np.linalg.norm(terms, axis=0)
     return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
+
+
+def _flat_error(part: LitNodes, k: float, extent: float) -> FloatArray:
+    """E (n,): what the curvature at the end of flat ground is worth on it."""
+    flatness = np.maximum(0.0, 1 - FLAT * np.maximum(part.along, 0.0) * extent)
+    least = np.cbrt(2 / (k * extent))
+    return np.asarray(ENDS * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))
