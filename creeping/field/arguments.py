@@ -3,6 +3,14 @@
 import numpy as np
 
 from creeping.errors import InvalidInputError
+from creeping.geometry.speed import speed_of
+from creeping.geometry.surface import Surface
+
+
+def checked_plain(body: Surface) -> None:
+    """Refuse a weighted body."""
+    if speed_of(body) is not None:
+        raise InvalidInputError(f"{body!r} has a speed; the diffracted field is that of a plain body")
 
 
 def checked(wavenumber: float, order: int) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough, total_at
@@ -92,6 +92,7 @@ def near_field(
     >>> u.shape, round(float(abs(u[0])), 2), u.method.tolist()
     ((2,), 0.04, ['rays', 'currents'])
     """
+    checked_plain(fan.body)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     if method not in METHODS:

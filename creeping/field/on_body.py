@@ -22,7 +22,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import SurfaceError
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.kept import affordable, kept_currents
@@ -104,6 +104,7 @@ def surface_field(
     >>> np.abs(u).round(1).tolist(), u.method.tolist(), bool(u.error.max() < 0.05)
     ([2.0, 0.5], ['lit', 'rays'], True)
     """
+    checked_plain(fan.body)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     if points is None:
