@@ -20,36 +20,37 @@ on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.lit import lit_currents
-from creeping.field.currents.nodes import PENUMBRA, LitNodes, lit_part
+from creeping.field.currents.nodes import TAKEN_OVER, LitNodes, lit_part, nodes_at
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
 from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
+from creeping.field.served import Served
 from creeping.field.shed_wave import fock_parameter, scales
 from creeping.field.surface import scalar_boundary, surface_waves
+from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
-from creeping.geometry.evaluators import entries_of
-from creeping.geometry.quadrature import BodyNodes
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
 from creeping.rays.tracer import ray_points
 
 SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
+"""Factor A of the error on lit ground, by boundary."""
 LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
+"""B."""
 VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
+"""C; an impedance leaves curvature that varies out of its second order."""
 ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
-"""Factors A, B, C and D of the error on lit ground; an impedance leaves curvature that varies out of its second order.
-"""
-
+"""D."""
 FLAT, ENDS = 2.0, 0.7
 """1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
 LEFT, UNKNOWN = 2.0, 2.0
@@ -112,17 +113,20 @@ def surface_field(
     y = as_points(points)
     shape = y.shape[:-1]
     total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)
-    unit = k if kind.kind == "soft" else 1.0
-    values = total["lit"] + total["creeping"]
-    total["status"] = judged(total["status"], values, total["error"], total["error_by"], unit)
-    arrays = {name: value.reshape(shape) for name, value in total.items()}
+    status = judged(total.status, total.values, total.error, total.error_by, k if kind.kind == "soft" else 1.0)
     return SurfaceField(
         points=y.copy(),
-        values=values.reshape(shape),
+        values=total.values.reshape(shape),
+        error=total.error.reshape(shape),
+        error_by=total.error_by.reshape(shape),
+        status=status.reshape(shape),
+        method=total.method.reshape(shape),
+        lit=total.wave.reshape(shape),
+        creeping=total.creeping.reshape(shape),
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
-        **arrays,
+        validity=validity(fan, wavenumber=k),
     )
 
 
@@ -133,7 +137,7 @@ def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, o
     m = scales(rays, k)[1]
     with np.errstate(invalid="ignore"):
         caustic = tube_share(rays, np.zeros(waves.shape)) * m < NARROW_ALONE
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    launched = fan.launched
     status = np.select(
         [np.broadcast_to(~launched[:, None], waves.shape), ~rays.alive, caustic],
         [FieldStatus.NO_RAY, FieldStatus.DETACHED, FieldStatus.CAUSTIC],
@@ -156,6 +160,7 @@ def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, o
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
+        validity=validity(fan, wavenumber=k),
     )
 
 
@@ -166,8 +171,7 @@ def rays_on(
     found = shed_on(fan_strips(fan), fan.body, points)
     waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
     if share is not None:
-        # twice the end, for m at the launch point is not m here
-        young = fock_parameter(found.rays, k) < 2 * PENUMBRA[1]
+        young = fock_parameter(found.rays, k) < TAKEN_OVER
         weight = np.where(young, share[found.observer], 1.0)
         # a wave may be infinite
         waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
@@ -183,8 +187,8 @@ def total_on(
     kind: Boundary,
     order: int,
     currents: SurfaceCurrents | None = None,
-) -> dict[str, Any]:
-    """Total field at points of the body (n, 3): lit, creeping, error, error_by, status and method, each (n,).
+) -> Served:
+    """Total field at points of the body (n, 3).
 
     ``currents`` are those of the wavenumber and boundary, if they are at hand.
     """
@@ -205,15 +209,14 @@ def total_on(
     most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
     creeping, error = np.where(out, 0.0, creeping), np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
     status = np.where(share == 1, FieldStatus.OK, status)
-    bound = unknown | (status != FieldStatus.OK)
-    return {
-        "lit": lit,
-        "creeping": creeping,
-        "error": np.hypot(error, lit_error),
-        "error_by": np.where(bound, "bound", "expansion"),
-        "status": np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
-        "method": np.where(share == 1, "lit", np.where(share > 0, "lit+rays", "rays")),
-    }
+    return Served(
+        wave=lit,
+        creeping=creeping,
+        error=np.hypot(error, lit_error),
+        error_by=np.where(unknown | (status != FieldStatus.OK), "bound", "expansion"),
+        status=np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
+        method=np.where(share == 1, "lit", np.where(share > 0, "lit+rays", "rays")),
+    )
 
 
 def _convex(fan: RayFan) -> bool:
@@ -236,9 +239,7 @@ def _lit_at(
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """The lit side's part of the field at points of the body (n, 3), its error, and its share: (n,) each."""
     body, d = fan.body, fan.line.direction
-    hessian = body.hessian(points) / np.linalg.norm(body.gradient(points), axis=-1)[:, None, None]
-    nodes = BodyNodes(points, normal(body, points), np.ones(len(points)), entries_of(hessian).T, 0.0)
-    at, part = lit_part(body, fan.line, nodes, k)
+    at, part = lit_part(body, fan.line, nodes_at(body, points, normal(body, points)), k)
     geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
     u, other = (lit_currents(*geometry, k, kind, o) for o in (order, 3 - order))
     values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))

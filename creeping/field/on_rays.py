@@ -16,7 +16,7 @@ from creeping.field.boundary import BoundaryLike
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 
 
 def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> FloatArray:
@@ -55,5 +55,5 @@ def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "s
 
 def creeps(fan: RayFan) -> BoolArray:
     """Whether each ray is a creeping ray at its steps: launched by the wave and not detached before (rays, steps)."""
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    launched = fan.launched
     return np.asarray(launched[:, None] & (fan.travel_time < fan.detachment[:, None]) & (fan.curvature > 0))

@@ -3,7 +3,7 @@
 Results act as arrays of their values (`creeping.field.array_result`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from creeping._presenting import Shown
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.array_result import ArrayResult
+from creeping.field.validity_range import Validity
 
 
 class FieldStatus(IntEnum):
@@ -79,7 +80,7 @@ class PointField(ArrayResult, Shown):
         where the values are.
     error_by : (...) of str
         What gave its level: "extinction", measured inside the body; "expansion", what the next terms of the expansions
-        are worth; "bound", no more than what is missing may be.
+        are worth; both, joined by "+", in the layer; "bound", no more than what is missing may be.
     status : (...) of int
         Codes of `FieldStatus`.
     method : (...) of str
@@ -87,6 +88,8 @@ class PointField(ArrayResult, Shown):
     wavenumber : float, 1/L
     boundary : str
     order : int
+    validity : Validity
+        Least k rho and largest kappa_t rho/m^2 on the fan's rays.
     """
 
     points: FloatArray
@@ -98,6 +101,7 @@ class PointField(ArrayResult, Shown):
     wavenumber: float
     boundary: str
     order: int
+    validity: Validity | None = field(default=None, kw_only=True)
 
     @property
     def ok(self) -> BoolArray:
@@ -135,7 +139,7 @@ class NearField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
         As of every field at points; ``method`` is "currents", "layer" between them and the
         body, or "rays"; on the body "lit", "rays", "lit+rays", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
@@ -166,7 +170,7 @@ class SurfaceField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
         As of every field at points; ``method`` is "lit", "rays" or, in the penumbra, "lit+rays".
     lit, creeping : (...) complex
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.

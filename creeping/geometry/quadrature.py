@@ -82,7 +82,7 @@ class BodyNodes:
         return np.asarray(np.sum(self.hessians[:, :3], axis=1) - self.curvature(self.normals))
 
     def distance(self, points: FloatArray) -> FloatArray:
-        """Distance of points (m, 3) from the body as nodes tell it, L: from the nearest one, less what they are apart."""
+        """Distance of points (m, 3) from the body as nodes tell it, L: the nearest less their spacing."""
         # half the distance between neighbouring nodes, of those that are furthest apart
         apart = 0.5 * float(np.sqrt(np.max(self.weights)))
         return np.asarray(np.sqrt(np.maximum(self._tree.query(points)[0] ** 2 - apart**2, 0.0)))

@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from creeping._presenting import DrawnOnBody, brief
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
@@ -155,17 +155,21 @@ class RayFan(DrawnOnBody):
         return {s.name: int(np.sum(self.status == s)) for s in RayStatus if np.any(self.status == s)}
 
     @property
+    def launched(self) -> BoolArray:
+        """Whether the wave launched each ray, wherever it ended (rays,)."""
+        return np.isin(self.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+
+    @property
     def least_radius(self) -> float:
         """Least 1/kappa_n, L, where the rays matter most; NaN without rays, or for a weighted body, which has no field.
 
         That is up to xi = 1 at the wavenumber where k rho is 10 at the median of the launch points.
         """
-        creeping = np.isin(self.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
-        if speed_of(self.body) is not None or not np.any(creeping):
+        if speed_of(self.body) is not None or not np.any(self.launched):
             return float("nan")
-        curvature = self.curvature[creeping]
+        curvature = self.curvature[self.launched]
         k = IN_RANGE * float(np.median(curvature[:, 0]))
-        largest = float(np.max(curvature, initial=0.0, where=np.cbrt(k / 2) * self.attenuation[creeping] < 1))
+        largest = float(np.max(curvature, initial=0.0, where=np.cbrt(k / 2) * self.attenuation[self.launched] < 1))
         return 1 / largest if largest > 0 else float("nan")
 
     def __repr__(self) -> str:
@@ -210,7 +214,7 @@ def launch(
     n_rays : int, optional
         Rays, shared among the arcs by length; one per point of the line if not given.
     n_steps : int, optional
-        Equal steps of travel time; at least 64 and enough to count caustics if not given.
+        Equal steps of travel time; 64 or more, enough to count caustics, if not given.
     launch_from : {"attached", "all"}
         "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
@@ -340,12 +344,8 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
         out[there] = values
         return out
 
-    return RayArrays(
-        placed(J, np.nan),
-        placed(rate, np.nan),
-        placed(status, NO_RAY),
-        placed(np.minimum(detachment, non_smooth), np.nan),
-    )
+    first = np.minimum(detachment, non_smooth)
+    return RayArrays(placed(J, np.nan), placed(rate, np.nan), placed(status, NO_RAY), placed(first, np.nan))
 
 
 def fan_of(flow: Flow, line: ShadowLine, launch: LaunchPoints, states: FloatArray, times: FloatArray) -> RayFan:

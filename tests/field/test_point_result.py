@@ -10,6 +10,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.field.point_result import FieldStatus, judged
+from creeping.field.served import measured_field
 
 K = 20.0
 AT = np.array([(0.3, 0.1, 1.6), (0.0, 0.0, 1.5), (0.0, 0.2, -1.05), (0.0, 0.5, -2.0), (1.4, 0.0, 1.0)])
@@ -162,3 +163,21 @@ def test_weighted_bodies_are_refused_with_or_without_points():
     for points in (np.zeros((0, 3)), [(1.5, 0.0, 0.0)], None):
         with pytest.raises(InvalidInputError, match="has a speed"):
             cr.surface_field(fan, points, wavenumber=K)
+
+
+def test_fields_at_points_have_the_validity_of_their_fan(fan, fields):
+    assert {u.validity for u in fields} == {cr.validity(fan, wavenumber=K)}
+
+
+def test_what_serves_gives_way_to_what_is_ok_and_errs_less():
+    mine = measured_field(np.zeros(4, dtype=complex), np.array([0.1, 0.3, 0.3, 0.1]), "rays", "expansion")
+    mine = replace(mine, status=np.array([0, 0, 4, 4]))
+    other = measured_field(np.ones(4, dtype=complex), np.array([0.2, 0.2, 0.5, np.nan]), "currents", "extinction+x")
+    at = np.arange(4)
+    found = mine.put_better(at, other, must=False)
+    assert found.method.tolist() == ["rays", "currents", "currents", "rays"]
+    assert found.error_by.tolist() == ["expansion", "extinction+x", "extinction+x", "expansion"]
+    assert found.status.tolist() == [0, 0, 0, 4] and found.values.tolist() == [0, 1, 1, 0]
+    must = mine.put_better(at[2:], other[2:], must=True)
+    assert must.method.tolist() == ["rays", "rays", "currents", "currents"]
+    assert must.status[3] == FieldStatus.UNRESOLVED and must.error[3] == 1.0
