@@ -36,7 +36,7 @@ class FieldStatus(IntEnum):
     TRUNCATED = 5
     """The fan ends before its rays could come here."""
     UNRESOLVED = 6
-    """The error, or a bound in its place, is above 0.3 of the value and above 0.1 of the incident wave."""
+    """The error, or a bound in its place, is above half the value and above 0.1 of the incident wave."""
 
     @property
     def remedy(self) -> str:
@@ -54,7 +54,7 @@ _REMEDIES = {
     FieldStatus.TRUNCATED: "launch longer rays: length= of launch",
     FieldStatus.UNRESOLVED: "none at this wavenumber but another method=: the value is hardly known beyond its error",
 }
-WORTH, LEAST_WORTH = 0.3, 0.1
+WORTH, LEAST_WORTH = 0.5, 0.1
 """Error from which a value is unresolved: both this share of it, and this one of the incident wave."""
 
 

@@ -125,7 +125,7 @@ def test_every_status_has_a_remedy():
 
 def test_values_of_the_size_of_their_error_are_not_ok():
     values = np.array([5.0, 5.0, 0.01, 0.01, 1.0, 1.0, 1.0])
-    error = np.array([1.4, 1.6, 0.09, 0.11, np.nan, 0.01, 5.0])
+    error = np.array([2.4, 2.6, 0.09, 0.11, np.nan, 0.01, 5.0])
     by = np.array(["expansion"] * 5 + ["bound", "bound"])
     status = np.array([FieldStatus.OK] * 6 + [FieldStatus.CAUSTIC])
     ok, off = FieldStatus.OK, FieldStatus.UNRESOLVED
@@ -141,7 +141,7 @@ def test_the_axis_of_a_torus_is_unresolved(boundary):
     body = sc.Torus(1.0, 0.5)
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=3.0, n_rays=64)
     u = cr.near_field(fan, [(0.0, 0.0, z) for z in (0.5, 1.5, 3.0)], wavenumber=30.0, boundary=boundary)
-    assert u.status_counts == {"UNRESOLVED": 3} and np.all(np.isfinite(u)) and np.all(u.error > 0.3 * np.abs(u))
+    assert u.status_counts == {"UNRESOLVED": 3} and np.all(np.isfinite(u)) and np.all(u.error > 0.5 * np.abs(u))
 
 
 def test_an_error_that_is_not_known_is_not_ok(fan, monkeypatch):
