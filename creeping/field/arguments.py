@@ -5,6 +5,8 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.directions import unit_directions
+from creeping.geometry.speed import speed_of
+from creeping.geometry.surface import Surface
 
 METHODS = ("auto", "currents", "rays")
 UNRESOLVED = 0.1
@@ -29,6 +31,12 @@ def observers_of(observation: ArrayLike) -> FloatArray:
     if nothing:
         return np.zeros((0, 3))
     return unit_directions(observation, "observation directions").reshape(-1, 3)
+
+
+def checked_plain(body: Surface) -> None:
+    """Refuse a weighted body."""
+    if speed_of(body) is not None:
+        raise InvalidInputError(f"{body!r} has a speed; the diffracted field is that of a plain body")
 
 
 def checked(wavenumber: float, order: int) -> float:

@@ -1,14 +1,30 @@
 """Results that are arrays of complex values with more to say: numpy takes them for their values.
 
-Arithmetic, ufuncs and numpy's functions give plain arrays; so does indexing.
+Arithmetic, ufuncs and numpy's functions give plain arrays; so do indexing, the methods that arrays have, and arithmetic
+in place, after which the name stands for the array. Nothing writes into a result.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from creeping._typing import Any, ComplexArray, FloatArray
+
+
+def _of_values(name: str) -> Callable[..., Any]:
+    """Method of that name of the values."""
+
+    def method(self: "ArrayResult", *args: Any, **options: Any) -> Any:
+        return getattr(self.values, name)(*args, **options)
+
+    method.__name__, method.__doc__ = name, f"As `numpy.ndarray.{name}` of the values."
+    return method
+
+
+def _not_in_place(self: "ArrayResult", other: Any) -> Any:
+    """Leave it to the operator that makes a new array."""
+    return NotImplemented
 
 
 class ArrayResult(NDArrayOperatorsMixin):
@@ -26,6 +42,8 @@ class ArrayResult(NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         """Apply a ufunc to the values."""
+        if any(isinstance(one, ArrayResult) for one in options.get("out", ())):
+            raise TypeError(f"out= of {ufunc.__name__} would leave the error of a result behind; give its .values")
         plain = [one.values if isinstance(one, ArrayResult) else one for one in inputs]
         return getattr(ufunc, method)(*plain, **options)
 
@@ -79,22 +97,17 @@ class ArrayResult(NDArrayOperatorsMixin):
         """Imaginary parts."""
         return self.values.imag
 
-    def conj(self) -> ComplexArray:
-        """Complex conjugates."""
-        return self.values.conj()
+    @property
+    def T(self) -> ComplexArray:  # noqa: N802
+        """Values, transposed."""
+        return self.values.T
 
-    def copy(self) -> ComplexArray:
-        """Values, copied."""
-        return self.values.copy()
+    all, any, argmax, argmin, argsort, astype = map(_of_values, ("all", "any", "argmax", "argmin", "argsort", "astype"))
+    conj, conjugate, copy, cumsum, diagonal = map(_of_values, ("conj", "conjugate", "copy", "cumsum", "diagonal"))
+    dot, flatten, item, max, mean, min = map(_of_values, ("dot", "flatten", "item", "max", "mean", "min"))
+    nonzero, prod, ravel, repeat, reshape = map(_of_values, ("nonzero", "prod", "ravel", "repeat", "reshape"))
+    round, squeeze, std, sum, swapaxes = map(_of_values, ("round", "squeeze", "std", "sum", "swapaxes"))
+    take, tolist, transpose, var = map(_of_values, ("take", "tolist", "transpose", "var"))
 
-    def ravel(self) -> ComplexArray:
-        """Values in one axis."""
-        return self.values.ravel()
-
-    def reshape(self, *shape: Any) -> ComplexArray:
-        """Values in another shape."""
-        return self.values.reshape(*shape)
-
-    def tolist(self) -> Any:
-        """Values as lists."""
-        return self.values.tolist()
+    __iadd__ = __isub__ = __imul__ = __itruediv__ = __ipow__ = __imatmul__ = _not_in_place
+    __ifloordiv__ = __imod__ = __iand__ = __ior__ = __ixor__ = __ilshift__ = __irshift__ = _not_in_place

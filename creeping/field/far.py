@@ -13,7 +13,7 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import SurfaceError
-from creeping.field.arguments import UNRESOLVED, checked, checked_method, observers_of
+from creeping.field.arguments import UNRESOLVED, checked, checked_method, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
@@ -72,6 +72,7 @@ def far_field(
     >>> round(float(abs(ff.total[0])), 3), bool(ff.error[0] < 2e-3), ff.method.tolist()     # about radius/2
     (0.504, True, ['currents'])
     """
+    checked_plain(fan.body)
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, order)
     checked_method(method, order)

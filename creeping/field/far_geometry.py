@@ -19,7 +19,7 @@ from creeping.geodesics.states import WITH_JACOBI
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import normal, project, size
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 from creeping.rays.observer_contour import HorizonRays, MidHorizon, forward_nodes
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
@@ -92,7 +92,7 @@ def launched_by(fan: RayFan) -> LaunchPoints:
 
     Each run of neighbours among them is an arc of its own, closed if it is a whole closed arc of the fan.
     """
-    creeping = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    creeping = fan.launched
     mine = np.flatnonzero(creeping)
     starts = fan.arc_index[mine[1:]] != fan.arc_index[mine[:-1]]
     arc = np.cumsum(np.concatenate([[0], starts | (np.diff(mine) > 1)])) if len(mine) else np.zeros(0)

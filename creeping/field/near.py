@@ -13,9 +13,9 @@ Sources: [LK59], [CK13]; Derivations, F8, F17 and F20.
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_method, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough, total_at
@@ -23,16 +23,17 @@ from creeping.field.far_geometry import fan_strips
 from creeping.field.near_layer import layer_field
 from creeping.field.near_wave import shed_waves
 from creeping.field.on_body import rays_on, total_on
-from creeping.field.point_result import FieldStatus, NearField
-from creeping.field.ray_sums import own_error, ray_sum
+from creeping.field.point_result import FieldStatus, NearField, judged
+from creeping.field.ray_sums import RaySum, own_error, ray_sum
+from creeping.field.served import Served, measured_field, zero_field
 from creeping.field.surface import scalar_boundary
+from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_near
 from creeping.shadow.occlusion import occluded
 
-METHODS = ("auto", "currents", "rays")
 ON_BODY = 1e-7
 """Distance from the body, in its sizes, below which a point counts as on it."""
 FINE = 0.01
@@ -92,29 +93,48 @@ def near_field(
     >>> u.shape, round(float(abs(u[0])), 2), u.method.tolist()
     ((2,), 0.04, ['rays', 'currents'])
     """
+    checked_plain(fan.body)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
-    if method not in METHODS:
-        raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
-    if method == "currents" and order != 2:
-        raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
+    checked_method(method, order)
     y = as_points(points)
     flat = y.reshape(-1, 3)
     on = _checked_height(fan, flat) <= ON_BODY
-    field = _Assembled(fan, flat, on, k, kind, order)
-    if method == "rays":
-        field.rays_on_body()
-    else:
-        field.total_on_body()
-        asked = ~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents"))
-        if order == 2 and np.any(asked):
-            field.by_currents(asked, boundary, method)
+    off, at = np.flatnonzero(~on), np.flatnonzero(on)
+    dark = np.zeros(len(flat), dtype=bool)
+    dark[off] = occluded(fan.body, flat[off], fan.line.direction)
+    field = zero_field(len(flat), "boundary")
+    if len(off):
+        field = field.put(off, _rays_off(fan, flat[off], ~dark[off], k, kind, order))
+    if len(at) and kind.kind != "soft":
+        parts = _rays_alone_on if method == "rays" else total_on
+        field = field.put(at, parts(fan, flat[at], k, kind, order))
+    asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents")))
+    if method != "rays" and order == 2 and len(asked):
+        field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=method == "currents")
+    return _result(field, fan, y, k, boundary, order)
+
+
+def _result(field: Served, fan: RayFan, points: FloatArray, k: float, boundary: BoundaryLike, order: int) -> NearField:
+    """The field at points (..., 3), judged, in the parts that a reader wants."""
+    shape = points.shape[:-1]
+    phase = np.exp(1j * k * (points @ fan.line.direction))
+    incident = np.where(np.isin(field.method, ("rays", "boundary")).reshape(shape), 0.0, phase)
+    scattered, creeping = field.wave.reshape(shape) - incident, field.creeping.reshape(shape)
     return NearField(
-        points=y.copy(),
+        points=points.copy(),
+        values=incident + scattered + creeping,
+        error=field.error.reshape(shape),
+        error_by=field.error_by.reshape(shape),
+        status=judged(field.status, field.values, field.error, field.error_by, 1.0).reshape(shape),
+        method=field.method.reshape(shape),
+        incident=incident,
+        scattered=scattered,
+        creeping=creeping,
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
-        **{name: value.reshape(y.shape[:-1]) for name, value in field.arrays().items()},
+        validity=validity(fan, wavenumber=k),
     )
 
 
@@ -134,99 +154,64 @@ def _checked_height(fan: RayFan, points: FloatArray) -> FloatArray:
     return np.asarray(height)
 
 
-class _Assembled:
-    """Field at points (n, 3), first by rays; parts, error, status and method (n,)."""
+def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: Boundary, order: int) -> Served:
+    """Creeping rays at points off the body (n, 3)."""
+    shed = shed_near(fan_strips(fan), fan.body, points)
+    shed = shed[~occluded(fan.body, shed.rays.points, -shed.rays.directions, shed.reach)]
+    waves, other = (shed_waves(shed.rays, shed.reach, k, kind, o) for o in (order, 3 - order))
+    error = own_error(shed.rays, (waves, other), k, kind, order, on=False)
+    return _rays_alone(ray_sum(fan, shed, len(points), waves, error, k, kind), lit)
 
-    def __init__(self, fan: RayFan, points: FloatArray, on: BoolArray, k: float, kind: Boundary, order: int) -> None:
-        self.fan, self.points, self.on, self.k, self.kind, self.order = fan, points, on, k, kind, order
-        n = len(points)
-        self.incident, self.scattered, self.creeping = np.zeros((3, n), dtype=complex)
-        self.error, self.status = np.zeros(n), np.zeros(n, dtype=np.int64)
-        self.error_by, self.method = np.full(n, "expansion", dtype="<U10"), np.full(n, "rays", dtype="<U8")
-        self.lit = np.zeros(n, dtype=bool)
-        off = np.flatnonzero(~on)
-        if not len(off):
-            return
-        body, d = fan.body, fan.line.direction
-        shed = shed_near(fan_strips(fan), body, points[off])
-        free = ~occluded(body, shed.rays.points, -shed.rays.directions, shed.reach)
-        shed = shed[free]
-        waves, other = (shed_waves(shed.rays, shed.reach, k, kind, o) for o in (order, 3 - order))
-        rays = ray_sum(
-            fan, shed, len(off), waves, own_error(shed.rays, (waves, other), k, kind, order, on=False), k, kind
-        )
-        self.lit[off] = ~occluded(body, points[off], d)
-        self._take(off, rays.values, rays.error, np.where(self.lit[off], FieldStatus.LIT, rays.status))
 
-    def _take(self, at: IntArray, creeping: ComplexArray, error: FloatArray, status: IntArray) -> None:
-        """Rays at some points."""
-        self.creeping[at], self.status[at] = creeping, status
-        bad = status != FieldStatus.OK
-        # a sum that is not to be trusted has the whole of its waves for a bound already
-        missing = np.where(status == FieldStatus.LIT, MISSING, np.where(error > 0, 0.0, 1.0))
-        self.error[at] = error + np.where(bad, missing, 0.0)
-        self.error_by[at] = np.where(bad, "bound", "expansion")
+def _rays_alone_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int) -> Served:
+    """Creeping rays alone at points on the body (n, 3)."""
+    d = fan.line.direction
+    lit = normal(fan.body, points) @ d < 0
+    lit[lit] = ~occluded(fan.body, points[lit], d)
+    return _rays_alone(rays_on(fan, points, k, kind, order), lit)
 
-    def rays_on_body(self) -> None:
-        """Creeping rays alone at points on the body."""
-        at = np.flatnonzero(self.on)
-        if not len(at):
-            return
-        if self.kind.kind == "soft":
-            self.method[at] = "boundary"
-            return
-        rays = rays_on(self.fan, self.points[at], self.k, self.kind, self.order)
-        lit = normal(self.fan.body, self.points[at]) @ self.fan.line.direction < 0
-        lit[lit] = ~occluded(self.fan.body, self.points[at][lit], self.fan.line.direction)
-        self._take(at, rays.values, rays.error, np.where(lit, FieldStatus.LIT, rays.status))
 
-    def total_on_body(self) -> None:
-        """Total field at points on the body, the lit side's expansion included."""
-        at = np.flatnonzero(self.on)
-        if not len(at) or self.kind.kind == "soft":
-            self.method[at] = "boundary"
-            return
-        total = total_on(self.fan, self.points[at], self.k, self.kind, self.order)
-        lit = total["method"] != "rays"
-        self.incident[at] = np.where(lit, np.exp(1j * self.k * (self.points[at] @ self.fan.line.direction)), 0.0)
-        self.creeping[at], self.scattered[at] = total["creeping"], total["lit"] - self.incident[at]
-        for name in ("error", "error_by", "status", "method"):
-            getattr(self, name)[at] = total[name]
+def _rays_alone(rays: RaySum, lit: BoolArray) -> Served:
+    """A sum over rays as the field, with a bound of what it lacks on the lit side and where it is not to be trusted."""
+    status = np.where(lit, FieldStatus.LIT, rays.status).astype(np.int64)
+    bad = status != FieldStatus.OK
+    # a sum that is not to be trusted has the whole of its waves for a bound already
+    missing = np.where(lit, MISSING, np.where(rays.error > 0, 0.0, 1.0))
+    return Served(
+        wave=np.zeros_like(rays.values),
+        creeping=rays.values,
+        error=rays.error + np.where(bad, missing, 0.0),
+        error_by=np.where(bad, "bound", "expansion"),
+        status=status,
+        method=np.full(len(status), "rays"),
+    )
 
-    def by_currents(self, asked: BoolArray, boundary: BoundaryLike, method: str) -> None:
-        """Let currents serve where they are asked for, far enough and, unless they must, better."""
-        at = np.flatnonzero(asked)
-        if method == "auto" and not affordable(self.fan, len(at), self.k):
-            return
-        try:
-            far = far_enough(self.fan.body, self.k, self.points[at])
-            currents = kept_currents(self.fan, self.k, boundary)
-        except SurfaceError:
-            if method == "currents":
-                raise
-            return
-        must = method == "currents"
-        at, close = at[far], at[~far]
-        incident, scattered, error = total_at(currents, self.points[at], ~self.lit[at])
-        self._prefer(at, incident + scattered, error, "currents", must)
-        if len(close):
-            layer = layer_field(self.fan, currents, self.points[close], self.kind)
-            at = close[layer.there]
-            self._prefer(at, layer.values[layer.there], layer.error[layer.there], "layer", must)
 
-    def _prefer(self, at: IntArray, values: ComplexArray, error: FloatArray, name: str, must: bool) -> None:
-        """Let values serve at some points where they must, or are better than what rays give."""
-        known = np.isfinite(error)
-        better = must | (error < self.error[at]) | (known & (self.status[at] != FieldStatus.OK))
-        at, known = at[better], known[better]
-        self.incident[at] = np.exp(1j * self.k * (self.points[at] @ self.fan.line.direction))
-        self.scattered[at], self.creeping[at] = values[better] - self.incident[at], 0.0
-        # of a body that is nowhere thick enough to look inside nothing is known but the size of the wave
-        self.error[at], self.error_by[at] = np.where(known, error[better], 1.0), np.where(known, "extinction", "bound")
-        self.status[at], self.method[at] = FieldStatus.OK, name
-
-    def arrays(self) -> dict[str, Any]:
-        """What a result is made of, each (n,)."""
-        names = ("incident", "scattered", "creeping", "error", "error_by", "status", "method")
-        arrays = {name: getattr(self, name) for name in names}
-        return arrays | {"values": self.incident + self.scattered + self.creeping}
+def _with_currents(
+    field: Served,
+    fan: RayFan,
+    points: FloatArray,
+    asked: IntArray,
+    dark: BoolArray,
+    k: float,
+    boundary: BoundaryLike,
+    *,
+    must: bool,
+) -> Served:
+    """The field with that of currents, or of the layer, at the points asked for where it must be or is better."""
+    if not must and not affordable(fan, len(asked), k):
+        return field
+    try:
+        far = far_enough(fan.body, k, points[asked])
+        currents = kept_currents(fan, k, boundary)
+    except SurfaceError:
+        if must:
+            raise
+        return field
+    at, close = asked[far], asked[~far]
+    incident, scattered, error = total_at(currents, points[at], dark[at])
+    field = field.put_better(at, measured_field(incident + scattered, error, "currents", "extinction"), must=must)
+    if len(close):
+        rows, layer = layer_field(fan, currents, points[close], scalar_boundary(boundary))
+        field = field.put_better(close[rows], layer, must=must)
+    return field

@@ -11,16 +11,15 @@ at most; what four terms leave out is about 0.08 |kappa_1 + kappa_2|/k of the in
 Sources: Derivations, F20.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping._typing import ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.currents.total import far_enough, total_at
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.on_body import total_on
 from creeping.field.point_result import FieldStatus
+from creeping.field.served import Served, measured_field
 from creeping.geometry.quadrature import BodyNodes, nearest_points
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
@@ -36,25 +35,8 @@ FOOT = 1e-6
 """Distance, in body sizes, up to which a point is above its foot."""
 
 
-@dataclass(frozen=True, eq=False)
-class Layer:
-    """Total field at some of the points asked for.
-
-    Attributes
-    ----------
-    there : (n,) of bool
-        Where it is given.
-    values, error : (n,)
-        0 elsewhere.
-    """
-
-    there: BoolArray
-    values: ComplexArray
-    error: FloatArray
-
-
-def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind: Boundary) -> Layer:
-    """Total field at points (n, 3), L, off the body and within a quarter of a wavelength or so."""
+def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind: Boundary) -> tuple[IntArray, Served]:
+    """Rows of the points (n, 3), L, less than half a wavelength off the body, that the layer serves, and its field."""
     body, k, d = fan.body, currents.wavenumber, currents.direction
     foot, n, hessians, height = nearest_points(body, points)
     scale = size(body)
@@ -66,17 +48,11 @@ def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind
         at = np.flatnonzero(there)
         # over a bay they may be in the body or near its other side
         there[at] = (body.level(top[at]) > 0) & far_enough(body, k, top[at])
-    values, error = np.zeros(len(points), dtype=complex), np.zeros(len(points))
     at = np.flatnonzero(there)
-    surface = total_on(fan, foot[at], k, kind, 2)
-    good = surface["status"] == FieldStatus.OK
-    at = at[good]
-    there[:] = False
-    there[at] = True
-    if not len(at):
-        return Layer(there, values, error)
-    on, off = (surface["lit"] + surface["creeping"])[good], surface["error"][good]
-    known, errors = _on_body(on, off, k, kind)
+    surface = total_on(fan, foot[at], k, kind, 2, currents)
+    good = surface.status == FieldStatus.OK
+    at, surface = at[good], surface[good]
+    known, errors = _on_body(surface.values, surface.error, k, kind)
     for top in tops:
         incident, scattered, its = total_at(currents, top[at], occluded(body, top[at], d))
         known.append(incident + scattered)
@@ -84,9 +60,9 @@ def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind
     weights = _weights(np.maximum(np.abs(n[at] @ d), GRAZING), k * height[at])
     curvature = BodyNodes(foot[at], n[at], np.ones(len(at)), hessians[at], 0.0).total_curvature
     errors = [weights[:, i] * one for i, one in enumerate(errors)]
-    values[at] = np.sum(weights * np.stack(known, axis=1), axis=1)
-    error[at] = np.linalg.norm([*errors, LEFT_OUT[kind.kind] * curvature / k], axis=0)
-    return Layer(there, values, error)
+    values = np.sum(weights * np.stack(known, axis=1), axis=1)
+    error = np.linalg.norm([*errors, LEFT_OUT[kind.kind] * curvature / k], axis=0)
+    return at, measured_field(values, error, "layer", "extinction+expansion")
 
 
 def _on_body(

@@ -5,48 +5,57 @@
 with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
 w_i of rays that come from afar. The error of lit ground, as a share of u1 and with u2 of second order, is
 
-    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2]^(1/2)
+    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
+    E = F max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
 
-and, where rays end or the body hides part of its line, 2 epsilon more: waves that come to lit ground from elsewhere on
-the body are left out, and what currents leave inside (`creeping.field.currents.whole_body`) tells how large they are.
+E is for ground that is flat by the measure of the body's size a: the second order kappa_a/(2kc^3) of optics knows
+nothing there of the curvature at its end, which on a closed body is 1/a in the mean. Where rays end or the body hides
+part of its line, 2 epsilon more: waves that come to lit ground from elsewhere on the body are left out, and what
+currents leave inside (`creeping.field.currents.whole_body`) tells how large they are; where that cannot be measured the
+error is a bound.
 
-Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on four bodies
-(`studies.near_coverage`).
+Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on four bodies (`studies.near_coverage`), F
+on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import SurfaceError
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.lit import lit_currents
-from creeping.field.currents.nodes import PENUMBRA, LitNodes, lit_part
+from creeping.field.currents.nodes import TAKEN_OVER, LitNodes, lit_part, nodes_at
 from creeping.field.currents.whole_body import POINTS as INNER
+from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
-from creeping.field.point_result import FieldStatus, SurfaceField
+from creeping.field.point_result import FieldStatus, SurfaceField, judged
 from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
+from creeping.field.served import Served
 from creeping.field.shed_wave import fock_parameter, scales
 from creeping.field.surface import scalar_boundary, surface_waves
+from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
-from creeping.geometry.evaluators import entries_of
-from creeping.geometry.quadrature import BodyNodes
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
 from creeping.rays.tracer import ray_points
 
 SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
+"""Factor A of the error on lit ground, by boundary."""
 LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
+"""B."""
 VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
+"""C; an impedance leaves curvature that varies out of its second order."""
 ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
-"""Factors A, B, C and D of the error on lit ground; an impedance leaves curvature that varies out of its second order.
-"""
-
-LEFT = 2.0
-"""Factor of what currents leave inside: of waves that come to lit ground from elsewhere on the body."""
+"""D."""
+FLAT, ENDS = 2.0, 0.7
+"""1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
+LEFT, UNKNOWN = 2.0, 2.0
+"""Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
+reflected wave and its image."""
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 
 
@@ -96,6 +105,7 @@ def surface_field(
     >>> np.abs(u).round(1).tolist(), u.method.tolist(), bool(u.error.max() < 0.05)
     ([2.0, 0.5], ['lit', 'rays'], True)
     """
+    checked_plain(fan.body)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     if points is None:
@@ -103,14 +113,20 @@ def surface_field(
     y = as_points(points)
     shape = y.shape[:-1]
     total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)
-    arrays = {name: value.reshape(shape) for name, value in total.items()}
+    status = judged(total.status, total.values, total.error, total.error_by, k if kind.kind == "soft" else 1.0)
     return SurfaceField(
         points=y.copy(),
-        values=arrays["lit"] + arrays["creeping"],
+        values=total.values.reshape(shape),
+        error=total.error.reshape(shape),
+        error_by=total.error_by.reshape(shape),
+        status=status.reshape(shape),
+        method=total.method.reshape(shape),
+        lit=total.wave.reshape(shape),
+        creeping=total.creeping.reshape(shape),
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
-        **arrays,
+        validity=validity(fan, wavenumber=k),
     )
 
 
@@ -121,26 +137,30 @@ def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, o
     m = scales(rays, k)[1]
     with np.errstate(invalid="ignore"):
         caustic = tube_share(rays, np.zeros(waves.shape)) * m < NARROW_ALONE
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    launched = fan.launched
     status = np.select(
         [np.broadcast_to(~launched[:, None], waves.shape), ~rays.alive, caustic],
         [FieldStatus.NO_RAY, FieldStatus.DETACHED, FieldStatus.CAUSTIC],
         FieldStatus.OK,
     )
     ok = status == FieldStatus.OK
-    bound = np.where(rays.alive, np.abs(waves), k if kind.kind == "soft" else 1.0)
+    unit = k if kind.kind == "soft" else 1.0
+    error = own_error(rays, (waves, other), k, kind, order, on=True)
+    error = np.where(ok, error, np.where(rays.alive, np.abs(waves), unit))
+    error_by = np.where(ok, "expansion", "bound")
     return SurfaceField(
         points=rays.points.copy(),
         values=waves,
-        error=np.where(ok, own_error(rays, (waves, other), k, kind, order, on=True), bound),
-        error_by=np.where(ok, "expansion", "bound"),
-        status=status.astype(np.int64),
+        error=error,
+        error_by=error_by,
+        status=judged(status, waves, error, error_by, unit),
         method=np.full(waves.shape, "rays"),
         lit=np.zeros(waves.shape, dtype=complex),
         creeping=waves,
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
+        validity=validity(fan, wavenumber=k),
     )
 
 
@@ -151,8 +171,7 @@ def rays_on(
     found = shed_on(fan_strips(fan), fan.body, points)
     waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
     if share is not None:
-        # twice the end, for m at the launch point is not m here
-        young = fock_parameter(found.rays, k) < 2 * PENUMBRA[1]
+        young = fock_parameter(found.rays, k) < TAKEN_OVER
         weight = np.where(young, share[found.observer], 1.0)
         # a wave may be infinite
         waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
@@ -161,13 +180,26 @@ def rays_on(
     )
 
 
-def total_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int) -> dict[str, Any]:
-    """Total field at points of the body (n, 3): lit, creeping, error, error_by, status and method, each (n,)."""
+def total_on(
+    fan: RayFan,
+    points: FloatArray,
+    k: float,
+    kind: Boundary,
+    order: int,
+    currents: SurfaceCurrents | None = None,
+) -> Served:
+    """Total field at points of the body (n, 3).
+
+    ``currents`` are those of the wavenumber and boundary, if they are at hand.
+    """
     lit, lit_error, share = _lit_at(fan, points, k, kind, order)
     rays = rays_on(fan, points, k, kind, order, 1 - share)
     unit = k if kind.kind == "soft" else 1.0
-    if order == 2 and np.any(share > 0):
-        lit_error = np.hypot(lit_error, share * unit * LEFT * _left_inside(fan, k, kind))
+    left = 0.0
+    if np.any(share > 0) and not _convex(fan):
+        left = _left_inside(fan, k, kind) if currents is None else currents.extinction
+    unknown = (share > 0) & (not np.isfinite(left))
+    lit_error = np.hypot(lit_error, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
     error = np.where(bare, unit, error)
@@ -177,28 +209,29 @@ def total_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: i
     most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
     creeping, error = np.where(out, 0.0, creeping), np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
     status = np.where(share == 1, FieldStatus.OK, status)
-    ok = status == FieldStatus.OK
-    return {
-        "lit": lit,
-        "creeping": creeping,
-        "error": np.where(ok, np.hypot(error, lit_error), error),
-        "error_by": np.where(ok, "expansion", "bound"),
-        "status": status.astype(np.int64),
-        "method": np.where(share == 1, "lit", np.where(share > 0, "lit+rays", "rays")),
-    }
+    return Served(
+        wave=lit,
+        creeping=creeping,
+        error=np.hypot(error, lit_error),
+        error_by=np.where(unknown | (status != FieldStatus.OK), "bound", "expansion"),
+        status=np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
+        method=np.where(share == 1, "lit", np.where(share > 0, "lit+rays", "rays")),
+    )
+
+
+def _convex(fan: RayFan) -> bool:
+    """Whether nothing on the rays or along the line says that the body may reflect onto itself."""
+    return fan.line.fractions["attached"] == 1.0 and bool(np.all(fan.status == RayStatus.OK))
 
 
 def _left_inside(fan: RayFan, k: float, kind: Boundary) -> float:
-    """What currents leave of the wave inside a body that may reflect onto itself; 0 of one that looks convex."""
-    if fan.line.fractions["attached"] == 1.0 and np.all(fan.status == RayStatus.OK):
-        return 0.0
+    """What currents leave of the wave inside the body; NaN if they cost too much or it is not to be measured."""
     boundary: BoundaryLike = ImpedanceBoundary(kind.admittance) if kind.kind == "impedance" else SCALAR[kind.kind]
     try:
         # as many points as it is measured at
-        left = kept_currents(fan, k, boundary).extinction if affordable(fan, INNER, k) else 0.0
+        return kept_currents(fan, k, boundary).extinction if affordable(fan, INNER, k) else np.nan
     except SurfaceError:
-        return 0.0
-    return float(left) if np.isfinite(left) else 0.0
+        return np.nan
 
 
 def _lit_at(
@@ -206,22 +239,20 @@ def _lit_at(
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """The lit side's part of the field at points of the body (n, 3), its error, and its share: (n,) each."""
     body, d = fan.body, fan.line.direction
-    hessian = body.hessian(points) / np.linalg.norm(body.gradient(points), axis=-1)[:, None, None]
-    nodes = BodyNodes(points, normal(body, points), np.ones(len(points)), entries_of(hessian).T, 0.0)
-    at, part = lit_part(body, fan.line, nodes, k)
+    at, part = lit_part(body, fan.line, nodes_at(body, points, normal(body, points)), k)
     geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
     u, other = (lit_currents(*geometry, k, kind, o) for o in (order, 3 - order))
     values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))
     share[at] = part.weights
     values[at] = part.weights * u * np.exp(1j * k * (part.points @ d))
-    error[at] = part.weights * _lit_error(part, u, other, k, kind, order)
+    error[at] = part.weights * _lit_error(part, u, other, k, kind, order, size(body))
     return values, error, share
 
 
 def _lit_error(
-    part: LitNodes, u: ComplexArray, other: ComplexArray, k: float, kind: Boundary, order: int
+    part: LitNodes, u: ComplexArray, other: ComplexArray, k: float, kind: Boundary, order: int, extent: float
 ) -> FloatArray:
-    """Error of the lit side's expansion (n,)."""
+    """Error of the lit side's expansion (n,) on a body of size ``extent``, L."""
     size, change = np.abs(u), np.abs(u - other)
     m = fock_scale(k, part.along)
     # grazing a flat or concave place m is infinite, and optics alone stands there
@@ -232,6 +263,14 @@ def _lit_error(
         LEAST[kind.kind] / m**4,
         VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
         ACROSS[kind.kind] * across**2,
+        _flat_error(part, k, extent),
     )
     share = np.linalg.norm(terms, axis=0)
     return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
+
+
+def _flat_error(part: LitNodes, k: float, extent: float) -> FloatArray:
+    """E (n,): what the curvature at the end of flat ground is worth on it."""
+    flatness = np.maximum(0.0, 1 - FLAT * np.maximum(part.along, 0.0) * extent)
+    least = np.cbrt(2 / (k * extent))
+    return np.asarray(ENDS * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))

@@ -11,14 +11,12 @@ Sources: Derivations, F3.
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray
-from creeping.errors import InvalidInputError
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import BoundaryLike
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary
-from creeping.geometry.speed import speed_of
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 
 
 def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> FloatArray:
@@ -42,8 +40,7 @@ def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "s
     """
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, 1)
-    if speed_of(fan.body) is not None:
-        raise InvalidInputError(f"{fan.body!r} has a speed; the diffracted field is that of a plain body")
+    checked_plain(fan.body)
     out = np.zeros(fan.spreading.shape)
     here = creeps(fan)
     first = np.broadcast_to(fan.curvature[:, :1], here.shape)[here]
@@ -58,5 +55,5 @@ def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "s
 
 def creeps(fan: RayFan) -> BoolArray:
     """Whether each ray is a creeping ray at its steps: launched by the wave and not detached before (rays, steps)."""
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    launched = fan.launched
     return np.asarray(launched[:, None] & (fan.travel_time < fan.detachment[:, None]) & (fan.curvature > 0))

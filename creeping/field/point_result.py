@@ -3,7 +3,7 @@
 Results act as arrays of their values (`creeping.field.array_result`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from creeping._presenting import Shown
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.array_result import ArrayResult
+from creeping.field.validity_range import Validity
 
 
 class FieldStatus(IntEnum):
@@ -34,6 +35,8 @@ class FieldStatus(IntEnum):
     """A ray that comes here has ended before, over concave or rough ground, and may have mattered."""
     TRUNCATED = 5
     """The fan ends before its rays could come here."""
+    UNRESOLVED = 6
+    """The error, or a bound in its place, is above half the value and above 0.1 of the incident wave."""
 
     @property
     def remedy(self) -> str:
@@ -49,7 +52,19 @@ _REMEDIES = {
     FieldStatus.NO_RAY: f"{_AWAY}; what no ray brings their error holds",
     FieldStatus.DETACHED: f"{_AWAY}; what rays that have ended bring no more their error holds",
     FieldStatus.TRUNCATED: "launch longer rays: length= of launch",
+    FieldStatus.UNRESOLVED: "none at this wavenumber but another method=: the value is hardly known beyond its error",
 }
+WORTH, LEAST_WORTH = 0.5, 0.1
+"""Error from which a value is unresolved: both this share of it, and this one of the incident wave."""
+
+
+def judged(
+    status: IntArray, values: ComplexArray, error: FloatArray, error_by: np.ndarray[Any, Any], unit: float
+) -> IntArray:
+    """Status (...) with UNRESOLVED in place of OK; ``unit`` is the incident wave's amplitude, k (1/L) for du/dn."""
+    with np.errstate(invalid="ignore"):
+        enough = (error <= np.maximum(WORTH * np.abs(values), LEAST_WORTH * unit)) & (error_by != "bound")
+    return np.where((status == FieldStatus.OK) & ~enough, FieldStatus.UNRESOLVED, status).astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,9 +79,8 @@ class PointField(ArrayResult, Shown):
         Of the values, in their unit, meant to hold at 95 of 100 points whose status is OK; at others a bound, infinite
         where the values are.
     error_by : (...) of str
-        What gave its level: "extinction", measured inside the body; "expansion", what the next
-        terms of the expansions are worth; "bound", no
-        more than what is missing may be.
+        What gave its level: "extinction", measured inside the body; "expansion", what the next terms of the expansions
+        are worth; both, joined by "+", in the layer; "bound", no more than what is missing may be.
     status : (...) of int
         Codes of `FieldStatus`.
     method : (...) of str
@@ -74,6 +88,8 @@ class PointField(ArrayResult, Shown):
     wavenumber : float, 1/L
     boundary : str
     order : int
+    validity : Validity
+        Least k rho and largest kappa_t rho/m^2 on the fan's rays.
     """
 
     points: FloatArray
@@ -85,6 +101,7 @@ class PointField(ArrayResult, Shown):
     wavenumber: float
     boundary: str
     order: int
+    validity: Validity | None = field(default=None, kw_only=True)
 
     @property
     def ok(self) -> BoolArray:
@@ -122,7 +139,7 @@ class NearField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
         As of every field at points; ``method`` is "currents", "layer" between them and the
         body, or "rays"; on the body "lit", "rays", "lit+rays", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
@@ -153,7 +170,7 @@ class SurfaceField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
         As of every field at points; ``method`` is "lit", "rays" or, in the penumbra, "lit+rays".
     lit, creeping : (...) complex
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.

@@ -2,7 +2,7 @@
 
 With T = J + l J' the width of a ray's tube, T' its slope across the rays, and J' along them, L the length of a ray,
 
-    error^2 = (sum |ui| e_i)^2 + sum_i |ui|^2 f_i + (sum_pairs C (|ui| + |uj|)/(k |Li - Lj|))^2 + (sum |ui| g_i)^2
+    error^2 = (sum |ui| e_i)^2 + sum_i |ui|^2 f_i + (sum_pairs P (|ui| + |uj|)/(k |Li - Lj|))^2 + (sum |ui| g_i)^2
     f = (5/8k) T'^2/T^4/(3 |J'/T| + 1/(s + l)),   g = e^(-a (xi_end - xi))
     e = [(A/m^2)^2 + (B V)^2]^(1/2) off the body,   [(C |u2/u1 - 1|^2)^2 + xi^2 (B V)^2 + xi^2 (D r^2)^2]^(1/2)
     V = (|rho rho''| + rho'^2)/m^2,   r = rho kappa_t/m^2,   on it; A/m^2, V and r means of both ends
@@ -12,7 +12,7 @@ is of its root's size. Two waves of which one has touched a caustic that the oth
 Airy or Bessel function, whose next terms fall with their difference in phase. A ray beyond the end of the fan is weaker
 than one found by the decay a of the first mode, g.
 
-Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F20. A, B and C were set on four bodies
+Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F20. A to D were set on four bodies
 (`studies.near_coverage`).
 """
 
@@ -39,7 +39,7 @@ VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25}
 ACROSS, LEAST_XI = 0.3, 0.7
 """D, and the least xi that the error on the body grows with."""
 MERGING = 0.3
-"""C of pairs: 5/36 at a fold, 1/4 on the axis of a sphere."""
+"""P: 5/36 at a fold, 1/4 on the axis of a sphere."""
 FOLDED, MERGED = 0.008, 0.04
 """Shares of the waves from which f and merging make a point one of a caustic."""
 NARROW = 0.25

@@ -23,7 +23,7 @@ from creeping.geodesics.states import ATTENUATION, P, X, pack
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.surface import Surface, normal
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 from creeping.rays.reach import INCIDENCES, TRIALS, early_length
 from creeping.shadow.attachment import LaunchPoints, evenly_chosen
 from creeping.shadow.many import shadow_lines
@@ -76,7 +76,7 @@ def validity(fan: RayFan, *, wavenumber: float) -> Validity:
     k = checked(wavenumber, 2)
     if not len(fan.points):
         return Validity(np.nan, np.nan)
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    launched = fan.launched
     there = (fan.curvature > 0) & (fan.travel_time < fan.detachment[:, None]) & launched[:, None]
     there &= np.cbrt(k / 2) * fan.attenuation < EARLY
     if not np.any(there):

@@ -34,14 +34,9 @@ def inner_points(body: Surface, depth: float, count: int) -> FloatArray:
 
 def _depths(body: Surface) -> tuple[FloatArray, FloatArray]:
     """Points inside (n, 3) and bounds of their depth (n,), L."""
-    from scipy.spatial import cKDTree
     from scipy.stats import qmc
 
     low, high = np.asarray(body.bounds, dtype=float)
     x = low + (high - low) * qmc.Halton(3, scramble=False).random(TRIED)
     x = x[body.level(x) < 0]
-    nodes = body_nodes(body, 4 / size(body))
-    # half the distance between neighbouring nodes, of those that are furthest apart
-    apart = 0.5 * float(np.sqrt(np.max(nodes.weights)))
-    distance, _ = cKDTree(nodes.points).query(x)
-    return x, np.sqrt(np.maximum(distance**2 - apart**2, 0.0))
+    return x, body_nodes(body, 4 / size(body)).distance(x)

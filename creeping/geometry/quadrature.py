@@ -15,10 +15,11 @@ Sources: [G98], [DR84, sec. 2.7]; Derivations, B11.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.geometry.curvature import adjugate_form, principal_curvature_bound, second_form
 from creeping.geometry.evaluators import evaluators
@@ -79,6 +80,18 @@ class BodyNodes:
     def total_curvature(self) -> FloatArray:
         """kappa_1 + kappa_2 (n,), 1/L."""
         return np.asarray(np.sum(self.hessians[:, :3], axis=1) - self.curvature(self.normals))
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Distance of points (m, 3) from the body as nodes tell it, L: the nearest less their spacing."""
+        # half the distance between neighbouring nodes, of those that are furthest apart
+        apart = 0.5 * float(np.sqrt(np.max(self.weights)))
+        return np.asarray(np.sqrt(np.maximum(self._tree.query(points)[0] ** 2 - apart**2, 0.0)))
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points)
 
 
 def body_nodes(body: Surface, rate: float) -> BodyNodes:

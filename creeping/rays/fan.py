@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from creeping._presenting import DrawnOnBody, brief
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
@@ -156,30 +156,32 @@ class RayFan(DrawnOnBody):
         return {s.name: int(np.sum(self.status == s)) for s in RayStatus if np.any(self.status == s)}
 
     @property
+    def launched(self) -> BoolArray:
+        """Whether the wave launched each ray, wherever it ended (rays,)."""
+        return np.isin(self.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+
+    @property
     def least_radius(self) -> float:
         """Least 1/kappa_n, L, where the rays matter most; NaN without rays, or for a weighted body, which has no field.
 
         That is up to xi = 1 at the wavenumber where k rho is 10 at the median of the launch points.
         """
-        creeping = np.isin(self.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
-        if speed_of(self.body) is not None or not np.any(creeping):
+        if speed_of(self.body) is not None or not np.any(self.launched):
             return float("nan")
-        curvature = self.curvature[creeping]
+        curvature = self.curvature[self.launched]
         k = IN_RANGE * float(np.median(curvature[:, 0]))
-        largest = float(np.max(curvature, initial=0.0, where=np.cbrt(k / 2) * self.attenuation[creeping] < 1))
+        largest = float(np.max(curvature, initial=0.0, where=np.cbrt(k / 2) * self.attenuation[self.launched] < 1))
         return 1 / largest if largest > 0 else float("nan")
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
         error = f"rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
         arcs = len(self.closed_arcs)
-        least = self.least_radius
-        sharpest = "" if np.isnan(least) else f"; radius of curvature {least:.3g} L at least"
+        sharpest = "" if np.isnan(self.least_radius) else f"; radius of curvature {self.least_radius:.3g} L at least"
         return (
             f"RayFan({len(self.points)} rays x {len(self.travel_time)} steps to {self.length:g}, "
             f"{arcs} arc{'s' * (arcs != 1)}, on {brief(self.body)})\n"
-            f"  {counts or 'no rays'}; caustics passed: up to {int(self.caustic_index[:, -1:].max(initial=0))}"
-            f"{sharpest}\n"
+            f"  {counts or 'no rays'}; caustics passed: {int(self.caustic_index[:, -1:].max(initial=0))}{sharpest}\n"
             f"  error at the end: {error if self.error.samples else 'not measured'}"
         )
 
@@ -211,7 +213,7 @@ def launch(
     n_rays : int, optional
         Rays, shared among the arcs by length; one per point of the line if not given.
     n_steps : int, optional
-        Equal steps of travel time; at least 64 and enough to count caustics if not given.
+        Equal steps of travel time; 64 or more, enough to count caustics, if not given.
     launch_from : {"attached", "all"}
         "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
@@ -254,9 +256,8 @@ def launch(
         raise InvalidInputError(f"max_gap = {max_gap!r} is not positive; give inf for no refinement")
     length = ray_length(line, length, wavenumber=wavenumber)
     steps = n_steps or enough_steps(body, length)
-    # states, and what is made of them
-    size_of = 3.0 * 8 * WHOLE * (n_rays or sum(len(curve.points) for curve in line.curves)) * steps
-    within_budget(size_of, f"{steps} steps of the rays", "ask for fewer rays or steps, or a shorter length")
+    count = n_rays or sum(len(curve.points) for curve in line.curves)
+    within_budget(24.0 * WHOLE * count * steps, f"{steps} steps of {count} rays", "ask for fewer, or shorter ones")
     times = np.linspace(0.0, length, steps + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
@@ -345,12 +346,8 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
         out[there] = values
         return out
 
-    return RayArrays(
-        placed(J, np.nan),
-        placed(rate, np.nan),
-        placed(status, NO_RAY),
-        placed(np.minimum(detachment, non_smooth), np.nan),
-    )
+    first = np.minimum(detachment, non_smooth)
+    return RayArrays(placed(J, np.nan), placed(rate, np.nan), placed(status, NO_RAY), placed(first, np.nan))
 
 
 def fan_of(flow: Flow, line: ShadowLine, launch: LaunchPoints, states: FloatArray, times: FloatArray) -> RayFan:

@@ -25,7 +25,7 @@ from creeping.geodesics.states import M11, M21, P, X, pack
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, size
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 from creeping.rays.nonsmooth import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
 from creeping.shadow.attachment import line_tangents
@@ -371,7 +371,7 @@ def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray
     tangents = line_tangents(fan.body, starts, d) if rays else np.zeros((0, 3))
     owner = np.repeat(np.arange(rays), steps)
     found = tracer.at(d, starts, tangents, np.tile(times, rays), owner).rays
-    launched = np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+    launched = fan.launched
     alive = found.alive.reshape(rays, steps) & launched[:, None]
     return times, RayPoints(
         found.lanes.reshape(rays, steps, LANES),

@@ -123,7 +123,7 @@ def test_close_to_lit_ground_the_field_is_between_currents_and_the_body(fan, bou
     u = cr.near_field(fan, y, wavenumber=20.0, boundary=kind)
     exact = sphere.total_field(20.0, 1.0, y, D, boundary)
     off = np.abs(u - exact)
-    assert np.all(u.ok) and np.all(u.method == "layer")
+    assert np.all(u.ok) and np.all(u.method == "layer") and set(u.error_by) == {"extinction+expansion"}
     assert np.mean(off < u.error) > 0.95 and off.max() < 0.03
 
 

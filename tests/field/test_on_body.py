@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.point_result import FieldStatus
-from studies.reference import sphere
+from studies.reference import clouds, fundamental, sphere
 
 
 def fan_of(length=4.0):
@@ -86,3 +86,63 @@ def test_first_order_states_a_larger_error(fan):
         cr.surface_field(fan, at([30.0, 80.0, 120.0]), wavenumber=20.0, boundary="hard", order=o) for o in (1, 2)
     )
     assert np.all(first.error > 2 * second.error)
+
+
+@pytest.fixture(scope="module")
+def torus():
+    body = sc.Torus(1.0, 0.5)
+    return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1.0, 0.1, 0.3)), length=3.0, n_rays=64)
+
+
+def test_what_comes_from_elsewhere_is_bounded_where_it_cannot_be_measured(torus):
+    """2026-11: at wavenumbers at which currents cost too much it counted as nothing, and the status was OK."""
+    x = [(-1.5, 0.0, 0.0), (1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
+    low, high = (cr.surface_field(torus, x, wavenumber=k, boundary="hard") for k in (40.0, 420.0))
+    assert low.method.tolist() == high.method.tolist() == ["lit", "lit"]
+    assert low.error_by.tolist() == ["expansion"] * 2 and np.all(low.ok)
+    assert high.status_counts == {"UNRESOLVED": 2} and set(high.error_by) == {"bound"} and np.all(high.error >= 2)
+
+
+def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
+    import creeping.field.on_body as module
+
+    class Unknown:
+        extinction = float("nan")
+
+    monkeypatch.setattr(module, "kept_currents", lambda *_: Unknown())
+    x = [(1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
+    u = cr.surface_field(torus, x, wavenumber=30.0, boundary="soft")
+    assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound" and u.error[0] >= 2 * 30.0
+
+
+@pytest.mark.parametrize(
+    ("d", "boundary"), [((0.02, 0.05, 1), "hard"), ((0.5, 0.1, 1), "soft"), ((1.5, 0.3, 1), "hard")]
+)
+def test_flat_lit_ground_has_an_error(d, boundary):
+    """2026-11: at kappa = 0 it was 0 exactly."""
+    from creeping.geometry.surface import normal, project
+
+    body, d = sc.Implicit("x**4 + y**4 + z**4 - 1"), np.array(d) / np.linalg.norm(d)
+    x = project(body, np.array([(a, b, -1.0) for a in (-0.2, 0.0, 0.1, 0.2) for b in (-0.3, 0.0, 0.1)]))
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), length=3.0, n_rays=48)
+    reference = clouds.star(lambda x: np.sum(x**4, axis=-1) - 1, lambda x: 4 * x**3, (0, 1, 2))
+    solution = fundamental.scatter(reference, 8.0, d[None], boundary, depth=0.1)
+    exact = solution.normal_derivative(x, normal(body, x)) if boundary == "soft" else solution.total(x)
+    u = cr.surface_field(fan, x, wavenumber=8.0, boundary=boundary)
+    assert set(u.method) == {"lit"} and np.all(u.error > 0)
+    assert np.mean(np.abs(u - exact[:, 0]) < u.error) > 0.9
+
+
+@pytest.mark.parametrize("across", [0.0, 1.0])
+def test_ground_that_is_flat_or_concave_is_not_exact(across):
+    from creeping.field.boundary import HARD
+    from creeping.field.currents.lit import lit_currents
+    from creeping.field.currents.nodes import LitNodes
+    from creeping.field.on_body import _lit_error
+
+    cosine, along = np.array([1.0, 0.9, 0.5, 1.0, 0.5]), np.array([0.0, 0.0, 0.0, -1.0, -1.0])
+    zero, vectors = np.zeros(5), np.zeros((5, 3))
+    part = LitNodes(vectors, vectors, zero, cosine, along, across + zero, zero, zero, vectors, zero)
+    u, other = (lit_currents(cosine, along, across + zero, zero, zero, zero, 30.0, HARD, o) for o in (2, 1))
+    low, high = (_lit_error(part, u, other, k, HARD, 2, 1.7) for k in (30.0, 60.0))
+    assert np.all(low > 0.01) and np.all(high < low)

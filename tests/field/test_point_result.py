@@ -1,13 +1,16 @@
 """Results of fields at points: arrays to numpy, with statuses that say what is the matter and what to do."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.point_result import FieldStatus
+from creeping.errors import InvalidInputError
+from creeping.field.point_result import FieldStatus, judged
+from creeping.field.served import measured_field
 
 K = 20.0
 AT = np.array([(0.3, 0.1, 1.6), (0.0, 0.0, 1.5), (0.0, 0.2, -1.05), (0.0, 0.5, -2.0), (1.4, 0.0, 1.0)])
@@ -63,6 +66,35 @@ def test_they_act_as_arrays(fields):
     assert not np.shares_memory(np.array(first, copy=True), first.values)
 
 
+def test_arithmetic_in_place_gives_plain_arrays_and_leaves_the_result(fields):
+    for u in fields:
+        values, kept = u.values, u.values.copy()
+        v = u
+        v *= 2
+        v += 1
+        assert type(v) is np.ndarray
+        np.testing.assert_array_equal(v, 2 * values + 1)
+        plain = np.zeros(u.shape, dtype=complex)
+        plain += u
+        np.testing.assert_array_equal(plain, values)
+        with pytest.raises(TypeError, match=r"\.values"):
+            np.add(u, 1, out=u)
+        np.testing.assert_array_equal(u.values, kept)
+        np.testing.assert_array_equal(np.add(u, 1, out=plain), values + 1)
+
+
+def test_they_have_the_methods_of_arrays(fields):
+    u = fields[2]
+    finite = np.nan_to_num(u)
+    v = replace(u, values=finite)
+    for name in ("sum", "mean", "max", "min", "ravel", "flatten", "copy", "conj", "transpose", "squeeze", "std", "all"):
+        np.testing.assert_array_equal(getattr(v, name)(), getattr(finite, name)())
+    np.testing.assert_array_equal(v.T, finite.T)
+    np.testing.assert_array_equal(v.sum(axis=0), finite.sum(axis=0))
+    np.testing.assert_array_equal(v.astype(np.complex64), finite.astype(np.complex64))
+    assert v.tolist() == finite.tolist() and v.reshape(-1).shape == (v.size,)
+
+
 def test_arrays_of_a_result_have_its_shape_and_parts_add_up(fields):
     near, *surface = fields
     for u in fields:
@@ -89,3 +121,63 @@ def test_every_status_has_a_remedy():
     assert [int(status) for status in FieldStatus] == list(range(len(FieldStatus)))
     assert all(len(status.remedy) > 5 for status in FieldStatus)
     assert "length" in FieldStatus.TRUNCATED.remedy
+
+
+def test_values_of_the_size_of_their_error_are_not_ok():
+    values = np.array([5.0, 5.0, 0.01, 0.01, 1.0, 1.0, 1.0])
+    error = np.array([2.4, 2.6, 0.09, 0.11, np.nan, 0.01, 5.0])
+    by = np.array(["expansion"] * 5 + ["bound", "bound"])
+    status = np.array([FieldStatus.OK] * 6 + [FieldStatus.CAUSTIC])
+    ok, off = FieldStatus.OK, FieldStatus.UNRESOLVED
+    found = judged(status, values, error, by, 1.0)
+    assert found.tolist() == [ok, off, ok, off, off, off, FieldStatus.CAUSTIC]
+    # du/dn is measured by k
+    assert judged(status[:1], 0.1 * values[:1], error[:1], by[:1], 30.0).tolist() == [ok]
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
+def test_the_axis_of_a_torus_is_unresolved(boundary):
+    """2026-11: |u| = 5.03 with an error of 4.03 was OK."""
+    body = sc.Torus(1.0, 0.5)
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=3.0, n_rays=64)
+    u = cr.near_field(fan, [(0.0, 0.0, z) for z in (0.5, 1.5, 3.0)], wavenumber=30.0, boundary=boundary)
+    assert u.status_counts == {"UNRESOLVED": 3} and np.all(np.isfinite(u)) and np.all(u.error > 0.5 * np.abs(u))
+
+
+def test_an_error_that_is_not_known_is_not_ok(fan, monkeypatch):
+    import creeping.field.near as module
+
+    taken = module.total_at
+    monkeypatch.setattr(module, "total_at", lambda *given: (*taken(*given)[:2], np.full(len(given[1]), np.nan)))
+    u = cr.near_field(fan, [(0.0, 0.0, -2.0)], wavenumber=K, boundary="hard", method="currents")
+    assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound"
+
+
+def test_weighted_bodies_are_refused_with_or_without_points():
+    """2026-11: of no points there was a field."""
+    body = sc.Torus(1.0, 0.5, speed="1 + 0.1*x")
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0.2, 0.1, 1)), length=0.5, n_rays=8)
+    for points in (np.zeros((0, 3)), [(0.0, 0.0, 3.0)]):
+        with pytest.raises(InvalidInputError, match="has a speed"):
+            cr.near_field(fan, points, wavenumber=K)
+    for points in (np.zeros((0, 3)), [(1.5, 0.0, 0.0)], None):
+        with pytest.raises(InvalidInputError, match="has a speed"):
+            cr.surface_field(fan, points, wavenumber=K)
+
+
+def test_fields_at_points_have_the_validity_of_their_fan(fan, fields):
+    assert {u.validity for u in fields} == {cr.validity(fan, wavenumber=K)}
+
+
+def test_what_serves_gives_way_to_what_is_ok_and_errs_less():
+    mine = measured_field(np.zeros(4, dtype=complex), np.array([0.1, 0.3, 0.3, 0.1]), "rays", "expansion")
+    mine = replace(mine, status=np.array([0, 0, 4, 4]))
+    other = measured_field(np.ones(4, dtype=complex), np.array([0.2, 0.2, 0.5, np.nan]), "currents", "extinction+x")
+    at = np.arange(4)
+    found = mine.put_better(at, other, must=False)
+    assert found.method.tolist() == ["rays", "currents", "currents", "rays"]
+    assert found.error_by.tolist() == ["expansion", "extinction+x", "extinction+x", "expansion"]
+    assert found.status.tolist() == [0, 0, 0, 4] and found.values.tolist() == [0, 1, 1, 0]
+    must = mine.put_better(at[2:], other[2:], must=True)
+    assert must.method.tolist() == ["rays", "rays", "currents", "currents"]
+    assert must.status[3] == FieldStatus.UNRESOLVED and must.error[3] == 1.0

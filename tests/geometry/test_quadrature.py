@@ -95,3 +95,15 @@ def test_a_body_as_thin_as_a_sheet_is_refused_at_once_the_second_time():
     for _ in range(2):
         with pytest.raises(SurfaceError, match="too thin or too sharp"):
             body_nodes(body, 5.0)
+
+
+def test_distances_are_from_nodes_sorted_once(monkeypatch):
+    """2026-11: a tree of all nodes was built for every point asked for."""
+    import scipy.spatial
+
+    body = sc.Sphere()
+    points = np.array([[0.0, 0.0, 2.0], [0.3, 0.0, 0.0]])
+    found = body_nodes(body, 20.0).distance(points)
+    assert found == pytest.approx([1.0, 0.7], rel=0.01)
+    monkeypatch.setattr(scipy.spatial, "cKDTree", None)
+    np.testing.assert_array_equal(body_nodes(body, 20.0).distance(points), found)

@@ -183,3 +183,11 @@ def test_repr_is_short_and_says_the_error(phase_map):
     fan = cr.launch(phase_map("sphere"), cr.shadow_line(sc.Sphere(), (1, 0, 0)), length=1.0, n_rays=8)
     assert len(repr(fan).splitlines()) == 3
     assert "error at the end" in repr(fan)
+
+
+def test_launched_rays_are_those_of_the_wave():
+    body = sc.Torus(1.0, 0.5)
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 0.1, 0.3)), length=2.0, n_rays=32, launch_from="all")
+    names = np.array([cr.RayStatus(s).name for s in fan.status])
+    assert set(names[fan.launched]) == {"OK", "DETACHED"} and not set(names[~fan.launched]) & {"OK", "DETACHED"}
+    assert len(names[~fan.launched])

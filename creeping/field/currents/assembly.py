@@ -6,7 +6,7 @@ Sources: Derivations, F16 to F18.
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
 from creeping.field.currents.lit import lit_currents
@@ -48,6 +48,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
     >>> currents.extinction < 0.02, bool(currents.error([(0, 1, 0)])[0] < 0.05)
     (True, True)
     """
+    checked_plain(fan.body)
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, 2)
     # a conductor's rays are as long as its wave that decays less

@@ -30,6 +30,8 @@ from creeping.shadow.status import ATTACHED
 
 PENUMBRA = (0.0, 0.6)
 """xi over which the rays take over from the lit side's nodes."""
+TAKEN_OVER = 2 * PENUMBRA[1]
+"""xi by m at the start of a ray beyond which it has taken over: twice the end, for m at its points is another."""
 VARYING = 6.0
 """-xi up to which the rate of curvature matters."""
 RAYS, GAP, STEPS = 4.0, 0.5, 5.0
@@ -201,10 +203,10 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     weights = weights * _share_of_rays(fan.body, rays, normals, fan.line.direction, wavenumber)
     there = rays.alive & np.isfinite(weights) & (weights > 0)
     rays, normals, weights = rays[there], normals[there], weights[there]
-    return RayNodes(rays, normals, weights, _nodes_at(fan.body, rays.points, normals).twist(rays.directions))
+    return RayNodes(rays, normals, weights, nodes_at(fan.body, rays.points, normals).twist(rays.directions))
 
 
-def _nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:
+def nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:
     """Points (n, 3) of the body, L, as nodes of weight 1."""
     g, h = body.gradient(points), body.hessian(points)
     entries = entries_of(h / np.linalg.norm(g, axis=-1)[:, None, None]).T
@@ -226,10 +228,9 @@ def _share_of_rays(
     """Share of the rays (rays, steps): W up to where it first is 1, then 1."""
     cosine = -normals @ direction
     share = np.ones(cosine.shape)
-    # twice the end, for m at the launch point is not m here
-    near = -cosine * fock_scale(wavenumber, np.maximum(rays.curvature[0], 1e-300)) < 2 * PENUMBRA[1]
+    near = -cosine * fock_scale(wavenumber, np.maximum(rays.curvature[0], 1e-300)) < TAKEN_OVER
     near &= np.logical_and.accumulate(near, axis=1)
-    _, along, _ = plane_of_incidence(_nodes_at(body, rays.points[near], normals[near]), direction)
+    _, along, _ = plane_of_incidence(nodes_at(body, rays.points[near], normals[near]), direction)
     with np.errstate(invalid="ignore"):
         xi = np.where(along > 0, -fock_scale(wavenumber, along) * cosine[near], np.inf)
     share[near] = smoothstep(xi, *PENUMBRA)

@@ -35,13 +35,8 @@ def far_enough(body: Surface, wavenumber: float, points: FloatArray) -> BoolArra
     SurfaceError
         If the wavenumber, 1/L, is too high for any mesh of the body.
     """
-    from scipy.spatial import cKDTree
-
     # the nodes of the lit side, on the whole of the body
-    nodes = body_nodes(body, 2 * wavenumber)
-    apart = 0.5 * float(np.sqrt(np.max(nodes.weights)))
-    distance, _ = cKDTree(nodes.points).query(points)
-    return np.asarray(distance**2 - apart**2 > (OFF * 2 * np.pi / wavenumber) ** 2)
+    return body_nodes(body, 2 * wavenumber).distance(points) > OFF * 2 * np.pi / wavenumber
 
 
 def total_at(
