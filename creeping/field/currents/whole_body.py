@@ -129,7 +129,13 @@ class SurfaceCurrents:
         return self._field(self.values, x)
 
     def left_inside(self, points: ArrayLike) -> ComplexArray:
-        """What is left of the incident wave at points (m, 3), L, inside the body, as a share of it: (m,)."""
+        """What is left of the incident wave at points (m, 3), L, inside the body, as a share of it: (m,).
+
+        Raises
+        ------
+        InvalidInputError
+            If a point is outside, or too near to the body (`scattered`).
+        """
         x = as_points(points).reshape(-1, 3)
         out = np.flatnonzero(self.body.level(x) > 0)
         if len(out):
