@@ -12,7 +12,7 @@ counts as a direction. What the reference leaves on the body, as a share of the 
     false     directions flagged where the error is below 1 %, per cent
     residual  of the reference, the largest, per cent of the incident wave
 
-Run ``python -m studies.field_coverage`` (twenty minutes), ``--quick`` for the lowest wavenumber alone.
+Run ``python -m studies.field_coverage`` (half an hour), ``--quick`` for the lowest wavenumber alone.
 """
 
 import sys
