@@ -118,15 +118,8 @@ def test_backscatter_of_high_frequencies(shape, kind):
     assert np.abs(currents).mean() < BACK and np.abs(currents).max() < WORST
 
 
-SOFT = pytest.mark.xfail(
-    strict=True,
-    reason="back along an axis of symmetry the shadow line lies in one phase, and currents of soft bodies err by up to "
-    "three times what they say",
-)
-
-
 @pytest.mark.parametrize("shape", ["sphere", "spheroid"])
-@pytest.mark.parametrize("kind", ["hard", pytest.param("soft", marks=SOFT)])
+@pytest.mark.parametrize("kind", ["hard", "soft"])
 def test_errors_stated_for_backscatter(shape, kind):
     shares = np.array([back(shape, kind, f)[1] for f in (*LOW, *HIGH)])
     # one value of the rigid spheroid, at 38 kHz, errs by 1.41 times what is stated

@@ -14,6 +14,7 @@ from creeping.field.currents.nodes import LitNodes, RayNodes, lit_nodes, ray_nod
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.surface import surface_waves
 from creeping.rays.fan import RayFan
+from creeping.shadow.line import ShadowLine
 
 
 def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> SurfaceCurrents:
@@ -70,10 +71,22 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         values=values,
         change=values - first,
         lit=np.arange(len(values)) < len(lit.points),
+        rim=_rim(fan.line, k),
+        rim_length=fan.line.length,
         unserved=1.0 - float(fan.line.fractions["attached"]),
         wavenumber=k,
         boundary=kind,
     )
+
+
+def _rim(line: ShadowLine, wavenumber: float) -> FloatArray:
+    """Points of a shadow line (l, 3), an eighth of a wavelength apart on all its curves."""
+    apart = np.pi / (4 * wavenumber)
+    parts = []
+    for curve in line.curves:
+        count = max(64, int(np.ceil(curve.length / apart)))
+        parts.append(curve.at(curve.length * (np.arange(count) + 0.5) / count))
+    return np.concatenate(parts)
 
 
 def _waves(
