@@ -24,6 +24,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from creeping._typing import Any
+from creeping.errors import CreepingError
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 LARGEST = 1_000_000
@@ -86,10 +87,20 @@ class Door:
 
     @contextmanager
     def installed(self) -> Iterator[None]:
-        """Stand before the server that is started inside: viser has no other place before the upgrade."""
+        """Stand before the server that is started inside: viser has no other place before the upgrade.
+
+        Raises
+        ------
+        CreepingError
+            At the end, if no server was started where the door stands: another viser, that would be open to all.
+        """
         serve = websocket_server.serve
+        stands = False
 
         def guarded(*arguments: Any, process_request: Any = None, max_size: Any = None, **options: Any) -> Any:
+            nonlocal stands
+            stands = True
+
             def checked(connection: Any, request: Request) -> Response | None:
                 port = int(connection.local_address[1])
                 reason = self.refusal(request, port)
@@ -110,6 +121,8 @@ class Door:
                 yield
             finally:
                 websocket_server.serve = serve  # type: ignore[misc]
+        if not stands:
+            raise CreepingError("this version of viser starts its server in a way that cannot be guarded")
 
 
 def upgrades(request: Request) -> bool:

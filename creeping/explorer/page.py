@@ -41,8 +41,12 @@ class LocalServer(viser.ViserServer):  # type: ignore[misc]
     def __init__(self, port: int) -> None:
         self.door = Door(lambda: len(self._websock_server._live_connections))
         # the address is shown by whoever starts it
-        with redirect_stdout(StringIO()), self.door.installed():
-            super().__init__(HOST, port, label="creeping", verbose=False)
+        try:
+            with redirect_stdout(StringIO()), self.door.installed():
+                super().__init__(HOST, port, label="creeping", verbose=False)
+        except CreepingError:
+            self.stop()
+            raise
 
     def stop(self) -> None:
         """End the server and its threads."""

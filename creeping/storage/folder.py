@@ -99,7 +99,7 @@ def remove_folder(folder: Path) -> str:
     except StoredMapError as error:
         return str(error)
     try:
-        for name in (*content["files"], MANIFEST):
+        for name in (*content.get("files", {}), MANIFEST):
             if Path(name).name == name:
                 (folder / name).unlink(missing_ok=True)
         left = sorted(path.name for path in folder.iterdir())

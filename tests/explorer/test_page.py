@@ -175,6 +175,13 @@ def test_the_files_of_the_page_ask_for_the_token(page):
         assert answer.status == 200 and answer.headers["Set-Cookie"] is None
 
 
+def test_a_server_that_is_not_guarded_is_refused():
+    from creeping.explorer.door import Door
+
+    with pytest.raises(cr.CreepingError, match="cannot be guarded"), Door(lambda: 0).installed():
+        pass
+
+
 def test_only_so_many_pages_are_let_in(page):
     from contextlib import ExitStack
 

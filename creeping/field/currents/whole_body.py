@@ -137,8 +137,7 @@ class SurfaceCurrents:
         if len(close):
             raise InvalidInputError(
                 f"{len(close)} of {len(x)} points are within {SHALLOW:g} wavelengths of the body "
-                f"(first: row {close[0]}); "
-                "near_field and surface_field give the field there"
+                f"(first: row {close[0]}); near_field and surface_field give the field there"
             )
         return self._field(self.values, x)
 
@@ -154,8 +153,7 @@ class SurfaceCurrents:
         out = np.flatnonzero(self.body.level(x) > 0)
         if len(out):
             raise InvalidInputError(f"{len(out)} of {len(x)} points are outside the body (first: row {out[0]})")
-        wave = np.exp(1j * self.wavenumber * (x @ self.direction))
-        return np.asarray(self.scattered(x) + np.multiply.outer(wave, self._incident))
+        return self._remainder(x, self.scattered(x))
 
     @cached_property
     def inner_points(self) -> FloatArray:
@@ -215,7 +213,12 @@ class SurfaceCurrents:
     @cached_property
     def _left(self) -> FloatArray:
         """What is left inside of each incident wave, rms, as a share of it: () or (2,)."""
-        return self._rms(self.left_inside(self.inner_points))
+        return self._rms(self._remainder(self.inner_points, self._field(self.values, self.inner_points)))
+
+    def _remainder(self, points: FloatArray, scattered: ComplexArray) -> ComplexArray:
+        """Incident and scattered field at points (m, 3), L: (m, ...)."""
+        wave = np.exp(1j * self.wavenumber * (points @ self.direction))
+        return np.asarray(scattered + np.multiply.outer(wave, self._incident))
 
     @cached_property
     def _change_inside(self) -> FloatArray:
