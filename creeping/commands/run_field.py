@@ -236,7 +236,7 @@ def _stated_error(far: FarField) -> dict[str, Any]:
     off = far.stated_error
     if off is None:
         return {"rms": None, "max": None, "by": None}
-    return {"rms": off[0], "max": off[1], "by": far.error_by}
+    return {"rms": off[0], "max": off[1], "by": far.error_source}
 
 
 def _named(found: Validity) -> dict[str, float | None]:

@@ -2,7 +2,8 @@
 
 Currents (`creeping.field.currents`) have no caustics, blends or hand-overs, and measure their own error; their cost
 grows like k^2 with every direction. Rays (`creeping.field.far_rays`) cost the same at any k and tell what each of them
-gives; where the reflected field has a caustic they err, and what they say of it is the size of their second order.
+gives; where the reflected field has a caustic they err. Their error is an estimate, whose level is measured against
+currents at a lower wavenumber (`creeping.field.extrapolated`) where the method was left to the program.
 
 Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
@@ -17,8 +18,9 @@ from creeping.field.arguments import UNRESOLVED, checked, checked_method, checke
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.extrapolated import measured_level
 from creeping.field.far_geometry import far_geometry
-from creeping.field.far_rays import error_by_order, field_of
+from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.rays.fan import RayFan
@@ -87,8 +89,9 @@ def far_field(
             if method == "currents":
                 raise
     geometry = far_geometry(fan, r)
-    far = error_by_order(field_of(geometry, k, boundary, order), geometry, boundary)
-    return replace(far, validity=validity(fan, wavenumber=k))
+    far = replace(field_of(geometry, k, boundary, order), validity=validity(fan, wavenumber=k))
+    level = measured_level(fan, k, boundary) if method == "auto" and order == 2 and len(r) else None
+    return level.applied(far) if level else far
 
 
 def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike) -> FarField:

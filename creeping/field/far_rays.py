@@ -11,8 +11,6 @@ with θ the angle from d, m̄ the mean of m over the shadow line and W a smooth 
 Sources: [LK59], [P79]; Derivations, F3, F10, F14 and F15. The thresholds of W were set by trial.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
@@ -28,7 +26,7 @@ from creeping.field.far_geometry import FarGeometry, merging, off_axis
 from creeping.field.far_result import FarField
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.polarisation import dyads, wave_frame
-from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude
+from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude, reflected_error
 from creeping.field.shed_wave import scales, shed_wave, smoothstep
 from creeping.rays.quantities import RayPoints
 
@@ -45,6 +43,11 @@ DARK = 0.5
 """Share of the field that ground without rays may have before a direction is unresolved."""
 HIDDEN = 0.01
 """Share of the shadow line from which hidden parts leave the forward lobe unresolved."""
+THIRD, UNSURE = 3.0, 1.5
+"""Third order over the square of the second, each beside the first; of an impedance, some terms of whose second order
+are left out, so many times that."""
+AHEAD = 0.1
+"""Error of the forward lobe over itself and 1/m̄⁴."""
 MERGED = (0.38, 0.52)
 """χ between which the fan integral replaces isolated rays."""
 
@@ -63,19 +66,11 @@ def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
         method=_methods(parts.in_forward, parts.in_fan),
         unresolved=parts.unresolved(),
         error=parts.error(),
-        error_by="",
+        error_by="order",
         wavenumber=k,
         boundary=boundary_name(boundary),
         order=order,
     )
-
-
-def error_by_order(far: FarField, geometry: FarGeometry, boundary: BoundaryLike) -> FarField:
-    """A far field whose error has the difference of both orders too."""
-    other = field_of(geometry, far.wavenumber, boundary, 3 - far.order)
-    with np.errstate(invalid="ignore"):
-        error = np.hypot(np.abs(far.total - other.total), far.error)
-    return replace(far, error=np.where(np.isfinite(error), error, np.nan), error_by="order")
 
 
 def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
@@ -126,16 +121,16 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
 
 
 class _Parts:
-    """Weighted parts of the far field, summed contribution by contribution."""
+    """Weighted parts of the far field, summed contribution by contribution, and the squares of what each may be off."""
 
     def __init__(self, geometry: FarGeometry, kinds: tuple[Boundary, ...], wavenumber: float, order: int) -> None:
         self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
         self.incident = geometry.direction
         self.vector = len(kinds) == 2
+        self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
         m = len(geometry.directions)
-        self.creeping, self.reflected, self.forward = (
-            np.zeros((m, 2, 2) if self.vector else m, dtype=complex) for _ in range(3)
-        )
+        self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
+        self.doubt = self._zeros().real
         self.failing_size, self.missing = np.zeros(m), np.zeros(m, dtype=bool)
         theta = geometry.angle
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
@@ -150,6 +145,10 @@ class _Parts:
         # ground behind the rest of the line has no wave: its share of a field that is nowhere in particular
         self.dark = geometry.unserved * geometry.typical
 
+    def _zeros(self) -> ComplexArray:
+        m = len(self.geometry.directions)
+        return np.zeros((m, 2, 2) if self.vector else m, dtype=complex)
+
     def unresolved(self) -> BoolArray:
         """Directions in which an expansion fails, or something is left out, that matters there (m,)."""
         total = np.abs(self.creeping + self.reflected + self.forward)
@@ -159,9 +158,10 @@ class _Parts:
         return np.asarray((self.missing & (self.in_forward > 0)) | (failing > MATTERS * largest) | without)
 
     def error(self) -> FloatArray:
-        """Size of what is left out, and of what has an expansion that fails (m,) or (m, 2, 2), L."""
+        """Size of what is left out, what has an expansion that fails, and what is beyond both orders, L."""
         error = np.hypot(np.hypot(self.left_out, self.failing_size), self.dark)
-        return np.broadcast_to(error.reshape(-1, *(1,) * (self.creeping.ndim - 1)), self.creeping.shape).copy()
+        error = np.hypot(error.reshape(-1, *(1,) * (self.creeping.ndim - 1)), np.sqrt(self.doubt))
+        return np.asarray(np.where(np.isfinite(error), error, np.nan))
 
     def _note_failing(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
         """Note the size of contributions (n,) whose expansion fails."""
@@ -169,43 +169,62 @@ class _Parts:
 
     def add(self, number: int, kind: Boundary) -> None:
         """Add every part of one scalar problem."""
-        g, k, order = self.geometry, self.wavenumber, self.order
+        g, k = self.geometry, self.wavenumber
         w, shed = self.in_forward, g.shed
         share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
-        wave = _weighted(share, isolated_rays(g, k, kind, order))
+        first, second = (_weighted(share, isolated_rays(g, k, kind, order)) for order in (1, 2))
         # the first zero of J' is the launch point itself, where the forward lobe serves
         merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
-        self._note_failing(shed.observer, wave, merged)
-        n0, n = shed.rays.first_normal, g.shed_normals
-        self._sum(self.creeping, number, shed.observer, wave, n0, n)
-        fan = g.fan_nodes(k, self.in_fan > 0)
-        wave = _weighted(((1 - w) * self.in_fan)[fan.observer], fan_half(fan, g.directions, k, kind, order))
-        self._sum(self.creeping, number, fan.observer, wave, fan.rays.first_normal, g.normals_of(fan.rays.points))
-        s = g.specular
-        incident = self.incident[s.observer]
-        wave = reflected_amplitude(s, g.directions, incident, k, kind, order)
-        if self.vector:
-            # at normal incidence no polarisation is along the plane of incidence: both take the mean of their orders
-            other = reflected_amplitude(s, g.directions, incident, k, CROSSED[kind][1], order)
-            wave = wave - 0.5 * (1 - smoothstep(s.sine, *NORMAL)) * (wave + other)
-        wave = _weighted((1 - w)[s.observer], wave)
-        self._note_failing(s.observer, wave, np.abs(next_order(s, k)) > UNRESOLVED)
-        self._sum(self.reflected, number, s.observer, wave, s.normals, s.normals)
+        normals = shed.rays.first_normal, g.shed_normals
+        wave = second if self.order == 2 else first
+        off = beyond(np.abs(second - first), wave, self.order, self.unsure)
+        self._add_apart(self.creeping, number, shed.observer, wave, off, *normals, merged)
+        if np.any(self.in_fan > 0):
+            self._add_fan(number, kind)
+        self._add_reflected(number, kind)
         if np.any(w > 0):
             self._add_forward(number, kind)
 
+    def _add_fan(self, number: int, kind: Boundary) -> None:
+        g, k = self.geometry, self.wavenumber
+        nodes = g.fan_nodes(k, self.in_fan > 0)
+        share = ((1 - self.in_forward) * self.in_fan)[nodes.observer]
+        normals = nodes.rays.first_normal, g.normals_of(nodes.rays.points)
+        sums = []
+        for order in (1, 2):
+            wave = _weighted(share, fan_half(nodes, g.directions, k, kind, order))
+            sums.append(self._summed(number, nodes.observer, wave, *normals))
+        self._add_whole(self.creeping, *sums)
+
+    def _add_reflected(self, number: int, kind: Boundary) -> None:
+        g, k = self.geometry, self.wavenumber
+        s = g.specular
+        share = (1 - self.in_forward)[s.observer]
+        incident = self.incident[s.observer]
+        wave = reflected_amplitude(s, g.directions, incident, k, kind, self.order)
+        if self.vector:
+            # at normal incidence no polarisation is along the plane of incidence: both take the mean of their orders
+            other = reflected_amplitude(s, g.directions, incident, k, CROSSED[kind][1], self.order)
+            wave = wave - 0.5 * (1 - smoothstep(s.sine, *NORMAL)) * (wave + other)
+        off = share * reflected_error(s, wave, k, self.order, THIRD * self.unsure)
+        wave = _weighted(share, wave)
+        failing = np.abs(next_order(s, k)) > UNRESOLVED
+        self._add_apart(self.reflected, number, s.observer, wave, off, s.normals, s.normals, failing)
+
     def _add_forward(self, number: int, kind: Boundary) -> None:
         """Add the forward lobes."""
-        g, k, order, w = self.geometry, self.wavenumber, self.order, self.in_forward
+        g, k, w = self.geometry, self.wavenumber, self.in_forward
         shadow, lit, missing = g.forward_nodes(k, w > 0)
         self.missing[missing] = True
-        wave = shadow_half(shadow, g.directions, self.incident, k, kind, order, self.beyond_axis[shadow.observer])
-        wave = _weighted(w[shadow.observer], wave)
-        self._sum(
-            self.forward, number, shadow.observer, wave, shadow.rays.first_normal, g.normals_of(shadow.rays.points)
-        )
-        wave = lit_half(lit, g.directions, self.incident, k, kind, order, self.beyond_axis[lit.observer])
-        self._sum(self.forward, number, lit.observer, _weighted(w[lit.observer], wave), lit.normals, lit.normals)
+        normals = shadow.rays.first_normal, g.normals_of(shadow.rays.points)
+        sums = []
+        for order in (1, 2):
+            dark = shadow_half(shadow, g.directions, self.incident, k, kind, order, self.beyond_axis[shadow.observer])
+            bright = lit_half(lit, g.directions, self.incident, k, kind, order, self.beyond_axis[lit.observer])
+            one = self._summed(number, shadow.observer, _weighted(w[shadow.observer], dark), *normals)
+            two = self._summed(number, lit.observer, _weighted(w[lit.observer], bright), lit.normals, lit.normals)
+            sums.append(one + two)
+        self._add_whole(self.forward, *sums, sharp=False)
         for incidence in np.unique(g.incidence[w > 0]):
             here, line = (g.incidence == incidence) & (w > 0), g.line_of(int(incidence))
             self.missing[here] |= line.fractions["occluded"] > HIDDEN
@@ -213,20 +232,75 @@ class _Parts:
             wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(line, g.directions[ahead], k)
             # any normal of the plane of d and r will do, and any vector across d where they are one
             aside = np.cross(line.direction, off_axis(g.directions[ahead], line.direction))
-            self._sum(self.forward, number, ahead, wave, aside, aside)
+            self.forward += self._summed(number, ahead, np.asarray(wave), aside, aside)
+        # where most of it is one sum over the rim, its error is a share of it that falls like that of Fock's currents
+        scale = (g.mean_root_radius * np.cbrt(k / 2)).reshape(-1, *(1,) * (self.forward.ndim - 1))
+        self.doubt += (self.unsure * AHEAD * np.abs(self.forward) / scale**4) ** 2
 
-    def _sum(
-        self, into: ComplexArray, number: int, observer: IntArray, wave: ComplexArray, n0: FloatArray, n: FloatArray
+    def _add_apart(
+        self,
+        into: ComplexArray,
+        number: int,
+        observer: IntArray,
+        wave: ComplexArray,
+        off: FloatArray,
+        n0: FloatArray,
+        n: FloatArray,
+        failing: BoolArray,
     ) -> None:
-        """Add contributions (n,) of normals n0 where they land and n where they leave (n, 3)."""
+        """Add contributions (n,) that err apart, by ``off``; those whose expansion fails are noted.
+
+        ``n0`` and ``n`` (n, 3) are the normals where they land and where they leave.
+        """
+        into += self._summed(number, observer, wave, n0, n)
+        self.doubt += np.abs(self._summed(number, observer, off, n0, n, squared=True))
+        np.add.at(self.failing_size, observer, np.where(failing, np.abs(wave), 0.0))
+
+    def _add_whole(self, into: ComplexArray, first: ComplexArray, second: ComplexArray, *, sharp: bool = True) -> None:
+        """Add an integral of both orders (m, ...), which errs as one; unless ``sharp`` by what the second adds."""
+        wave = second if self.order == 2 else first
+        into += wave
+        change = np.abs(second - first)
+        self.doubt += np.asarray(beyond(change, wave, self.order, self.unsure) if sharp else 2 * change) ** 2
+
+    def _summed(
+        self,
+        number: int,
+        observer: IntArray,
+        wave: ComplexArray | FloatArray,
+        n0: FloatArray,
+        n: FloatArray,
+        *,
+        squared: bool = False,
+    ) -> ComplexArray:
+        """Sums (m, ...) of contributions (n,), or of their squares."""
+        out = self._zeros()
         if not self.vector:
-            np.add.at(into, observer, wave)
-            return
+            np.add.at(out, observer, wave**2 if squared else wave)
+            return out
         d, r = self.incident[observer], self.geometry.directions[observer]
         spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=-1)])
         spare /= np.maximum(np.linalg.norm(spare, axis=-1, keepdims=True), 1e-300)
-        pair = dyads(wave_frame(n0, d, spare), wave_frame(n, r, spare), d, r)
-        np.add.at(into, observer, wave[:, None, None] * pair[:, number])
+        pair = dyads(wave_frame(n0, d, spare), wave_frame(n, r, spare), d, r)[:, number]
+        each = np.asarray(wave)[:, None, None] * pair
+        np.add.at(out, observer, np.abs(each) ** 2 if squared else each)
+        return out
+
+
+def beyond(change: FloatArray, wave: ComplexArray, order: int, unsure: float = 1.0) -> FloatArray:
+    """Size of what is beyond an order, from what the second adds to the first: (...), as ``wave``.
+
+    Of the first order that is the second itself; of the second, as in a geometric series, change^2/|wave|, some times.
+
+    Examples
+    --------
+    >>> beyond(np.array([0.1, 3.0]), np.array([1.0, 1.0]), 2).round(3).tolist()
+    [0.03, 3.0]
+    """
+    if order == 1:
+        return change
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.asarray(np.fmin(change, unsure * THIRD * change * (change / np.abs(wave))))
 
 
 def _weighted(share: FloatArray, wave: ComplexArray) -> ComplexArray:

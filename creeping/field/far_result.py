@@ -1,12 +1,18 @@
 """What a far field is: complex amplitudes by direction, their parts, and what is to be thought of them."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._presenting import Drawn
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping.field.decibels import cross_section_decibels, decibels
 from creeping.field.validity_range import Validity, validity_numbers
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,14 +35,18 @@ class FarField(Drawn):
         rays that end too early may lack so much there (`creeping.field.ray_ends`). With
         currents, whether the error is more than a tenth of the largest |f|.
     error : (m,) or (m, 2, 2), L
-        Of |f|, meant to hold in 95 of 100 directions if ``error_by`` is "extinction"; NaN where it is not known.
+        Of |f|, meant to hold in 95 of 100 directions; NaN where it is not known.
     error_by : str
-        "extinction", measured inside the body (`creeping.field.currents.whole_body`); "order", the size of what the
-        second order adds and what rays that end too early may lack, which does not see caustics of the reflected
-        field; "" for none.
+        "extinction", measured inside the body (`creeping.field.currents.whole_body`); "order", the size of what is
+        beyond both orders of each ray and of what is left out; "extrapolated", the same, its level measured against
+        currents at a lower wavenumber (`creeping.field.extrapolated`).
     wavenumber : float, 1/L
     boundary : str
     order : int
+    measured_at : float, 1/L
+        Wavenumber at which the level of an extrapolated error was measured; else NaN.
+    unit : str
+        Of lengths: "m" where the body knows it, else "L".
     validity : Validity, optional
         Least k rho and largest kappa_t rho/m^2 on the fan's rays; of `far_field`.
 
@@ -64,6 +74,8 @@ class FarField(Drawn):
     wavenumber: float
     boundary: str
     order: int
+    measured_at: float = np.nan
+    unit: str = "L"
     validity: Validity | None = None
 
     @property
@@ -76,6 +88,30 @@ class FarField(Drawn):
         """4π|f|², L²."""
         return np.asarray(4 * np.pi * np.abs(self.total) ** 2)
 
+    @property
+    def dbsm(self) -> FloatArray:
+        """Radar cross section 10 log10(4π|f|²), dB relative to a square metre if L is the metre: as ``total``."""
+        return cross_section_decibels(self.total)
+
+    @property
+    def target_strength(self) -> FloatArray:
+        """Target strength 20 log10 |f|, dB relative to a metre if L is the metre, as of sonar: as ``total``."""
+        return decibels(self.total)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Amplitudes, parts, error and cross section with names on their axes: an ``xarray.Dataset``.
+
+        Dimensions are ``direction``, of a conductor ``scattered`` and ``incident`` too, "theta" and "phi"; coordinates
+        ``vector``, ``azimuth`` and ``elevation`` (degrees) of the directions.
+        """
+        from creeping.field.labelled import far_dataset
+
+        return far_dataset(self)
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """The same as a ``pandas.DataFrame``, one row for each direction, of a conductor for each component of it."""
+        return self.to_xarray().drop_vars("vector").drop_dims("axis", errors="ignore").to_dataframe()
+
     def __repr__(self) -> str:
         names, counts = np.unique(self.method, return_counts=True)
         served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
@@ -84,7 +120,7 @@ class FarField(Drawn):
         largest = np.max(size, initial=0.0, where=finite)
         missing = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
         off = self.stated_error
-        error = "" if off is None else f"; error by {self.error_by} {off[0]:.2g} L rms, {off[1]:.2g} L at most"
+        error = "" if off is None else f"; error by {self.error_source} {off[0]:.2g} L rms, {off[1]:.2g} L at most"
         return (
             f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
             f"order {self.order}{self._range})\n"
@@ -98,6 +134,13 @@ class FarField(Drawn):
         if self.validity is None or not np.isfinite(self.validity.least_k_rho):
             return ""
         return f"; {validity_numbers(self.validity)}"
+
+    @property
+    def error_source(self) -> str:
+        """What the error comes from, in words."""
+        if self.error_by == "extrapolated":
+            return f"extrapolation from k = {self.measured_at:.3g}"
+        return self.error_by
 
     @property
     def stated_error(self) -> tuple[float, float] | None:

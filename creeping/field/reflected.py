@@ -5,8 +5,12 @@
 
 m with the curvature in the plane of incidence, r = κ_b/κₙ of the curvature across it. q_eff belongs to the hard
 boundary and to impedances; it is 1 - iκ_b/(k cos θᵢ) away from grazing. On a conducting sphere that factor is found
-with E across the plane of incidence, and none with E in it. Where the body is not convex in that plane R is that of a
-plane, and each negative principal curvature turns the phase by -π/2.
+with E across the plane of incidence, and none with E in it. What P lacks of an admittance η at that order is added to
+R; where P does not serve, R is that of a plane with what P would have of that order, R₀ = (cos θᵢ - η)/(cos θᵢ + η):
+
+    (i η/(2k (cos θᵢ + η)²)) [κ_b - R₀ κₙ]     and     -(i κₙ/(2k cos³θᵢ)) [R₀² + 2 η² cos θᵢ/(cos θᵢ + η)³]
+
+Each negative principal curvature turns the phase by -π/2.
 
 The bracket is what the next order of the reflected field's series adds to that of P: Λ, from third and fourth
 derivatives of the surface (`creeping.rays.specular.shape_term`), is 1/(2a) on a sphere, where the bracket is 1, and
@@ -26,6 +30,8 @@ from creeping.rays.specular import SpecularPoints
 
 NORMAL = (0.0, 0.2)
 """Sines of the angle of incidence between which its plane, and a conductor's polarisations, come to be told apart."""
+LARGEST_TERM = 0.5
+"""Bound of terms of the next order."""
 UNRESOLVED = 0.25
 """Size of the next term of the reflected field's series from which a specular point is too flat for it."""
 
@@ -36,11 +42,10 @@ def reflection(
     """Coefficient R (n,) from cos θᵢ (n,) and curvatures (n,), 1/L, in and across the plane of incidence; k in 1/L."""
     m = fock_scale(wavenumber, along)
     curved = np.isfinite(m) & (2 * m * cosine < -FARTHEST) & (cosine > 1e-12)
-    out = plane_reflection(cosine, boundary)
+    out = np.empty(cosine.shape, dtype=complex)
     shifted = order == 2 and boundary.kind not in ("soft", "electric hard")
-    if shifted and boundary.kind != "impedance":
-        with np.errstate(divide="ignore", invalid="ignore"):
-            out = np.nan_to_num(1 - 1j * across / (wavenumber * cosine)) * out
+    flat = ~curved
+    out[flat] = _flat_reflection(cosine[flat], along[flat], across[flat], wavenumber, boundary, order)
     if np.any(curved):
         xi = -2 * m[curved] * cosine[curved]
         q = boundary.q(m[curved])
@@ -51,7 +56,34 @@ def reflection(
             change = pekeris_slope(xi, of) * np.exp(0.25j * np.pi) / (pekeris(xi, of) if q is None else wave)
             wave = (1 - 0.25 * across[curved] / along[curved] / m[curved] ** 2 * change) * wave
         out[curved] = -np.sqrt(-4 / xi) * np.exp(1j * xi**3 / 12) * wave
+    if order == 2 and boundary.kind == "impedance":
+        out = out + _admittance_term(cosine, along, across, wavenumber, boundary.admittance)
     return out
+
+
+def _flat_reflection(
+    cosine: FloatArray, along: FloatArray, across: FloatArray, k: float, boundary: Boundary, order: int
+) -> ComplexArray:
+    """R (n,) where P does not serve: on flat and concave ground, and far from grazing."""
+    first = plane_reflection(cosine, boundary)
+    if order == 1:
+        return first
+    c = np.maximum(cosine, 1e-12)
+    eta = boundary.admittance
+    absorbed = 2 * eta**2 * c / (c + eta) ** 3 if boundary.kind == "impedance" else 0.0
+    second = -1j * along / (2 * k * c**3) * (first**2 + absorbed)
+    if boundary.kind in ("hard", "impedance", "electric soft"):
+        # q_eff, which P has where it serves
+        slope = c / (c + eta) ** 2 if boundary.kind == "impedance" else first / c
+        second = second - 1j * across / k * slope
+    return np.asarray(first + limited(np.asarray(second, dtype=complex), LARGEST_TERM))
+
+
+def _admittance_term(cosine: FloatArray, along: FloatArray, across: FloatArray, k: float, eta: complex) -> ComplexArray:
+    """What R (n,) of an admittance has at order 1/k beside P."""
+    c = np.maximum(cosine, 0.0) + eta
+    term = 0.5j * eta / (k * c**2) * (across - (cosine - eta) / c * along)
+    return limited(np.asarray(term, dtype=complex), LARGEST_TERM)
 
 
 def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:
@@ -77,6 +109,34 @@ def next_order(specular: SpecularPoints, wavenumber: float) -> FloatArray:
         return np.asarray((curvatures(specular)[1] / 2 - specular.shape) / (wavenumber * specular.cosine))
 
 
+def series_parameter(specular: SpecularPoints, wavenumber: float) -> FloatArray:
+    """What the series of the reflected field goes by (n,), at most LARGEST_TERM: its n-th term is about its n-th power.
+
+    It is the sum of the sizes of what makes the second, (|κₙ|/c² + |κ_b| + 2|Λ|)/(2kc), with c² = cos²θᵢ + 2/m²: nearer
+    to grazing than that P is no series.
+    """
+    along, across = curvatures(specular)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        c = np.sqrt(specular.cosine**2 + 2 / fock_scale(wavenumber, np.abs(along)) ** 2)
+        share = (np.abs(along) / c**2 + np.abs(across) + 2 * np.abs(specular.shape)) / (2 * wavenumber * c)
+    return np.asarray(np.minimum(np.nan_to_num(share, nan=LARGEST_TERM), LARGEST_TERM))
+
+
+def reflected_error(
+    specular: SpecularPoints, wave: ComplexArray, wavenumber: float, order: int, factor: float
+) -> FloatArray:
+    """Size of what is beyond an order of the wave of each specular point (n,), L, some times its next power.
+
+    Where a plane would reflect little, what comes next is a share of what a mirror reflects.
+    """
+    share = series_parameter(specular, wavenumber)
+    with np.errstate(divide="ignore"):
+        mirror = 0.5 / np.sqrt(np.abs(np.prod(specular.principal, axis=1)))
+    if order == 1:
+        return np.asarray(2 * share * np.maximum(np.abs(wave), share * mirror))
+    return np.asarray(factor * share**2 * (np.abs(wave) + share * mirror))
+
+
 def reflected_amplitude(
     specular: SpecularPoints,
     observers: FloatArray,
@@ -94,7 +154,7 @@ def reflected_amplitude(
     f = spread * R * np.exp(1j * wavenumber * path - 0.5j * np.pi * turns)
     size = next_order(specular, wavenumber)
     if order == 2:
-        f = (1 + limited(np.asarray(1j * size, dtype=np.complex128), 0.5)) * f
+        f = (1 + limited(np.asarray(1j * size, dtype=np.complex128), LARGEST_TERM)) * f
     # towards a flat point the term grows like κ^-3: f, like κ^-1/2, stops growing where the term is not small
     with np.errstate(over="ignore"):
         excess = np.minimum(np.abs(size) / UNRESOLVED, 1e60)

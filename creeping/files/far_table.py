@@ -65,7 +65,9 @@ def rows(far: "FarField") -> Iterable[tuple[Any, ...]]:
 def _error_of(far: "FarField") -> str:
     if far.error_by == "extinction":
         return "measured inside the body, for 95 of 100 directions"
-    return "what the second order adds; blind to caustics of the reflected field" if far.error_by else "not known"
+    if far.error_by == "extrapolated":
+        return f"of rays, its level measured against currents at k = {far.measured_at:.4g}"
+    return "of rays, by the size of their second order" if far.error_by else "not known"
 
 
 def _suffixes(far: "FarField") -> tuple[str, ...]:

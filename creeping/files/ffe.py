@@ -108,7 +108,7 @@ def _trust(far: "FarField") -> Iterator[str]:
     yield f"** computed by {served or 'nothing'}; unresolved in {doubtful}"
     if far.stated_error is not None:
         rms, worst = far.stated_error
-        yield f"** error of |f| by {far.error_by}: {rms:.3e} m rms over the directions, {worst:.3e} m at most"
+        yield f"** error of |f| by {far.error_source}: {rms:.3e} m rms over the directions, {worst:.3e} m at most"
 
 
 def _lines(far: "FarField", theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:

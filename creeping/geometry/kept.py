@@ -1,4 +1,4 @@
-"""What is made of a body once and kept as long as it lives.
+"""What is made of a body or a fan once and kept as long as it lives.
 
 By identity: bodies may be equal to others, or not be hashable.
 """
@@ -8,22 +8,21 @@ from typing import TypeVar
 from weakref import finalize
 
 from creeping._typing import Any
-from creeping.geometry.surface import Surface
 
 T = TypeVar("T")
 _KEPT: dict[int, dict[str, Any]] = {}
 
 
-def kept(body: Surface, name: str, make: Callable[[], T]) -> T:
-    """What ``make`` gives at the first call for a body and a name."""
-    if id(body) not in _KEPT:
+def kept(owner: object, name: str, make: Callable[[], T]) -> T:
+    """What ``make`` gives at the first call for an owner and a name."""
+    if id(owner) not in _KEPT:
         try:
-            finalize(body, _KEPT.pop, id(body), None)
+            finalize(owner, _KEPT.pop, id(owner), None)
         except TypeError:
             # without weak references the identity may come again
             return make()
-        _KEPT[id(body)] = {}
-    own = _KEPT[id(body)]
+        _KEPT[id(owner)] = {}
+    own = _KEPT[id(owner)]
     if name not in own:
         own[name] = make()
     found: T = own[name]

@@ -8,7 +8,7 @@ from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundar
 from creeping.field.currents.kept import affordable
 from creeping.field.far import far_field
 from creeping.field.far_geometry import FarGeometry
-from creeping.field.far_rays import error_by_order, field_of
+from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
@@ -113,8 +113,7 @@ class Sweeper:
         for name, which, suffix in request.problems:
             boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
-                by_rays = field_of(geometry, wavenumber, boundary, request.order)
-                field = FieldArrays.of(error_by_order(by_rays, geometry, boundary), len(rows))
+                field = FieldArrays.of(field_of(geometry, wavenumber, boundary, request.order), len(rows))
                 if request.method == "currents":
                     for number in range(len(rows)):
                         asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "method": "currents"}

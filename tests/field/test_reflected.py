@@ -7,8 +7,9 @@ from scipy.special import spherical_jn, spherical_yn
 import creeping as cr
 import scatterers as sc
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary, scalar_boundaries
-from creeping.field.reflected import plane_reflection, reflected_amplitude, reflection
+from creeping.field.reflected import plane_reflection, reflected_amplitude, reflected_error, reflection
 from creeping.rays.specular import specular_points
+from studies.reference import sphere
 
 D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
 WALL = Boundary("impedance", 0.4 + 0.3j)
@@ -119,3 +120,45 @@ def test_impedance_between_hard_and_soft_in_the_far_field():
         (wall,) = scalar_boundaries(cr.ImpedanceBoundary(eta))
         got = reflection(COSINE, ones, ones, 40.0, wall, 1)
         np.testing.assert_allclose(got, reflection(COSINE, ones, ones, 40.0, limit, 1), rtol=1e-4)
+
+
+@pytest.mark.parametrize("eta", [0.2, 0.7, 1.5, 0.4 + 0.3j])
+def test_impedance_to_its_next_order(eta):
+    # oblique and normal incidence against the partial waves; at first order the same misses by 100 times as much
+    theta = np.array([2.0, 2.4, 2.8, np.pi])
+    r = turned(theta)
+    found = specular_points(sc.Sphere(), D, r)
+    (wall,) = scalar_boundaries(cr.ImpedanceBoundary(eta))
+    for k, most in ((63.0, 1e-3), (250.0, 5e-5)):
+        exact = sphere.far_field(k, 1.0, np.cos(theta), complex(eta))
+        off = [np.abs(reflected_amplitude(found, r, D, k, wall, order) / exact - 1) for order in (1, 2)]
+        assert np.all(off[1] < most)
+        assert np.max(off[1]) < 0.4 * np.max(off[0])
+
+
+@pytest.mark.parametrize("boundary", [SOFT, HARD, ELECTRIC_SOFT, ELECTRIC_HARD, WALL], ids=lambda b: b.kind)
+def test_the_series_of_flat_and_concave_ground_is_that_of_pekeris(boundary):
+    # one is a series in the curvatures, of either sign, and the other uniform: they meet far from grazing
+    k = 4000.0
+    along, across = np.full(3, 1.0), np.full(3, 0.6)
+    uniform = reflection(COSINE, along, across, k, boundary, 2)
+    bent = [reflection(COSINE, s * along, s * across, k, boundary, 2) for s in (-1, 0)]
+    # the part that is odd in the curvatures
+    assert np.all(np.abs(2 * bent[1] - bent[0] - uniform) < 30 / (k * COSINE**3) ** 2)
+    assert np.all(np.abs(uniform - bent[1]) > 1e-5)
+
+
+@pytest.mark.parametrize("kind, factor", [("soft", 1), ("hard", 2), ("impedance", 3)])
+def test_stated_error_of_reflection_on_the_sphere(kind, factor):
+    theta = np.linspace(1.6, np.pi, 60)
+    r = turned(theta)
+    found = specular_points(sc.Sphere(), D, r)
+    boundary = Boundary(kind, 0.7 if kind == "impedance" else 0j)
+    # at lower ka what creeps round is more than that
+    for k in (200.0, 800.0):
+        wave = reflected_amplitude(found, r, D, k, boundary, 2)
+        stated = reflected_error(found, wave, k, 2, 3.0)
+        exact = sphere.far_field(k, 1.0, np.cos(theta), 0.7 + 0j if kind == "impedance" else kind)
+        off = np.abs(wave - exact)
+        assert np.mean(off[theta > 2] <= stated[theta > 2]) > 0.9
+        assert np.median(stated / off) < 8 * factor

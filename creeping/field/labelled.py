@@ -1,0 +1,92 @@
+"""Results with names on their axes: fields as an ``xarray.Dataset`` or a ``pandas.DataFrame``.
+
+Units are those of the CF conventions where the body's unit is known, else powers of L, the body's unit of length.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._typing import Any
+from creeping.geometry.directions import azimuth_elevation_of
+from creeping.storage.extras import required
+
+if TYPE_CHECKING:
+    import xarray
+
+    from creeping.field.far_result import FarField
+    from creeping.field.point_result import PointField
+
+COMPONENTS = ("theta", "phi")
+"""Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
+PARTS = ("creeping", "reflected", "forward")
+
+
+def power(unit: str, exponent: int) -> str:
+    """Power of a unit of length, as the CF conventions write it.
+
+    Examples
+    --------
+    >>> power("m", 2), power("L", -1), power("m", 1)
+    ('m2', '1/L', 'm')
+    """
+    if exponent == 1:
+        return unit
+    if exponent > 0:
+        return f"{unit}{exponent}" if unit == "m" else f"{unit}^{exponent}"
+    return f"{unit}{exponent}" if unit == "m" else f"1/{unit}"
+
+
+def far_dataset(far: "FarField") -> "xarray.Dataset":
+    """A far field, its parts, error and cross section, by direction: see `FarField.to_xarray`."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    unit = far.unit
+    dims = ("direction", "scattered", "incident")[: far.total.ndim]
+    azimuth, elevation = azimuth_elevation_of(far.directions)
+    coordinates: dict[str, Any] = {
+        "vector": (
+            ("direction", "axis"),
+            far.directions,
+            {"units": "1", "long_name": "unit direction to the observer"},
+        ),
+        "azimuth": (("direction",), np.degrees(azimuth), {"units": "degree"}),
+        "elevation": (("direction",), np.degrees(elevation), {"units": "degree"}),
+        "axis": (("axis",), ["x", "y", "z"]),
+        "wavenumber": ((), far.wavenumber, {"units": power(unit, -1), "long_name": "k"}),
+    }
+    if far.total.ndim == 3:
+        coordinates |= {name: ((name,), list(COMPONENTS)) for name in dims[1:]}
+    names = {"total": "far-field amplitude f", **{name: f"{name} part of f" for name in PARTS}}
+    variables: dict[str, Any] = {
+        name: (dims, getattr(far, name), {"units": unit, "long_name": text}) for name, text in names.items()
+    }
+    variables["error"] = (dims, far.error, {"units": unit, "long_name": f"error of |f|, by {far.error_source}"})
+    area = {"units": power(unit, 2), "long_name": "cross section 4 pi |f|^2"}
+    variables["cross_section"] = (dims, far.cross_section, area)
+    variables["unresolved"] = (
+        ("direction",),
+        far.unresolved,
+        {"long_name": "an expansion fails, or the error is large"},
+    )
+    variables["method"] = (("direction",), far.method, {"long_name": "what served"})
+    words = {"boundary": far.boundary, "order": far.order, "conventions": "time factor exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+    return found
+
+
+def point_dataset(field: "PointField", parts: tuple[str, ...]) -> "xarray.Dataset":
+    """A field at points with its parts, error and status, one row a point: see `PointField.to_xarray`."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    flat = field.points.reshape(-1, 3)
+    coordinates: dict[str, Any] = {
+        name: (("point",), flat[:, i], {"units": "L"}) for i, name in enumerate(("x", "y", "z"))
+    }
+    coordinates["wavenumber"] = ((), field.wavenumber, {"units": "1/L", "long_name": "k"})
+    variables: dict[str, Any] = {"total": (("point",), field.values.reshape(-1), {"units": field.unit})}
+    for name in (*parts, "error"):
+        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {"units": field.unit})
+    for name in ("error_by", "status", "method"):
+        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {})
+    words = {"boundary": field.boundary, "order": field.order, "conventions": "time factor exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+    return found
