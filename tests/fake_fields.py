@@ -4,6 +4,7 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
+from creeping.field.echo import Echo
 
 HOSTILE = "<script>alert('x')</script>&\"$\\frac"
 
@@ -32,3 +33,23 @@ def far_of(directions, total, **changes):
         "order": 2,
     }
     return cr.FarField(**values | changes)
+
+
+def echo_of(amplitude, error, quantity="rcs"):
+    """Echo of one channel at two angles, a quarter of it creeping."""
+    f = np.full((1, 2, 1), amplitude, dtype=complex)
+    flags = np.zeros(f.shape, dtype=bool)
+    angles = np.array([0.0, 90.0])
+    return Echo(
+        quantity,
+        ("VV",),
+        "azimuth",
+        angles,
+        0 * angles,
+        None,
+        np.array([20.0]),
+        {"creeping": 0.25 * f, "reflected": 0.75 * f},
+        np.full(f.shape, error),
+        flags,
+        flags,
+    )

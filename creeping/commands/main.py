@@ -15,6 +15,7 @@ from cyclopts import App, Group, Parameter
 
 from creeping._version import __version__
 from creeping.commands import check as _checking
+from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
@@ -242,6 +243,8 @@ def figure(
     return 0
 
 
+app.command(_echo_command.rcs)
+app.command(_echo_command.ts)
 app.command(_checking.check)
 app.command(_sweep_command.sweep)
 app.command(_explore_command.explore)

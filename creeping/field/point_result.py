@@ -3,8 +3,9 @@
 Results act as arrays of their values (`creeping.field.array_result`).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,10 @@ from creeping._presenting import Shown
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.array_result import ArrayResult
 from creeping.field.validity_range import Validity
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 class FieldStatus(IntEnum):
@@ -114,9 +119,25 @@ class PointField(ArrayResult, Shown):
         return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     @property
+    def total(self) -> ComplexArray:
+        """The values (...)."""
+        return self.values
+
+    @property
     def unit(self) -> str:
         """Unit of the values."""
         return "of the incident wave"
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
+        from creeping.field.labelled import point_dataset
+
+        own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
+        return point_dataset(self, tuple(sorted(own)))
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """The same as a ``pandas.DataFrame``, one row a point."""
+        return self.to_xarray().to_dataframe()
 
     def __repr__(self) -> str:
         names, counts = np.unique(self.method, return_counts=True)

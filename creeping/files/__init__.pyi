@@ -1,5 +1,9 @@
 # Public names and where they are: read by type checkers, and by lazy_loader when the package is imported.
+from .echo_table import write_echo as write_echo
+from .echo_table import write_profile as write_profile
 from .ffe import write_ffe as write_ffe
+from .measured import MeasuredCut as MeasuredCut
+from .measured import read_cut as read_cut
 from .polylines import polydata as polydata
 from .tables import write_csv as write_csv
 from .tables import write_text as write_text

@@ -2,6 +2,11 @@
 from .coloured_body import currents_picture as currents_picture
 from .display import GLProbe as GLProbe
 from .display import gl_available as gl_available
+from .echo_pictures import comparison_picture as comparison_picture
+from .echo_pictures import echo_band_picture as echo_band_picture
+from .echo_pictures import echo_cut_picture as echo_cut_picture
+from .echo_pictures import echo_map_picture as echo_map_picture
+from .echo_pictures import range_picture as range_picture
 from .far_cuts import far_cut_picture as far_cut_picture
 from .field_pictures import decay_picture as decay_picture
 from .field_pictures import surface_field_picture as surface_field_picture

@@ -3,16 +3,16 @@
 Attributes are text, numbers or lists of numbers, which zarr and netCDF both keep.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
-from creeping.errors import CreepingError
 from creeping.geometry.directions import angles_of
 from creeping.shadow.status import INCIDENCE_STATUSES
+from creeping.storage.extras import required
+from creeping.sweeping.accessor import register
 from creeping.sweeping.plan import Arrays, SweepPlan
 from creeping.sweeping.request import SweepRequest
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 MISSING = -1
 """Status of an incidence that is not computed yet."""
 STATUS_NAMES = {code: text.partition(":")[0] for code, text in INCIDENCE_STATUSES.items()} | {MISSING: "missing"}
+COMPONENTS = ("theta", "phi")
+"""Components of a conductor's incident and scattered wave."""
 SHOWN = 20
 """Errors of incidences that stand in the attributes."""
 CONVENTIONS = (
@@ -39,10 +41,7 @@ def require(package: str) -> Any:
     CreepingError
         If it is missing, with the command that installs it.
     """
-    try:
-        return import_module(package)
-    except ModuleNotFoundError as error:
-        raise CreepingError(f"sweeps need {error.name}: pip install 'creeping[sweep]'") from error
+    return required(package, use="sweeps need", extra="sweep")
 
 
 def coordinates(request: SweepRequest, incidences: FloatArray) -> dict[str, Coordinate]:
@@ -64,6 +63,9 @@ def coordinates(request: SweepRequest, incidences: FloatArray) -> dict[str, Coor
     found["wavenumber"] = (("wavenumber",), np.array(request.wavenumbers), {"units": "1/L", "description": "k"})
     if request.scalar_boundaries:
         found["boundary"] = (("boundary",), np.array(request.scalar_boundaries), {"description": "on the body"})
+    if "pec" in request.boundaries:
+        for name in ("scattered", "incident"):
+            found[name] = ((name,), np.array(COMPONENTS), {"description": "component of the wave, along theta or phi"})
     if request.quantity == "bistatic":
         seen = np.array(request.observation)
         words = {"units": "1", "description": "direction in which the field is observed"}
@@ -141,7 +143,7 @@ def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]], s
     }
     counts = count_attributes(arrays["incidence_status"], errors, seconds)
     words = sweep_attributes(plan) | counts
-    found: xarray.Dataset = require("xarray").Dataset(variables, coordinates(request, plan.incidences), words)
+    found: xarray.Dataset = register().Dataset(variables, coordinates(request, plan.incidences), words)
     return found
 
 

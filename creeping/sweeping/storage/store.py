@@ -23,6 +23,7 @@ from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
+from creeping.sweeping.accessor import register
 from creeping.sweeping.plan import Arrays, SweepPlan, differing, open_flow, save_flow
 from creeping.sweeping.results import MISSING, SHOWN, count_attributes, require
 from creeping.sweeping.storage.layout import (
@@ -265,7 +266,7 @@ class SweepStore:
 
     def dataset(self) -> "xarray.Dataset":
         """Dataset whose values are read when they are used."""
-        opened: xarray.Dataset = require("xarray").open_zarr(self.folder, consolidated=False)
+        opened: xarray.Dataset = register().open_zarr(self.folder, consolidated=False)
         # in the order of the request; a selection lacks coordinates with dimensions of their own
         return opened[self.variables].assign_coords(opened.coords)
 

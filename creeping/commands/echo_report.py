@@ -1,0 +1,229 @@
+"""What ``creeping rcs`` and ``creeping ts`` compute, write and say."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from creeping import plotting
+from creeping._typing import FloatArray
+from creeping._version import __version__
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import BoundaryLike
+from creeping.field.comparison import Comparison, compare
+from creeping.field.echo import Echo
+from creeping.field.slant_range import RangeProfile, range_profile
+from creeping.files import read_cut, write_echo, write_profile
+from creeping.files.measured import MeasuredCut
+from creeping.geometry.surface import Surface
+from creeping.sweeping.echoes import backscatter, bistatic
+
+LEAST_BAND = 16
+"""Frequencies from which a band has a range profile."""
+
+
+def computed(
+    body: Surface,
+    request: Any,
+    boundary: BoundaryLike,
+    azimuths: FloatArray,
+    elevations: FloatArray,
+    method: str,
+    cache: bool,
+    progress: Any,
+) -> Any:
+    """Dataset of what a request asks for."""
+    asked: dict[str, Any] = {"wavenumbers": request.wavenumbers, "azimuth": azimuths, "elevation": elevations}
+    asked |= {"boundary": boundary, "method": method, "cache": cache, "progress": progress}
+    if request.monostatic:
+        return backscatter(body, **asked)
+    # one fan for all observers: currents cost no more than rays
+    chosen = "currents" if method == "auto" else method
+    return bistatic(body, **(asked | {"incidence": request.incidence, "method": chosen}))
+
+
+def reference_of(request: Any, path: Path | None, column: str | None) -> dict[str, tuple[MeasuredCut, FloatArray]]:
+    """Measured cut and its levels by channel, of those that it has.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file is no table, lacks the columns, or is over what the request does not vary.
+    """
+    if path is None:
+        if column is not None:
+            raise InvalidInputError("--column belongs to --compare")
+        return {}
+    cut = read_cut(path)
+    over = "frequency" if len(request.wavenumbers) > 1 else "angle"
+    if cut.over != over or (over == "angle" and not request.angle_name):
+        raise InvalidInputError(f"--compare {path} is over {cut.over}; ask for a cut or a band that varies that")
+    if column is None:
+        found = {channel: cut.of(channel) for channel in request.channels}
+    else:
+        names = [name.strip() for name in column.split(",")]
+        unknown = [name for name in names if name not in cut.levels]
+        if unknown or len(names) != len(request.channels):
+            raise InvalidInputError(
+                f"--column {column!r}: give one of {', '.join(cut.levels)} for each of {', '.join(request.channels)}"
+            )
+        found = {channel: cut.levels[name] for channel, name in zip(request.channels, names, strict=True)}
+    known = {channel: (cut, levels) for channel, levels in found.items() if levels is not None}
+    if not known:
+        raise InvalidInputError(
+            f"--compare {path} has columns {', '.join(cut.levels)}: say with --column which is "
+            f"{', '.join(request.channels)}"
+        )
+    return known
+
+
+def compared(echo: Echo, reference: dict[str, tuple[MeasuredCut, FloatArray]], align: float) -> dict[str, Comparison]:
+    """Comparison by channel."""
+    found, levels, (low, high) = {}, echo.levels(), echo.bounds()
+    for channel, (cut, given) in reference.items():
+        c = echo.channels.index(channel)
+        at = (c, 0, slice(None)) if cut.over == "frequency" else (c, slice(None), 0)
+        values = echo.hertz if cut.over == "frequency" else echo.angles
+        most = align if cut.over == "angle" else 0.0
+        found[channel] = compare(values, levels[at], cut.values, given, low=low[at], high=high[at], align=most)
+    return found
+
+
+def write_results(
+    output: Path, echo: Echo, comparisons: dict[str, Comparison], body: Surface, name: str, *, pictures: bool
+) -> tuple[list[str], dict[str, Any]]:
+    """Write tables and pictures; their names, and what they add to the summary."""
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
+    stem = echo.quantity
+    write_echo(output / f"{stem}.csv", echo)
+    names = [f"{stem}.csv"]
+    extra: dict[str, Any] = {}
+    for channel, found in comparisons.items():
+        extra.setdefault("compared", {})[channel] = found.summary()
+    profiles = _profiles(echo)
+    if profiles:
+        write_profile(output / "range.csv", profiles, echo)
+        names.append("range.csv")
+        extra["range_resolution"] = next(iter(profiles.values())).resolution
+        extra["range_repeats"] = float(np.pi / np.diff(echo.wavenumbers).mean())
+    if pictures:
+        names += _drawn(output, stem, echo, profiles, float(np.linalg.norm(np.ptp(body.bounds, axis=0))), name)
+        if comparisons:
+            plotting.comparison_picture(output / "compared.png", echo, comparisons, title=_title(echo, name))
+            names.append("compared.png")
+    return names, extra
+
+
+def _profiles(echo: Echo) -> dict[str, RangeProfile]:
+    """Range profiles by channel, of backscatter in one direction over a band of equal steps whose values are finite."""
+    if echo.incidence is not None or len(echo.azimuth) > 1 or len(echo.wavenumbers) < LEAST_BAND:
+        return {}
+    try:
+        return {
+            channel: range_profile(values[0], echo.wavenumbers)
+            for channel, values in zip(echo.channels, echo.total, strict=True)
+        }
+    except InvalidInputError:
+        return {}
+
+
+def _drawn(
+    output: Path, stem: str, echo: Echo, profiles: dict[str, RangeProfile], extent: float, name: str
+) -> list[str]:
+    words: dict[str, Any] = {"title": _title(echo, name)}
+    several, band = len(echo.azimuth) > 1, len(echo.wavenumbers) > 1
+    jobs: list[tuple[str, Any]] = []
+    if several and not band:
+        jobs.append((f"{stem}.png", lambda path: plotting.echo_cut_picture(path, echo, **words)))
+        polar = {"kind": "polar", **words}
+        jobs.append((f"{stem}_polar.png", lambda path: plotting.echo_cut_picture(path, echo, **polar)))
+    if several and band:
+        jobs.append((f"{stem}_map.png", lambda path: plotting.echo_map_picture(path, echo, **words)))
+    if band and not several:
+        jobs.append((f"{stem}.png", lambda path: plotting.echo_band_picture(path, echo, **words)))
+    if profiles:
+        far = min(0.9 * extent, -float(next(iter(profiles.values())).range[0]))
+        jobs.append(("range.png", lambda path: plotting.range_picture(path, profiles, echo, far, **words)))
+    names = []
+    for file, draw in jobs:
+        try:
+            draw(output / file)
+        except InvalidInputError:
+            # nothing that can be drawn in decibels: the table says so
+            continue
+        names.append(file)
+    return names
+
+
+def _title(echo: Echo, name: str) -> str:
+    short = name if len(name) < 50 else f"{name[:47]}..."
+    hertz = echo.hertz
+    at = f"{hertz[0] / 1e9:g} GHz" if echo.quantity == "rcs" else f"{hertz[0] / 1e3:g} kHz"
+    words = [short, "" if len(hertz) > 1 else at]
+    if echo.incidence is not None:
+        words.append(f"bistatic, radar at {echo.incidence[0]:g}°, {echo.incidence[1]:g}°")
+    elif len(echo.azimuth) == 1:
+        words.append(f"azimuth {echo.azimuth[0]:g}°, elevation {echo.elevation[0]:g}°")
+    return ", ".join(word for word in words if word)
+
+
+def summary_of(body: str, request: Any, echo: Echo, dataset: Any) -> dict[str, Any]:
+    """What the summary file holds."""
+    least, largest = dataset["least_k_rho"].values, dataset["largest_transverse"].values
+    return {
+        "body": body,
+        "version": __version__,
+        **echo.summary(),
+        "frequency_hz": [float(echo.hertz[0]), float(echo.hertz[-1])],
+        "boundary": request.boundary,
+        "validity": {
+            "least_k_rho": _extreme(np.nanmin, least),
+            "largest_transverse": _extreme(np.nanmax, largest),
+        },
+        "failed_incidences": int(np.sum(dataset["incidence_status"].values == 4)),
+        "digest": dataset.attrs.get("sweep_digest"),
+    }
+
+
+def _extreme(pick: Any, values: Any) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(pick(known)) if known.size else None
+
+
+def readable(summary: dict[str, Any], output: Path) -> str:
+    """The summary as a person reads it."""
+    unit = summary["unit"]
+    tops = ", ".join(
+        f"{channel} up to {value:.2f}" if value is not None else f"{channel} nothing finite"
+        for channel, value in summary["largest"].items()
+    )
+    rows = [f"{summary['quantity']} of {summary['body']}, {unit}: {tops}"]
+    if summary["error_db_median"] is not None:
+        rows.append(
+            f"stated error: {summary['error_db_median']:.2g} dB in the median, "
+            f"{summary['error_db_95']:.2g} dB in 95 of 100 values"
+        )
+    served = f"{summary['by_currents']} of {summary['values']} values by currents, the others by rays"
+    rows.append(f"{served}; {summary['unresolved']} unresolved")
+    least, largest = summary["validity"]["least_k_rho"], summary["validity"]["largest_transverse"]
+    if least is not None and largest is not None:
+        rows.append(f"on the rays k rho >= {least:.3g}, kappa_t rho/m^2 <= {largest:.2g}")
+    if summary["failed_incidences"]:
+        rows.append(f"{summary['failed_incidences']} incidences failed: their rows are NaN")
+    if "range_resolution" in summary:
+        rows.append(
+            f"range profile: resolution {summary['range_resolution']:.3g} m, repeats after "
+            f"{summary['range_repeats']:.3g} m"
+        )
+    for channel, off in summary.get("compared", {}).items():
+        rows.append(
+            f"{channel} against the reference at {off['places']:g} places: mean {off['mean_db']:+.3g} dB, rms "
+            f"{off['rms_db']:.3g} dB, largest {off['largest_db']:.3g} dB, Austin measure {off['austin_db']:.3g} dB"
+        )
+        shift = f"; shifted by {off['shift']:g} degrees" if off["shift"] else ""
+        rows.append(f"  {100 * off['within_error']:.0f} % within the stated error{shift}")
+    rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
+    return "\n".join(rows)

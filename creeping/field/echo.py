@@ -1,0 +1,129 @@
+"""An echo: amplitudes by channel, angle and wavenumber, and their levels in decibels.
+
+    radar cross section   sigma = 4 pi |f|^2,   10 log10 sigma, dBsm
+    target strength       TS = 20 log10 |f|, dB re 1 m
+
+Sources: [S08] for the cross section, [U83] for target strength.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.decibels import cross_section_decibels, decibels
+from creeping.field.frequency import frequency
+
+LEVELS = {"rcs": ("radar cross section", "dBsm"), "ts": ("target strength", "dB re 1 m")}
+"""Names of the levels, and their units where lengths are metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Echo:
+    """Echo in c channels at n angles and k wavenumbers; lengths are metres.
+
+    Attributes
+    ----------
+    quantity : {"rcs", "ts"}
+    channels : tuple of str
+        Polarisations, received then transmitted, or a boundary.
+    angle_name : str
+        "azimuth" or "elevation", the angle that varies; "" for one direction.
+    azimuth, elevation : (n,), degrees
+        Of the radar, or of the observers of a bistatic cut, as seen from the body.
+    incidence : (azimuth, elevation), degrees, or None
+        Of the radar of a bistatic cut; None in backscatter.
+    wavenumbers : (k,), 1/m
+    parts : dict of str to (c, n, k) complex, m
+        Whose sum the amplitude is.
+    error : (c, n, k), m
+        Of the amplitude's magnitude.
+    unresolved, by_currents : (c, n, k) of bool
+    sound_speed : float, m/s, optional
+        That of light if None.
+
+    Raises
+    ------
+    InvalidInputError
+        If the arrays do not fit each other.
+
+    Examples
+    --------
+    >>> import creeping as cr, scatterers as sc
+    >>> from creeping.sweeping.echoes import echo_of
+    >>> ds = cr.backscatter(sc.Sphere(0.15), wavenumbers=[200.0, 210.0])
+    >>> echo = echo_of(ds, "rcs", ("VV", "HH"), "")
+    >>> echo.levels().shape, echo.levels()[0, 0].round(1).tolist()
+    ((2, 1, 2), [-11.5, -11.4])
+    """
+
+    quantity: str
+    channels: tuple[str, ...]
+    angle_name: str
+    azimuth: FloatArray
+    elevation: FloatArray
+    incidence: tuple[float, float] | None
+    wavenumbers: FloatArray
+    parts: dict[str, ComplexArray]
+    error: FloatArray
+    unresolved: BoolArray
+    by_currents: BoolArray
+    sound_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.quantity not in LEVELS:
+            raise InvalidInputError(f"quantity {self.quantity!r} is none of {', '.join(LEVELS)}")
+        shape = (len(self.channels), len(self.azimuth), len(self.wavenumbers))
+        for name, values in {**self.parts, "error": self.error, "unresolved": self.unresolved}.items():
+            if values.shape != shape:
+                raise InvalidInputError(f"{name} of an echo has shape {values.shape}, not {shape}")
+
+    @property
+    def total(self) -> ComplexArray:
+        """Amplitude f, m (c, n, k)."""
+        return np.asarray(sum(self.parts.values()))
+
+    @property
+    def angles(self) -> FloatArray:
+        """The angle that varies (n,), degrees."""
+        return self.elevation if self.angle_name == "elevation" else self.azimuth
+
+    @property
+    def hertz(self) -> FloatArray:
+        """Frequencies (k,), Hz."""
+        return np.asarray(frequency(self.wavenumbers, sound_speed=self.sound_speed))
+
+    def levels(self, amplitude: ComplexArray | FloatArray | None = None) -> FloatArray:
+        """Levels, dB, of the total (c, n, k), or of another amplitude (...), metres: of its shape."""
+        values = self.total if amplitude is None else amplitude
+        return cross_section_decibels(values) if self.quantity == "rcs" else decibels(values)
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Levels, dB, of the amplitude less and more its error: (c, n, k) each, down to -inf."""
+        size = np.abs(self.total)
+        return self.levels(np.maximum(size - self.error, 0.0)), self.levels(size + self.error)
+
+    def summary(self) -> dict[str, Any]:
+        """Numbers that tell what it is like."""
+        levels, size = self.levels(), np.abs(self.total)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = 20 * np.log10(1 + self.error / size)
+        known = off[np.isfinite(off)]
+        return {
+            "quantity": LEVELS[self.quantity][0],
+            "unit": LEVELS[self.quantity][1],
+            "channels": list(self.channels),
+            "angles": len(self.azimuth),
+            "frequencies": len(self.wavenumbers),
+            "largest": {c: _finite(np.max(v, initial=-np.inf)) for c, v in zip(self.channels, levels, strict=True)},
+            "error_db_median": _finite(np.median(known)) if known.size else None,
+            "error_db_95": _finite(np.quantile(known, 0.95)) if known.size else None,
+            "unresolved": int(self.unresolved.sum()),
+            "by_currents": int(self.by_currents.sum()),
+            "values": int(levels.size),
+        }
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,119 @@
+"""Wavenumbers from frequencies and wavelengths: k = 2 pi f/c = 2 pi/lambda.
+
+c is the speed of light in a vacuum, or a given speed of sound.
+
+Sources: [BIPM19] for the speed of light, which is exact.
+"""
+
+import re
+
+import numpy as np
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+
+LIGHT = 299_792_458.0
+"""Speed of light in a vacuum, m/s."""
+HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "thz": 1e12}
+"""Units of frequency by their names in small letters, 1/s."""
+METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9}
+"""Units of wavelength, m."""
+MOST = 100_000
+"""Frequencies of one range."""
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+
+
+def wavenumber(value: str | ArrayLike, *, sound_speed: float | None = None) -> float | FloatArray:
+    """Wavenumber k, 1/m, of a frequency or a wavelength.
+
+    Parameters
+    ----------
+    value : str, float or array of float
+        Frequency in Hz, or text with a unit: a frequency ("10 GHz", "38kHz") or a wavelength ("3 cm"), or a range of
+        either, "first:last:step" with the unit behind the last number.
+    sound_speed : float, m/s, optional
+        Of the medium; the speed of light if not given.
+
+    Returns
+    -------
+    float, or (n,) of float, 1/m
+        As many as the value has, as an array for an array or a range.
+
+    Raises
+    ------
+    InvalidInputError
+        If the value is not positive and finite, or is no such text.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> round(cr.wavenumber("10 GHz"), 3), round(cr.wavenumber(38e3, sound_speed=1477), 3)
+    (209.585, 161.653)
+    >>> cr.wavenumber("2:4:1GHz").round(2)
+    array([41.92, 62.88, 83.83])
+    """
+    speed = _speed(sound_speed)
+    if not isinstance(value, str):
+        hertz = _positive(value, "frequency")
+        return float(2 * np.pi * hertz / speed) if hertz.ndim == 0 else np.asarray(2 * np.pi * hertz / speed)
+    numbers, scale, is_length = _parsed(value)
+    values = _positive(scale * numbers, "frequency" if not is_length else "wavelength")
+    found = 2 * np.pi / values if is_length else 2 * np.pi * values / speed
+    return np.asarray(found) if ":" in value else float(found[0])
+
+
+def frequency(wavenumber: ArrayLike, *, sound_speed: float | None = None) -> float | FloatArray:
+    """Frequency, Hz, of wavenumbers, 1/m: one number for one, else (n,).
+
+    Examples
+    --------
+    >>> round(frequency(209.585) / 1e9, 4)
+    10.0
+    """
+    found = _positive(wavenumber, "wavenumber") * _speed(sound_speed) / (2 * np.pi)
+    return float(found) if found.ndim == 0 else np.asarray(found)
+
+
+def _speed(sound_speed: float | None) -> float:
+    if sound_speed is None:
+        return LIGHT
+    return float(_positive(sound_speed, "sound_speed"))
+
+
+def _positive(value: ArrayLike, what: str) -> FloatArray:
+    try:
+        if np.asarray(value).dtype.kind not in "iuf":
+            raise TypeError
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f'{what} = {value!r} is no number; give Hz, or text such as "10 GHz"') from None
+    bad = np.atleast_1d(~(np.isfinite(numbers) & (numbers > 0)))
+    if np.any(bad):
+        first = np.atleast_1d(numbers)[bad.argmax()]
+        raise InvalidInputError(f"{what} {first!r} is not a positive finite number ({bad.sum()} of {bad.size} are not)")
+    return numbers
+
+
+def _parsed(text: str) -> tuple[FloatArray, float, bool]:
+    """Numbers (n,) of a text, their unit in Hz or m, and whether it is a length."""
+    match = re.fullmatch(rf"\s*({_NUMBER})(?::({_NUMBER}))?(?::({_NUMBER}))?\s*([^\W\d]*)\s*", text)
+    known = f"units are {', '.join(['Hz', 'kHz', 'MHz', 'GHz', 'THz', *METRES])}"
+    if not match or (match[2] and not match[3]):
+        raise InvalidInputError(
+            f'{text!r} is no frequency or wavelength such as "10 GHz", "3 cm", "2:18:0.1GHz"; {known}'
+        )
+    unit = match[4] or "Hz"
+    # of frequencies capitals do not matter, of lengths they would
+    scale = HERTZ.get(unit.lower(), METRES.get(unit))
+    if scale is None:
+        raise InvalidInputError(f"{text!r}: unknown unit {unit!r}; {known}")
+    first = float(match[1])
+    if not match[3]:
+        return np.array([first]), scale, unit.lower() not in HERTZ
+    last, step = float(match[2]), float(match[3])
+    if not (step > 0 and first > 0 and np.isfinite(last) and last >= first):
+        raise InvalidInputError(f"{text!r} is no range: give first:last:step, positive, the first not above the last")
+    if not (last - first) / step < MOST:
+        raise InvalidInputError(f"{text!r} has {(last - first) / step + 1:.3g} values; {MOST} are the most")
+    values = first + step * np.arange(int((last - first) / step + 1e-9) + 1)
+    return np.asarray(values, dtype=float), scale, unit.lower() not in HERTZ

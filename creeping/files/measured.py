@@ -1,0 +1,155 @@
+"""A measured or published cut of others: levels against an angle or a frequency, by columns under any usual header.
+
+Numbers stand in rows, with commas, semicolons, tabs or spaces between them; lines that begin with #, %, ! or // are
+comments. A header names the columns; without one the first is the angle in degrees, the others levels in dB.
+"""
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.errors import InvalidInputError
+
+MOST_BYTES = 200_000_000
+"""Largest file that is read."""
+COMMENT = ("#", "%", "!", "//")
+HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
+_ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
+_AREA = re.compile(r"(m2|m\^2|sqm|sigma|linear)")
+_OTHER = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
+_POLARISATION = re.compile(r"(?<![a-z])(hh|vv|hv|vh)(?![a-z])")
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredCut:
+    """Levels by column.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    over : {"angle", "frequency"}
+    values : (m,)
+        Angles, degrees, or frequencies, Hz, ascending.
+    levels : dict of str to (m,), dB
+        By the name of the column; NaN where there is no number.
+    """
+
+    name: str
+    over: str
+    values: FloatArray
+    levels: dict[str, FloatArray]
+
+    def of(self, channel: str) -> FloatArray | None:
+        """Levels (m,) of a polarisation or boundary, or of the only column; None if there is none."""
+        for name, levels in self.levels.items():
+            found = _POLARISATION.search(name.lower())
+            if name.lower() == channel.lower() or (found and found[1] == channel.lower()):
+                return levels
+        unnamed = [v for name, v in self.levels.items() if not _POLARISATION.search(name.lower())]
+        return unnamed[0] if len(unnamed) == 1 == len(self.levels) else None
+
+
+def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
+    """Read a cut.
+
+    Parameters
+    ----------
+    path : str or path
+        Text with one row for each angle or frequency. Columns of areas ("sigma (m2)") are turned into decibels.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is no such table; with the columns that were found.
+    """
+    file = Path(path)
+    try:
+        nbytes = file.stat().st_size
+        if nbytes > MOST_BYTES:
+            raise InvalidInputError(f"{file} has {nbytes / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} are the most")
+        text = file.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
+    header, rows = _table(file, text)
+    numbers = np.array(rows, dtype=float)
+    names = header or ["angle", *(f"level {i}" for i in range(1, numbers.shape[1]))]
+    at, over, scale = _abscissa(names)
+    levels = {}
+    for column, name in enumerate(names):
+        lower = name.lower()
+        if column == at or _OTHER.search(lower) or _is_frequency(lower) or (_ANGLE.search(lower) and not _level(lower)):
+            continue
+        values = numbers[:, column]
+        if _AREA.search(lower) and "db" not in lower:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                values = 10 * np.log10(values)
+        levels[name] = values
+    if not levels:
+        raise InvalidInputError(f"{file} has no column of levels; its columns are {', '.join(names)}")
+    order = np.argsort(numbers[:, at], kind="stable")
+    return MeasuredCut(file.name, over, scale * numbers[order, at], {name: v[order] for name, v in levels.items()})
+
+
+def _table(file: Path, text: str) -> tuple[list[str], list[list[float]]]:
+    """Header, empty if there is none, and rows of numbers, NaN for what is none."""
+    header: list[str] = []
+    rows: list[list[float]] = []
+    for number, raw in enumerate(text.splitlines(), 1):
+        line = raw.strip()
+        if not line:
+            continue
+        comment = line.startswith(COMMENT)
+        cells = _cells(line.lstrip("#%!/ ") if comment else line)
+        values = [_number(cell) for cell in cells]
+        if comment or values[0] is None:
+            # the last line of words above the numbers that has as many cells names them
+            if not rows and len(cells) > 1:
+                header = cells
+            continue
+        if rows and len(values) != len(rows[0]):
+            raise InvalidInputError(f"{file}, line {number}: {len(values)} columns where {len(rows[0])} were before")
+        rows.append([np.nan if value is None else value for value in values])
+    if len(rows) < 2 or len(rows[0]) < 2:
+        raise InvalidInputError(f"{file} has no table of two columns and two rows of numbers or more")
+    return (header if len(header) == len(rows[0]) else []), rows
+
+
+def _cells(line: str) -> list[str]:
+    for separator in (",", ";", "\t"):
+        if separator in line:
+            return [cell.strip().strip('"') for cell in line.split(separator)]
+    return line.split()
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _is_frequency(name: str) -> bool:
+    return "freq" in name or any(re.search(rf"(?<![a-z]){unit}(?![a-z])", name) for unit in HERTZ)
+
+
+def _abscissa(names: list[str]) -> tuple[int, str, float]:
+    """Column of the angle or frequency, which of both, and the unit in degrees or Hz."""
+    lower = [name.lower() for name in names]
+    frequencies = [i for i, name in enumerate(lower) if _is_frequency(name)]
+    angles = [i for i, name in enumerate(lower) if i not in frequencies and _ANGLE.search(name) and not _level(name)]
+    if frequencies and (not angles or frequencies[0] < angles[0]):
+        name = lower[frequencies[0]]
+        unit = next((unit for unit in ("ghz", "mhz", "khz") if unit in name), "hz")
+        return frequencies[0], "frequency", HERTZ[unit]
+    if angles:
+        return angles[0], "angle", float(np.degrees(1.0)) if "rad" in lower[angles[0]] else 1.0
+    return 0, "angle", 1.0
+
+
+def _level(name: str) -> bool:
+    return "db" in name or bool(_POLARISATION.search(name))

@@ -1,0 +1,194 @@
+"""Pictures of an echo: against angle or frequency with the band of its error, as a map of both, and in range."""
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.field.decibels import shown_range
+from creeping.field.echo import LEVELS
+from creeping.plotting.far_cuts import COLOURS, Curve, draw_cut
+from creeping.plotting.pictures import add_legend, new_figure, save_figure
+
+if TYPE_CHECKING:
+    from creeping.field.comparison import Comparison
+    from creeping.field.echo import Echo
+    from creeping.field.slant_range import RangeProfile
+
+STYLES = ("-", "--", "-.", ":")
+PREFIXES = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
+SPAN = 60.0
+"""Range of levels, dB."""
+
+
+def echo_cut_picture(
+    path: str | os.PathLike[str], echo: "Echo", *, kind: str = "cartesian", title: str = "", dpi: int = 200
+) -> None:
+    """Write a PNG of an echo against its angle, one curve for each channel, at one wavenumber.
+
+    Parameters
+    ----------
+    path : str or path
+    echo : Echo
+        Of several angles; its first wavenumber is drawn.
+    kind : {"cartesian", "polar"}
+    title : str
+    dpi : int
+
+    Raises
+    ------
+    CreepingError
+        If nothing can be drawn, or the file cannot be written.
+    """
+    curves = _curves(echo, (slice(None), 0))
+    heights = shown_range([curve.levels for curve in curves], SPAN)
+    figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
+    figure.set_layout_engine("constrained")
+    ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
+    draw_cut(ax, np.radians(echo.angles), curves, heights, quantity="rcs", angle_name=echo.angle_name, unit="m")
+    if kind == "cartesian":
+        ax.set_ylabel(_level(echo), fontsize=9)
+    else:
+        ax.set_xlabel(f"{echo.angle_name}; rings: {_level(echo)}", fontsize=9)
+    ax.set_title(title, fontsize=9, parse_math=False)
+    add_legend(ax, fresh=True)
+    save_figure(figure, path, dpi)
+
+
+def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
+    """Write a PNG of an echo against frequency at its first angle; arguments as of `echo_cut_picture`."""
+    curves = _curves(echo, (0, slice(None)))
+    low, high = shown_range([curve.levels for curve in curves], SPAN)
+    scale, unit = _prefix(echo.hertz)
+    figure = new_figure((6.4, 4.2))
+    figure.set_layout_engine("constrained")
+    ax = figure.add_subplot()
+    x = echo.hertz / scale
+    for curve in reversed(curves):
+        floor = low - (high - low)
+        if curve.band is not None:
+            band = np.maximum(curve.band, floor)
+            ax.fill_between(x, *band, color=curve.style["color"], alpha=0.18, linewidth=0)
+        ax.plot(x, np.maximum(curve.levels, floor), label=curve.label, **curve.style)
+    doubtful = echo.unresolved[:, 0].any(axis=0)
+    if doubtful.any():
+        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color="#5a6872", clip_on=False, label="unresolved")
+    ax.set_xlim(x[0], x[-1])
+    ax.set_ylim(low, high)
+    _dressed(ax, f"frequency ({unit})", _level(echo), title)
+    add_legend(ax, fresh=True)
+    save_figure(figure, path, dpi)
+
+
+def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
+    """Write a PNG of an echo over angle and frequency, a panel for each channel; arguments as of `echo_cut_picture`."""
+    levels = echo.levels()
+    low, high = shown_range([levels], SPAN)
+    scale, unit = _prefix(echo.hertz)
+    count = len(echo.channels)
+    figure = new_figure((6.4, 0.6 + 2.9 * count))
+    figure.set_layout_engine("constrained")
+    for number, channel in enumerate(echo.channels):
+        ax = figure.add_subplot(count, 1, number + 1)
+        grid = np.where(np.isfinite(levels[number]), levels[number], low)
+        image = ax.pcolormesh(
+            echo.angles, echo.hertz / scale, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest"
+        )
+        _dressed(
+            ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})", channel if number else f"{title}\n{channel}"
+        )
+        ax.grid(visible=False)
+        figure.colorbar(image, ax=ax, label=_level(echo))
+    save_figure(figure, path, dpi)
+
+
+def range_picture(
+    path: str | os.PathLike[str],
+    profiles: "dict[str, RangeProfile]",
+    echo: "Echo",
+    extent: float,
+    *,
+    title: str = "",
+    dpi: int = 200,
+) -> None:
+    """Write a PNG of range profiles by channel, out to ``extent``, m, to both sides of the origin."""
+    figure = new_figure((6.4, 4.2))
+    figure.set_layout_engine("constrained")
+    ax = figure.add_subplot()
+    curves = {channel: echo.levels(found.values) for channel, found in profiles.items()}
+    low, high = shown_range(curves.values(), SPAN)
+    for number, (channel, found) in enumerate(profiles.items()):
+        ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **_style(number))
+    ax.set_xlim(-extent, extent)
+    ax.set_ylim(low, high)
+    _dressed(ax, "range along the line of sight (m), from the radar", _level(echo), title)
+    add_legend(ax, fresh=True)
+    save_figure(figure, path, dpi)
+
+
+def comparison_picture(
+    path: str | os.PathLike[str], echo: "Echo", comparisons: "dict[str, Comparison]", *, title: str = "", dpi: int = 200
+) -> None:
+    """Write a PNG of computed and given levels, one above the other with their residual below.
+
+    Parameters
+    ----------
+    path : str or path
+    echo : Echo
+    comparisons : dict of str to Comparison
+        By channel.
+    title : str
+    dpi : int
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    band = len(echo.wavenumbers) > 1
+    scale, unit = _prefix(echo.hertz) if band else (1.0, "degrees")
+    figure = new_figure((6.4, 5.6))
+    figure.set_layout_engine("constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
+    for number, (channel, found) in enumerate(comparisons.items()):
+        x, style = found.values / scale, _style(number)
+        above.plot(x, found.levels, label=channel, **style)
+        above.plot(x, found.reference, label=f"{channel}, given", **style | {"linewidth": 3.2, "alpha": 0.3})
+        below.plot(x, found.residual, label=f"_{channel}", **style)
+    below.axhline(0.0, color="#5a6872", linewidth=0.6)
+    _dressed(above, "", _level(echo), title)
+    _dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)", "")
+    add_legend(above, fresh=True)
+    save_figure(figure, path, dpi)
+
+
+def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
+    levels, bounds = echo.levels(), np.stack(echo.bounds())
+    found = []
+    for number, channel in enumerate(echo.channels):
+        here = (number, *at)
+        finite: FloatArray = np.where(np.isposinf(levels[here]), np.nan, levels[here])
+        found.append(Curve(channel, finite, _style(number), bounds[(slice(None), *here)], echo.unresolved[here]))
+    return found
+
+
+def _style(number: int) -> dict[str, Any]:
+    return {"color": COLOURS[number % len(COLOURS)], "linestyle": STYLES[number % len(STYLES)], "linewidth": 1.3}
+
+
+def _level(echo: "Echo") -> str:
+    name, unit = LEVELS[echo.quantity]
+    return f"{name} ({unit})"
+
+
+def _prefix(hertz: FloatArray) -> tuple[float, str]:
+    return next((one for one in PREFIXES if hertz.max() >= one[0]), PREFIXES[-1])
+
+
+def _dressed(ax: Any, across: str, up: str, title: str) -> None:
+    ax.set_xlabel(across, fontsize=9)
+    ax.set_ylabel(up, fontsize=9)
+    ax.set_title(title, fontsize=9, parse_math=False)
+    ax.grid(color="#d9dde0", linewidth=0.5)
+    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)

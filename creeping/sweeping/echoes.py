@@ -1,0 +1,267 @@
+"""Backscatter of a body over angle and frequency, and its bistatic field in a cut: what a radar or a sonar measures.
+
+Angles are those of the radar or of the observer as seen from the body, in degrees: azimuth from x towards y, elevation
+from the plane z = 0. The wave of a radar at (azimuth, elevation) travels the other way.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
+from creeping.field.boundary import BoundaryLike
+from creeping.field.echo import Echo
+from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
+from creeping.geometry.surface import Surface
+from creeping.phaseflow.tuning.flow_choice import choose_flow
+from creeping.rays.reach import body_length
+from creeping.sweeping.accessor import PARTS, SweepFields, register
+from creeping.sweeping.run import sweep_directions
+
+if TYPE_CHECKING:
+    import xarray
+
+PER_LOBE = 4
+"""Angles for each lobe of a pattern."""
+NICE = (1.0, 0.5, 0.25, 0.2, 0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001)
+"""Steps of a cut, degrees, the largest that fits is taken."""
+BLOCK = 24
+"""Wavenumbers of one call where incidences are few: how often progress is told."""
+MOST = 10_000_000
+"""Values of one call."""
+Progress = Callable[[int, int, float], None]
+
+
+def backscatter(
+    body: Surface,
+    *,
+    wavenumbers: ArrayLike,
+    azimuth: ArrayLike = 0.0,
+    elevation: ArrayLike = 0.0,
+    boundary: BoundaryLike = "pec",
+    method: str = "auto",
+    n_rays: int = 192,
+    cache: bool = True,
+    progress: Progress | None = None,
+) -> "xarray.Dataset":
+    """Field in the direction of the radar, for each of its angles and wavenumbers.
+
+    Parameters
+    ----------
+    body : Surface
+    wavenumbers : float or (k,), 1/L
+        See `creeping.wavenumber` for frequencies.
+    azimuth, elevation : float or (n,), degrees
+        Where the radar is, as seen from the body; one may be a number.
+    boundary : "pec", "soft", "hard" or ImpedanceBoundary
+    method : {"auto", "rays", "currents"}
+        As of `creeping.sweep_directions`: "auto" takes currents where rays do not resolve a value and they err less.
+    n_rays : int
+        Rays of an incidence.
+    cache : bool
+        Whether a phase map is kept for the next run.
+    progress : callable, optional
+        Called as ``progress(done, total, seconds)``.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `creeping.sweep_directions`, with coordinates ``azimuth`` and ``elevation`` of the incidences in degrees;
+        ``dataset.creeping`` has totals, decibels and polarisations.
+
+    Raises
+    ------
+    CreepingError
+        On bad input, or where the sweep fails.
+
+    Examples
+    --------
+    >>> import creeping as cr, scatterers as sc
+    >>> ds = cr.backscatter(sc.Sphere(0.15), wavenumbers=cr.wavenumber("10 GHz"))
+    >>> float(ds.creeping.polarisation("VV").dbsm.squeeze().round(1))            # 10 log10(pi radius^2) is -11.5
+    -11.4
+    """
+    azimuths, elevations = _angles(azimuth, elevation)
+    radar = directions_from_azimuth_elevation(np.radians(azimuths), np.radians(elevations))
+    asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "monostatic"}
+    found = _swept(body, -radar, wavenumbers, asked, cache, progress)
+    return _with_angles(found, "incidence", azimuths, elevations)
+
+
+def bistatic(
+    body: Surface,
+    *,
+    wavenumbers: ArrayLike,
+    incidence: tuple[float, float] = (0.0, 0.0),
+    azimuth: ArrayLike = 0.0,
+    elevation: ArrayLike = 0.0,
+    boundary: BoundaryLike = "pec",
+    method: str = "currents",
+    n_rays: int = 192,
+    cache: bool = True,
+    progress: Progress | None = None,
+) -> "xarray.Dataset":
+    """Field towards observers around the body, for one incidence.
+
+    Parameters
+    ----------
+    incidence : (azimuth, elevation), degrees
+        Where the radar is, as seen from the body: the wave travels in the opposite direction.
+    azimuth, elevation : float or (m,), degrees
+        Where the observers are, as seen from the body.
+    body, wavenumbers, boundary, method, n_rays, cache, progress
+        As of `backscatter`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `creeping.sweep_directions`, with coordinates ``azimuth`` and ``elevation`` of the observers in degrees.
+
+    Raises
+    ------
+    CreepingError
+        On bad input, or where the sweep fails.
+
+    Examples
+    --------
+    >>> import creeping as cr, scatterers as sc
+    >>> ds = cr.bistatic(sc.Sphere(), wavenumbers=20.0, azimuth=[0.0, 90.0], boundary="soft")
+    >>> ds.creeping.total.sizes["observer"]
+    2
+    """
+    azimuths, elevations = _angles(azimuth, elevation)
+    observers = directions_from_azimuth_elevation(np.radians(azimuths), np.radians(elevations))
+    radar = directions_from_azimuth_elevation(*np.radians(np.asarray(incidence, dtype=float)))
+    asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "bistatic", "observation": observers}
+    found = _swept(body, -radar[None], wavenumbers, asked, cache, progress)
+    return _with_angles(found, "observer", azimuths, elevations)
+
+
+def lobe_step(body: Surface, wavenumber: float, *, monostatic: bool) -> float:
+    """Step of a cut, degrees, with PER_LOBE angles for each lobe: lambda/D of a bistatic pattern, half in backscatter.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> lobe_step(sc.Sphere(), 60.0, monostatic=True)
+    0.25
+    """
+    longest = float(np.max(np.ptp(body.bounds, axis=0)))
+    lobe = 2 * np.pi / (float(checked(wavenumber, 2)) * longest) / (2 if monostatic else 1)
+    wanted = np.degrees(lobe) / PER_LOBE
+    return next((step for step in NICE if step <= wanted), NICE[-1])
+
+
+def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    try:
+        a, e = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in (azimuth, elevation)))
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"azimuth and elevation are no numbers of one shape: {error}") from None
+    if a.ndim != 1 or not a.size or not (np.all(np.isfinite(a)) and np.all(np.isfinite(e))):
+        raise InvalidInputError(
+            f"azimuth and elevation of shape {a.shape} are not one or more finite angles in degrees"
+        )
+    if np.any(np.abs(e) > 90):
+        raise InvalidInputError(f"elevation {e[np.argmax(np.abs(e))]:g} is not between -90 and 90 degrees")
+    return a, e
+
+
+def _swept(
+    body: Surface,
+    incidences: FloatArray,
+    wavenumbers: ArrayLike,
+    asked: dict[str, Any],
+    cache: bool,
+    progress: Progress | None,
+) -> "xarray.Dataset":
+    """Sweep, in blocks of wavenumbers where there are few incidences, so that progress is told in time."""
+    library = register()
+    numbers = np.atleast_1d(np.asarray(wavenumbers))
+    k = np.array([checked(value, 2) for value in numbers.tolist()])
+    if k.ndim != 1 or not k.size:
+        raise InvalidInputError(f"wavenumbers of shape {numbers.shape} are not one or more numbers")
+    if len(np.unique(k)) < len(k):
+        raise InvalidInputError("wavenumbers repeat themselves")
+    count = len(incidences) * len(k) * len(asked.get("observation", (None,)))
+    if count > MOST:
+        raise InvalidInputError(f"{count} values are asked for at once; {MOST} are the most: give a coarser step")
+    length = body_length(body, float(k.min()))
+    flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
+    if len(incidences) >= 8:
+        return sweep_directions(flow, incidences, wavenumbers=k, length=length, progress=progress, **asked)
+    found, seconds = [], 0.0
+    for first in range(0, len(k), BLOCK):
+        part = k[first : first + BLOCK]
+        found.append(sweep_directions(flow, incidences, wavenumbers=part, length=length, **asked))
+        seconds += float(found[-1].attrs["seconds"])
+        if progress:
+            progress(first + len(part), len(k), seconds)
+    joined: xarray.Dataset = found[0]
+    if len(found) > 1:
+        joined = library.concat(
+            found, "wavenumber", data_vars="minimal", coords="minimal", compat="override", join="outer"
+        )
+    return joined.assign_attrs(seconds=round(seconds, 3))
+
+
+def _with_angles(
+    found: "xarray.Dataset", dimension: str, azimuths: FloatArray, elevations: FloatArray
+) -> "xarray.Dataset":
+    words = {"units": "degree", "long_name": "as seen from the body"}
+    angles = {"azimuth": azimuths, "elevation": elevations}
+    return found.assign_coords({name: (dimension, values, words) for name, values in angles.items()})
+
+
+def echo_of(
+    dataset: "xarray.Dataset",
+    quantity: str,
+    channels: tuple[str, ...],
+    angle_name: str,
+    *,
+    sound_speed: float | None = None,
+) -> Echo:
+    """Echo of a dataset of `backscatter` or `bistatic`: its arrays by channel, angle and wavenumber.
+
+    ``channels`` are polarisations of a conductor, or the one boundary; a value counts as unresolved in all of them.
+    """
+    conductor = "creeping_pec" in dataset
+    bistatic_cut = "observer" in dataset.dims
+    order = ("observer", "wavenumber") if bistatic_cut else ("incidence", "wavenumber")
+    first = dataset.isel(incidence=0) if bistatic_cut else dataset
+    fields = SweepFields(first)
+
+    def array(values: Any) -> np.ndarray[Any, Any]:
+        return np.asarray(values.transpose(*order).values)
+
+    picked = [fields.polarisation(name) if conductor else SweepFields(first.isel(boundary=0)) for name in channels]
+    parts = [name for name in PARTS if name in picked[0].dataset]
+    flags = {name: np.stack([array(one.dataset[name]) for one in picked]) for name in ("unresolved", "error")}
+    served = np.stack(
+        [
+            array(one.dataset["by_currents"])
+            if "by_currents" in one.dataset
+            else np.zeros(flags["error"].shape[1:], bool)
+            for one in picked
+        ]
+    )
+    radar = None
+    if bistatic_cut:
+        azimuth, elevation = azimuth_elevation_of(-dataset["direction"].values[0])
+        radar = (float(np.degrees(azimuth)), float(np.degrees(elevation)))
+    return Echo(
+        quantity=quantity,
+        channels=channels,
+        angle_name=angle_name,
+        azimuth=dataset["azimuth"].values,
+        elevation=dataset["elevation"].values,
+        incidence=radar,
+        wavenumbers=dataset["wavenumber"].values,
+        parts={name: np.stack([array(one.dataset[name]) for one in picked]) for name in parts},
+        error=flags["error"],
+        unresolved=flags["unresolved"],
+        by_currents=served,
+        sound_speed=sound_speed,
+    )

@@ -1,0 +1,119 @@
+"""``creeping rcs`` and ``creeping ts``."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from creeping.commands.echo_request import echo_request
+from creeping.commands.main import main
+from creeping.errors import InvalidInputError
+
+
+def ran(*words):
+    with pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return end.value.code
+
+
+def table(file):
+    lines = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
+
+
+def test_band_of_a_sphere_with_a_comparison(tmp_path, capsys):
+    given = tmp_path / "given.csv"
+    # geometrical optics: pi radius^2
+    given.write_text(
+        "frequency_GHz,VV_dBsm\n" + "".join(f"{f},{10 * np.log10(np.pi * 0.15**2)}\n" for f in (8, 9.1, 10))
+    )
+    out = tmp_path / "out"
+    words = ["sphere:radius=0.15", "--frequency", "8:10.4:0.15GHz", "--compare", given, "-o", out]
+    assert ran("rcs", *words, "--no-cache") == 0
+    said = capsys.readouterr().out
+    assert "VV against the reference at 3 places" in said and "range profile" in said
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["values"] == 34 and summary["unresolved"] == 0
+    assert summary["compared"]["VV"]["rms_db"] < 0.3
+    assert sorted(p.name for p in out.iterdir()) == sorted(summary["files"])
+    assert {"rcs.csv", "rcs.png", "range.csv", "range.png", "compared.png"} <= set(summary["files"])
+    assert [row["channel"] for row in table(out / "rcs.csv")[::17]] == ["HH", "VV"]
+
+
+def test_map_of_target_strength_without_pictures(tmp_path, capsys):
+    words = [
+        "ellipsoid:a=0.06,b=0.05,c=0.04",
+        "--sound-speed",
+        1477,
+        "--frequency",
+        "200:220:20kHz",
+        "--boundary",
+        "hard",
+    ]
+    assert ran("ts", *words, "--monostatic", "az:0:20:10", "-o", tmp_path, "--no-pictures", "--json", "--no-cache") == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["unit"] == "dB re 1 m" and summary["files"] == ["ts.csv", "summary.json"]
+    rows = table(tmp_path / "ts.csv")
+    assert len(rows) == 6 and {row["azimuth_deg"] for row in rows} == {"0.0", "10.0", "20.0"}
+    # sqrt(rho1 rho2)/2 at the nose: b c/a/2
+    assert float(rows[0]["level_db"]) == pytest.approx(20 * np.log10(0.05 * 0.04 / 0.06 / 2), abs=1.0)
+
+
+GOOD = {
+    "frequency": "10GHz",
+    "wavelength": None,
+    "sound_speed": None,
+    "polarisation": None,
+    "boundary": "pec",
+    "monostatic": None,
+    "bistatic": None,
+    "incidence": None,
+}
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"frequency": None},
+        {"wavelength": "3cm"},
+        {"frequency": None, "wavelength": "3"},
+        {"frequency": "ten"},
+        {"polarisation": "HH,HH"},
+        {"polarisation": "left"},
+        {"polarisation": "HH", "boundary": "soft"},
+        {"monostatic": "az", "bistatic": "el"},
+        {"monostatic": "round"},
+        {"monostatic": "az:0"},
+        {"monostatic": "az:5:3:1"},
+        {"monostatic": "az:1:2"},
+        {"monostatic": "el:-100:0:1"},
+        {"incidence": "1"},
+        {"incidence": "0,95"},
+    ],
+)
+def test_bad_options(bad):
+    with pytest.raises(InvalidInputError, match="--"):
+        echo_request("rcs", **(GOOD | bad))
+
+
+def test_what_is_taken_if_nothing_is_asked_for():
+    request = echo_request("rcs", **GOOD)
+    assert (request.angle_name, request.span, request.channels) == ("azimuth", (0.0, 360.0), ("HH", "VV"))
+    assert echo_request("rcs", **(GOOD | {"frequency": "1:2:1GHz"})).angle_name == ""
+    assert echo_request("rcs", **(GOOD | {"incidence": "30,0"})).angle_name == ""
+    cut = echo_request("rcs", **(GOOD | {"monostatic": "el:-10:10:5", "incidence": "30,0"}))
+    import scatterers as sc
+
+    azimuths, elevations = cut.angles(sc.Sphere())
+    assert azimuths.tolist() == [30.0] * 5 and elevations.tolist() == [-10, -5, 0, 5, 10]
+
+
+def test_a_reference_that_does_not_fit_is_refused_first(tmp_path, capsys):
+    given = tmp_path / "given.csv"
+    given.write_text("angle,VV\n0,1\n1,2\n")
+    assert ran("rcs", "sphere", "--frequency", "1:2:1GHz", "--compare", given, "-o", tmp_path) == 3
+    assert "over angle" in capsys.readouterr().err
+    assert ran("rcs", "sphere", "--frequency", "1GHz", "--polarisation", "HH", "--compare", given, "-o", tmp_path) == 3
+    assert "--column" in capsys.readouterr().err
+    assert ran("ts", "sphere", "--frequency", "1kHz", "--sound-speed", 1500, "--boundary", "pec") == 3

@@ -1,0 +1,91 @@
+"""Echoes: levels, range profiles, comparisons."""
+
+import numpy as np
+import pytest
+from fake_fields import echo_of
+
+import creeping as cr
+from creeping.field.echo import Echo
+
+
+def test_levels():
+    echo = echo_of(0.5, 0.25)
+    # sigma = pi m^2 of |f| = 1/2, as of a sphere of 1 m
+    np.testing.assert_allclose(echo.levels(), 10 * np.log10(np.pi))
+    np.testing.assert_allclose(echo_of(0.5, 0.25, "ts").levels(), 20 * np.log10(0.5))
+    low, high = echo.bounds()
+    np.testing.assert_allclose(low, echo.levels() + 20 * np.log10(0.5))
+    np.testing.assert_allclose(high, echo.levels() + 20 * np.log10(1.5))
+    assert np.all(np.isneginf(echo_of(0.5, 0.6).bounds()[0]))
+    assert echo.summary()["largest"]["VV"] == pytest.approx(4.971, abs=1e-3)
+    assert echo.hertz[0] == pytest.approx(20 * 299792458 / (2 * np.pi))
+
+
+def test_shapes_and_names_are_checked():
+    with pytest.raises(cr.InvalidInputError, match="none of"):
+        echo_of(1.0, 0.1, "loudness")
+    with pytest.raises(cr.InvalidInputError, match="shape"):
+        Echo(
+            "rcs",
+            ("VV",),
+            "",
+            np.zeros(1),
+            np.zeros(1),
+            None,
+            np.ones(2),
+            {"a": np.ones((1, 1, 1))},
+            np.ones(1),
+            np.ones(1),
+            np.ones(1),
+        )
+
+
+@pytest.mark.parametrize("window", ["hann", "taylor", "none"])
+def test_two_echoes_stand_at_their_ranges(window):
+    k = np.linspace(150.0, 450.0, 301)
+    f = 0.5 * np.exp(-2j * k * 0.4) + 0.2j * np.exp(2j * k * 0.25)
+    found = cr.range_profile(f, k, window=window)
+    size = np.abs(found.values)
+    for where, amplitude in ((-0.4, 0.5), (0.25, 0.2j)):
+        near = np.abs(found.range - where) < 0.05
+        top = np.flatnonzero(near)[size[near].argmax()]
+        # the side lobes of the other are below a hundredth, without a window a twentieth
+        assert found.range[top] == pytest.approx(where, abs=np.pi / 300 / 8)
+        at = np.interp(where, found.range, size)
+        assert at == pytest.approx(abs(amplitude), rel=0.02 if window != "none" else 0.1)
+    # half power: 0.886 and 1.44 widths of pi/(k_N - k_1)
+    width = found.resolution / (np.pi / 301)
+    assert width == pytest.approx({"none": 0.886, "hann": 1.44, "taylor": 1.2}[window], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "k, f",
+    [
+        (np.arange(1.0, 5.0), np.ones(4)),
+        (np.geomspace(1, 2, 20), np.ones(20)),
+        (np.linspace(2, 1, 20), np.ones(20)),
+        (np.linspace(1, 2, 20), np.ones(19)),
+        (np.linspace(1, 2, 20), np.full(20, np.nan)),
+    ],
+)
+def test_no_band_has_no_profile(k, f):
+    with pytest.raises(cr.InvalidInputError):
+        cr.range_profile(f, k)
+
+
+def test_comparison_finds_a_shift(rng):
+    x = np.linspace(0, 90, 901)
+    y = 10 * np.sin(np.radians(5 * x))
+    at = np.sort(rng.uniform(10, 80, 60))
+    found = cr.compare(x, y, at - 0.7, 10 * np.sin(np.radians(5 * at)) + 0.5, align=2.0, low=y - 1, high=y + 1)
+    assert found.shift == pytest.approx(0.7, abs=0.03)
+    assert found.mean == pytest.approx(-0.5, abs=0.02) and found.rms == pytest.approx(0.5, abs=0.02)
+    assert found.within == 1.0 and found.austin == pytest.approx(0.5, abs=0.02)
+    assert cr.compare(x, y, at, 10 * np.sin(np.radians(5 * at)) + 3, low=y - 1, high=y + 1).within == 0.0
+
+
+def test_comparison_of_strangers():
+    with pytest.raises(cr.InvalidInputError, match="no place"):
+        cr.compare([0, 1], [0, 0], [5, 6], [0, 0])
+    with pytest.raises(cr.InvalidInputError, match="ascending"):
+        cr.compare([1, 0], [0, 0], [5, 6], [0, 0])

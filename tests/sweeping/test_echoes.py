@@ -1,0 +1,116 @@
+"""Backscatter over angle and frequency, bistatic cuts: against Mie, against single calls, and what datasets offer."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.labelled import power
+from creeping.sweeping.echoes import echo_of, lobe_step
+from studies.reference import sphere
+
+RADIUS = 0.15
+
+
+@pytest.fixture(scope="module")
+def band():
+    k = cr.wavenumber("4:16:0.75GHz")
+    return cr.backscatter(sc.Sphere(RADIUS), wavenumbers=k, cache=False)
+
+
+def test_sphere_over_frequency_against_mie(band):
+    k = band["wavenumber"].values
+    exact = [abs(sphere.pec_amplitudes(one, RADIUS, [-1.0])[0][0]) / one for one in k]
+    for name in ("HH", "VV"):
+        fields = band.creeping.polarisation(name)
+        size, error = (abs(v.values.squeeze()) for v in (fields.total, fields.error))
+        assert np.all(np.abs(size - exact) <= error)
+        # the smallest has ka = 12.6
+        assert np.max(np.abs(20 * np.log10(size / exact))) < 0.02
+        assert np.all(20 * np.log10(1 + error / size) < 0.5)
+
+
+def test_labels_and_units(band):
+    assert band["scattered"].values.tolist() == ["theta", "phi"]
+    cross = band.creeping.polarisation("HV").dbsm
+    assert cross.attrs["units"] == "dBsm" and np.all(cross < -60)
+    np.testing.assert_allclose(band.creeping.cross_section, 4 * np.pi * abs(band.creeping.total) ** 2)
+    np.testing.assert_allclose(band.creeping.target_strength, band.creeping.dbsm - 10 * np.log10(4 * np.pi))
+    with pytest.raises(cr.InvalidInputError, match="polarisation"):
+        band.creeping.polarisation("XX")
+    assert [power("m", 2), power("L", 2)] == ["m2", "L^2"]
+
+
+def test_echo_of_a_dataset(band):
+    echo = echo_of(band, "rcs", ("VV", "HH"), "")
+    assert echo.total.shape == (2, 1, len(band["wavenumber"]))
+    np.testing.assert_allclose(echo.levels()[0, 0], band.creeping.polarisation("VV").dbsm[0])
+    assert set(echo.parts) == {"creeping", "reflected"}
+
+
+def test_angles_are_where_the_radar_is():
+    body = sc.Ellipsoid(0.3, 0.1, 0.2)
+    k = 150.0
+    ds = cr.backscatter(body, wavenumbers=k, azimuth=[0.0, 90.0], elevation=[0.0, 0.0], boundary="hard", cache=False)
+    np.testing.assert_allclose(ds["direction"].values, [[-1, 0, 0], [0, -1, 0]], atol=1e-12)
+    # broadside is the brighter: geometrical optics has sqrt(rho1 rho2)/2
+    f = abs(ds.creeping.total.values.squeeze())
+    np.testing.assert_allclose(f, [0.1 * 0.2 / 0.3 / 2, 0.3 * 0.2 / 0.1 / 2], rtol=0.1)
+
+
+def test_bistatic_is_the_far_field():
+    body = sc.Ellipsoid(1.0, 0.8, 0.7)
+    azimuth = np.array([10.0, 80.0, 200.0])
+    ds = cr.bistatic(body, wavenumbers=15.0, incidence=(30.0, 20.0), azimuth=azimuth, boundary="soft", cache=False)
+    d = -np.array(
+        [np.cos(np.radians(20)) * v for v in (np.cos(np.radians(30)), np.sin(np.radians(30)))]
+        + [np.sin(np.radians(20))]
+    )
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), wavenumber=15.0)
+    r = np.stack([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0 * azimuth], axis=1)
+    far = cr.far_field(fan, r, wavenumber=15.0)
+    found = ds.creeping.total.values.squeeze()
+    assert np.all(np.abs(found - far.total) < far.error)
+    echo = echo_of(ds, "ts", ("soft",), "azimuth", sound_speed=1500.0)
+    np.testing.assert_allclose(echo.incidence, (30.0, 20.0))
+    np.testing.assert_allclose(echo.total[0, :, 0], found)
+
+
+def test_far_fields_have_names_on_their_axes():
+    ball = sc.Sphere()
+    fan = cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, (0, 0, 1)), wavenumber=20.0)
+    far = cr.far_field(fan, [[0, 1, 0], [0, 0, -1]], wavenumber=20.0, boundary="pec")
+    ds = far.to_xarray()
+    np.testing.assert_array_equal(ds["total"].sel(scattered="phi", incident="theta"), far.total[:, 1, 0])
+    np.testing.assert_allclose(far.dbsm, 10 * np.log10(far.cross_section))
+    np.testing.assert_allclose(far.dbsm - far.target_strength, 10 * np.log10(4 * np.pi))
+    table = far.to_dataframe()
+    assert len(table) == 8 and {"total", "error", "azimuth", "unresolved"} <= set(table.columns)
+    near = cr.near_field(fan, [[0, 0, -2.0]], wavenumber=20.0)
+    assert near.to_dataframe()["total"].iloc[0] == near.total[0]
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"wavenumbers": [30.0, 30.0]},
+        {"wavenumbers": []},
+        {"elevation": 100.0},
+        {"azimuth": [np.nan]},
+        {"azimuth": "north"},
+        {"azimuth": np.zeros((2, 2))},
+        {"boundary": "rubber"},
+    ],
+)
+def test_bad_requests(bad):
+    with pytest.raises(cr.InvalidInputError):
+        cr.backscatter(sc.Sphere(), **({"wavenumbers": 30.0, "cache": False} | bad))
+
+
+def test_steps_fit_the_lobes():
+    ball = sc.Sphere(0.5)
+    for k in (100.0, 400.0):
+        # lambda/D is a lobe of a disc, and backscatter turns twice as fast
+        lobe = np.degrees(2 * np.pi / k)
+        assert lobe / 10 < lobe_step(ball, k, monostatic=False) <= lobe / 4
+        assert lobe / 20 < lobe_step(ball, k, monostatic=True) <= lobe / 8
