@@ -55,7 +55,7 @@ class Echo:
     >>> ds = cr.backscatter(sc.Sphere(0.15), wavenumbers=[200.0, 210.0])
     >>> echo = echo_of(ds, "rcs", ("VV", "HH"), "")
     >>> echo.levels().shape, echo.levels()[0, 0].round(1).tolist()
-    ((2, 1, 2), [-11.5, -11.4])
+    ((2, 1, 2), [-11.4, -11.4])
     """
 
     quantity: str
