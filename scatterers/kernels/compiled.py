@@ -26,6 +26,8 @@ discard_stale(Path(__file__).parents[1])
 F = TypeVar("F", bound=Callable[..., Any])
 # products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+CLOSED_FORM = 50.0
+"""Operations of the level of a quadric."""
 _helpers: list[Callable[..., Any]] = []
 
 
@@ -59,6 +61,11 @@ class Compiled:
     def function(self) -> Any:
         """The compiled function, a numba CFunc."""
         return _compile(self.source, self.kind)
+
+    @property
+    def operations(self) -> float:
+        """Floating-point operations of a point, about: as the source says, or those of a closed form."""
+        return float(getattr(self.source, "operations", CLOSED_FORM))
 
 
 @cache
