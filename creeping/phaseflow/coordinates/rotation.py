@@ -26,8 +26,8 @@ NEAR = 24_000_000
 """if what a leap reads has so many bytes: more than the caches hold."""
 SHARE = 65_536
 """Rays ordered at a time."""
-BUDGET = 20_000
-"""Leaps of blocks after which the kernels come up for signals: 0.03 to 0.3 s."""
+BUDGET = 5000
+"""Leaps of blocks after which the kernels come up for signals: 0.01 to 0.2 s."""
 EXIT_SIDES = (48, 72, 108, 160)
 EXIT_ERROR = 1e-9
 """Rms error of (x, p) by such a table, x in body sizes."""
