@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.cache import discard_stale
+from scatterers.kernels.private_cache import keep_private
 
 Kind = Literal["level", "locator", "forward", "inverse"]
-discard_stale(Path(__file__).parents[1])
+keep_private(Path(__file__).parents[1], discard_stale(Path(__file__).parents[1]))
 
 F = TypeVar("F", bound=Callable[..., Any])
 # products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
