@@ -43,7 +43,7 @@ AT_ROOT = (
 
 # modules outside `kernels` folders whose constants (names in capitals) kernels share; types and errors are not compiled
 SHARED_CONSTANTS = ("creeping.geodesics.hermite", "creeping.rays.quantities", "creeping.shadow.status")
-NOT_COMPILED = ("creeping._typing", "creeping.errors")
+NOT_COMPILED = ("creeping._typing", "creeping.errors", "platformdirs")
 
 
 def imports(tree, *, inside_functions=True):

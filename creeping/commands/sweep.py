@@ -124,7 +124,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
     request = read.request_for(body)
     progress("flow")
     if resume and folder.exists():
-        store = SweepStore.open(folder)
+        store = SweepStore.open(folder, mending=True)
         # the size of its tasks is the store's, whatever the study says now
         flow, chunk = store.flow(body), store.chunk
     else:
@@ -137,7 +137,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
         asked={"flow": read.flow, "tolerance": read.tolerance},
         text=read.text,
     )
-    return plan, open_store(plan, folder, resume=resume)
+    return plan, open_store(plan, folder, resume=resume, note=progress)
 
 
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:

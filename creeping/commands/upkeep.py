@@ -24,7 +24,6 @@ def list_maps(*, json_: Json = False) -> int:
     """List the stored maps and fitted bodies."""
     from creeping.errors import CreepingError
     from creeping.phaseflow import cache as caching
-    from creeping.phaseflow.tuning import choice_record as choices
     from creeping.storage import folder as storing
 
     rows = []
@@ -42,8 +41,7 @@ def list_maps(*, json_: Json = False) -> int:
         print(json.dumps([*rows, *fits], indent=1))
     else:
         total = sum(float(r["MB"]) for r in (*rows, *fits))
-        chosen = len(choices.choice_files())
-        kept = f"{len(rows)} maps, {len(fits)} fitted bodies, {total:.1f} MB; {chosen} choices of flows"
+        kept = f"{len(rows)} maps, {len(fits)} fitted bodies, {total:.1f} MB"
         print(f"{caching.cache_folder()}: {kept}")
         for row in rows:
             print(f"  {row['map']}  {row['MB']:8.1f} MB  {row['body']}")
@@ -74,25 +72,24 @@ def verify_maps() -> int:
 
 
 def clear_maps() -> int:
-    """Remove every stored map, fitted body and choice between flows; what is not ours, or damaged, is left and named.
+    """Remove every stored map and fitted body; what is not ours, or damaged, is left and named.
 
     Exit code 3 if anything is left.
     """
-    from creeping.phaseflow.tuning.choice_record import choice_files
     from creeping.storage.folder import remove_folder
     from scatterers.spline import cache as _fit_cache
 
-    folders, files, choices = _stored(), _fits(), choice_files()
+    folders, files = _stored(), _fits()
     left = [reason for folder in folders if (reason := remove_folder(folder))]
     # by their names, for a damaged one is to go too
     ours = [file for file in files if not file.is_symlink() and _fit_cache.NAME.fullmatch(file.name)]
     left += [f"{file} is no fitted body of ours" for file in files if file not in ours]
     # of processes that were ended while they wrote
     halves = [file for file in _fit_cache.cache_folder().glob(".writing-*") if file.is_file() and not file.is_symlink()]
-    for file in (*choices, *ours, *halves):
+    for file in (*ours, *halves):
         file.unlink(missing_ok=True)
     maps = len(folders) - sum(1 for folder in folders if folder.exists() or folder.is_symlink())
-    print(f"removed {maps} maps, {len(ours)} fitted bodies and {len(choices)} choices of flows")
+    print(f"removed {maps} maps, {len(ours)} fitted bodies")
     for reason in left:
         print(f"left: {reason}")
     return 3 if left else 0

@@ -36,6 +36,8 @@ from creeping.storage.memory import within_budget
 
 _KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionary()
 _STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()
+AT_ONCE = 20_000_000
+"""Samples of rays, times observers, that are searched before signals are heard: 0.1 s."""
 NUDGE = 1e-6
 """Least angle between an observer and the forward direction in the forward integral, radians."""
 ALONG = 0.9
@@ -197,22 +199,32 @@ class FarGeometry:
         most = len(times) * PARTS
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
         self.ends = RayEnds(self.tracer, launch, states, times)
-        while rays:
-            found, places = np.empty((cells * n * many, 4), np.int64), np.empty((cells * n * many, 2))
-            crossed = np.empty((crossings * rays * max(1, int(back.sum())), 4))
-            with evaluators(self.body) as parts:
-                a, b = seek_all(
-                    *parts[:2], times[1], quintic_weights(times[1]), states, arc, launch.closed, self.observers, back,
-                    EARLY * size(self.body), ALONG, cells * many, crossings * rays, found, places, crossed, self._chi,
-                    self._roots,
-                )  # fmt: skip
-            if a >= 0:
-                break
-            cells, crossings = min(8 * cells, most * rays), min(2 * crossings, most)
-        else:
-            a = b = 0
-            found, places, crossed = np.empty((0, 4), np.int64), np.empty((0, 2)), np.empty((0, 4))
-        self._found, self._places, self._crossed = found[:a], places[:a], crossed[:b]
+        pieces = [(np.empty((0, 4), np.int64), np.empty((0, 2)), np.empty((0, 4)))]
+        # parts of a size that is the same wherever it runs: what is passed over depends on the observers of a call
+        share = max(1, AT_ONCE // max(1, rays * most))
+        each, weights = max(1, share // max(1, many)), quintic_weights(times[1])
+        for row, seen in np.ndindex(-(-n // each), -(-many // share)) if rays else ():
+            here, some = slice(row * each, (row + 1) * each), slice(seen * share, (seen + 1) * share)
+            observers, chi = np.ascontiguousarray(self.observers[here, some]), self._chi[here, some].copy()
+            behind = np.ascontiguousarray(back[here, some])
+            while True:
+                found, places = np.empty((cells * chi.size, 4), np.int64), np.empty((cells * chi.size, 2))
+                crossed = np.empty((crossings * rays * max(1, int(behind.sum())), 4))
+                with evaluators(self.body) as parts:
+                    a, b = seek_all(
+                        *parts[:2], times[1], weights, states[here], arc[here], launch.closed[here],
+                        observers, behind, EARLY * size(self.body), ALONG, cells * chi.shape[1], crossings * rays,
+                        found, places, crossed, chi, self._roots[here],
+                    )  # fmt: skip
+                if a >= 0:
+                    break
+                cells, crossings = min(8 * cells, most * rays), min(2 * crossings, most)
+            self._chi[here, some] = chi
+            for rows in (found[:a, 0], crossed[:b, 0]):
+                own, observer = np.divmod(rows, chi.shape[1])
+                rows[:] = (here.start + own) * many + some.start + observer
+            pieces.append((found[:a], places[:a], crossed[:b]))
+        self._found, self._places, self._crossed = (np.concatenate(kind) for kind in zip(*pieces, strict=True))
         self._fine = times[:-1, None] + np.diff(times)[:, None] * (np.arange(PARTS) / PARTS)
 
     @property

@@ -22,7 +22,7 @@ from creeping.geodesics.hermite import Sliding, sliding
 from creeping.geodesics.integrator import trace_states
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface
-from creeping.kernels.threads import CHUNK, in_threads
+from creeping.kernels.threads import CHUNK, in_slices, in_threads
 
 NODES = 8
 GAUSS = 12
@@ -117,8 +117,9 @@ def curvature_values(body: Surface, states: FloatArray) -> FloatArray:
     from creeping.geodesics.kernels.attenuation import curvatures
 
     out = np.empty(len(states))
+    states = np.ascontiguousarray(states)
     with evaluators(body) as parts:
-        curvatures(*parts, np.ascontiguousarray(states), out)
+        in_slices(lambda some: curvatures(*parts, states[some], out[some]), len(states))
     return out
 
 
@@ -213,4 +214,4 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
         def run(part: slice) -> None:
             kernel(*parts, states[part], *fine, (*fine_rules(), DIP), place, out[part])
 
-        in_threads(run, len(states))
+        in_threads(run, len(states), seconds=1e-7 * states.shape[1])

@@ -15,10 +15,12 @@ from creeping.geodesics.bundle import bundle_points
 from creeping.geodesics.states import pack, unpack
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, size
-from creeping.kernels.threads import in_threads
+from creeping.kernels.threads import CHUNK, in_threads, pause
 
 MAX_STEPS = 100_000
 """Steps between two outputs after which a block of rays is given up."""
+BUDGET = 4000
+"""Steps of blocks after which the kernel comes up for signals: 0.03 s of a closed form, 0.2 s of a spline."""
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,19 @@ def trace_states(
     IntegrationError
         If a ray does not reach its end; ``failed`` lists the rays.
     """
+    return counted_states(body, states, times, rtol=rtol, step=step, tableau=tableau)[0]
+
+
+def counted_states(
+    body: Surface,
+    states: FloatArray,
+    times: FloatArray,
+    *,
+    rtol: float = 1e-10,
+    step: float | None = None,
+    tableau: Tableau | None = None,
+) -> tuple[FloatArray, int]:
+    """Do what `trace_states` does, and count the steps of all blocks of rays, refused ones too."""
     if states.shape[1] > 11:
         raise InvalidInputError(f"states of {states.shape[1]} lanes; at most 11 are traced, see `attenuation`")
     method = tableau or dormand_prince_8()
@@ -176,12 +191,17 @@ def trace_states(
     scale = error_scale(body, states.shape[1])
     ends = np.asarray(times, dtype=float)
     tableau_parts = method.packed()
+    taken: list[int] = []
+    controls = scale, float(rtol), float(step), MAX_STEPS, BUDGET
     with evaluators(body) as parts:
 
         def run(part: slice) -> None:
-            integrate(*parts, states[part], ends, *tableau_parts, scale, float(rtol), float(step), MAX_STEPS, out[part])
+            at, kept = np.zeros(7), np.empty((2, states.shape[1], CHUNK))
+            while not integrate(*parts, states[part], ends, *tableau_parts, *controls, at, kept, out[part]):
+                pause()
+            taken.append(int(at[6]))
 
-        in_threads(run, len(states))
+        in_threads(run, len(states), seconds=None)
     failed = np.flatnonzero(~np.all(np.isfinite(out), axis=(1, 2)))
     if len(failed):
         raise IntegrationError(
@@ -194,7 +214,7 @@ def trace_states(
             ),
             failed=failed,
         )
-    return out
+    return out, sum(taken)
 
 
 def error_scale(body: Surface, lanes: int) -> FloatArray:

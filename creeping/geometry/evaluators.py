@@ -42,16 +42,16 @@ def evaluators(body: Surface) -> Iterator[Evaluators]:
     speed = speed_of(body)
     level = _offered(body, "level", lambda: _level(body), body)
     weight = level if speed is None else _offered(body, "speed", lambda: _speed(body), speed)
-    yield Evaluators(level.function, level.parameters, weight.function, weight.parameters, speed is not None)
-    _raise_failures(level, weight)
+    with _told(level, weight):
+        yield Evaluators(level.function, level.parameters, weight.function, weight.parameters, speed is not None)
 
 
 @contextmanager
 def locator(body: Surface) -> Iterator[tuple[Any, FloatArray]]:
     """Locator of a body's atlas for the kernels called inside, with its parameters."""
     found = _offered(body, "locator", lambda: _locator(body), body.atlas)
-    yield found.function, found.parameters
-    _raise_failures(found)
+    with _told(found):
+        yield found.function, found.parameters
 
 
 def is_compiled(body: Surface) -> bool:
@@ -69,10 +69,18 @@ def _offered(body: Surface, role: str, make: Callable[[], Any], source: Any) -> 
     return kept(body, role, make)
 
 
-def _raise_failures(*functions: Any) -> None:
-    for function in functions:
-        if hasattr(function, "raise_failure"):
-            function.raise_failure()
+@contextmanager
+def _told(*functions: Any) -> Iterator[None]:
+    """Raise at the end what callbacks have raised, unless something else ends the calls."""
+    callbacks = [function for function in functions if hasattr(function, "raise_failure")]
+    try:
+        yield
+    except BaseException:
+        for callback in callbacks:
+            callback.forget_failure()
+        raise
+    for callback in callbacks:
+        callback.raise_failure()
 
 
 def entries_of(hessian: FloatArray) -> FloatArray:

@@ -26,6 +26,7 @@ from creeping.geometry.evaluators import evaluators
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import quadrilaterals
+from creeping.kernels.threads import in_slices
 
 CELLS, MOST_CELLS, MOST_NODES = 24, 120, 3_000_000
 """Cells of the coarsest and the finest mesh, and the most nodes."""
@@ -246,7 +247,13 @@ def nearest_points(body: Surface, points: FloatArray) -> tuple[FloatArray, Float
 
     m = len(points)
     x, n, hessians, height = np.empty((3, m)), np.empty((3, m)), np.empty((6, m)), np.empty(m)
+    columns, close = np.ascontiguousarray(points.T), 1e-14 * size(body)
     with evaluators(body) as parts:
-        close = 1e-14 * size(body)
-        nearest(*parts[:2], np.ascontiguousarray(points.T), STEPS, close, x, n, hessians, height)
+
+        def run(part: slice) -> None:
+            found = [np.ascontiguousarray(values[..., part]) for values in (x, n, hessians, height)]
+            nearest(*parts[:2], np.ascontiguousarray(columns[:, part]), STEPS, close, *found)
+            x[:, part], n[:, part], hessians[:, part], height[part] = found
+
+        in_slices(run, m)
     return np.ascontiguousarray(x.T), np.ascontiguousarray(n.T), np.ascontiguousarray(hessians.T), height

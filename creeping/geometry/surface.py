@@ -20,7 +20,8 @@ from creeping._typing import Any, FloatArray, IntArray
 class Compiled(Protocol):
     """A compiled block function with its parameters; see `scatterers.kernels.compiled.Compiled`.
 
-    A body that offers none is evaluated by its numpy methods: same results, slower.
+    A body that offers none is evaluated by its numpy methods: same results, slower. An optional member ``operations``
+    says about how many floating-point operations a point takes; those of a closed form are assumed without it.
     """
 
     @property

@@ -9,8 +9,9 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.cache import discard_stale
+from creeping.kernels.private_cache import keep_private
 
-discard_stale(Path(__file__).parents[1])
+keep_private(Path(__file__).parents[1], discard_stale(Path(__file__).parents[1]))
 
 BLOCK = 64
 

@@ -70,18 +70,26 @@ class BlockCallback(types.WrapperAddressProtocol):  # type: ignore[misc]
     def _call(self, *fields: int) -> None:
         arrays = list(self._views(fields))
         try:
-            self._function(*arrays)
+            # what is left of a call that has failed is not worth its time
+            if self._failure is None:
+                self._function(*arrays)
         except BaseException as error:  # an interrupt must not get lost either
-            self._failure = self._failure or error
+            self._failure = error
+        if self._failure is not None:
             for number, array in enumerate(arrays[:-1]):
                 if number not in self._inputs:
                     array[...] = np.nan if array.dtype.kind == "f" else 0
 
     def raise_failure(self) -> None:
-        """Raise what the function has raised since the last call of this."""
-        failure, self._failure = self._failure, None
+        """Raise what the function has raised since the last call of this or of `forget_failure`."""
+        failure = self._failure
+        self.forget_failure()
         if failure is not None:
             raise failure
+
+    def forget_failure(self) -> None:
+        """Begin anew, where another error ends the call."""
+        self._failure = None
 
 
 def level_callback(function: Callable[..., None]) -> BlockCallback:

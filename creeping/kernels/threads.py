@@ -1,8 +1,16 @@
-"""Work on rays in threads: compiled kernels release the interpreter, so chunks of rays run side by side."""
+"""Work on rays in slices, in as many threads as pay, that an interrupt ends within about a second.
+
+Compiled kernels release the interpreter, and no handler of a signal runs before they return. So they are given slices
+of some SLICE seconds, by the time that the last one took; slices end at multiples of the kernels' block, and results
+depend neither on them nor on the number of threads. Kernels whose single block may take longer return by themselves
+after a number of steps, and are called until they are done, with `pause` in between.
+"""
 
 import os
+import threading
 from collections.abc import Callable
 from functools import cache
+from time import perf_counter
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
@@ -10,7 +18,23 @@ from creeping.errors import InvalidInputError
 LEAST = 2048
 """Fewest rays worth a thread."""
 CHUNK = 64
-"""Chunks end at multiples of this, the kernels' block: results do not depend on the number of threads."""
+"""Slices end at multiples of this, the kernels' block: results do not depend on them."""
+SLICE = 0.1
+"""Seconds that a kernel may keep the signals waiting."""
+
+
+class _Stopped(BaseException):
+    """Ends the work of a thread whose caller has given up."""
+
+
+_team = threading.local()
+
+
+def pause() -> None:
+    """Between two calls of a kernel: let a thread end if its caller has been interrupted or another one has failed."""
+    stop = getattr(_team, "stop", None)
+    if stop is not None and stop.is_set():
+        raise _Stopped
 
 
 def thread_count() -> int:
@@ -36,15 +60,105 @@ def _pool(threads: int) -> Any:
     return ThreadPoolExecutor(threads, thread_name_prefix="creeping")
 
 
-def in_threads(work: Callable[[slice], None], count: int, *, least: int = LEAST, multiple: int = CHUNK) -> None:
-    """Call ``work`` on slices that cover range(count), at least ``least`` a thread, in as many threads as pay."""
+class _Slices:
+    """Slices of range(count), handed out one after the other; unless ``even``, as long as their time allows."""
+
+    def __init__(self, count: int, first: float, most: int, multiple: int, *, even: bool) -> None:
+        self._count, self._most, self._multiple, self._even = count, max(multiple, most), multiple, even
+        self._next, self._size = 0, self._whole(most if even else first)
+        self._lock = threading.Lock()
+
+    def _whole(self, rows: float) -> int:
+        return max(self._multiple, int(min(rows, self._most)) // self._multiple * self._multiple)
+
+    def work(self, work: Callable[[slice], None]) -> None:
+        """Call ``work`` on slices until none is left."""
+        while True:
+            pause()
+            with self._lock:
+                part = slice(self._next, min(self._next + self._size, self._count))
+                self._next = part.stop
+            if part.start >= part.stop:
+                return
+            began = perf_counter()
+            work(part)
+            if not self._even:
+                share = SLICE / max(perf_counter() - began, 1e-9)
+                self._size = self._whole((part.stop - part.start) * min(4.0, max(0.25, share)))
+
+
+def in_slices(work: Callable[[slice], None], count: int, *, seconds: float = 1e-6, multiple: int = CHUNK) -> None:
+    """Call ``work`` on slices that cover range(count), one after the other, in this thread.
+
+    Parameters
+    ----------
+    work : callable
+        What it does for a row must not depend on the slice.
+    count : int
+    seconds : float
+        About what a row takes; it decides how long the first slice is.
+    multiple : int
+        Slices end at multiples of this.
+    """
+    _Slices(count, SLICE / seconds, count + multiple, multiple, even=False).work(work)
+
+
+def in_threads(
+    work: Callable[[slice], None],
+    count: int,
+    *,
+    least: int = LEAST,
+    multiple: int = CHUNK,
+    seconds: float | None = 1e-6,
+    most: int | None = None,
+) -> None:
+    """Do what `in_slices` does, in as many threads as pay, at least ``least`` rows a thread.
+
+    An interrupt, or an error in one thread, ends the others after their slices.
+
+    Parameters
+    ----------
+    work, count, seconds, multiple
+        As for `in_slices`; with ``seconds=None`` slices are equal, for kernels that come up by themselves.
+    least : int
+    most : int, optional
+        Rows of the longest slice.
+    """
     threads = min(thread_count(), max(1, count // least))
+    longest = count + multiple
+    if threads > 1:
+        # more slices than threads: rays of one region may cost more than those of another
+        longest = -(-count // (4 * threads * multiple)) * multiple
+    longest = min(longest, most or longest)
+    slices = _Slices(count, SLICE / (seconds or 1.0), longest, multiple, even=seconds is None)
     if threads == 1:
-        work(slice(0, count))
+        slices.work(work)
         return
-    # more chunks than threads: rays of one region may cost more than those of another
-    chunk = -(-count // (4 * threads * multiple)) * multiple
-    parts = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
-    # consume the results, or an exception of a chunk would be lost
-    for _ in _pool(thread_count()).map(work, parts):
-        pass
+    from concurrent.futures import wait
+
+    stop = threading.Event()
+
+    def join() -> None:
+        _team.stop = stop
+        try:
+            slices.work(work)
+        except BaseException:
+            stop.set()
+            raise
+        finally:
+            _team.stop = None
+
+    futures = [_pool(thread_count()).submit(join) for _ in range(threads)]
+    try:
+        # where a signal does not end a wait it is seen after it
+        while wait(futures, timeout=SLICE).not_done:
+            continue
+    except BaseException:
+        # their slices are short, and what they write must not change once this has returned
+        stop.set()
+        wait(futures)
+        raise
+    for future in futures:
+        failure = future.exception()
+        if failure is not None and not isinstance(failure, _Stopped):
+            raise failure

@@ -8,7 +8,6 @@ expensive. The error is C (tau^4 + h^(p+1)) and C h^(p+1) respectively.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from time import perf_counter as clock
 
 import numpy as np
 
@@ -78,7 +77,6 @@ def curvature_reach(tolerance: float) -> float:
 
 def build_direct(body: Surface, model: Model, plan: Plan, progress: Progress, *, rtol: float) -> PhaseMap:
     """Trace every node to T0/2^d, interpolate, and double d times."""
-    start = clock()
     nodes = nodes_of(model, plan.grid)
     doublings = plan.doublings if isinstance(model, CompiledModel) else 0
     now = plan.horizon / 2**doublings
@@ -92,7 +90,7 @@ def build_direct(body: Surface, model: Model, plan: Plan, progress: Progress, *,
         values = model.doubled(plan.grid, leap, nodes)
         now *= 2
         leap = _leap(values, plan.grid, now, model, single=plan.single and k == doublings - 1)
-    parameters = {"method": "direct", "doublings": doublings, "seconds": round(clock() - start, 3)}
+    parameters = {"method": "direct", "doublings": doublings}
     return PhaseMap(body, model, plan.grid, (leap,), UNMEASURED, None, parameters)
 
 
@@ -137,7 +135,6 @@ def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: 
     nodes = nodes_of(model, grid)
     states = pack(nodes[:, :3], nodes[:, 3:], jacobi=True)
     progress(f"burn-in of {len(nodes)} nodes by tau = {time_step:g}")
-    start = clock()
     reached = trace_states(body, states, np.array([time_step]), rtol=0.0, step=time_step, tableau=runge_kutta_4())
     leaps: list[Leap] = []
     for level in range(stages + 1):
@@ -148,7 +145,6 @@ def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: 
         values = model.displacement(nodes, reached, np.array([now]))
         leaps.append(_leap((values, reached[:, 0, 6:], np.empty((0, NODES))), grid, now, model))
     parameters = {"method": "tower", "time_step": time_step, "stages": stages, "base": base}
-    parameters["seconds"] = round(clock() - start, 3)
     return PhaseMap(body, model, grid, tuple(leaps), UNMEASURED, None, parameters)
 
 

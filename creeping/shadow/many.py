@@ -99,7 +99,7 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
             def run(part: slice, mesh: Any = mesh, some: FloatArray = some, out: Any = out, parts: Any = parts) -> None:
                 trace_lines(*parts[:2], box, mesh, some[part], every, *(values[part] for values in out))
 
-            in_threads(run, len(rows), least=LEAST, multiple=1)
+            in_threads(run, len(rows), least=LEAST, multiple=1, seconds=1e-3)
         summary[rows], certain, launched[rows], places[rows] = out
         onward, status[rows] = judged(v[rows], certain, meshes.turn(tier), tier)
         rows = rows[onward]

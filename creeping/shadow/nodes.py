@@ -15,6 +15,7 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, size
+from creeping.kernels.threads import in_slices
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
 
@@ -99,7 +100,8 @@ def critical_distances(body: Surface, directions: FloatArray) -> FloatArray:
     from creeping.shadow.kernels.trace import least_criticals
 
     least = np.empty(len(directions))
-    least_criticals(prepared(body).critical, directions, least)
+    points = prepared(body).critical
+    in_slices(lambda part: least_criticals(points, directions[part], least[part]), len(directions))
     return least
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface
+from creeping.kernels.threads import in_slices
 
 
 def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: FloatArray | float = np.inf) -> BoolArray:
@@ -28,5 +29,10 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
     box = np.ascontiguousarray(body.bounds, dtype=float)
     columns = np.ascontiguousarray(points.T, dtype=float)
     with evaluators(body) as parts:
-        blocked_rays(*parts[:2], box, directions, columns, limit, hidden)
+
+        def run(part: slice) -> None:
+            some = np.ascontiguousarray(columns[:, part])
+            blocked_rays(*parts[:2], box, directions[part], some, limit[part], hidden[part])
+
+        in_slices(run, len(points), seconds=1e-5)
     return hidden

@@ -18,6 +18,7 @@ from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, 
 from creeping.sweeping.request import Quantity, sweep_length, sweep_request
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.storage.layout import UNDONE
+from creeping.sweeping.storage.mending import mended
 from creeping.sweeping.storage.store import SweepStore
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ def sweep_directions(
         raise InvalidInputError(f"chunk = {chunk!r} is not a whole number >= 1")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (
-        SweepStore.open(str(store)).chunk
+        SweepStore.open(str(store), mending=True).chunk
         if going_on
         else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
@@ -172,8 +173,10 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> "xarray.Data
     return as_dataset(plan, arrays, errors, time.perf_counter() - started)
 
 
-def open_store(plan: SweepPlan, folder: str | Path, *, resume: bool) -> SweepStore:
-    """Store of a plan: made, or opened if ``resume`` and it exists.
+def open_store(
+    plan: SweepPlan, folder: str | Path, *, resume: bool, note: Callable[[str], None] = lambda _: None
+) -> SweepStore:
+    """Store of a plan: made, or opened, and mended, if ``resume`` and it exists; ``note`` is told what was damaged.
 
     Raises
     ------
@@ -181,8 +184,10 @@ def open_store(plan: SweepPlan, folder: str | Path, *, resume: bool) -> SweepSto
         If the folder exists and ``resume`` is false, or holds another study.
     """
     if resume and Path(folder).exists():
-        store = SweepStore.open(folder)
+        store = SweepStore.open(folder, mending=True)
         store.require_same(plan)
+        for text in mended(store, plan):
+            note(text)
         return store
     if Path(folder).exists():
         raise InvalidInputError(

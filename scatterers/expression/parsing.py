@@ -8,6 +8,7 @@ its derivatives are those of the pieces, so pieces must join smoothly.
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -17,6 +18,8 @@ MAX_LENGTH = 2000
 MAX_POWER = 64
 MAX_DEPTH = 120
 LARGEST = 1e12
+LIBRARY = 100
+"""Operations that a call of a function is worth."""
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -194,6 +197,7 @@ def _differentiated(text: str) -> Differentiated:
         *(f"        {symbol} = {printer.doprint(part)}" for symbol, part in shared),
         *(f"        {target} = {printer.doprint(part)}" for target, part in zip(targets, reduced, strict=True)),
     ]
+    operations = _operations(lines)
     slopes, of_slopes = _shared([expression, *gradient])
     lines += [
         "def first(x, y, z, parameters):",
@@ -202,9 +206,17 @@ def _differentiated(text: str) -> Differentiated:
     ]
     space: dict[str, Any] = {"math": math}
     exec(compile("\n".join(lines), "<expression>", "exec"), space)  # printed by sympy, see the module's head
+    space["block"].operations = operations
 
     def numeric(parts: list[Any]) -> Callable[..., Any]:
         function: Callable[..., Any] = sympy.lambdify((x, y, z), parts, "numpy", cse=_shared)
         return function
 
     return Differentiated(numeric([expression]), numeric(gradient), numeric(hessian), space["block"], space["first"])
+
+
+def _operations(lines: list[str]) -> float:
+    """Floating-point operations of printed code, about; see `scatterers.kernels.compiled.Compiled`."""
+    text = "\n".join(lines)
+    called = len(re.findall(rf"\b(?:{'|'.join(FUNCTIONS)})\(", text))
+    return float(LIBRARY * called + len(re.findall(r" [+/-] |\*", text)))

@@ -7,10 +7,10 @@ import hashlib
 from pathlib import Path
 
 
-def discard_stale(package: Path) -> None:
+def discard_stale(package: Path) -> str:
     """Delete what is cached for a package's folder unless it belongs to its sources as they are.
 
-    A cache that cannot be written (numba keeps it elsewhere then) is left alone.
+    A cache that cannot be written (numba keeps it elsewhere then) is left alone. Returns the digest of the sources.
     """
     digest = hashlib.blake2b(digest_size=16)
     for source in sorted(package.rglob("*.py")):
@@ -18,10 +18,11 @@ def discard_stale(package: Path) -> None:
     stamp = package / "__pycache__" / "kernels.digest"
     try:
         if stamp.is_file() and stamp.read_text() == digest.hexdigest():
-            return
+            return digest.hexdigest()
         stamp.parent.mkdir(exist_ok=True)
         for cached in package.rglob("__pycache__/*.nb[ic]"):
             cached.unlink(missing_ok=True)
         stamp.write_text(digest.hexdigest())
     except OSError:
-        return
+        pass
+    return digest.hexdigest()

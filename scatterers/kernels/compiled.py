@@ -19,13 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.cache import discard_stale
+from scatterers.kernels.private_cache import keep_private
 
 Kind = Literal["level", "locator", "forward", "inverse"]
-discard_stale(Path(__file__).parents[1])
+keep_private(Path(__file__).parents[1], discard_stale(Path(__file__).parents[1]))
 
 F = TypeVar("F", bound=Callable[..., Any])
 # products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+CLOSED_FORM = 50.0
+"""Operations of the level of a quadric."""
 _helpers: list[Callable[..., Any]] = []
 
 
@@ -59,6 +62,11 @@ class Compiled:
     def function(self) -> Any:
         """The compiled function, a numba CFunc."""
         return _compile(self.source, self.kind)
+
+    @property
+    def operations(self) -> float:
+        """Floating-point operations of a point, about: as the source says, or those of a closed form."""
+        return float(getattr(self.source, "operations", CLOSED_FORM))
 
 
 @cache

@@ -20,8 +20,10 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.kernels.threads import in_threads
 
-TOGETHER = 32
-"""Fewest directions or points worth a thread."""
+SHARES = {"least": 32, "multiple": 8}
+"""Fewest directions or points worth a thread, and what slices of them end at."""
+EACH = 5e-9
+"""Seconds, about, of one direction seen from one node."""
 TOLERANCE = 1e-9
 """Of the transform, as a share of its largest value."""
 PER_NODE, PER_CELL = 1500.0, 60.0
@@ -52,7 +54,10 @@ def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray
     out = np.empty((len(directions), 2 * columns))
     directions = np.ascontiguousarray(directions)
     in_threads(
-        lambda part: distant(turns, real, imaginary, directions[part], out[part]), len(directions), least=TOGETHER
+        lambda part: distant(turns, real, imaginary, directions[part], out[part]),
+        len(directions),
+        seconds=EACH * len(points),
+        **SHARES,
     )
     return np.asarray(out[:, :columns] + 1j * out[:, columns:])
 
@@ -112,7 +117,12 @@ def field_of_scalar(
     columns = np.ascontiguousarray(points.T), np.ascontiguousarray(normals.T)
     pairs = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (single, double)]
     at = np.ascontiguousarray(at)
-    in_threads(lambda part: near(*columns, *pairs, wavenumber, at[part], out[part]), len(at), least=TOGETHER)
+    in_threads(
+        lambda part: near(*columns, *pairs, wavenumber, at[part], out[part]),
+        len(at),
+        seconds=EACH * len(points),
+        **SHARES,
+    )
     return np.asarray(out[:, 0] + 1j * out[:, 1])
 
 
@@ -140,5 +150,10 @@ def magnetic_field_of_vector(
     real, imaginary = np.ascontiguousarray(J.real), np.ascontiguousarray(J.imag)
     out = np.empty((len(at), 6))
     columns, at = np.ascontiguousarray(points.T), np.ascontiguousarray(at)
-    in_threads(lambda part: curl(columns, real, imaginary, wavenumber, at[part], out[part]), len(at), least=TOGETHER)
+    in_threads(
+        lambda part: curl(columns, real, imaginary, wavenumber, at[part], out[part]),
+        len(at),
+        seconds=EACH * len(points),
+        **SHARES,
+    )
     return np.asarray(out[:, :3] + 1j * out[:, 3:])

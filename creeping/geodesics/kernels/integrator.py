@@ -203,14 +203,19 @@ def _finite(y):
 
 @njit(**options)
 def integrate(
-    level, level_par, speed, speed_par, weighted, states, times, terms, index, weights, scale, rtol, step, limit, out
-):
-    """Trace states (n, lanes) to the ascending times (m,) into out (n, m, lanes); returns the rays that failed.
+    level, level_par, speed, speed_par, weighted, states, times, terms, index, weights, scale, rtol, step, limit,
+    budget, reached, kept, out
+):  # fmt: skip
+    """Trace states (n, lanes) to the ascending times (m,) into out (n, m, lanes); returns whether all is done.
 
     Rows of the tableau are packed as ``terms`` (rows,), ``index`` and ``weights`` (rows, stages): one row a stage, the
     last of them the solution, then the two error estimates.
     rtol > 0 adapts the step of each block to its worst ray; rtol = 0 uses the equal steps nearest below ``step``.
     A block that needs more than ``limit`` steps between outputs, or leaves the finite numbers, is filled with NaN.
+
+    After ``budget`` steps it returns, to be called again with the same arguments: ``reached`` (7,), zeros at first,
+    keeps the ray and the output it has come to, the steps taken and wanted to that output, what is left to it, the step
+    that adapts, and the steps of all blocks; ``kept`` (2, lanes, BLOCK) the block's state and derivative.
     """
     n, lanes = states.shape
     stages = terms.shape[0] - 3
@@ -220,19 +225,41 @@ def integrate(
     estimates, zero = aligned(2, size).reshape(2, lanes, BLOCK), np.zeros((lanes, BLOCK))
     geometry, weight, sums = aligned(10, BLOCK), aligned(10, BLOCK), aligned(2, BLOCK)
     scaled = np.empty_like(weights)
-    failed = 0
-    for start in range(0, n, BLOCK):
+    spent, again = 0, reached[3] > 0.0
+    for start in range(int(reached[0]), n, BLOCK):
         count = min(BLOCK, n - start)
-        for i in range(BLOCK):
-            for lane in range(lanes):
-                y[lane, i] = states[start + min(i, count - 1), lane]
-        right_hand_side(level, level_par, speed, speed_par, weighted, y, k[0], geometry, weight)
-        now, h, good = 0.0, step, True
-        for m in range(times.shape[0]):
+        now, h, good, first = 0.0, step, True, 0
+        if again:
+            _copy(kept[0], y)
+            _copy(kept[1], k[0])
+            h, first = reached[5], int(reached[1])
+            now = times[first - 1] if first > 0 else 0.0
+        else:
+            for i in range(BLOCK):
+                for lane in range(lanes):
+                    y[lane, i] = states[start + min(i, count - 1), lane]
+            right_hand_side(level, level_par, speed, speed_par, weighted, y, k[0], geometry, weight)
+        for m in range(first, times.shape[0]):
             used = 0
             left = times[m] - now
             equal = max(1, math.ceil(left / step - 1e-9)) if rtol == 0.0 and left > 0.0 else 1
+            if again:
+                used, equal, left, again = int(reached[2]), int(reached[3]), reached[4], False
             while good and left > 0.0:
+                if spent >= budget:
+                    reached[0], reached[1], reached[2], reached[3], reached[4], reached[5] = (
+                        start,
+                        m,
+                        used,
+                        equal,
+                        left,
+                        h,
+                    )
+                    reached[6] += spent
+                    _copy(y, kept[0])
+                    _copy(k[0], kept[1])
+                    return False
+                spent += 1
                 trial = left / (equal - used) if rtol == 0.0 else min(h, left)
                 for row in range(stages + 1):
                     for r in range(terms[row]):
@@ -266,6 +293,5 @@ def integrate(
             for i in range(count):
                 for lane in range(lanes):
                     out[start + i, m, lane] = y[lane, i] if good else math.nan
-        if not good:
-            failed += count
-    return failed
+    reached[6] += spent
+    return True

@@ -14,9 +14,11 @@ from creeping._typing import FloatArray, IntArray
 from creeping.geometry.evaluators import evaluators, locator
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface, size
-from creeping.kernels.threads import in_threads
+from creeping.kernels.threads import in_threads, pause
 from creeping.phaseflow.grid import Grid, Leap
 
+TOGETHER = 1000
+"""Leaps between which the kernel comes up for signals, 0.1 s for a block."""
 PROJECTION = 1e-13
 """Distance from the body, in units of its size, at which a composed ray counts as on it."""
 
@@ -70,6 +72,9 @@ class AmbientModel:
         with evaluators(self.body) as parts, locator(self.body) as place:
 
             def run(part: slice) -> None:
-                kernel(*place, *parts[:2], *tables, leap.time, count, off, states[part])
+                # a map composed with itself in place may be left in between
+                for done in range(0, count, TOGETHER):
+                    kernel(*place, *parts[:2], *tables, leap.time, min(TOGETHER, count - done), off, states[part])
+                    pause()
 
-            in_threads(run, len(states))
+            in_threads(run, len(states), seconds=1e-6 * min(count, TOGETHER))

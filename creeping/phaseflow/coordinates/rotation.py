@@ -13,7 +13,7 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import halves, kernel_rules
 from creeping.geometry.surface import Surface, size
-from creeping.kernels.threads import in_threads
+from creeping.kernels.threads import CHUNK, in_slices, in_threads, pause
 from creeping.phaseflow.coordinates.quaternions import quaternion_product, quaternions
 from creeping.phaseflow.grid import Grid, Leap
 from creeping.phaseflow.splines import interpolation_operator
@@ -26,6 +26,8 @@ NEAR = 24_000_000
 """if what a leap reads has so many bytes: more than the caches hold."""
 SHARE = 65_536
 """Rays ordered at a time."""
+BUDGET = 5000
+"""Leaps of blocks after which the kernels come up for signals: 0.01 to 0.2 s."""
 EXIT_SIDES = (48, 72, 108, 160)
 EXIT_ERROR = 1e-9
 """Rms error of (x, p) by such a table, x in body sizes."""
@@ -63,7 +65,8 @@ class CompiledModel:
         from creeping.phaseflow.kernels.nodes import to_body
 
         out = np.empty((len(coordinates), 6))
-        to_body(self.kind, self._surface_table, *self._there, coordinates, out)
+        parts = self.kind, self._surface_table, *self._there
+        in_slices(lambda part: to_body(*parts, coordinates[part], out[part]), len(coordinates))
         return out
 
     def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
@@ -76,8 +79,15 @@ class CompiledModel:
         """
         from creeping.phaseflow.kernels.nodes import displacements
 
-        out = np.empty((len(nodes), 4))
-        surest = displacements(self.kind, self._surface_table, *self._there, *self._back, nodes, traced, out)
+        out, sure = np.empty((len(nodes), 4)), [1.0]
+        parts = self.kind, self._surface_table, *self._there, *self._back
+
+        def run(part: slice) -> None:
+            sure.append(displacements(*parts, nodes[part], traced[part], out[part]))
+
+        in_slices(run, len(nodes), seconds=1e-6 * traced.shape[1])
+        # a cosine that is not a number must not get lost
+        surest = float(np.min(sure))
         if not surest >= SUREST:
             raise ToleranceError(
                 f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {surest:.2f}); "
@@ -87,8 +97,9 @@ class CompiledModel:
 
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
         """See `Model`."""
+        from creeping.kernels.block import aligned
         from creeping.phaseflow.kernels.cell_ordered import flow_ordered
-        from creeping.phaseflow.kernels.composition import flow
+        from creeping.phaseflow.kernels.composition import KEPT, flow
 
         out = np.empty((len(states), len(counts), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
@@ -97,16 +108,20 @@ class CompiledModel:
         used = leap.state.nbytes if states.shape[1] == 6 else leap.nbytes
         many = len(states) >= ORDERED and used > NEAR and int(counts.sum()) > 0
         kernel = flow_ordered if many else flow
+        parts = self.kind, self._surface_table, *self._there, *self._back, *tables
 
         def run(part: slice) -> None:
-            # shares of a thread stay small, so that what is known of their rays stays in the cache
-            for start in range(part.start, part.stop, SHARE):
-                some = slice(start, min(start + SHARE, part.stop))
-                kernel(
-                    self.kind, self._surface_table, *self._there, *self._back, *tables, states[some], counts, out[some]
-                )
+            n, at = part.stop - part.start, np.zeros(5)
+            kept: tuple[Any, ...] = (np.empty((KEPT, CHUNK)),)
+            if many:
+                cells = int(np.prod(leap.state.shape[:3]))
+                carried = np.empty((n, states.shape[1] - 6))
+                kept = aligned(n, 8), carried, np.empty(n, np.int32), np.zeros(cells + 1, np.int64)
+            while not kernel(*parts, states[part], counts, BUDGET, at, *kept, out[part]):
+                pause()
 
-        in_threads(run, len(states))
+        # shares that are ordered stay small, so that what is known of their rays stays in the cache
+        in_threads(run, len(states), most=SHARE if many else None, seconds=None)
         return out
 
     def doubled(self, grid: Grid, leap: Leap, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -16,9 +16,15 @@ from creeping.phaseflow.kernels.composition import WORK, from_coordinates, leap_
 
 @njit(**options)
 def flow_ordered(
-    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out
-):
-    """Do what `composition.flow` does, for many rays."""
+    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts,
+    budget, reached, ray, carried, bucket, ends, out
+):  # fmt: skip
+    """Do what `composition.flow` does, for many rays; after a leap of all of them the budget may be spent.
+
+    Between two calls ``ray`` (n, 8), rows aligned, ``carried`` (n, lanes - 6), ``bucket`` (n,) and ``ends`` (cells of
+    (u, v) + 1,), zeros at first, keep the rays: coordinates, fractions of the cell, number of the stencil's first
+    coefficient plus 1/2 where an odd number of mirrors has folded the ray: one cache line.
+    """
     n, lanes = states.shape
     table, more = leap[0], lanes - 6
     extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
@@ -27,16 +33,11 @@ def flow_ordered(
     work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     odd = np.zeros(BLOCK)
-    # coordinates, fractions of the cell, number of the stencil's first coefficient plus 1/2 where an odd number of
-    # mirrors has folded the ray: one cache line
-    ray = aligned(n, 8)
-    flat = ray.reshape(-1)
-    carried = np.empty((n, more))
-    order, bucket = np.empty(n, np.int64), np.empty(n, np.int32)
-    ends = np.zeros(table.shape[0] * table.shape[1] * table.shape[2] + 1, np.int64)
+    flat, order = ray.reshape(-1), np.empty(n, np.int64)
     # a whole number times the next number above 1/na never falls below the quotient, and division is slow
     inverse = (1.0 + 1e-15) / table.shape[3]
-    for start in range(0, n, BLOCK):
+    spent, again = 0, reached[4] > 0.0
+    for start in range(0, 0 if again else n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(BLOCK):
             source = start + min(i, count - 1)
@@ -49,9 +50,16 @@ def flow_ordered(
             for k in range(more):
                 carried[start + i, k] = states[start + i, 6 + k]
         _put(flat, order[start : start + count], r, uva, place, work[7], inverse, bucket, ends)
-    now = 0.0
-    for output in range(counts.shape[0]):
-        for _ in range(counts[output]):
+    now = reached[3]
+    for output in range(int(reached[1]), counts.shape[0]):
+        done = 0
+        if again:
+            done, again = int(reached[2]), False
+        for number in range(done, counts[output]):
+            if spent >= budget:
+                reached[1], reached[2], reached[3], reached[4] = output, number, now, 1.0
+                return False
+            spent += (n + BLOCK - 1) // BLOCK
             _sort(bucket, ends, order)
             ends[:] = 0
             for start in range(0, n, BLOCK):
@@ -87,6 +95,7 @@ def flow_ordered(
                     out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
                 for k in range(more):
                     out[start + i, output, 6 + k] = carried[start + i, k]
+    return True
 
 
 @njit(**options)

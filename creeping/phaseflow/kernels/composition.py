@@ -19,6 +19,8 @@ from creeping.phaseflow.kernels.stencil import interpolate, interpolate_where
 ROTATION, ANGLES, FOLDED = 0, 1, 2
 WORK = 48
 """Rows of work space for a block."""
+KEPT = 10
+"""Rows that a block keeps between two calls: coordinates, Jacobi matrix, attenuation, time of detachment."""
 
 _to_rotation, _to_angles = _rotations.to_coordinates, _angles.to_coordinates
 _from_rotation, _from_angles = _rotations.from_coordinates, _angles.from_coordinates
@@ -122,14 +124,19 @@ def _carry_jacobi(d, matrix, m):
 
 @njit(**options)
 def flow(
-    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts, out
-):
+    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts,
+    budget, reached, kept, out
+):  # fmt: skip
     """Compose the map counts[0], then counts[1], ... times on states (n, 6, 10 or 12) into out (n, m, the same).
 
     ``leap`` is (table, centre, jacobi, matrix, curvature): table (charts, nu, nv, na, 4) holds the displacement less
     its mean ``centre``, jacobi the Jacobi matrix less its mean ``matrix`` (4,), curvature (..., 8) that of
     `geodesics.kernels.attenuation`, as are the ``rules``. ``there`` takes the model to the body, ``back`` the body to
     the model; ``surface_table`` (6 or 0, n, n, 4) is a table of x(u, v) that replaces ``there``.
+
+    Returns whether all is done. After ``budget`` leaps of a block it is not, and is to be called again with the same
+    arguments: ``reached`` (5,), zeros at first, keeps ray, output and leap, the time, and whether it is on its way;
+    ``kept`` (KEPT, BLOCK) the block's coordinates and what else it carries.
     """
     n, lanes = states.shape
     x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
@@ -138,18 +145,31 @@ def flow(
     work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
     place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
-    for start in range(0, n, BLOCK):
+    spent, again = 0, reached[4] > 0.0
+    for start in range(int(reached[0]), n, BLOCK):
         count = min(BLOCK, n - start)
-        for i in range(BLOCK):
-            source = start + min(i, count - 1)
-            for k in range(3):
-                x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
-            for k in range(6, lanes):
-                m[k - 6, i] = states[source, k]
-        to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
-        now = 0.0
-        for output in range(counts.shape[0]):
-            for _ in range(counts[output]):
+        now, first = 0.0, 0
+        if again:
+            first, now = int(reached[1]), reached[3]
+            r[:], m[:] = kept[:4], kept[4:]
+        else:
+            for i in range(BLOCK):
+                source = start + min(i, count - 1)
+                for k in range(3):
+                    x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
+                for k in range(6, lanes):
+                    m[k - 6, i] = states[source, k]
+            to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
+        for output in range(first, counts.shape[0]):
+            done = 0
+            if again:
+                done, again = int(reached[2]), False
+            for number in range(done, counts[output]):
+                if spent >= budget:
+                    reached[0], reached[1], reached[2], reached[3], reached[4] = start, output, number, now, 1.0
+                    kept[:4], kept[4:] = r, m
+                    return False
+                spent += 1
                 place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
                 creeping = leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d)
                 if creeping > 0:
@@ -161,3 +181,4 @@ def flow(
                     out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
                 for k in range(6, lanes):
                     out[start + i, output, k] = m[k - 6, i]
+    return True

@@ -1,15 +1,15 @@
-"""The choice between a phase map and direct integration, by their cost on this machine and body.
+"""The choice between a phase map and direct integration, by their nominal cost.
 
 Direct integration takes c_d seconds a ray, with the longest equal steps that meet the tolerance; a map takes b seconds
-to build and c_m a ray. For N rays the map is chosen if b + N c_m < N c_d, with c_d measured, b and c_m estimated before
-the build, and c_m measured after it.
+to build and c_m a ray. For N rays the map is chosen if b + N c_m < N c_d. All three are counted work times nominal
+seconds (`nominal_cost`), c_m once more after the build: the choice follows from what was asked for and from the maps
+in the cache, not from how busy the machine is.
 
 Sources: Derivations, R16.
 """
 
 from dataclasses import replace
 from pathlib import Path
-from time import process_time as clock
 
 import numpy as np
 
@@ -26,16 +26,16 @@ from creeping.phaseflow.cache import cached_phase_map, is_cached
 from creeping.phaseflow.coordinates.base import model_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
 from creeping.phaseflow.phase_map import PhaseMap
-from creeping.phaseflow.tuning.choice_record import remember_choice, remembered_choice
+from creeping.phaseflow.tuning.nominal_cost import direct_seconds, map_seconds, tracing_cost
 from creeping.phaseflow.tuning.request import MapSpec
-from creeping.phaseflow.tuning.search import RAYS, Candidate, candidates, tracing_cost, tuned_map
+from creeping.phaseflow.tuning.search import RAYS, Candidate, candidates, tuned_map
 
 SAMPLES = 512
-"""Rays on which direct integration is measured and both are timed, fewer where F is expensive."""
+"""Rays on which direct integration is measured, fewer where F is expensive."""
 BUDGET = 0.2
-"""Seconds that one measurement may take."""
+"""Nominal seconds that one measurement may take."""
 QUICK = 0.3
-"""Seconds of direct integration below which nothing is tuned."""
+"""Nominal seconds of direct integration below which nothing is tuned."""
 WORTH = 0.85
 """Share of direct integration that a map must be expected to take less than, and its tuning too."""
 SMALLEST = 60_000
@@ -68,9 +68,7 @@ def choose_flow(
     carry_jacobi : bool
         Whether the Jacobi matrix is wanted, as by fans.
     cache : bool or path
-        As for `build_phase_map`; a map in the cache costs nothing to build. The choice is kept there too: it rests on
-        measured times, and a later run is to carry its rays in the same way; a map that has come into the cache since
-        reopens it.
+        As for `build_phase_map`; a map in the cache costs nothing to build.
     progress : callable, optional
         Called with a line of text before each long step, and with the reason of the choice.
 
@@ -109,16 +107,9 @@ def choose_flow(
     report: Progress = progress or (lambda _: None)
     require_checked(body)
     if cache is False:
-        return _chosen(spec, tolerance, False, False, False, report)
-    key = spec.key() | {"tolerance": float(tolerance), "rays": int(n_rays)}
+        return _chosen(spec, tolerance, False, False, report)
     stored = _stored(spec, tolerance, cache)
-    before = remembered_choice(body, key, length / n_steps, stored=stored is not None, folder=cache)
-    if isinstance(before, DirectFlow):
-        report("direct integration, as chosen before")
-        return before
-    flow = _chosen(stored or spec, tolerance, cache, stored is not None, before is not None, report)
-    remember_choice(body, key, flow, stored=_stored(spec, tolerance, cache) is not None, folder=cache)
-    return flow
+    return _chosen(stored or spec, tolerance, cache, stored is not None, report)
 
 
 def _stored(spec: MapSpec, tolerance: float, cache: bool | str | Path) -> MapSpec | None:
@@ -132,16 +123,13 @@ def _stored(spec: MapSpec, tolerance: float, cache: bool | str | Path) -> MapSpe
 
 
 def _chosen(
-    spec: MapSpec, tolerance: float, cache: bool | str | Path, stored: bool, before: bool, progress: Progress
+    spec: MapSpec, tolerance: float, cache: bool | str | Path, stored: bool, progress: Progress
 ) -> PhaseMap | DirectFlow:
-    """The flow that is cheaper by the clock, or the map if it is ``stored`` and was the choice ``before``."""
+    """The flow that is cheaper; a map that is ``stored`` costs nothing but its rays."""
     body, n_rays, n_steps, carry_jacobi = spec.body, spec.n_rays, spec.n_steps, spec.carry_jacobi
     length = spec.length
     assert length is not None
     cost = tracing_cost(body)
-    if stored and before:
-        progress("phase map, as chosen before")
-        return cached_phase_map(body, spec.key(), lambda: tuned_map(spec, progress), folder=cache, progress=progress)
     if n_rays * length * cost < QUICK and not stored:
         progress(f"direct integration: {n_rays} rays take about {n_rays * length * cost:.1g} s")
         return _untuned_direct(body, length, n_steps, tolerance)
@@ -163,18 +151,18 @@ def _chosen(
     except ToleranceError as error:
         progress(f"direct integration: {error}")
         return direct
-    composed = _seconds_per_ray(flow, body, length, n_steps, carry_jacobi, each)
+    composed = map_seconds(flow, length, carry_jacobi=carry_jacobi)
     if composed > each:
-        progress(f"direct integration: {1e6 * each:.2g} us a ray, with the map {1e6 * composed:.2g}")
+        progress(f"direct integration: about {1e6 * each:.2g} us a ray, with the map {1e6 * composed:.2g}")
         return direct
-    progress(f"phase map: {1e6 * composed:.2g} us a ray, direct integration {1e6 * each:.2g}")
+    progress(f"phase map: about {1e6 * composed:.2g} us a ray, direct integration {1e6 * each:.2g}")
     return flow
 
 
 def _worth_building(spec: MapSpec, direct: float, cost: float, tolerance: float) -> tuple[list[Candidate], str]:
-    """Candidates for a map, and the reason to build none of them, if there is one; ``direct`` in seconds."""
+    """Candidates for a map, and the reason to build none of them, if there is one; ``direct`` in nominal seconds."""
     body = spec.body
-    time = f"{spec.n_rays} rays take {direct:.2g} s"
+    time = f"{spec.n_rays} rays take about {direct:.2g} s"
     if tolerance < 1e-9:
         return [], f"no map reaches such a tolerance; {time}"
     # what the smallest map takes, so that probing is not begun in vain
@@ -190,7 +178,7 @@ def _worth_building(spec: MapSpec, direct: float, cost: float, tolerance: float)
     assert spec.length is not None
     expected = found[0].seconds(spec.n_rays, spec.length)
     # estimates err, and so do the gains that they promise
-    return found, f"{time}, with a map about {expected:.2g} s" if expected > WORTH * direct else ""
+    return found, f"{time}, with a map {expected:.2g} s" if expected > WORTH * direct else ""
 
 
 def _untuned_direct(body: Surface, length: float, n_steps: int, tolerance: float) -> DirectFlow:
@@ -217,7 +205,7 @@ def _untuned_direct(body: Surface, length: float, n_steps: int, tolerance: float
 def tuned_direct(
     body: Surface, length: float, n_steps: int, tolerance: float, carry_jacobi: bool
 ) -> tuple[DirectFlow, float]:
-    """Direct flow with the longest equal steps that meet the tolerance, and its seconds a ray.
+    """Direct flow with the longest equal steps that meet the tolerance, and its nominal seconds a ray.
 
     Raises
     ------
@@ -250,7 +238,7 @@ def tuned_direct(
             flow = DirectFlow(
                 body, float(np.clip(1e-2 * tolerance, 1e-13, 1e-8)), horizon, length / steps, error_estimate
             )
-            return flow, _seconds_per_ray(flow, body, length, n_steps, carry_jacobi, cost * length)
+            return flow, direct_seconds(flow, length, n_steps, carry_jacobi=carry_jacobi)
         # an order below the method's own while it has not set in
         factor = (reached / (0.5 * tolerance)) ** (1 / 7.5) if np.isfinite(reached) else 2.0
         steps = int(np.ceil(steps * np.clip(factor, 1.1, 2.0)))
@@ -261,25 +249,3 @@ def tuned_direct(
         f"{tolerance:.1e}; rounding grows along such rays: shorten them or loosen the tolerance",
         rms=reached,
     )
-
-
-def _seconds_per_ray(
-    flow: PhaseMap | DirectFlow, body: Surface, length: float, n_steps: int, carry_jacobi: bool, guess: float
-) -> float:
-    """Measured time of one ray, on one thread."""
-    # whole blocks, or their unused rays would count
-    count = 64 * int(np.clip(BUDGET / (64 * guess), 1, 16))
-    states = _random_states(body, count, carry_jacobi)
-    times = length * np.arange(1, n_steps + 1) / n_steps
-    flow.transport(states[:64], times[:1])
-    best = np.inf
-    for _ in range(3):
-        start = clock()
-        flow.transport(states, times)
-        best = min(best, clock() - start)
-    return max(float(best), 1e-9) / count
-
-
-def _random_states(body: Surface, count: int, carry_jacobi: bool) -> FloatArray:
-    # what a fan carries, or a flow
-    return pack(*random_bundle_points(body, count, rng=np.random.default_rng(3)), lanes=12 if carry_jacobi else 6)

@@ -139,7 +139,7 @@ class MapSpec:
     body, tolerance, length, n_steps, n_rays, horizon, grid, degree, precision, carry_jacobi, method, time_step, stages
         As for `build_phase_map`.
     seconds : float
-        Of direct integration, if that is the other choice: what tuning and rays may take.
+        Of direct integration, nominal, if that is the other choice: what tuning and rays may take.
     """
 
     body: Surface
@@ -217,6 +217,11 @@ class MapSpec:
         """Burn-in tau, B and S, for method "tower"."""
         return _tower_base(self.horizon, self.time_step, self.stages) if self.method == "tower" else None
 
+    @property
+    def magnitude(self) -> float:
+        """Rays for which a map is tuned: their number to a power of ten, or hardly a map would be found again."""
+        return float(10.0 ** round(float(np.log10(self.n_rays))))
+
     def key(self) -> dict[str, Any]:
         """Parameters that decide the result, for the cache; the names are those of the maps that are stored."""
         burn_in, _, stages = self.tower or (None, 0, 0)
@@ -224,7 +229,6 @@ class MapSpec:
             "tolerance": self.tolerance,
             "length": self.length,
             "outputs": self.n_steps,
-            # the magnitude only, or hardly a map would be found again
             "rays": round(float(np.log10(self.n_rays))),
             "horizon": self.horizon,
             "nodes": self.nodes and list(self.nodes),

@@ -7,13 +7,13 @@ the ray by the Jacobi matrices: G(T0)^2 = sum_k |M(L) M(k T0)^-1|^2/2, geometric
     e_u^2 + e_v^2 + e_a^2 <= (tolerance/G)^2,   all three equal where nodes are fewest.
 
 Of all candidates the one that is cheapest for the rays to come, its build included, is built, measured at the end of
-rays, and refined until it meets the tolerance; three at most in turn.
+rays, and refined until it meets the tolerance; three at most in turn. Costs are nominal (`nominal_cost`): a map follows
+from what was asked for, not from the machine that built it.
 
 Sources: Derivations, R16.
 """
 
 from dataclasses import dataclass, replace
-from time import process_time as clock
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +30,13 @@ from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.splines import thinning_operator
+from creeping.phaseflow.tuning.nominal_cost import (
+    build_seconds,
+    doublings_of,
+    leap_seconds,
+    measuring_seconds,
+    tracing_cost,
+)
 
 if TYPE_CHECKING:
     from creeping.phaseflow.tuning.request import MapSpec
@@ -45,14 +52,10 @@ LINES = 24
 CELLS = 192
 """Cells of a probed row; it has divisors enough to try many grids."""
 STRIDES = (2, 3, 4, 6, 8, 12, 16, 24)
-NODE, DOUBLING = 6e-7, 4e-7
-"""Seconds that a node takes of a build besides tracing, and of a doubling."""
-FIXED = 0.1
-"""Seconds of a build that do not depend on its size."""
 COARSE = 1_500_000
 """Nodes from which on a coarser map is built first, to measure how errors grow."""
 BUDGET, SHARE = (0.02, 0.4), 0.02
-"""Least and most seconds that one probe or measurement may take, as a share of direct integration of all rays."""
+"""Least and most nominal seconds of one probe or measurement, as a share of direct integration of all rays."""
 SINGLE, RISKY = 4e-9, 1.2e-8
 """Errors of one leap, in units of (x, p): float32 coefficients are tried down to the first, and given up at the first
 failure below the second; their rounding makes about 1e-8."""
@@ -68,9 +71,9 @@ class Candidate:
     ----------
     plan : Plan
     leap : float
-        Estimated seconds of composition per ray and unit of length.
+        Nominal seconds of composition per ray and unit of length.
     build : float
-        Estimated seconds of the build.
+        Nominal seconds of the build.
     target : float
         Error of one leap that is aimed at.
     """
@@ -81,7 +84,7 @@ class Candidate:
     target: float
 
     def seconds(self, rays: float, length: float) -> float:
-        """Estimated time of the build and of so many rays."""
+        """Nominal seconds of the build and of so many rays."""
         return self.build + rays * length * self.leap
 
 
@@ -101,16 +104,16 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
         progress("probing horizons and grids")
         found = candidates(spec, model, cost)
     best: tuple[float, PhaseMap] | None = None
-    started = clock()
+    spent = 0.0
     for candidate in found[:3]:
         plan, before = candidate.plan, np.inf
         if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
             plan = _scaled(plan, 0.6)
         for _ in range(6):
             progress(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
-            began = clock()
             built = build_direct(body, model, plan, progress, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
-            result = _measured(built, spec, cost)
+            result, measuring = _measured(built, spec, cost)
+            spent += build_seconds(plan, model, cost) + measuring
             assert result.growth is not None
             reached = result.growth.bound if spec.length else result.error.rms
             if best is None or reached < best[0]:
@@ -131,12 +134,10 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
                 if most < 1.0:
                     plan = _scaled(plan, 0.97 * most ** (1 / 3))
             # what was spent is spent: it is the next map and its rays that must pay, and no map is tuned for ever
-            own = float(built.parameters["seconds"])
-            more = int(np.prod(plan.grid.nodes)) / int(np.prod(built.grid.nodes))
-            ahead = clock() - began - own + own * more + spec.n_rays * (spec.length or 0.0) * candidate.leap
-            if max(ahead, clock() - started) > spec.seconds:
+            ahead = measuring + build_seconds(plan, model, cost) + spec.n_rays * (spec.length or 0.0) * candidate.leap
+            if max(ahead, spent) > spec.seconds:
                 raise ToleranceError(
-                    f"tuning took {clock() - started:.2g} s, and {ahead:.2g} s are ahead: direct integration is near"
+                    f"tuning took about {spent:.2g} s, and {ahead:.2g} s are ahead: direct integration is near"
                 )
     assert best is not None
     reached, result = best
@@ -149,30 +150,24 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
     )
 
 
-def _measured(built: PhaseMap, spec: "MapSpec", cost: float) -> PhaseMap:
-    """The map with its errors; where F is expensive on fewer rays, and against a reference only so much better."""
+def _measured(built: PhaseMap, spec: "MapSpec", cost: float) -> tuple[PhaseMap, float]:
+    """The map with its errors, and nominal seconds of measuring them.
+
+    Where F is expensive it is done on fewer rays, and against a reference only so much better.
+    """
     length = spec.length or built.horizon
     assert spec.tolerance is not None
     budget = _budget(spec, cost)
     samples = int(np.clip(budget / (cost * length), 400, 2000))
     expensive = 4 * cost * length * samples > budget
     rtol = 1e-3 * spec.tolerance if expensive else 1e-12
-    return with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16)
+    result = with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16)
+    return result, measuring_seconds(cost, length, result.error.samples, rtol)
 
 
 def _budget(spec: "MapSpec", cost: float) -> float:
-    """Seconds that one probe or measurement may take."""
-    return float(np.clip(SHARE * spec.n_rays * cost * (spec.length or natural_horizon(spec.body)), *BUDGET))
-
-
-def tracing_cost(body: Surface) -> float:
-    """Seconds of direct integration at 1e-9 per ray and unit of length, on one thread."""
-    length = natural_horizon(body)
-    states = pack(*random_bundle_points(body, 256, rng=np.random.default_rng(0)))
-    trace_states(body, states[:64], np.array([0.01 * length]), rtol=1e-9, step=length / 4)
-    start = clock()
-    trace_states(body, states, np.array([length]), rtol=1e-9, step=length / 4)
-    return max(clock() - start, 1e-7) / (256 * length)
+    """Nominal seconds that one probe or measurement may take."""
+    return float(np.clip(SHARE * spec.magnitude * cost * (spec.length or natural_horizon(spec.body)), *BUDGET))
 
 
 def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
@@ -204,18 +199,12 @@ def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
             fewest = min(fewest, (nodes, horizon))
             if nodes > MAX_NODES or nbytes > MAX_BYTES:
                 continue
-            doublings = _doublings(horizon, natural, cost)
+            doublings = doublings_of(horizon, natural, cost)
             plan = Plan(
                 horizon, grid, single, spec.carry_jacobi, doublings, least_cells(body), curvature_reach(tolerance)
             )
-            # the curvatures are wanted at several times of each leap
-            traced = cost * horizon / 2**plan.doublings * (6.0 if spec.carry_jacobi else 1.0)
-            build = nodes * (traced + NODE + DOUBLING * plan.doublings) * (2.5 if spec.carry_jacobi else 1.0)
-            build += FIXED + 2 * _budget(spec, cost)
-            leap = leap_seconds(degree, nbytes)
-            if spec.carry_jacobi:
-                # lanes are four times as many, and the attenuation is summed
-                leap = 4 * leap + 40e-9
+            leap = leap_seconds(degree, nbytes, carry_jacobi=spec.carry_jacobi)
+            build = build_seconds(plan, model, cost) + 2 * _budget(spec, cost)
             found.append(Candidate(plan, leap / horizon, build, target))
     if not found:
         raise ToleranceError(
@@ -225,17 +214,7 @@ def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
             "or integrate with DirectFlow",
         )
     length = spec.length or natural
-    return sorted(found, key=lambda one: one.seconds(spec.n_rays, length))
-
-
-def leap_seconds(degree: int, nbytes: float) -> float:
-    """Estimated time of one leap of a ray anywhere on the body.
-
-    Measured on one core: 20 (cubic) and 40 ns in the nearest cache, more by the logarithm of the table beyond 1 MB,
-    where a stencil's cache lines come from farther away.
-    """
-    base, lines = (20.0, 0.6) if degree == 3 else (40.0, 1.0)
-    return 1e-9 * (base + 27.0 * lines * float(np.log2(max(nbytes / 1e6, 1.0))))
+    return sorted(found, key=lambda one: one.seconds(spec.magnitude, length))
 
 
 def _horizons(spec: "MapSpec", natural: float, cost: float) -> list[float]:
@@ -254,14 +233,6 @@ def _horizons(spec: "MapSpec", natural: float, cost: float) -> list[float]:
     if not found:
         found = [distance / max(1, np.ceil(distance / longest))]
     return sorted(found)
-
-
-def _doublings(horizon: float, natural: float, cost: float) -> int:
-    """Doublings that make the build fastest: each halves the tracing and costs two leaps and a fit at every node."""
-    d = 0
-    while cost * horizon / 2 ** (d + 1) > DOUBLING and horizon / 2 ** (d + 1) >= natural / 8:
-        d += 1
-    return d
 
 
 def amplification(body: Surface, length: float, rays: int) -> tuple[FloatArray, FloatArray]:

@@ -42,7 +42,8 @@ class Recipe:
         if not hasattr(self.own, "tools"):
             if not Path(self.folder).is_dir():
                 raise CreepingError(f"the worker on {process()[0]} does not see {self.folder}; give a shared folder")
-            store = SweepStore.open(self.folder)
+            # the driver has mended it
+            store = SweepStore.open(self.folder, mending=True)
             self.own.tools = (self.make(store.flow(self.body), self.request), store)
         tools: tuple[Any, SweepStore] = self.own.tools
         return tools

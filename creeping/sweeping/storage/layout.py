@@ -1,14 +1,22 @@
-"""Layout of a store on disk: its arrays, made with nothing in them, and the group that holds its study."""
+"""Layout of a store on disk: its arrays, made with nothing in them, and the group that holds its study.
 
+All of it follows from the plan, and is written anew from it where it is damaged, if that gives the same bytes.
+"""
+
+import os
+import shutil
+import uuid
 from pathlib import Path
 
 from creeping._typing import Any
+from creeping.errors import CreepingError
 from creeping.storage.folder import content_digest
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.results import coordinates, require, sweep_attributes, variable_attributes
+from creeping.sweeping.storage.damage import STUDY, file_digests, is_whole, sealed
 
-SCHEMA = 1
-STUDY, STATUS, ERRORS = "study", "task_status", "incidence_error"
+SCHEMA = 2
+STATUS, ERRORS = "task_status", "incidence_error"
 UNDONE, DONE, WITH_FAILURES = 0, 1, 2
 ERROR_BYTES = 256
 """Bytes kept of the message of a failed incidence, UTF-8, zeros after it."""
@@ -36,9 +44,36 @@ def write_empty(folder: Path, plan: SweepPlan) -> None:
     words = {"description": "why an incidence failed, UTF-8, zeros after it"}
     _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
     # as xarray writes it: which arrays are coordinates
-    group.attrs.update(sweep_attributes(plan) | {"coordinates": " ".join(beside)})
-    content = {"schema": SCHEMA, "key": plan.key, "variables": list(request.variables)}
-    group.create_group(STUDY).attrs.update({"content": content, "blake2b": content_digest(content)})
+    group.attrs.update(sealed(sweep_attributes(plan) | {"coordinates": " ".join(beside)}))
+    study = group.create_group(STUDY)
+    content = {"schema": SCHEMA, "key": plan.key, "variables": list(request.variables), "files": file_digests(folder)}
+    study.attrs.update({"content": content, "blake2b": content_digest(content)})
+
+
+def write_anew(folder: Path, plan: SweepPlan, names: list[str], known: dict[str, str]) -> None:
+    """Write files of a store as they were; ``known`` are their digests.
+
+    Raises
+    ------
+    CreepingError
+        If the plan does not give the same files again, or they cannot be written.
+    """
+    aside = folder.parent / f".{folder.name}-{uuid.uuid4().hex[:12]}"
+    try:
+        aside.mkdir()
+        write_empty(aside, plan)
+        for name in names:
+            if not is_whole(aside, name, known[name]):
+                raise CreepingError(
+                    f"{folder / name} is damaged, and this installation would write another one; compute the sweep anew"
+                )
+        for name in names:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(aside / name, folder / name)
+    except OSError as error:
+        raise CreepingError(f"cannot write to {folder}: {error}; make room, or choose another place") from error
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def _create(

@@ -2,12 +2,12 @@
 
 One array a variable, with dimension names, one chunk a task along the incidences, compressed and with a CRC. Chunks are
 written aside and renamed, and ``task_status`` of a task (0 missing, 1 done, 2 done but for failed incidences) after all
-its chunks: what is marked is whole, whenever a writer dies. After a power failure `SweepStore.verify` finds what the
-disk lost. The group ``study`` holds what the results depend on, with a digest, and the flow. CRCs and digest have no
-key: they tell of accidents, not of forgery.
+its chunks: what is marked is whole, whenever a writer dies. The group ``study`` holds what the results depend on, with
+a digest, the digests of what describes arrays and coordinates, and the flow. A store is opened if these agree and the
+chunks of done tasks are there; `SweepStore.verify` reads them. CRCs and digests have no key: they tell of accidents,
+not of forgery.
 """
 
-import os
 import shutil
 import uuid
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any, IntArray
+from creeping._typing import IntArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
@@ -26,13 +26,14 @@ from creeping.storage.folder import content_digest
 from creeping.sweeping.accessor import register
 from creeping.sweeping.plan import Arrays, SweepPlan, differing, open_flow, save_flow
 from creeping.sweeping.results import MISSING, SHOWN, count_attributes, require
+from creeping.sweeping.storage.arrays import StoreArrays, exists
+from creeping.sweeping.storage.damage import ROOT, SEAL, STUDY, STUDY_FILE, damaged_files, read_document, sealed
 from creeping.sweeping.storage.layout import (
     DONE,
     ERROR_BYTES,
     ERRORS,
     SCHEMA,
     STATUS,
-    STUDY,
     UNDONE,
     WITH_FAILURES,
     write_empty,
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class SweepStore:
+class SweepStore(StoreArrays):
     """A store; make one with `create`, or open one with `open`.
 
     Attributes
@@ -50,15 +51,9 @@ class SweepStore:
     folder : Path
     key : dict
         What the results depend on; see `SweepPlan.key`.
+    files : dict
+        Digests of what is the same from beginning to end; see `creeping.sweeping.storage.damage`.
     """
-
-    def __init__(self, folder: Path, content: dict[str, Any]) -> None:
-        self.folder, self.key = folder, content["key"]
-        self.chunk, self.count = int(self.key["chunk"]), int(self.key["incidences"]["count"])
-        self.tasks = -(-self.count // self.chunk)
-        self.variables: list[str] = list(content["variables"])
-        self._opened: dict[str, Any] = {}
-        self._lock: Any = None
 
     @classmethod
     def create(cls, folder: str | Path, plan: SweepPlan) -> "SweepStore":
@@ -89,27 +84,63 @@ class SweepStore:
         return cls.open(folder)
 
     @classmethod
-    def open(cls, folder: str | Path) -> "SweepStore":
+    def open(cls, folder: str | Path, *, mending: bool = False) -> "SweepStore":
         """Open a store.
+
+        Parameters
+        ----------
+        folder : path
+        mending : bool
+            Open it though files are damaged, for `mended`; what it says of its study must be whole.
 
         Raises
         ------
         CreepingError
-            If there is none, or what it says of its study is damaged or of another schema.
+            If there is none, if what it says of its study is damaged or of another schema, or if a file that describes
+            an array or holds coordinates is damaged, or a chunk of a done task missing.
         """
-        zarr = require("zarr")
+        require("zarr")
         folder = Path(folder).absolute()
         try:
-            attributes = dict(zarr.open_group(folder / STUDY, mode="r", zarr_format=3).attrs)
+            attributes, _ = read_document(folder / STUDY_FILE)
             content = attributes["content"]
             intact = attributes["blake2b"] == content_digest(content)
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except OSError as error:
             raise CreepingError(f"{folder} holds no sweep ({error}); choose another store") from error
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise CreepingError(f"{folder / STUDY_FILE} is damaged ({error}); compute the sweep anew") from error
         if not intact:
-            raise CreepingError(f"{folder}/{STUDY} is damaged: its digest differs; compute the sweep anew")
+            raise CreepingError(f"{folder / STUDY_FILE} is damaged: its digest differs; compute the sweep anew")
         if content.get("schema") != SCHEMA:
             raise CreepingError(f"{folder} has schema {content.get('schema')!r}, this version reads {SCHEMA}")
-        return cls(folder, content)
+        store = cls(folder, content)
+        if not mending:
+            store.require_whole()
+        return store
+
+    def require_whole(self) -> None:
+        """Refuse a store with damaged files, or without chunks of done tasks.
+
+        Raises
+        ------
+        CreepingError
+            With the first of them and their number.
+        """
+        names = damaged_files(self.folder, self.files)
+        if names:
+            raise CreepingError(
+                f"{self.folder / names[0]} is damaged or missing ({len(names)} such files); to write it anew, resume",
+                path=self.folder / names[0],
+            )
+        lost = self.lost()
+        if lost:
+            task, name = next(iter(lost.items()))
+            rows = self.rows(task)
+            raise CreepingError(
+                f"{name} of task {task} (incidences {rows.start} to {rows.stop - 1}) is missing in {self.folder} "
+                f"({len(lost)} such tasks); to compute it anew, resume",
+                task=task,
+            )
 
     def flow(self, body: Surface) -> Flow:
         """Flow that the sweep was begun with.
@@ -165,14 +196,10 @@ class SweepStore:
         finally:
             self._lock.release()
 
-    def rows(self, task: int) -> slice:
-        """Incidences of a task."""
-        return slice(task * self.chunk, min((task + 1) * self.chunk, self.count))
-
     def status(self) -> IntArray:
         """Status of the tasks (tasks,): 0 missing, 1 done, 2 done but for failed incidences."""
-        with self._reading(STATUS):
-            return np.asarray(self._array(STATUS)[:], dtype=np.int64)
+        with self.reading(STATUS):
+            return np.asarray(self.array(STATUS)[:], dtype=np.int64)
 
     def missing(self) -> list[int]:
         """Tasks that are not done; those with failed incidences are among them, to be tried again."""
@@ -187,33 +214,33 @@ class SweepStore:
             If an array has not the shape that the layout says.
         """
         rows = self.rows(task)
-        if self._array(STATUS)[task] != UNDONE:
+        if self.array(STATUS)[task] != UNDONE:
             # a task that is tried again is not whole until it is marked again
-            self._put(STATUS, slice(task, task + 1), UNDONE)
+            self.put(STATUS, slice(task, task + 1), UNDONE)
         for name in self.variables:
-            expected = (rows.stop - rows.start, *self._array(name).shape[1:])
+            expected = (rows.stop - rows.start, *self.array(name).shape[1:])
             if arrays[name].shape != expected:
                 raise CreepingError(f"the sweeper gave {name} of shape {arrays[name].shape}, not {expected}: a mistake")
-            self._put(name, rows, arrays[name])
+            self.put(name, rows, arrays[name])
         if errors:
             texts = np.zeros((rows.stop - rows.start, ERROR_BYTES), dtype=np.uint8)
             for row, text in errors.items():
                 raw = text.encode()[:ERROR_BYTES]
                 texts[row, : len(raw)] = np.frombuffer(raw, dtype=np.uint8)
-            self._put(ERRORS, rows, texts)
+            self.put(ERRORS, rows, texts)
 
     def commit(self, task: int, *, failures: bool) -> None:
         """Mark a task, all of whose chunks are written."""
-        self._put(STATUS, slice(task, task + 1), WITH_FAILURES if failures else DONE)
+        self.put(STATUS, slice(task, task + 1), WITH_FAILURES if failures else DONE)
 
     def failures(self, most: int = SHOWN) -> list[tuple[int, str]]:
         """The first incidences that failed, and why."""
         found: list[tuple[int, str]] = []
         for task in np.flatnonzero(self.status() == WITH_FAILURES):
             rows = self.rows(int(task))
-            with self._reading(ERRORS, int(task)):
-                failed = np.flatnonzero(self._array("incidence_status")[rows] == FAILED)
-                texts = self._array(ERRORS)[rows]
+            with self.reading(ERRORS, int(task)):
+                failed = np.flatnonzero(self.array("incidence_status")[rows] == FAILED)
+                texts = self.array(ERRORS)[rows]
             for row in failed[: most - len(found)]:
                 found.append((rows.start + int(row), bytes(texts[row]).rstrip(b"\0").decode(errors="replace")))
             if len(found) >= most:
@@ -244,13 +271,13 @@ class SweepStore:
     def incidence_status(self) -> IntArray:
         """Status of the incidences (n,); -1 of those that are missing."""
         try:
-            with self._reading("incidence_status"):
-                return np.asarray(self._array("incidence_status")[:], dtype=np.int64)
+            with self.reading("incidence_status"):
+                return np.asarray(self.array("incidence_status")[:], dtype=np.int64)
         except CreepingError:
             # once more, by task, for the message
             for task in range(self.tasks):
-                with self._reading("incidence_status", task):
-                    self._array("incidence_status")[self.rows(task)]
+                with self.reading("incidence_status", task):
+                    self.array("incidence_status")[self.rows(task)]
             raise
 
     def finish(self, seconds: float) -> None:
@@ -259,16 +286,36 @@ class SweepStore:
         status = self.incidence_status()
         for task in np.flatnonzero(self.status() == UNDONE):
             status[self.rows(int(task))] = MISSING
-        with self._writing():
+        with self.writing(), self.reading(ROOT):
             group = zarr.open_group(self.folder, mode="r+", zarr_format=3)
             old = {k: v for k, v in group.attrs.items() if k != "errors"}
-            group.attrs.put(old | count_attributes(status, self.failures(), float(old.get("seconds", 0)) + seconds))
+            counts = count_attributes(status, self.failures(), float(old.get("seconds", 0)) + seconds)
+            group.attrs.put(sealed(old | counts))
 
     def dataset(self) -> "xarray.Dataset":
-        """Dataset whose values are read when they are used."""
+        """Dataset whose values are read when they are used; a chunk that is damaged then is a `CreepingError`.
+
+        Raises
+        ------
+        CreepingError
+            As `require_whole`.
+        """
+        self.require_whole()
         opened: xarray.Dataset = register().open_zarr(self.folder, consolidated=False)
         # in the order of the request; a selection lacks coordinates with dimensions of their own
-        return opened[self.variables].assign_coords(opened.coords)
+        found = opened[self.variables].assign_coords(opened.coords)
+        found.attrs.pop(SEAL)
+        return found.assign({name: found[name].copy(data=self.lazily(name)) for name in self.variables})
+
+    def lost(self) -> dict[int, str]:
+        """Done tasks without all their chunks, and the first variable that they lack."""
+        lost = {}
+        for task, mark in enumerate(self.status()):
+            names = [] if mark == UNDONE else [*self.variables, *([ERRORS] if mark == WITH_FAILURES else [])]
+            name = next((name for name in names if not exists(self.chunk_file(name, task))), None)
+            if name is not None:
+                lost[task] = name
+        return lost
 
     def _verified(self, repair: bool) -> list[tuple[int, str]]:
         damaged = []
@@ -277,59 +324,29 @@ class SweepStore:
             if reason:
                 damaged.append((int(task), reason))
                 if repair:
-                    for name in self.variables:
-                        self._chunk(name, int(task)).unlink(missing_ok=True)
-                    self._put(STATUS, slice(task, task + 1), UNDONE)
+                    self.undo(int(task))
         return damaged
+
+    def undo(self, task: int) -> None:
+        """Mark a task as missing."""
+        for name in self.variables:
+            self.chunk_file(name, task).unlink(missing_ok=True)
+        self.put(STATUS, slice(task, task + 1), UNDONE)
 
     def _damage(self, task: int) -> str:
         for name in self.variables:
-            array = self._array(name)
-            if not self._chunk(name, task).exists():
-                # zarr would read the fill value
-                return f"{name}: its chunk is missing"
             try:
-                with self._reading(name, task):
-                    array[self.rows(task)]
+                self.read(name, task)
             except CreepingError as error:
                 return str(error)
         return ""
 
-    def _chunk(self, name: str, task: int) -> Path:
-        return self.folder.joinpath(name, "c", str(task), *["0"] * (self._array(name).ndim - 1))
-
-    def _array(self, name: str) -> Any:
-        if name not in self._opened:
-            zarr = require("zarr")
-            # chunks of fill values too, so that one that is lost is missed
-            with zarr.config.set({"array.write_empty_chunks": name != ERRORS}):
-                self._opened[name] = zarr.open_array(self.folder / name, mode="r+", zarr_format=3)
-        return self._opened[name]
-
-    def _put(self, name: str, rows: slice, values: Any) -> None:
-        with self._writing():
-            self._array(name)[rows] = values
-
-    @contextmanager
-    def _writing(self) -> Iterator[None]:
+    def forget_mark(self, task: int) -> bool:
+        """Remove the mark of a task if it cannot be read; whether that was so."""
         try:
-            yield
-        except OSError as error:
-            free = shutil.disk_usage(self.folder).free if self.folder.exists() else 0
-            raise CreepingError(
-                f"cannot write to {self.folder}: {os.strerror(error.errno) if error.errno else error} "
-                f"({free / 1e6:.0f} MB are free); what is done is kept: make room and resume"
-            ) from error
-
-    @contextmanager
-    def _reading(self, name: str, task: int | None = None) -> Iterator[None]:
-        try:
-            yield
-        except (OSError, ValueError, RuntimeError) as error:
-            what = name if task is None else f"{name} of task {task}"
-            rows = "" if task is None else f" (incidences {self.rows(task).start} to {self.rows(task).stop - 1})"
-            raise CreepingError(
-                f"{what}{rows} in {self.folder} is damaged ({error}); to compute damaged tasks anew, resume with "
-                "--verify, or after SweepStore.verify(repair=True)",
-                task=task,
-            ) from error
+            with self.reading(STATUS, task):
+                self.array(STATUS)[task]
+            return False
+        except CreepingError:
+            self.chunk_file(STATUS, task).unlink(missing_ok=True)
+            return True

@@ -141,58 +141,6 @@ def test_stored_map_is_used_again(tmp_path):
     assert not any("tracing" in text for text in messages)
 
 
-@pytest.mark.parametrize("rays", [10, 10**7])
-def test_a_choice_is_made_once(rays, tmp_path, monkeypatch):
-    body, messages = sc.Ellipsoid(1.2, 0.8, 0.8), []
-    options = {"n_rays": rays, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
-    first = cr.choose_flow(body, **options)
-    # a machine on which the other flow would be the faster
-    monkeypatch.setattr("creeping.phaseflow.tuning.flow_choice.tracing_cost", lambda body: 1.0 if rays == 10 else 1e-12)
-    again = cr.choose_flow(body, progress=messages.append, **options)
-    assert type(again) is type(first) and "as chosen before" in messages[-1]
-    if rays == 10:
-        assert again == first
-    else:
-        assert np.array_equal(again.leaps[-1].state, first.leaps[-1].state)
-
-
-def test_a_damaged_choice_is_made_again(tmp_path):
-    options = {"n_rays": 10, "length": 2.0, "cache": tmp_path}
-    first = cr.choose_flow(sc.Sphere(), **options)
-    (kept,) = tmp_path.glob("*.json")
-    whole = kept.read_text()
-    changed = (whole.replace('"rtol": ', '"rtol": 1'), whole.replace('"step": null', '"step": 0.9'))
-    for text in ("", "[]", "3", '{"kind": "direct", "rtol": "x"}', *changed):
-        assert text != whole
-        kept.write_text(text)
-        messages = []
-        assert cr.choose_flow(sc.Sphere(), progress=messages.append, **options) == first
-        assert "as chosen before" not in messages[-1]
-
-
-def test_a_map_that_has_come_since_reopens_the_choice(tmp_path):
-    body = sc.Sphere()
-    options = {"n_rays": 20_000, "length": 4.0, "tolerance": 1e-4, "cache": tmp_path}
-    assert isinstance(cr.choose_flow(body, **options), cr.DirectFlow)
-    cr.build_phase_map(body, length=4.0, tolerance=1e-4, cache=tmp_path)
-    messages = []
-    cr.choose_flow(body, progress=messages.append, **options)
-    assert "as chosen before" not in messages[-1]
-    again = []
-    cr.choose_flow(body, progress=again.append, **options)
-    assert "as chosen before" in again[-1]
-
-
-def test_numbers_of_numpy_make_the_same_choice(tmp_path):
-    options = {"length": 2.0, "cache": tmp_path}
-    first = cr.choose_flow(sc.Sphere(), n_rays=10, tolerance=1e-5, **options)
-    assert (
-        cr.choose_flow(sc.Sphere(), n_rays=np.int64(10), tolerance=np.float64(1e-5), carry_jacobi=np.True_, **options)
-        == first
-    )
-    assert len(list(tmp_path.glob("*.json"))) == 1
-
-
 @pytest.mark.parametrize(
     "options, match",
     [

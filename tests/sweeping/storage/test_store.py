@@ -222,8 +222,11 @@ def test_damage_is_found_named_and_repaired(tmp_path, harm):
     assert [task for task, _ in found] == [1, 4] and "creeping" in found[0][1]
     if harm != "gone":
         assert "incidences 4 to 7" in found[0][1]
-        with pytest.raises((ValueError, RuntimeError)):
+        with pytest.raises(cr.CreepingError, match=r"creeping of task [14] .* is damaged"):
             store.dataset().creeping.load()
+    else:
+        with pytest.raises(cr.CreepingError, match=r"creeping of task 1 .* is missing .*2 such tasks.*resume"):
+            store.dataset()
     assert len(store.verify(repair=True)) == 2 and store.missing() == [1, 4]
     assert fill(plan, store) and store.verify() == []
     assert fake.bytes_of(store.folder) == whole

@@ -1,0 +1,111 @@
+"""Ctrl-C ends what takes long within about a second of processor time, and leaves no traceback on the command line."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BEGIN = """
+import sys, numpy as np, creeping as cr, scatterers as sc
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.states import pack
+body, rng = sc.Ellipsoid(1.0, 0.8, 0.6), np.random.default_rng(0)
+direct = cr.DirectFlow(body)
+def rays(count, lanes): return pack(*random_bundle_points(body, count, rng=rng), lanes=lanes)
+def small(**more): return cr.build_phase_map(body, horizon=0.5, grid=(16, 24), cache=False, **more)
+def fan(): return cr.launch(direct, cr.shadow_line(body, (1, 0, 0)), length=4.0, n_rays=256)
+def ready(): print("ready", flush=True)
+"""
+LONG = {
+    "flow of many rays": "f, s = small(), rays(300_000, 12); f.leap(s[:64], 1); ready(); "
+    "f.transport(s, np.array([9e3]))",
+    "flow of one block": "f, s = small(), rays(64, 12); f.leap(s, 1); ready()\n"
+    "while True: f.transport(s, np.array([4e4]))",
+    "trace": "s = rays(64, 6); x = s[:, :3], s[:, 3:]; cr.trace(body, *x, np.ones(1)); ready(); "
+    "cr.trace(body, *x, np.linspace(1, 3e6, 500), rtol=1e-12)",
+    "attenuation": "s = rays(20_000, 12); direct.transport(s[:64], np.ones(1)); ready(); "
+    "direct.transport(s, np.array([9e3]))",
+    "map build": "body = sc.TwistedEllipsoid(); ready()\n"
+    "while True: cr.build_phase_map(body, tolerance=1e-7, length=8.0, cache=False)",
+    "far field of currents": "a = fan(), cr.fibonacci_directions(100_000), 90.0; ready()\n"
+    "while True: cr.far_field(a[0], a[1], wavenumber=a[2], method='currents')",
+    "far field by rays": "a = fan(), cr.fibonacci_directions(100_000), 90.0; ready()\n"
+    "while True: cr.far_field(a[0], a[1], wavenumber=a[2], method='rays')",
+    "sweep": "d = cr.fibonacci_directions(10**5); ready(); cr.sweep_directions(direct, d, wavenumbers=40.0)",
+    "numpy methods": "class Plain(sc.Ellipsoid): compiled = None\n"
+    "direct = cr.DirectFlow(Plain(1.0, 0.8, 0.6)); ready(); direct.transport(rays(20_000, 12), np.array([99.0]))",
+}
+QUICK = ("flow of one block", "trace", "numpy methods")
+
+
+def seconds_of(process):
+    """Processor time that a process has taken."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def interrupted(command, folder, wait):
+    """Exit status, standard error and processor seconds of a process after a signal, ``wait`` s after it is ready."""
+    with (folder / "err").open("w") as err:
+        process = subprocess.Popen(
+            command, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=err, text=True
+        )
+        with process.stdout:
+            assert wait(process), (folder / "err").read_text()
+    before = seconds_of(process)
+    process.send_signal(signal.SIGINT)
+    deadline = time.monotonic() + 60
+    while True:
+        pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if pid:
+            process.returncode = os.waitstatus_to_exitcode(status)
+            return process.returncode, (folder / "err").read_text(), usage.ru_utime + usage.ru_stime - before
+        if time.monotonic() > deadline:
+            process.kill()
+            process.wait()
+            raise AssertionError("not interrupted within a minute")
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processor time is read from /proc")
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("what", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in LONG])
+def test_long_calls_are_interrupted(what, threads, tmp_path, monkeypatch):
+    if threads == 2 and what in QUICK[1:]:
+        pytest.skip("one thread does it")
+    monkeypatch.setenv("CREEPING_THREADS", str(threads))
+
+    def wait(process):
+        told = process.stdout.readline() == "ready\n"
+        time.sleep(0.8)
+        return told and process.poll() is None
+
+    code, err, seconds = interrupted([sys.executable, "-c", BEGIN + LONG[what]], tmp_path, wait)
+    assert code == -signal.SIGINT and err.rstrip().endswith("KeyboardInterrupt")
+    # the end of the interpreter is in it
+    assert seconds < 1.5 * threads
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processor time is read from /proc")
+def test_the_command_line_says_one_line(tmp_path):
+    run = "from creeping.commands.main import main; main()"
+    command = [sys.executable, "-c", run, "run", "ellipsoid:a=1,b=0.8,c=0.6", "-o", str(tmp_path / "out")]
+
+    def wait(process):
+        for _ in range(1500):
+            time.sleep(0.02)
+            if "tracing" in (tmp_path / "err").read_text() or process.poll() is not None:
+                break
+        time.sleep(0.2)
+        return process.poll() is None
+
+    code, err, seconds = interrupted(
+        [*command, "--flow", "map", "--tolerance", "1e-9", "--no-cache", "--direction", "1", "0", "0"], tmp_path, wait
+    )
+    assert code == 130 and "Traceback" not in err and err.splitlines()[-1] == "creeping: interrupted"
+    assert seconds < 1.5

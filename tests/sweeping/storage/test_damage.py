@@ -1,0 +1,151 @@
+"""Stores with files damaged at random: one clear error or the very same dataset; resuming mends what it can."""
+
+import json
+import shutil
+
+import fake_sweeps as fake
+import numpy as np
+import pytest
+import xarray
+
+import creeping as cr
+from creeping.sweeping.run import fill, open_store
+from creeping.sweeping.storage.store import SweepStore
+
+PLAN = fake.plan(6, 2)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    store = SweepStore.create(tmp_path_factory.mktemp("whole") / "s.zarr", PLAN)
+    fill(PLAN, store)
+    return store.folder, store.dataset().load()
+
+
+def files_of(folder, pattern):
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob(pattern) if p.is_file())
+
+
+def flipped(raw, rng):
+    raw = bytearray(raw)
+    raw[rng.integers(len(raw))] ^= 1 << int(rng.integers(8))
+    return bytes(raw)
+
+
+def harm(file, kind, rng):
+    """Flip a bit, cut, empty or remove a file."""
+    raw = file.read_bytes()
+    if kind == "gone":
+        file.unlink()
+        return
+    file.write_bytes({"flip": flipped(raw, rng), "cut": raw[: rng.integers(1, len(raw))], "empty": b""}[kind])
+
+
+def same(dataset, expected):
+    """Values, coordinates and attributes; the seconds are those of other runs."""
+    attributes = [{k: v for k, v in one.attrs.items() if k != "seconds"} for one in (dataset, expected)]
+    assert attributes[0] == attributes[1]
+    xarray.testing.assert_identical(dataset.load().drop_attrs(deep=False), expected.drop_attrs(deep=False))
+
+
+def attack(whole, folder, name, kind, rng):
+    """Whether opening told of the damage, and what resuming came to; all else is a failure."""
+    shutil.copytree(whole[0], folder)
+    harm(folder / name, kind, rng)
+    told = False
+    try:
+        same(SweepStore.open(folder).dataset(), whole[1])
+    except cr.CreepingError as error:
+        told = True
+        assert str(folder) in str(error)
+    try:
+        store = open_store(PLAN, folder, resume=True)
+        store.verify(repair=True)
+        fill(PLAN, store)
+        same(store.dataset(), whole[1])
+        mended = True
+    except cr.CreepingError as error:
+        assert "anew" in str(error), error
+        mended = False
+    shutil.rmtree(folder)
+    return told, mended
+
+
+def attacks(whole, tmp_path, names, kinds, count, seed):
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(count):
+        name = names[rng.integers(len(names))]
+        found.append((name, *attack(whole, tmp_path / "s.zarr", name, kinds[rng.integers(len(kinds))], rng)))
+    return found
+
+
+@pytest.mark.parametrize("count", [10, pytest.param(400, marks=pytest.mark.slow)])
+def test_flips_in_descriptions(whole, tmp_path, count):
+    names = files_of(whole[0], "zarr.json")
+    assert {"zarr.json", "study/zarr.json", "creeping/zarr.json", "task_status/zarr.json"} < set(names)
+    found = attacks(whole, tmp_path, names, ["flip"], count, 12)
+    # what is not told changed nothing; only the study cannot be written anew
+    assert sum(told for _, told, _ in found) > 0.8 * count
+    assert all(mended for name, _, mended in found if name != "study/zarr.json")
+
+
+@pytest.mark.parametrize("count", [10, pytest.param(400, marks=pytest.mark.slow)])
+def test_harm_to_chunks_and_descriptions(whole, tmp_path, count):
+    names = [name for name in files_of(whole[0], "*") if not name.startswith("study")]
+    kinds = ["flip", "cut", "empty", "gone"]
+    assert all(mended for _, _, mended in attacks(whole, tmp_path, names, kinds, count, 7))
+
+
+@pytest.mark.parametrize("kind", ["flip", "cut", "empty", "gone"])
+def test_descriptions_are_written_anew(whole, tmp_path, kind, rng):
+    folder = tmp_path / "s.zarr"
+    shutil.copytree(whole[0], folder)
+    before = {name: (folder / name).read_bytes() for name in files_of(folder, "*")}
+    for name in ("creeping/zarr.json", "theta/zarr.json", "theta/c/0", "task_status/zarr.json"):
+        harm(folder / name, kind, rng)
+    with pytest.raises(cr.CreepingError, match=r"s\.zarr/.* is damaged or missing \(4 such files\)"):
+        SweepStore.open(folder)
+    notes = []
+    store = open_store(PLAN, folder, resume=True, note=notes.append)
+    assert len(notes) == 4 and store.missing() == []
+    assert {name: (folder / name).read_bytes() for name in files_of(folder, "*")} == before
+    assert open_store(PLAN, folder, resume=True, note=notes.append).missing() == [] and len(notes) == 4
+
+
+def test_a_chunk_lost_after_opening_is_told(whole, tmp_path):
+    folder = tmp_path / "s.zarr"
+    shutil.copytree(whole[0], folder)
+    dataset = SweepStore.open(folder).dataset()
+    (folder / "creeping/c/2/0/0").unlink()
+    np.testing.assert_array_equal(dataset.creeping[:4], whole[1].creeping[:4])
+    with pytest.raises(cr.CreepingError, match=r"creeping of task 2 \(incidences 4 to 5\).*chunk is missing"):
+        dataset.creeping.load()
+    store = open_store(PLAN, folder, resume=True)
+    assert store.missing() == [2]
+
+
+def test_attributes_that_were_changed_are_told(whole, tmp_path):
+    folder = tmp_path / "s.zarr"
+    shutil.copytree(whole[0], folder)
+    document = json.loads((folder / "zarr.json").read_text())
+    document["attributes"]["flow_rtol"] = 1e-3
+    (folder / "zarr.json").write_text(json.dumps(document))
+    with pytest.raises(cr.CreepingError, match=r"s\.zarr/zarr\.json is damaged"):
+        SweepStore.open(folder)
+    store = open_store(PLAN, folder, resume=True)
+    fill(PLAN, store)
+    same(store.dataset(), whole[1])
+
+
+def test_another_installation_does_not_write_what_it_would_not_have_written(whole, tmp_path, monkeypatch):
+    folder = tmp_path / "s.zarr"
+    shutil.copytree(whole[0], folder)
+    (folder / "creeping/zarr.json").write_text("{}")
+    from creeping.sweeping.storage import layout
+
+    monkeypatch.setattr(layout, "ERROR_BYTES", 128)
+    monkeypatch.setattr(layout, "variable_attributes", lambda request, name: {"units": "other"})
+    with pytest.raises(cr.CreepingError, match="would write another one; compute the sweep anew"):
+        open_store(PLAN, folder, resume=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["s.zarr"]
