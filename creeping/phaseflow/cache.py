@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from creeping._typing import Any
 from creeping._version import __version__
 from creeping.errors import CreepingError, StoredMapError
 from creeping.geodesics.integrator import ErrorEstimate
+from creeping.geometry.arguments import checked_body, folder_path
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import Grid, Leap
@@ -57,7 +59,8 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     ...     cr.load_phase_map(stored, ball).horizon
     0.5
     """
-    folder = Path(folder)
+    folder = folder_path(folder, "folder")
+    checked_body(body)
     content = read_manifest(folder)
     if content["body"] != fingerprint(body):
         raise StoredMapError(f"{folder} is a map of {content['body']}, not of {fingerprint(body)}; rebuild it")
@@ -77,7 +80,7 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
             )
             for k, time in enumerate(content["times"])
         )
-        model = model_of(body, str(content["model"]))
+        model, parameters = model_of(body, str(content["model"])), dict(content["parameters"])
     except (KeyError, TypeError, IndexError, ValueError) as reason:
         if isinstance(reason, CreepingError):
             raise
@@ -85,7 +88,7 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     if model.name != content["model"]:
         raise StoredMapError(f"{folder} is stored as {content['model']!r}, which {body!r} does not offer; rebuild it")
     _check_shapes(folder, grid, leaps, model)
-    return PhaseMap(body, model, grid, leaps, error, growth, content["parameters"])
+    return PhaseMap(body, model, grid, leaps, error, growth, parameters)
 
 
 def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Model) -> None:
@@ -127,6 +130,9 @@ def cached_phase_map(
     root = place.parent
     try:
         private_folder(root)
+        # a lock waits for a folder that cannot be written as for one that is in use
+        with tempfile.TemporaryFile(dir=root):
+            pass
         lock = FileLock(root / f".{place.name}.lock")
         lock.acquire()
     except (OSError, StoredMapError) as error:
