@@ -137,7 +137,7 @@ class Gridded(LevelBody):
             raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers from {FEWEST} to {MOST}")
         if isinstance(margin, bool) or not isinstance(margin, (int, float)) or not 0 < margin <= 1e9:
             raise ValueError(f"margin = {margin!r} is not a positive finite number; give e.g. 0.15")
-        box = np.asarray(body.bounds, dtype=float)
+        box = _numbers("bounds", body.bounds, (2, 3))
         widened = margin * 0.5 * (box[1] - box[0])
         box = np.stack([box[0] - widened, box[1] + widened])
         x, y, z = (np.linspace(box[0, k], box[1, k], counts[k]) for k in range(3))

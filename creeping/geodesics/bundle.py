@@ -13,8 +13,8 @@ from creeping.geometry.arguments import real_array
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface, normal, project, size
 
-FARTHEST = 1e100
-"""Coordinate whose square is still a number."""
+FARTHEST = 1e15
+"""Coordinate, L, beyond which neither a phase nor a distance has digits left."""
 OFF_BODY = 1e-3
 """Largest distance of a given point from the body, in units of its size, that projection silently mends."""
 

@@ -13,6 +13,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.surface import Surface
+from creeping.geometry.triangulation import checked_extent
 from creeping.storage.memory import within_budget
 
 MEMBERS = ("level", "gradient", "hessian", "bounds", "atlas")
@@ -217,3 +218,6 @@ def checked_body(body: Surface) -> None:
             f"body = {shown(body)} is no body: it {lacks}; give one of scatterers, or see "
             "creeping.geometry.surface.Surface"
         )
+    if body.bounds is None:
+        raise InvalidInputError(f"body = {shown(body)} has no bounds; give the box that contains it")
+    checked_extent(body.bounds)

@@ -62,10 +62,10 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     folder = folder_path(folder, "folder")
     checked_body(body)
     content = read_manifest(folder)
-    if content["body"] != fingerprint(body):
-        raise StoredMapError(f"{folder} is a map of {content['body']}, not of {fingerprint(body)}; rebuild it")
+    if content.get("body") != fingerprint(body):
+        raise StoredMapError(f"{folder} is a map of {content.get('body')}, not of {fingerprint(body)}; rebuild it")
     try:
-        grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
+        grid = _grid_of(content)
         error = ErrorEstimate(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
         rows = content["growth"] and [tuple(map(float, row)) for row in content["growth"]]
         growth = ErrorGrowth(rows[0], rows[1], rows[2], rows[3][0]) if rows else None
@@ -89,6 +89,18 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
         raise StoredMapError(f"{folder} is stored as {content['model']!r}, which {body!r} does not offer; rebuild it")
     _check_shapes(folder, grid, leaps, model)
     return PhaseMap(body, model, grid, leaps, error, growth, parameters)
+
+
+def _grid_of(content: dict[str, Any]) -> Grid:
+    nodes, degree, periodic = tuple(content["nodes"]), content["degree"], tuple(content["periodic"])
+    if len(nodes) != 3 or any(type(n) is not int or n < 2 for n in nodes) or degree not in (3, 5):
+        raise ValueError(f"a grid of {nodes} with degree {degree}")
+    if len(periodic) != 2 or any(type(wraps) is not bool for wraps in periodic):
+        raise ValueError(f"a grid whose periods are {periodic}")
+    times = [float(time) for time in content["times"]]
+    if not times or not all(0 < time < np.inf for time in times):
+        raise ValueError(f"leaps of {times}")
+    return Grid(nodes, int(degree), periodic)
 
 
 def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Model) -> None:

@@ -57,7 +57,13 @@ class ErrorGrowth:
     bound: float
 
     def rms_after(self, length: float) -> float:
-        """Rms error after a length, L, by interpolation in logarithms; beyond the last one by its last slope."""
+        """Rms error after a length, L, by interpolation in logarithms; beyond the last one by its last slope.
+
+        Raises
+        ------
+        InvalidInputError
+            If the length is no number >= 0.
+        """
         length = real_number(length, "length")
         if not length >= 0:
             raise InvalidInputError(f"length = {length!r} is not a number >= 0")
@@ -72,7 +78,13 @@ class ErrorGrowth:
         return float(np.exp(np.interp(at, t, e)))
 
     def trusted_length(self, tolerance: float) -> float:
-        """Longest length, L, at most twice the measured one, whose rms error, extrapolated, meets the tolerance."""
+        """Longest length, L, at most twice the measured one, whose rms error, extrapolated, meets the tolerance.
+
+        Raises
+        ------
+        InvalidInputError
+            If the tolerance is no positive finite number.
+        """
         tolerance = positive_number(tolerance, "tolerance")
         ends = np.linspace(self.lengths[0], 2 * self.lengths[-1], 2001)
         good = np.array([self.rms_after(float(t)) <= tolerance for t in ends])

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scatterers.speed import as_speed
 
-MOST_NUMBERS = 10**8
+MOST_NUMBERS = 10**9
 
 
 def finite(**values: float) -> None:
@@ -39,8 +39,9 @@ def numbers(values: ArrayLike) -> NDArray[np.float64]:
     ValueError, TypeError
         If they are no numbers, or more of them than an array is made of.
     """
-    if not isinstance(values, np.ndarray) and isinstance(values, Sized) and len(values) > MOST_NUMBERS:
-        raise ValueError(f"{len(values)} numbers are more than {MOST_NUMBERS}")
+    count = values.size if isinstance(values, np.ndarray) else len(values) if isinstance(values, Sized) else 0
+    if count > MOST_NUMBERS:
+        raise ValueError(f"{count} numbers are more than {MOST_NUMBERS}")
     try:
         return np.asarray(values, dtype=float)
     except (OverflowError, RecursionError) as error:

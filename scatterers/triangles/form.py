@@ -42,6 +42,12 @@ def _ply(name: str, cut: str, data: bytes) -> None:
     elements = re.findall(rb"^\s*element\s+(\w+)\s+(\d+)\s*$((?:\s*(?:property|comment)\b.*$)*)", head, re.MULTILINE)
     if not body:
         raise ValueError(f"{cut}: its header has no end")
+    for what, names in [
+        ("element", [kind for kind, _, _ in elements]),
+        *(("property", re.findall(rb"(\w+)[ \t\r]*$", properties, re.MULTILINE)) for _, _, properties in elements),
+    ]:
+        if len(set(names)) < len(names):
+            raise ValueError(f"the header of {name} names one {what} twice; export it again")
     if b"ascii" not in head:
         return
     lines = [line for line in body.splitlines() if line.strip()]
@@ -85,6 +91,9 @@ def _obj(name: str, cut: str, data: bytes) -> None:
     _plain(name, [b" ".join(row) for row in geometry])
     # x y z, with a weight or a colour
     wrong = [row for row in geometry if row[0] == b"v" and _length(row) - 1 not in (3, 4, 6, 7)]
+    few = sum(row[0] == b"f" and _length(row) < 4 for row in geometry)
+    if few:
+        raise ValueError(f"{_of(few, 'face', name)} less than 3 corners; export it again")
     if wrong:
         raise ValueError(f"{_of(len(wrong), 'vertex', name)} not 3, 4, 6 or 7 numbers; export it again")
 
@@ -95,10 +104,10 @@ def _length(row: list[bytes]) -> int:
 
 
 def _plain(name: str, rows: list[bytes]) -> None:
-    """Refuse rows with bytes that are no ASCII characters: loaders leave them out and join what stands about them."""
-    wrong = sum(not row.isascii() for row in rows)
+    """Refuse rows with bytes that loaders leave out of numbers: what is no ASCII, and underlines, as in Python."""
+    wrong = sum(not row.isascii() or b"_" in row for row in rows)
     if wrong:
-        raise ValueError(f"{_of(wrong, 'text', name)} bytes that are no characters; export it again")
+        raise ValueError(f"{_of(wrong, 'text', name)} bytes that are no characters of numbers; export it again")
 
 
 def _columns(name: str, rows: list[bytes], count: int, kind: str) -> None:
@@ -112,7 +121,9 @@ def _lists(name: str, rows: list[bytes], *, exact: bool = True) -> None:
     wrong = 0
     for row in rows:
         first, *members = row.split()
-        fits = first.isdigit() and (len(members) == int(first) or (not exact and len(members) > int(first) >= 3))
+        count = int(first) if first.isdigit() and len(first) < 10 else -1
+        fits = len(members) == count or (not exact and len(members) > count >= 3)
+        fits &= all(word.isdigit() for word in members[: max(count, 0)])
         wrong += not fits
     if wrong:
         raise ValueError(f"{_of(wrong, 'face', name)} another number of corners than they state; export it again")

@@ -79,7 +79,7 @@ def _containers() -> dict[str, Callable[[], Any]]:
         "generator": lambda: (k for k in range(3)),
         "iterator": lambda: iter([1, 2, 3]),
         "map of numbers": lambda: map(float, "123"),
-        "many lists": lambda: [[0.0, 0.0, 1.0]] * 2000,
+        "many lists": lambda: [[0.0, 0.0, 1.0]] * 300,
         "pair": lambda: ("soft", "hard"),
         "big grid": lambda: (10**6, 10**6),
         "small grid": lambda: (1, 1),

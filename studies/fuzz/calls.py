@@ -68,8 +68,11 @@ class BadCalls:
                 found = function(**given)
                 mistake = "" if name.startswith("sc.") else not_finite(found)
         except Exception as error:
+            if callable(given.get("progress")):
+                return Verdict(REFUSED, f"what the caller's function raises: {error!r}")
             return self._judged(name, error, what)
-        dropped = [p for p in changed if p not in COMPLEX_PARAMETERS and _is_complex(given[p])]
+        # of points given to the arithmetic of a body numpy warns
+        dropped = [p for p in changed if p not in COMPLEX_PARAMETERS and _is_complex(given[p]) and "()." not in name]
         if mistake or dropped:
             return Verdict(SILENT, f"{what}: {mistake or 'the imaginary part is dropped'}")
         return Verdict(ACCEPTED, what)
@@ -81,7 +84,8 @@ class BadCalls:
             allowed: tuple[type[BaseException], ...] = (CreepingError,)
         else:
             # methods of bodies are arithmetic, of which numpy says what is wrong
-            arithmetic = (ValueError, TypeError, OverflowError, IndexError) if "()." in name else (ValueError,)
+            wide = (ValueError, TypeError, OverflowError, IndexError, MemoryError)
+            arithmetic = wide if "()." in name else (ValueError,)
             allowed = (ValueError, TypeError) if on_purpose(error) else arithmetic
         if isinstance(error, ModuleNotFoundError) and error.name == "gmsh":
             return Verdict(REFUSED, str(error))
@@ -114,7 +118,7 @@ def not_finite(result: object) -> str:
     kind = type(found).__name__
     if kind == "FarField":
         total = np.asarray(found.total)
-        finite = np.isfinite(total.reshape(*found.unresolved.shape, -1)).all(axis=-1)
+        finite = np.isfinite(total).all(axis=tuple(range(found.unresolved.ndim, total.ndim)))
         bad = ~finite & ~found.unresolved
         return f"{int(bad.sum())} directions of the far field" if bad.any() else ""
     if kind in ("NearField", "SurfaceField"):

@@ -138,6 +138,8 @@ def _line_repeated(data: bytes, rng: Generator) -> bytes:
 def shuffled_array(array: np.ndarray, rng: Generator) -> np.ndarray:
     """An array with some values replaced by such as kernels do not expect, or of another shape or type."""
     kind = int(rng.integers(5))
+    if not array.size:
+        return array.astype(np.float32)
     if kind == 0:
         return array[: int(rng.integers(len(array) + 1))]
     if kind == 1:

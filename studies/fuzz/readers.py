@@ -133,7 +133,7 @@ def _glb(data: bytes) -> FloatArray:
         raise UnclearError("another scene")
     if part != {"attributes": {"POSITION": 0}, "indices": 1, "mode": 4}:
         raise UnclearError("another mesh")
-    if tree["buffers"] != [{"byteLength": len(binary)}] or tree["asset"] != {"version": "2.0"}:
+    if [set(buffer) for buffer in tree["buffers"]] != [{"byteLength"}] or tree["asset"] != {"version": "2.0"}:
         raise UnclearError("another buffer")
     arrays = []
     for accessor, code, shape in zip(tree["accessors"], (5126, 5125), ("VEC3", "SCALAR"), strict=True):

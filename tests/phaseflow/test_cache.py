@@ -183,3 +183,20 @@ def test_a_signed_manifest_that_lacks_something(key, folder):
     edit(folder, lambda content: content.pop(key))
     with pytest.raises(cr.StoredMapError, match="incomplete"):
         cr.load_phase_map(folder, BODY)
+
+
+ODD = {
+    "nodes": [[12], [12, 12, 12, 12], ["12", 12, 12], [1.5, 12, 12], [-4, 12, 12], 3, None],
+    "periodic": [[True], [1, 0], [True, True, True], "ab"],
+    "degree": [4, "3", None, 1e300],
+    "times": [[], None, [float("nan")]],
+    "model": [None, 3, "none"],
+    "body": [None, "Sphere"],
+}
+
+
+@pytest.mark.parametrize("key, value", [(key, value) for key, values in ODD.items() for value in values])
+def test_a_signed_manifest_with_odd_values(key, value, folder):
+    edit(folder, lambda content: content.__setitem__(key, value))
+    with pytest.raises(cr.StoredMapError):
+        cr.load_phase_map(folder, BODY)

@@ -60,3 +60,21 @@ def test_names_and_comments_may_be_in_any_script(tmp_path):
     assert len(read(tmp_path, "a.obj", named)[0].vertices) == 642
     colours = replaced(FILES["a.obj"], 40, lambda row: row + b" 0.1 0.2 0.3")
     assert len(read(tmp_path, "a.obj", colours)[0].vertices) == 642
+
+
+def test_underlines_are_no_part_of_numbers(tmp_path):
+    damaged = replaced(FILES["a.off"], 40, lambda row: b"1_000 " + b" ".join(row.split()[1:]))
+    with pytest.raises(ValueError, match=r"1 text row of a.off"):
+        read(tmp_path, "a.off", damaged)
+
+
+def test_faces_of_two_corners(tmp_path):
+    with pytest.raises(ValueError, match=r"1 face row of a.obj has less than 3 corners"):
+        read(tmp_path, "a.obj", FILES["a.obj"] + b"f 466 613999988\n")
+
+
+@pytest.mark.parametrize("line, what", [(b"element face 1280", "element"), (b"property float y", "property")])
+def test_a_header_that_names_something_twice(line, what, tmp_path):
+    for data in (seeds.ply(binary=True), FILES["a.ply"]):
+        with pytest.raises(ValueError, match=rf"names one {what} twice"):
+            read(tmp_path, "a.ply", data.replace(line + b"\n", line + b"\n" + line + b"\n", 1))

@@ -261,3 +261,11 @@ def test_an_array_file_whose_head_is_no_head(tmp_path):
     (tmp_path / "d.npy").write_bytes(data.replace(b"'shape': (3, 3), }", b"'shape': (3, 3)[ ("))
     (found,) = mistakes(f'{HEAD}[incidences]\nkind = "file"\npath = "d.npy"', tmp_path)
     assert "cannot read directions from" in found
+
+
+def test_whole_numbers_that_are_none_of_numpy(tmp_path):
+    whole = 10**30
+    theta = f"theta_deg_min = 0\ntheta_deg_max = {whole}\ntheta_count = 2"
+    phi = "phi_deg_min = 0\nphi_deg_max = 9\nphi_count = 1"
+    found = directions(tmp_path, 'kind = "theta-phi"', theta, phi)
+    assert found.shape == (2, 3)
