@@ -28,7 +28,7 @@ from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.many import shadow_lines
 
-MOST_SIZES = 1e5
+LEAST_SIZES, MOST_SIZES = 1e-6, 1e5
 """Length of rays that can be meant, in body sizes: beyond, phases have no digits left."""
 AUTO: Final = "auto"
 HARD_DECAY = 1.0187929716474710 * float(np.sin(np.pi / 3))
@@ -102,13 +102,15 @@ def asked_length(body: Surface, length: float) -> float:
     Raises
     ------
     InvalidInputError
-        If it is more than `MOST_SIZES` body sizes, or times of a weighted body that take as long.
+        If it is not from `LEAST_SIZES` to `MOST_SIZES` body sizes, or times of a weighted body that take as long.
     """
     unit = size(body) if speed_of(body) is None else weighted_length(body)
-    if length > MOST_SIZES * unit:
-        raise InvalidInputError(
-            f"length = {length:g} is more than {MOST_SIZES:g} sizes of the body; give a shorter one"
-        )
+    for word, wrong, end in (
+        ("more", length > MOST_SIZES * unit, MOST_SIZES),
+        ("less", length < LEAST_SIZES * unit, LEAST_SIZES),
+    ):
+        if wrong:
+            raise InvalidInputError(f"length = {length:g} is {word} than {end:g} sizes of the body; give another")
     return length
 
 

@@ -246,8 +246,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     """
     checked_body(body)
     d = unit_direction(direction)
-    if isinstance(n_points, bool) or not isinstance(n_points, (int, np.integer)) or n_points < 16:
-        raise InvalidInputError(f"n_points = {n_points!r} is not a whole number >= 16")
+    n_points = whole_number(n_points, "n_points", 16)
     within_budget(150.0 * n_points, f"{n_points} points of the shadow line", "ask for fewer")
     nodes, code, distance = line_nodes(body, d)
     panels: tuple[PanelCurve, ...] = ()
@@ -258,7 +257,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
             exact, panels = nodes, ()
         nodes = exact
     found = finished(body, d, nodes, 0)
-    curves = [_curve(body, d, nodes, found, k, int(n_points)) for k in range(len(nodes.spacing))]
+    curves = [_curve(body, d, nodes, found, k, n_points) for k in range(len(nodes.spacing))]
     for curve, exact_curve in zip(curves, panels, strict=False):
         # the nodes of a line that turns this fast are too far apart to go through
         vars(curve)["panels"] = exact_curve

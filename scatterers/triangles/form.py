@@ -89,6 +89,9 @@ def _obj(name: str, cut: str, data: bytes) -> None:
     rows = [line.split() for line in data.splitlines()]
     geometry = [row for row in rows if row[:1] in ([b"v"], [b"f"])]
     _plain(name, [b" ".join(row) for row in geometry])
+    torn = sum(bool(row) and re.match(rb"[-+.]?\d", row[0]) is not None for row in rows)
+    if torn:
+        raise ValueError(f"{_of(torn, 'text', name)} a number where a word should be; export it again")
     # x y z, with a weight or a colour
     wrong = [row for row in geometry if row[0] == b"v" and _length(row) - 1 not in (3, 4, 6, 7)]
     few = sum(row[0] == b"f" and _length(row) < 4 for row in geometry)

@@ -145,6 +145,8 @@ CALLS = {
     "admittance": (lambda line, fan: cr.ImpedanceBoundary("0.5"), "not a complex number"),
     "length beyond all": (lambda line, fan: cr.launch(FLOW, line, length=2**63, n_steps=8), "sizes of the body"),
     "length of a sweep": (lambda line, fan: sweep(length=1e16), "sizes of the body"),
+    "length below all": (lambda line, fan: sweep(length=1e-9), "less than 1e-06 sizes of the body"),
+    "points of a line": (lambda line, fan: cr.shadow_line(BODY, (0, 0, 1), n_points=10**400), "n_points"),
     "duration": (lambda line, fan: cr.launch(FLOW, line, length=np.timedelta64(3, "s")), "length"),
     "number of directions": (lambda line, fan: cr.fibonacci_directions(np.timedelta64(3, "s")), "n = "),
     "chunk": (lambda line, fan: sweep(chunk=np.timedelta64(3, "s")), "chunk"),

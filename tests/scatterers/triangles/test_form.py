@@ -78,3 +78,9 @@ def test_a_header_that_names_something_twice(line, what, tmp_path):
     for data in (seeds.ply(binary=True), FILES["a.ply"]):
         with pytest.raises(ValueError, match=rf"names one {what} twice"):
             read(tmp_path, "a.ply", data.replace(line + b"\n", line + b"\n" + line + b"\n", 1))
+
+
+def test_a_row_that_is_torn_in_two(tmp_path):
+    damaged = replaced(FILES["a.obj"], 40, lambda row: row[:-5] + b"\n" + row[-5:])
+    with pytest.raises(ValueError, match=r"1 text row of a.obj has a number where a word should be"):
+        read(tmp_path, "a.obj", damaged)
