@@ -19,7 +19,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, pack
-from creeping.geometry.arguments import positive_number
+from creeping.geometry.arguments import positive_number, shown
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, size
@@ -180,4 +180,4 @@ def _positive(name: str, value: float | str, alternative: str = "") -> float:
     try:
         return positive_number(value, name)
     except InvalidInputError as error:
-        raise InvalidInputError(f"{error}{alternative}") from error
+        raise InvalidInputError(f"{name} = {shown(value)} is not a positive finite number{alternative}") from error
