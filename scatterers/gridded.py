@@ -6,18 +6,22 @@ Sources: [B78]; Derivations, B7.
 """
 
 import hashlib
+import reprlib
 from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scatterers.base.body import numbers
 from scatterers.base.level_body import LevelBody
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.samples import Samples
 from scatterers.spline.tensor import TensorSpline, coefficients
 
 FloatArray = NDArray[np.float64]
+MOST = 1000
+"""Nodes along an axis of a body that is sampled."""
 FEWEST = 8
 
 
@@ -124,12 +128,16 @@ class Gridded(LevelBody):
         >>> float(abs(body.level([0.0, 0.8, 0.0])).round(9))
         0.0
         """
-        counts = [nodes] * 3 if isinstance(nodes, int) else list(nodes)
-        if len(counts) != 3 or any(isinstance(n, bool) or not isinstance(n, int) or n < FEWEST for n in counts):
-            raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers, at least {FEWEST}")
-        if isinstance(margin, bool) or not isinstance(margin, (int, float)) or not 0 < margin < np.inf:
+        if not all(hasattr(body, name) for name in ("level", "bounds")) or isinstance(body, type):
+            raise ValueError(f"{reprlib.repr(body)} is no body: it needs level and bounds")
+        counts = [nodes] * 3 if isinstance(nodes, int) else list(nodes) if isinstance(nodes, (list, tuple)) else []
+        if len(counts) != 3 or any(
+            isinstance(n, bool) or not isinstance(n, int) or not FEWEST <= n <= MOST for n in counts
+        ):
+            raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers from {FEWEST} to {MOST}")
+        if isinstance(margin, bool) or not isinstance(margin, (int, float)) or not 0 < margin <= 1e9:
             raise ValueError(f"margin = {margin!r} is not a positive finite number; give e.g. 0.15")
-        box = np.asarray(body.bounds, dtype=float)
+        box = _numbers("bounds", body.bounds, (2, 3))
         widened = margin * 0.5 * (box[1] - box[0])
         box = np.stack([box[0] - widened, box[1] + widened])
         x, y, z = (np.linspace(box[0, k], box[1, k], counts[k]) for k in range(3))
@@ -147,9 +155,9 @@ class Gridded(LevelBody):
 
 def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     try:
-        found = np.asarray(values, dtype=float)
+        found = numbers(values)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {values!r} are not numbers; give an array of shape {shape}") from None
+        raise ValueError(f"{name} = {reprlib.repr(values)} are not numbers; give an array of shape {shape}") from None
     if found.shape != shape or not np.all(np.isfinite(found)):
         raise ValueError(f"{name} = {values!r} is no array of {shape} finite numbers")
     return found
@@ -158,7 +166,7 @@ def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray
 def _checked(samples: ArrayLike) -> FloatArray:
     """Samples as an array, or ValueError."""
     try:
-        nodes = np.ascontiguousarray(samples, dtype=float)
+        nodes = np.ascontiguousarray(numbers(samples))
     except (TypeError, ValueError):
         raise ValueError("the samples are not numbers; give F at the nodes, an array (n0, n1, n2)") from None
     if nodes.ndim != 3 or min(nodes.shape) < FEWEST:

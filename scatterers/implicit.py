@@ -5,12 +5,14 @@ one around it. Then places are looked for where it is not smooth (`scatterers.ex
 """
 
 import hashlib
+import reprlib
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scatterers.base.body import numbers
 from scatterers.base.level_body import LevelBody
 from scatterers.expression.search import FINE, SIZES, examine, found_box, samples_of, tightened
 from scatterers.expression.singularities import refuse_edges, refuse_kinks, singular_points
@@ -70,6 +72,8 @@ class Implicit(LevelBody):
         allow_rough: bool = False,
         speed: Any = None,
     ) -> None:
+        if not isinstance(allow_rough, bool):
+            raise ValueError(f"allow_rough = {allow_rough!r} is neither True nor False")
         everywhere = ExpressionSpace(expression, np.array([[-SIZES[-1]] * 3, [SIZES[-1]] * 3]))
         self.expression = expression
         self.speed = speed
@@ -148,9 +152,9 @@ class Implicit(LevelBody):
 
 def _box(bounds: ArrayLike) -> FloatArray:
     try:
-        box = np.asarray(bounds, dtype=float)
+        box = numbers(bounds)
     except (TypeError, ValueError):
-        raise ValueError(f"bounds {bounds!r} are not numbers; give ((x0, y0, z0), (x1, y1, z1))") from None
+        raise ValueError(f"bounds {reprlib.repr(bounds)} are not numbers; give ((x0, y0, z0), (x1, y1, z1))") from None
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
         raise ValueError(f"bounds {box.tolist()} are no box; give ((x0, y0, z0), (x1, y1, z1)) with x0 < x1 etc.")
     return box
@@ -158,9 +162,9 @@ def _box(bounds: ArrayLike) -> FloatArray:
 
 def _point(centre: ArrayLike) -> FloatArray:
     try:
-        point = np.asarray(centre, dtype=float)
+        point = numbers(centre)
     except (TypeError, ValueError):
-        raise ValueError(f"centre {centre!r} is not a point; give (x, y, z)") from None
+        raise ValueError(f"centre {reprlib.repr(centre)} is not a point; give (x, y, z)") from None
     if point.shape != (3,) or not np.all(np.isfinite(point)):
         raise ValueError(f"centre {centre!r} is not a point; give (x, y, z)")
     return point

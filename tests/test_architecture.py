@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -141,3 +142,35 @@ def test_cited_keys_are_in_the_bibliography():
     known = set(re.findall(r"@\w+\{(\w+),", (ROOT / "creeping" / "references.bib").read_text(encoding="utf-8")))
     cited = {name: set(re.findall(r"\[([A-Z]{1,4}\d{2}[a-z]?)(?:, [^\]]*)?\]", text)) for name, text in TEXTS.items()}
     assert not {name: sorted(keys - known) for name, keys in cited.items() if keys - known}
+
+
+def required(extra, known):
+    """Names of the packages that an extra asks for, those of extras in it, too."""
+    found = set()
+    for line in known[extra]:
+        inner = re.fullmatch(r"creeping\[(.*)\]", line)
+        if inner:
+            found |= {name for one in inner[1].split(",") for name in required(one, known)}
+        else:
+            found.add(re.match(r"[\w.-]+", line)[0].lower())
+    return found
+
+
+def test_all_can_be_had_without_the_gpl():
+    known = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    assert required("all", known) == required("all-but-gpl", known) | {"gmsh"}
+    assert "gmsh" not in required("all-but-gpl", known)
+
+
+def test_the_whole_tree_is_pinned_for_one_python():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    assert re.match(r"# Python 3\.\d+:", lines[0])
+    pins = [line.partition("==") for line in lines if not line.startswith("#")]
+    assert all(equals and version for _, equals, version in pins)
+    names = {name.lower().replace("_", "-") for name, _, _ in pins}
+    asked = required("test", project["optional-dependencies"])
+    asked |= {re.match(r"[\w.-]+", line)[0].lower() for line in project["dependencies"]}
+    assert not asked - names, "not pinned: write constraints.txt anew by pip freeze --exclude-editable"
+    # what those packages ask for themselves
+    assert {"llvmlite", "vtk", "msgpack", "tornado"} <= names

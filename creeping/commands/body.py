@@ -81,8 +81,9 @@ def parse_body(
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{text if len(text) < 60 else text[:57] + '...'}: {error}") from error
     except ModuleNotFoundError as error:
-        extra, use = ("cad", "a CAD file") if error.name == "gmsh" else ("expr", "an expression")
-        raise InvalidInputError(f"{use} needs {error.name}: pip install 'creeping[{extra}]'") from error
+        if error.name == "gmsh":
+            raise InvalidInputError(f"a CAD file: {error}") from error
+        raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
 def _with_charts(shape: Any, progress: Progress | None) -> Any:

@@ -11,7 +11,7 @@ from creeping._version import __version__
 
 OPTIONAL = {
     "sympy": "expressions",
-    "gmsh": "CAD files",
+    "gmsh": "CAD files; GPL",
     "xarray": "sweeps",
     "zarr": "stored sweeps",
     "dask": "sweeps on clusters",

@@ -4,10 +4,12 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.arguments import positive_number, real_array
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 
+LEAST_WAVENUMBER, LARGEST_WAVENUMBER = 1e-100, 1e100
 METHODS = ("auto", "currents", "rays")
 UNRESOLVED = 0.1
 """Error, as a share of the largest |f|, from which a direction counts as unresolved."""
@@ -15,7 +17,7 @@ UNRESOLVED = 0.1
 
 def checked_method(method: str, order: int) -> None:
     """Refuse a method that is none, and currents of the first order."""
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
     if method == "currents" and order != 2:
         raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
@@ -23,14 +25,10 @@ def checked_method(method: str, order: int) -> None:
 
 def observers_of(observation: ArrayLike) -> FloatArray:
     """Unit directions of a caller's observers (m, 3), of which there may be none."""
-    try:
-        nothing = np.shape(observation) == (0, 3)
-    except (TypeError, ValueError):
-        # what it is not is said below
-        nothing = False
-    if nothing:
-        return np.zeros((0, 3))
-    return unit_directions(observation, "observation directions").reshape(-1, 3)
+    looks = real_array(observation, "observation directions")
+    if looks.shape == (0, 3):
+        return looks
+    return unit_directions(looks, "observation directions").reshape(-1, 3)
 
 
 def checked_plain(body: Surface) -> None:
@@ -43,14 +41,9 @@ def checked(wavenumber: float, order: int) -> float:
     """The wavenumber, if it and the order are usable."""
     if isinstance(wavenumber, complex | np.complexfloating):
         raise InvalidInputError(f"wavenumber = {wavenumber!r} is complex; give a real one: losses belong to the medium")
-    if isinstance(wavenumber, bool | str | bytes):
-        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a number")
-    try:
-        k = float(wavenumber)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a number") from error
-    if not (np.isfinite(k) and k > 0):
-        raise InvalidInputError(f"wavenumber = {wavenumber!r} is not a positive finite number")
-    if order not in (1, 2):
+    k = positive_number(wavenumber, "wavenumber")
+    if not LEAST_WAVENUMBER <= k <= LARGEST_WAVENUMBER:
+        raise InvalidInputError(f"wavenumber = {k:g} has squares that are no numbers; take another unit of length")
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or order not in (1, 2):
         raise InvalidInputError(f"order = {order!r} is neither 1 nor 2")
     return k

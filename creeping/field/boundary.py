@@ -10,6 +10,7 @@ Of the Airy functions of a mode (`creeping.field.creeping_modes`), q is i m eta:
 Sources: [F65] for q, [PBM80] for the conductor; Derivations, F1 and F14.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.arguments import one_of, shown
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,14 @@ class ImpedanceBoundary:
     admittance: complex
 
     def __post_init__(self) -> None:
+        given = self.admittance
         try:
-            admittance = complex(self.admittance)
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"admittance = {self.admittance!r} is not a complex number") from error
+            # Python makes numbers of texts and flags
+            if isinstance(given, (Iterable, bool)) or np.asarray(given).dtype.kind in "bSUmM":
+                raise TypeError("it is none")
+            admittance = complex(given)
+        except (TypeError, ValueError, OverflowError, RecursionError) as error:
+            raise InvalidInputError(f"admittance = {shown(given)} is not a complex number") from error
         if not np.isfinite(admittance):
             raise InvalidInputError(f"admittance = {self.admittance!r} is not finite; for an infinite one use 'soft'")
         if admittance.real < 0:
@@ -113,6 +119,7 @@ def boundary_name(boundary: BoundaryLike) -> str:
     """
     if isinstance(boundary, str):
         return boundary
+    one_of(boundary, "boundary", ImpedanceBoundary, "creeping.ImpedanceBoundary; or give 'soft', 'hard' or 'pec'")
     eta = boundary.admittance
     number = repr(eta.real) if eta.imag == 0 else repr(eta).strip("()")
     return f"impedance:{number}"

@@ -23,6 +23,7 @@ from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
+from creeping.geometry.arguments import one_of
 from creeping.rays.fan import RayFan
 
 
@@ -74,6 +75,7 @@ def far_field(
     >>> round(float(abs(ff.total[0])), 3), bool(ff.error[0] < 2e-3), ff.method.tolist()     # about radius/2
     (0.504, True, ['currents'])
     """
+    one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, order)

@@ -29,6 +29,7 @@ from creeping.field.served import Served, measured_field, zero_field
 from creeping.field.surface import scalar_boundary
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_near
@@ -93,6 +94,7 @@ def near_field(
     >>> u.shape, round(float(abs(u[0])), 2), u.method.tolist()
     ((2,), 0.04, ['rays', 'currents'])
     """
+    one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)

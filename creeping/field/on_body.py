@@ -38,6 +38,7 @@ from creeping.field.shed_wave import fock_parameter, scales
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
+from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
@@ -105,6 +106,7 @@ def surface_field(
     >>> np.abs(u).round(1).tolist(), u.method.tolist(), bool(u.error.max() < 0.05)
     ([2.0, 0.5], ['lit', 'rays'], True)
     """
+    one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)

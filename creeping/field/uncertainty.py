@@ -3,8 +3,10 @@
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
-from creeping.field.boundary import BoundaryLike
+from creeping.field.arguments import checked, checked_plain, observers_of
+from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.far import far_field
+from creeping.geometry.arguments import one_of
 from creeping.rays.fan import RayFan
 from creeping.rays.uncertain_body import coarse_fan
 
@@ -43,6 +45,11 @@ def far_field_uncertainty(
     >>> cr.far_field_uncertainty(fan, [(0, 0, -1)], wavenumber=30.0) is None    # a sphere is known exactly
     True
     """
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    checked_plain(fan.body)
+    scalar_boundaries(boundary)
+    checked(wavenumber, order)
+    observers_of(observation)
     other = coarse_fan(fan)
     if other is None:
         return None

@@ -20,6 +20,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import runge_kutta_4, trace_states
 from creeping.geodesics.states import ATTENUATION, P, X, pack
+from creeping.geometry.arguments import one_of
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.surface import Surface, normal
@@ -73,6 +74,7 @@ def validity(fan: RayFan, *, wavenumber: float) -> Validity:
     >>> round(found.least_k_rho, 6), round(found.largest_transverse, 6)
     (54.0, 0.111111)
     """
+    one_of(fan, "fan", RayFan, "creeping.launch")
     k = checked(wavenumber, 2)
     if not len(fan.points):
         return Validity(np.nan, np.nan)

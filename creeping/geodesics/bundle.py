@@ -9,9 +9,12 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
+from creeping.geometry.arguments import real_array
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface, normal, project, size
 
+FARTHEST = 1e15
+"""Coordinate, L, beyond which neither a phase nor a distance has digits left."""
 OFF_BODY = 1e-3
 """Largest distance of a given point from the body, in units of its size, that projection silently mends."""
 
@@ -45,8 +48,10 @@ def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
         On a wrong shape, a value that is not finite, a point off the body, a direction that is zero or normal.
     """
     try:
-        x, p = np.broadcast_arrays(np.asarray(points, dtype=float), np.asarray(directions, dtype=float))
-    except (TypeError, ValueError) as error:
+        x, p = np.broadcast_arrays(real_array(points, "points"), real_array(directions, "directions"))
+    except InvalidInputError:
+        raise
+    except ValueError as error:
         raise InvalidInputError(f"points and directions are not arrays that broadcast together: {error}") from error
     if x.ndim == 0 or x.shape[-1] != 3:
         raise InvalidInputError(f"points have shape {np.shape(points)}; the last axis must hold x, y, z")
@@ -77,20 +82,14 @@ def as_points(points: ArrayLike) -> FloatArray:
     InvalidInputError
         If they are not numbers, of another shape, or not finite.
     """
-    try:
-        given = np.asarray(points)
-        complex_valued = np.iscomplexobj(given)
-        x = np.zeros(0) if complex_valued else np.asarray(given, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"points are not an array of numbers: {error}") from error
-    if complex_valued:
-        raise InvalidInputError("points are complex; give real ones")
+    x = real_array(points, "points")
     if x.ndim == 0 or x.shape[-1] != 3:
         raise InvalidInputError(f"points have shape {x.shape}; the last axis must hold x, y, z")
-    bad = ~np.all(np.isfinite(x), axis=-1)
+    bad = ~np.all(np.abs(x) <= FARTHEST, axis=-1)
     if bad.any():
         raise InvalidInputError(
-            f"{int(bad.sum())} of {bad.size} points are not finite (first: row {int(np.argmax(bad.ravel()))})"
+            f"{int(bad.sum())} of {bad.size} points are not finite, or beyond {FARTHEST:g} "
+            f"(first: row {int(np.argmax(bad.ravel()))})"
         )
     return x
 

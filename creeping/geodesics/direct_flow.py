@@ -2,15 +2,13 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from creeping._presenting import Shown, brief
 from creeping._typing import ArrayLike, FloatArray
-from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_points
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
-from creeping.geodesics.states import pack, unpack
+from creeping.geodesics.states import checked_states, pack, unpack
+from creeping.geometry.arguments import checked_body, number_between, one_of, positive_number
 from creeping.geometry.surface import Surface
 
 
@@ -53,11 +51,13 @@ class DirectFlow(Shown):
     error: ErrorEstimate | None = None
 
     def __post_init__(self) -> None:
-        if not 1e-14 <= self.rtol <= 1e-2:
-            raise InvalidInputError(f"rtol = {self.rtol!r} is not between 1e-14 and 1e-2")
-        for name, value in (("horizon", self.horizon), ("step", self.step)):
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
+        checked_body(self.body)
+        object.__setattr__(self, "rtol", number_between(self.rtol, "rtol", 1e-14, 1e-2))
+        object.__setattr__(self, "horizon", positive_number(self.horizon, "horizon"))
+        if self.step is not None:
+            object.__setattr__(self, "step", positive_number(self.step, "step"))
+        if self.error is not None:
+            one_of(self.error, "error", ErrorEstimate, "creeping.ErrorEstimate")
 
     def __repr__(self) -> str:
         steps = f"rtol {self.rtol:g} per step" if self.step is None else f"equal steps of at most {self.step:g}"
@@ -96,6 +96,7 @@ class DirectFlow(Shown):
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 6, 10 or 12) to ascending times (m,), L: (n, m, the same); see `PhaseMap.transport`."""
+        states, times = checked_states(states), as_times(times)[0]
         if states.shape[1] > 10:
             return with_attenuation(self.body, states, times, rtol=self.rtol, step=self.step)
         return trace_states(self.body, states, times, rtol=self.rtol if self.step is None else 0.0, step=self.step)

@@ -13,6 +13,7 @@ from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import IntegrationError, InvalidInputError
 from creeping.geodesics.bundle import bundle_points
 from creeping.geodesics.states import pack, unpack
+from creeping.geometry.arguments import checked_body, number_between, real_array
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import CHUNK, in_threads, pause
@@ -92,7 +93,7 @@ def as_times(times: ArrayLike) -> tuple[FloatArray, bool]:
     InvalidInputError
         If they are not finite, negative, or not in ascending order.
     """
-    t = np.asarray(times, dtype=float)
+    t = real_array(times, "times")
     if t.ndim > 1:
         raise InvalidInputError(f"times have shape {t.shape}; give a number or a list of numbers")
     values = np.atleast_1d(t)
@@ -140,9 +141,9 @@ def trace(
     >>> bool(np.allclose(x, [-1, 0, 0])), bool(np.allclose(p, [0, -1, 0]))
     (True, True)
     """
-    if not 1e-14 <= rtol <= 1e-2:
-        raise InvalidInputError(f"rtol = {rtol!r} is not between 1e-14 and 1e-2")
+    rtol = number_between(rtol, "rtol", 1e-14, 1e-2)
     values, scalar = as_times(times)
+    checked_body(body)
     x, p = bundle_points(body, points, directions)
     return unpack(trace_states(body, pack(x, p), values, rtol=rtol), x.shape, scalar)
 

@@ -9,6 +9,8 @@ M is the Jacobi matrix of the metric ds/c, A the attenuation integral, t1 the ti
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.errors import InvalidInputError
+from creeping.geometry.arguments import real_array
 
 X, P = slice(0, 3), slice(3, 6)
 M11, M21, M12, M22 = range(6, 10)
@@ -26,6 +28,20 @@ def pack(points: FloatArray, directions: FloatArray, *, jacobi: bool = False, la
     states = np.concatenate([points.reshape(-1, 3), directions.reshape(-1, 3)], axis=1)
     more = [1.0, 0.0, 0.0, 1.0, 0.0, np.inf][: (WITH_JACOBI if jacobi else lanes) - BARE]
     return np.concatenate([states, np.tile(more, (len(states), 1))], axis=1) if more else states
+
+
+def checked_states(states: FloatArray) -> FloatArray:
+    """States of a caller as a contiguous array (n, 6, 10 or 12).
+
+    Raises
+    ------
+    InvalidInputError
+        If their shape is another.
+    """
+    found = np.ascontiguousarray(real_array(states, "states"))
+    if found.ndim != 2 or found.shape[1] not in (BARE, WITH_JACOBI, ATTENUATION + 1, WHOLE):
+        raise InvalidInputError(f"states have shape {found.shape}; give rows of {BARE}, {WITH_JACOBI} or {WHOLE}")
+    return found
 
 
 def unpack(states: FloatArray, shape: tuple[int, ...], scalar: bool) -> tuple[FloatArray, FloatArray]:

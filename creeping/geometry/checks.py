@@ -6,6 +6,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import SurfaceError
+from creeping.geometry.arguments import checked_body
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import triangulate
 
@@ -81,6 +82,7 @@ def check_surface(body: Surface) -> SurfaceReport:
     >>> report.ok, report.genus
     (True, 1)
     """
+    checked_body(body)
     mesh = triangulate(body.level, body.gradient, body.bounds)
     points = mesh.vertices
     corners = points[mesh.triangles]

@@ -10,6 +10,7 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.arguments import real_array, shown
 
 MOST = 10_000_000
 """Directions of one set: 240 MB."""
@@ -220,14 +221,7 @@ def unit_directions(directions: ArrayLike, what: str = "directions") -> FloatArr
     InvalidInputError
         If the shape is another or rows are zero or not finite; the rows are named, and are ``rows`` of the error.
     """
-    try:
-        given = np.asarray(directions)
-        complex_valued = np.iscomplexobj(given)
-        d = np.zeros(0) if complex_valued else np.asarray(given, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{what} are not an array of numbers: {error}") from error
-    if complex_valued:
-        raise InvalidInputError(f"{what} are complex; give real vectors")
+    d = real_array(directions, what)
     if d.ndim < 1 or d.shape[-1] != 3 or d.size == 0:
         raise InvalidInputError(f"{what} have shape {d.shape}; give at least one row of three numbers, shape (n, 3)")
     flat = d.reshape(-1, 3)
@@ -260,8 +254,8 @@ def _angles(**named: ArrayLike) -> list[FloatArray]:
     found = []
     for name, values in named.items():
         try:
-            array = np.asarray(values, dtype=float)
-        except (TypeError, ValueError) as error:
+            array = real_array(values, name)
+        except InvalidInputError as error:
             raise InvalidInputError(f"{name} is not an array of numbers: {error}") from error
         bad = int(np.sum(~np.isfinite(array)))
         if bad:
@@ -282,8 +276,10 @@ def direction_count(name: str, value: int) -> int:
     InvalidInputError
         If it is none.
     """
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST:
-        raise InvalidInputError(f"{name} = {value!r} is not a whole number from 1 to {MOST}")
+    kinds = (int, np.signedinteger, np.unsignedinteger)
+    # to numpy a duration is a whole number
+    if isinstance(value, (bool, np.timedelta64)) or not isinstance(value, kinds) or not 1 <= value <= MOST:
+        raise InvalidInputError(f"{name} = {shown(value)} is not a whole number from 1 to {MOST}")
     return int(value)
 
 
@@ -301,9 +297,9 @@ def unit_direction(direction: ArrayLike) -> FloatArray:
     array([0. , 0.6, 0.8])
     """
     try:
-        d = np.asarray(direction, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"direction {direction!r} is not three numbers") from error
+        d = real_array(direction, "numbers of the direction")
+    except InvalidInputError as error:
+        raise InvalidInputError(f"direction {shown(direction)} is not three numbers: {error}") from error
     if d.shape != (3,):
         raise InvalidInputError(f"direction has shape {d.shape}; give three numbers, e.g. (1, 1, 1)")
     if not np.all(np.isfinite(d)):

@@ -106,15 +106,18 @@ def triangulate(
     return Triangulation(vertices, np.concatenate([tiles[:, [0, 1, 2]], tiles[:, [0, 2, 3]]]))
 
 
-def quadrilaterals(
-    level: Callable[[FloatArray], FloatArray],
-    gradient: Callable[[FloatArray], FloatArray],
-    bounds: FloatArray,
-    *,
-    cells: int = 48,
-) -> tuple[FloatArray, IntArray]:
-    """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there."""
-    box = np.asarray(bounds, dtype=float)
+def checked_extent(bounds: FloatArray) -> FloatArray:
+    """Box (2, 3) of a body, if it is one and of a size whose squares are numbers.
+
+    Raises
+    ------
+    SurfaceError
+        If it is none.
+    """
+    try:
+        box = np.asarray(bounds, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise SurfaceError(f"the bounds of the body are no numbers: {error}") from error
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
         raise SurfaceError(f"bounds {box.tolist()} are not two corners of a box; give [[xmin, ...], [xmax, ...]]")
     extent = float(np.max(box[1] - box[0]))
@@ -123,6 +126,18 @@ def quadrilaterals(
             f"the body's box is {extent:.3g} L wide; take a unit of length in which it is from {1 / LARGEST:g} "
             f"to {LARGEST:g}"
         )
+    return box
+
+
+def quadrilaterals(
+    level: Callable[[FloatArray], FloatArray],
+    gradient: Callable[[FloatArray], FloatArray],
+    bounds: FloatArray,
+    *,
+    cells: int = 48,
+) -> tuple[FloatArray, IntArray]:
+    """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there."""
+    box = checked_extent(bounds)
     while True:
         axes = _grid_axes(box, cells)
         values = _grid_values(level, axes)

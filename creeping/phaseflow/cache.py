@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from creeping._typing import Any
 from creeping._version import __version__
 from creeping.errors import CreepingError, StoredMapError
 from creeping.geodesics.integrator import ErrorEstimate
+from creeping.geometry.arguments import checked_body, folder_path
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import Grid, Leap
@@ -57,12 +59,13 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     ...     cr.load_phase_map(stored, ball).horizon
     0.5
     """
-    folder = Path(folder)
+    folder = folder_path(folder, "folder")
+    checked_body(body)
     content = read_manifest(folder)
-    if content["body"] != fingerprint(body):
-        raise StoredMapError(f"{folder} is a map of {content['body']}, not of {fingerprint(body)}; rebuild it")
+    if content.get("body") != fingerprint(body):
+        raise StoredMapError(f"{folder} is a map of {content.get('body')}, not of {fingerprint(body)}; rebuild it")
     try:
-        grid = Grid(tuple(content["nodes"]), int(content["degree"]), tuple(content["periodic"]))
+        grid = _grid_of(content)
         error = ErrorEstimate(float(content["error"][0]), float(content["error"][1]), int(content["error"][2]))
         rows = content["growth"] and [tuple(map(float, row)) for row in content["growth"]]
         growth = ErrorGrowth(rows[0], rows[1], rows[2], rows[3][0]) if rows else None
@@ -77,7 +80,7 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
             )
             for k, time in enumerate(content["times"])
         )
-        model = model_of(body, str(content["model"]))
+        model, parameters = model_of(body, str(content["model"])), dict(content["parameters"])
     except (KeyError, TypeError, IndexError, ValueError) as reason:
         if isinstance(reason, CreepingError):
             raise
@@ -85,7 +88,19 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
     if model.name != content["model"]:
         raise StoredMapError(f"{folder} is stored as {content['model']!r}, which {body!r} does not offer; rebuild it")
     _check_shapes(folder, grid, leaps, model)
-    return PhaseMap(body, model, grid, leaps, error, growth, content["parameters"])
+    return PhaseMap(body, model, grid, leaps, error, growth, parameters)
+
+
+def _grid_of(content: dict[str, Any]) -> Grid:
+    nodes, degree, periodic = tuple(content["nodes"]), content["degree"], tuple(content["periodic"])
+    if len(nodes) != 3 or any(type(n) is not int or n < 2 for n in nodes) or degree not in (3, 5):
+        raise ValueError(f"a grid of {nodes} with degree {degree}")
+    if len(periodic) != 2 or any(type(wraps) is not bool for wraps in periodic):
+        raise ValueError(f"a grid whose periods are {periodic}")
+    times = [float(time) for time in content["times"]]
+    if not times or not all(0 < time < np.inf for time in times):
+        raise ValueError(f"leaps of {times}")
+    return Grid(nodes, int(degree), periodic)
 
 
 def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Model) -> None:
@@ -127,6 +142,9 @@ def cached_phase_map(
     root = place.parent
     try:
         private_folder(root)
+        # a lock waits for a folder that cannot be written as for one that is in use
+        with tempfile.TemporaryFile(dir=root):
+            pass
         lock = FileLock(root / f".{place.name}.lock")
         lock.acquire()
     except (OSError, StoredMapError) as error:

@@ -18,7 +18,8 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_points
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
-from creeping.geodesics.states import pack, unpack
+from creeping.geodesics.states import checked_states, pack, unpack
+from creeping.geometry.arguments import folder_path, positive_number, real_number, whole_number
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model
 from creeping.phaseflow.grid import Grid, Leap
@@ -56,7 +57,16 @@ class ErrorGrowth:
     bound: float
 
     def rms_after(self, length: float) -> float:
-        """Rms error after a length, L, by interpolation in logarithms; beyond the last one by its last slope."""
+        """Rms error after a length, L, by interpolation in logarithms; beyond the last one by its last slope.
+
+        Raises
+        ------
+        InvalidInputError
+            If the length is no number >= 0.
+        """
+        length = real_number(length, "length")
+        if not length >= 0:
+            raise InvalidInputError(f"length = {length!r} is not a number >= 0")
         if length <= self.lengths[0]:
             return self.rms[0]
         t, e = np.log(self.lengths), np.log(np.maximum(self.rms, 1e-300))
@@ -68,7 +78,14 @@ class ErrorGrowth:
         return float(np.exp(np.interp(at, t, e)))
 
     def trusted_length(self, tolerance: float) -> float:
-        """Longest length, L, at most twice the measured one, whose rms error, extrapolated, meets the tolerance."""
+        """Longest length, L, at most twice the measured one, whose rms error, extrapolated, meets the tolerance.
+
+        Raises
+        ------
+        InvalidInputError
+            If the tolerance is no positive finite number.
+        """
+        tolerance = positive_number(tolerance, "tolerance")
         ends = np.linspace(self.lengths[0], 2 * self.lengths[-1], 2001)
         good = np.array([self.rms_after(float(t)) <= tolerance for t in ends])
         return float(ends[np.argmin(good) - 1]) if good[0] and not good.all() else float(ends[-1] if good[0] else 0.0)
@@ -196,8 +213,7 @@ class PhaseMap(Drawn):
         InvalidInputError
             If the states carry a Jacobi matrix and the map does not.
         """
-        states = np.ascontiguousarray(states, dtype=float)
-        times = np.asarray(times, dtype=float)
+        states, times = checked_states(states), as_times(times)[0]
         if states.shape[1] > 10 and not self._attenuates_at(times):
             return with_attenuation(self.body, states, times, rtol=self._rtol, transport=self.transport)
         if len(times) and times.max() > MOST_LEAPS * self.horizon:
@@ -258,9 +274,8 @@ class PhaseMap(Drawn):
         InvalidInputError
             If ``count`` is negative, or the states carry more than the map does.
         """
-        if count < 0:
-            raise InvalidInputError(f"cannot compose a map {count} times")
-        states = np.array(states, dtype=float, order="C")
+        count = whole_number(count, "count", 0)
+        states = checked_states(states).copy()
         if count == 0:
             return states
         return self._composed(states, level or self.leaps[-1], np.array([count]))[:, 0]
@@ -280,6 +295,7 @@ class PhaseMap(Drawn):
         StoredMapError
             If the folder exists or cannot be written.
         """
+        folder = folder_path(folder, "folder")
         content = {
             "version": __version__,
             "body": fingerprint(self.body),

@@ -24,6 +24,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, P, X, pack
+from creeping.geometry.arguments import flag, one_of, real_number, whole_number
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
@@ -32,9 +33,9 @@ from creeping.rays.nonsmooth import non_smooth_from
 from creeping.rays.reach import AUTO, IN_RANGE, ray_length
 from creeping.rays.spreading import spread, zeros_passed
 from creeping.rays.starts import Starts
-from creeping.rays.transport import Flow, carried
+from creeping.rays.transport import Flow, carried, checked_flow
 from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
-from creeping.shadow.line import ShadowLine
+from creeping.shadow.line import ShadowLine, checked_launch_from
 from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED
 from creeping.storage.memory import within_budget
 
@@ -243,18 +244,17 @@ def launch(
     >>> round(fan.length, 1)                                    # beyond, less than e^-7.5 is left of the wave
     3.5
     """
+    one_of(line, "line", ShadowLine, "creeping.shadow_line")
+    checked_flow(flow)
     body = line.body
     if flow.body is not body and fingerprint(flow.body) != fingerprint(body):
         raise InvalidInputError(f"the flow is of {flow.body!r}, the line of {body!r}; use one body for both")
-    if launch_from not in ("attached", "all"):
-        raise InvalidInputError(f"launch_from = {launch_from!r} is neither 'attached' nor 'all'")
-    for name, number in (("n_rays", n_rays), ("n_steps", n_steps)):
-        if number is not None and (not isinstance(number, (int, np.integer)) or number < 1):
-            raise InvalidInputError(f"{name} = {number!r} is not a whole number >= 1")
-    gap = 0.1 * size(body) if max_gap is None else float(max_gap)
+    checked_launch_from(launch_from)
+    n_rays, n_steps = (None if n is None else whole_number(n, "n_rays or n_steps") for n in (n_rays, n_steps))
+    gap = 0.1 * size(body) if max_gap is None else real_number(max_gap, "max_gap")
     if not gap > 0:
         raise InvalidInputError(f"max_gap = {max_gap!r} is not positive; give inf for no refinement")
-    length = ray_length(line, length, wavenumber=wavenumber)
+    measured, length = flag(measured, "measured"), ray_length(line, length, wavenumber=wavenumber)
     steps = n_steps or enough_steps(body, length)
     count = n_rays or sum(len(curve.points) for curve in line.curves)
     within_budget(24.0 * WHOLE * count * steps, f"{steps} steps of {count} rays", "ask for fewer, or shorter ones")

@@ -15,6 +15,7 @@ from creeping._presenting import DrawnOnBody
 from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import vector_field
+from creeping.geometry.arguments import flag, one_of, real_array
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import project
 from creeping.rays.angle_seams import split_at_seam
@@ -116,13 +117,15 @@ def iso_phase_curves(
     >>> bool(abs(curve.points[:, 2] - np.sin(1.0)).max() < 1e-6)                    # a circle of latitude
     True
     """
-    if of not in ("travel_time", "eikonal"):
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    if not isinstance(of, str) or of not in ("travel_time", "eikonal"):
         raise InvalidInputError(f"of = {of!r} is neither 'travel_time' nor 'eikonal'")
-    values = np.atleast_1d(np.asarray(levels, dtype=float))
+    values = np.atleast_1d(real_array(levels, "levels"))
     if values.ndim != 1 or not np.all(np.isfinite(values)):
         raise InvalidInputError("levels must be finite numbers, one or a list of them")
     if len(values) > MOST_LEVELS:
         raise InvalidInputError(f"{len(values)} levels are more than {MOST_LEVELS}; ask for fewer")
+    beyond_detachment = flag(beyond_detachment, "beyond_detachment")
     if not len(fan.points):
         return []
     hermite = _Hermite(fan)

@@ -19,6 +19,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, pack
+from creeping.geometry.arguments import positive_number, shown
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, size
@@ -27,6 +28,8 @@ from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.many import shadow_lines
 
+LEAST_SIZES, MOST_SIZES = 1e-6, 1e5
+"""Length of rays that can be meant, in body sizes: beyond, phases have no digits left."""
 AUTO: Final = "auto"
 HARD_DECAY = 1.0187929716474710 * float(np.sin(np.pi / 3))
 """Im τ of the slowest mode, that of the hard boundary: α'₁ is the first zero of Ai' [AS64, table 10.13]."""
@@ -85,12 +88,30 @@ def ray_length(
         _positive("wavenumber", wavenumber)
         if speed_of(body) is not None:
             raise InvalidInputError(f"wavenumber = {wavenumber!r} is for rays of constant speed; {body!r} has a speed")
-    if length != AUTO:
-        return _positive("length", length, ", nor 'auto'")
+    if not (isinstance(length, str) and length == AUTO):
+        return asked_length(body, _positive("length", length, ", nor 'auto'"))
     if speed_of(body) is not None:
         return weighted_length(body)
     launch = line.launch_points(TRIALS)
     return float(decayed_lengths(body, launch, wavenumber, decay)[0])
+
+
+def asked_length(body: Surface, length: float) -> float:
+    """A length that was asked for, if a ray can be meant to have it.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is not from `LEAST_SIZES` to `MOST_SIZES` body sizes, or times of a weighted body that take as long.
+    """
+    unit = size(body) if speed_of(body) is None else weighted_length(body)
+    for word, wrong, end in (
+        ("more", length > MOST_SIZES * unit, MOST_SIZES),
+        ("less", length < LEAST_SIZES * unit, LEAST_SIZES),
+    ):
+        if wrong:
+            raise InvalidInputError(f"length = {length:g} is {word} than {end:g} sizes of the body; give another")
+    return length
 
 
 def body_length(body: Surface, wavenumber: float | None = None) -> float:
@@ -156,7 +177,7 @@ def weighted_length(body: Surface) -> float:
 
 
 def _positive(name: str, value: float | str, alternative: str = "") -> float:
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not (number and np.isfinite(value) and value > 0):  # type: ignore[operator]
-        raise InvalidInputError(f"{name} = {value!r} is not a positive finite number{alternative}")
-    return float(value)
+    try:
+        return positive_number(value, name)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{name} = {shown(value)} is not a positive finite number{alternative}") from error

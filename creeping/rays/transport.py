@@ -9,8 +9,10 @@ from typing import Protocol
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.errors import InvalidInputError
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geodesics.states import pack
+from creeping.geometry.arguments import checked_body, shown
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK
 from creeping.shadow.attachment import LaunchPoints
@@ -37,6 +39,21 @@ class Flow(Protocol):
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 12) to ascending times (m,): (n, m, 12)."""
         ...
+
+
+def checked_flow(flow: Flow) -> None:
+    """Refuse what carries no rays.
+
+    Raises
+    ------
+    InvalidInputError
+    """
+    fits = all(hasattr(flow, name) for name in ("body", "horizon", "error")) and not isinstance(flow, type)
+    if not (fits and callable(getattr(flow, "transport", None))):
+        raise InvalidInputError(
+            f"flow = {shown(flow)} is no flow; make one by creeping.build_phase_map, DirectFlow or choose_flow"
+        )
+    checked_body(flow.body)
 
 
 def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: int) -> FloatArray:

@@ -10,15 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.errors import InvalidInputError
 from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.states import pack
+from creeping.geometry.arguments import one_of, whole_number
 from creeping.geometry.surface import project
 from creeping.rays.fan import RayFan, RayStatus, launch
 from creeping.rays.spreading import spread
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.line import shadow_line
+from creeping.storage.memory import within_budget
 
 RAYS = 48
 RTOL = 1e-10
@@ -81,8 +82,9 @@ def body_uncertainty(fan: RayFan, *, n_rays: int = RAYS) -> BodyUncertainty | No
     >>> cr.body_uncertainty(fan) is None                                 # a sphere is known exactly
     True
     """
-    if isinstance(n_rays, bool) or not isinstance(n_rays, (int, np.integer)) or n_rays < 1:
-        raise InvalidInputError(f"n_rays = {n_rays!r} is not a whole number >= 1")
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    n_rays = whole_number(n_rays, "n_rays")
+    within_budget(8.0 * n_rays, f"{n_rays} rays", "ask for fewer")
     coarse_fit: Any = getattr(fan.body, "coarse_fit", None)
     good = np.flatnonzero(fan.status == RayStatus.OK)
     if coarse_fit is None or not len(good):

@@ -16,6 +16,7 @@ import numpy as np
 from creeping._presenting import DrawnOnBody, brief
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.surface import Surface, normal
 from creeping.shadow.attachment import Arc, LaunchPoints
@@ -169,6 +170,7 @@ class ShadowLine(DrawnOnBody):
 
     def arcs(self, launch_from: str = "attached") -> list[Arc]:
         """Arcs that launch rays: the attached ones, or with "all" each whole curve."""
+        checked_launch_from(launch_from)
         if launch_from == "all":
             return [Arc(number, 0.0, curve.length, True) for number, curve in enumerate(self.curves)]
         return [
@@ -180,6 +182,9 @@ class ShadowLine(DrawnOnBody):
 
     def launch_points(self, n_rays: int, launch_from: str = "attached") -> LaunchPoints:
         """So many launch points on the arcs, as `shadow_lines` gives them: n is 1."""
+        checked_launch_from(launch_from)
+        n_rays = whole_number(n_rays, "n_rays")
+        within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
         found = finished(self.body, self.direction, self.nodes, n_rays, every=launch_from == "all")
         return LaunchPoints.unpacked(self.direction[None], found.launched[None], found.places[None])
 
@@ -193,6 +198,17 @@ class ShadowLine(DrawnOnBody):
             f"  {_spelled(self.fractions)}; on {brief(self.body)}\n"
             f"  |n.d| at most {worst:.1e}; singular distance {self.singular_distance:.3g}"
         )
+
+
+def checked_launch_from(launch_from: str) -> None:
+    """Refuse what names no points of a line.
+
+    Raises
+    ------
+    InvalidInputError
+    """
+    if not isinstance(launch_from, str) or launch_from not in ("attached", "all"):
+        raise InvalidInputError(f"launch_from = {launch_from!r} is neither 'attached' nor 'all'")
 
 
 def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> ShadowLine:
@@ -228,9 +244,9 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     >>> [round(curve.length, 6) for curve in line.curves]          # outer and inner equator
     [9.424778, 3.141593]
     """
+    checked_body(body)
     d = unit_direction(direction)
-    if isinstance(n_points, bool) or not isinstance(n_points, (int, np.integer)) or n_points < 16:
-        raise InvalidInputError(f"n_points = {n_points!r} is not a whole number >= 16")
+    n_points = whole_number(n_points, "n_points", 16)
     within_budget(150.0 * n_points, f"{n_points} points of the shadow line", "ask for fewer")
     nodes, code, distance = line_nodes(body, d)
     panels: tuple[PanelCurve, ...] = ()
@@ -241,7 +257,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
             exact, panels = nodes, ()
         nodes = exact
     found = finished(body, d, nodes, 0)
-    curves = [_curve(body, d, nodes, found, k, int(n_points)) for k in range(len(nodes.spacing))]
+    curves = [_curve(body, d, nodes, found, k, n_points) for k in range(len(nodes.spacing))]
     for curve, exact_curve in zip(curves, panels, strict=False):
         # the nodes of a line that turns this fast are too far apart to go through
         vars(curve)["panels"] = exact_curve

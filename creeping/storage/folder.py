@@ -73,6 +73,8 @@ def read_manifest(folder: Path, *, any_schema: bool = False) -> dict[str, Any]:
         document = json.loads(path.read_text())
         content = document["content"]
         intact = document["blake2b"] == content_digest(content)
+        if not isinstance(content, dict):
+            raise TypeError(f"its content is a {type(content).__name__}")
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         if isinstance(error, CreepingError):
             raise

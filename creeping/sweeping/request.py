@@ -13,16 +13,18 @@ from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
+from creeping.geometry.arguments import real_array
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
-from creeping.rays.reach import AUTO, body_length
+from creeping.rays.reach import AUTO, asked_length, body_length
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
 METHODS = ("rays", "auto", "currents")
-MOST_RAYS, MOST_STEPS = 65_536, 4096
+LARGEST_LENGTH = 1e300
+MOST_RAYS, MOST_STEPS, MOST_WAVENUMBERS = 65_536, 4096, 100_000
 
 
 class Variable(NamedTuple):
@@ -122,11 +124,12 @@ class SweepRequest:
 
     def _mistakes(self) -> Any:
         """All that is wrong, not the first only."""
-        if self.quantity not in QUANTITIES:
+        if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
             yield f"quantity = {self.quantity!r} is none of {', '.join(QUANTITIES)}"
             return
         number = isinstance(self.length, (int, float)) and not isinstance(self.length, bool)
-        if not (number and np.isfinite(self.length) and self.length > 0):
+        # of a whole number that is no float numpy knows nothing
+        if not (number and 0 < self.length <= LARGEST_LENGTH):
             yield f"length = {self.length!r} is not a positive finite number"
         for name, most in (("n_rays", MOST_RAYS), ("n_steps", MOST_STEPS)):
             value = getattr(self, name)
@@ -150,7 +153,7 @@ class SweepRequest:
                 yield str(error)
         if len(set(self.boundaries)) < len(self.boundaries):
             yield f"boundaries {list(self.boundaries)} repeat themselves"
-        if self.method not in METHODS:
+        if not isinstance(self.method, str) or self.method not in METHODS:
             yield f"method = {self.method!r} is none of {', '.join(METHODS)}"
         elif self.method != "rays" and self.order != 2:
             yield f"method = {self.method!r} has no order {self.order}; give method 'rays'"
@@ -243,11 +246,11 @@ def sweep_request(
         With all mistakes at once, as ``mistakes`` too.
     """
     several = boundary if isinstance(boundary, (list, tuple)) else (boundary,)
-    try:
-        numbers = tuple(float(k) for k in np.atleast_1d(np.asarray(wavenumbers, dtype=float)))
-        seen = np.zeros((0, 3)) if observation is None else np.asarray(observation, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"wavenumbers and observation must be arrays of numbers: {error}") from error
+    given = np.atleast_1d(real_array(wavenumbers, "wavenumbers"))
+    if given.ndim > 1 or given.size > MOST_WAVENUMBERS:
+        raise InvalidInputError(f"wavenumbers have shape {given.shape}; give a number or at most {MOST_WAVENUMBERS}")
+    numbers = tuple(map(float, given))
+    seen = np.zeros((0, 3)) if observation is None else real_array(observation, "observation directions")
     if seen.size or observation is not None:
         seen = unit_directions(seen, "observation directions").reshape(-1, 3)
     return SweepRequest(
@@ -269,10 +272,11 @@ def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: Ar
     What is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes.
     """
     if not (isinstance(length, str) and length == AUTO):
-        return length
+        number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= LARGEST_LENGTH
+        return asked_length(body, float(length)) if number else length
     try:
-        known = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
-    except (TypeError, ValueError):
+        known = np.atleast_1d(real_array(wavenumbers, "wavenumbers"))
+    except InvalidInputError:
         known = np.zeros(0)
     known = known[np.isfinite(known) & (known > 0)]
     return body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))

@@ -6,14 +6,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from creeping._typing import Any, ArrayLike
 from creeping.errors import CreepingError, InvalidInputError
-from creeping.field.boundary import BoundaryLike, ImpedanceBoundary
+from creeping.field.boundary import BoundaryLike
+from creeping.geometry.arguments import flag, folder_path, shown, whole_number
 from creeping.geometry.directions import unit_directions
 from creeping.rays.reach import AUTO
-from creeping.rays.transport import Flow
+from creeping.rays.transport import Flow, checked_flow
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, sweep_length, sweep_request
 from creeping.sweeping.results import as_dataset, require
@@ -109,10 +108,12 @@ def sweep_directions(
     {'incidence': 2, 'ray': 4, 'step': 1, 'axis': 3}
     """
     require("xarray")
+    checked_flow(flow)
+    _checked_options(store, progress, resume)
     _refuse(flow, quantity, store, resume, client)
     if boundary is None:
         boundary = () if quantity == "rays" else "soft"
-    several = [boundary] if isinstance(boundary, (str, ImpedanceBoundary)) else list(boundary)
+    several: Any = list(boundary) if isinstance(boundary, (list, tuple)) else [boundary]
     request = sweep_request(
         quantity,
         length=sweep_length(flow.body, length, wavenumbers),
@@ -127,8 +128,7 @@ def sweep_directions(
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:
         raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
-    if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, (int, np.integer)) or chunk < 1):
-        raise InvalidInputError(f"chunk = {chunk!r} is not a whole number >= 1")
+    chunk = None if chunk is None else whole_number(chunk, "chunk")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (
         SweepStore.open(str(store), mending=True).chunk
@@ -280,9 +280,18 @@ def _here(plan: SweepPlan, store: SweepStore, tasks: list[int], stop: Callable[[
             guard.add(count, common_error(errors, count))
 
 
+def _checked_options(store: Any, progress: Any, resume: Any) -> None:
+    """Refuse options that are of no kind that can be meant."""
+    flag(resume, "resume")
+    if store is not None:
+        folder_path(store, "store")
+    if progress is not None and not callable(progress):
+        raise InvalidInputError(f"progress = {shown(progress)} cannot be called; give a function of three numbers")
+
+
 def _refuse(flow: Flow, quantity: str, store: Any, resume: bool, client: Any) -> None:
     """Refuse options that do not go together."""
-    if quantity != "rays" and getattr(flow.body, "speed", None) is not None:
+    if isinstance(quantity, str) and quantity != "rays" and getattr(flow.body, "speed", None) is not None:
         raise InvalidInputError(
             f"quantity {quantity!r} is for rays of constant speed; leave out the speed, or ask for 'rays'"
         )

@@ -1,16 +1,25 @@
 """What all bodies share: checked parameters, the speed, the fingerprint."""
 
 import math
+import sys
+from collections.abc import Sized
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from scatterers.speed import as_speed
+
+MOST_NUMBERS = 10**9
 
 
 def finite(**values: float) -> None:
     """Raise ValueError unless every named value is a finite number."""
     for name, value in values.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        # of a whole number that is no float math knows nothing
+        number = isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+        if not number or not math.isfinite(value):
             raise ValueError(f"{name} = {value!r} is not a finite number")
 
 
@@ -20,6 +29,23 @@ def positive(**values: float) -> None:
     for name, value in values.items():
         if value <= 0:
             raise ValueError(f"{name} = {value!r} is not positive; give a length > 0")
+
+
+def numbers(values: ArrayLike) -> NDArray[np.float64]:
+    """Array of what a caller gives.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If they are no numbers, or more of them than an array is made of.
+    """
+    count = values.size if isinstance(values, np.ndarray) else len(values) if isinstance(values, Sized) else 0
+    if count > MOST_NUMBERS:
+        raise ValueError(f"{count} numbers are more than {MOST_NUMBERS}")
+    try:
+        return np.asarray(values, dtype=float)
+    except (OverflowError, RecursionError) as error:
+        raise ValueError(str(error)) from None
 
 
 class Body:

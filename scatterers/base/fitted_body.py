@@ -134,12 +134,15 @@ class FittedBody(SplineBody):
         self._set_speed()
         folder = _fit_cache.cache_folder() if cache is True else Path(str(cache)) if cache else None
         found = None if folder is None else _fit_cache.load(folder, key)
+        if found is not None:
+            try:
+                self._describe(*found)
+            except (TypeError, ValueError, KeyError, AttributeError):
+                # signed, and yet none of ours
+                progress("the stored fit is damaged: fitting again")
+                found = None
         arrays, text = found or self._fitted(make(), progress)
-        self.fit = FitReport.from_json(text["fit"])
-        self.quality = MeshQuality.from_json(text["quality"], arrays["badness"])
-        self.repairs = tuple(text["repairs"])
-        self._text = text
-        self._non_smooth, self._reach = arrays["rough"], float(text["reach"])
+        self._describe(arrays, text)
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(_unpacked(arrays, "fine"), key, speed)
         self.coarse_fit = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
@@ -153,6 +156,14 @@ class FittedBody(SplineBody):
                     arrays |= {CHARTS + name: array for name, array in charts.items()}
             if trouble := _fit_cache.store(folder, key, arrays, text):
                 progress(trouble)
+
+    def _describe(self, arrays: dict[str, FloatArray], text: dict[str, Any]) -> None:
+        """Take over what is known of the fit."""
+        self.fit = FitReport.from_json(text["fit"])
+        self.quality = MeshQuality.from_json(text["quality"], arrays["badness"])
+        self.repairs = tuple(text["repairs"])
+        self._text = text
+        self._non_smooth, self._reach = arrays["rough"], float(text["reach"])
 
     def _fitted(self, cloud: PointCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
         """Arrays and text of the fits, checked."""

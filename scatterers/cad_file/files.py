@@ -67,7 +67,9 @@ def read_cad(path: Path, units: str | None, points: int, *, progress: Callable[[
 
     kind = kind_of(path)
     if importlib.util.find_spec("gmsh") is None:
-        raise ModuleNotFoundError("CAD files need gmsh: pip install 'creeping[cad]'", name="gmsh")
+        raise ModuleNotFoundError(
+            "CAD files need gmsh: pip install 'creeping[cad]' (gmsh is under the GPL)", name="gmsh"
+        )
     found = _meshed(path, points)
     # a file cut short may have lost its unit: gmsh says more of it
     scale = _scale(path, kind, units)

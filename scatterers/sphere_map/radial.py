@@ -75,12 +75,18 @@ class Spine:
 
     def shift(self, points: FloatArray) -> FloatArray:
         """T(w) - w = x - T^-1(x), L: (..., 3) -> (..., 3)."""
-        t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
+        found = np.asarray(points, dtype=float)
+        if not found.ndim or found.shape[-1] != 3:
+            raise ValueError(f"points have shape {found.shape}; the last axis must hold x, y, z")
+        t: FloatArray = (found[..., self.axis] - self.middle) / self.half
         return np.moveaxis(np.asarray(polynomial.polyval(t.clip(-REACH, REACH), self.shifts)), 0, -1)
 
     def slope(self, points: FloatArray) -> FloatArray:
         """Derivative of the shift along the axis, without unit: (..., 3) -> (..., 3)."""
-        t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
+        found = np.asarray(points, dtype=float)
+        if not found.ndim or found.shape[-1] != 3:
+            raise ValueError(f"points have shape {found.shape}; the last axis must hold x, y, z")
+        t: FloatArray = (found[..., self.axis] - self.middle) / self.half
         found = polynomial.polyval(t.clip(-REACH, REACH), polynomial.polyder(self.shifts)) / self.half
         return np.moveaxis(np.where(np.abs(t) > REACH, 0.0, found), 0, -1)
 

@@ -6,7 +6,6 @@ read here, without a resolver of names; trimesh's own repairs are left out, as t
 
 import io
 import logging
-import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.triangles.crossings import crossings
+from scatterers.triangles.form import check_whole
 from scatterers.triangles.threemf import read_3mf
 from scatterers.triangles.topology import cleaned, oriented
 
@@ -93,7 +93,7 @@ def read_mesh(source: Any, units: str | None = None, *, progress: Callable[[str]
     ValueError
         If the source cannot be read, its unit is unknown, or it is not one closed body without self-intersections.
     """
-    if units is not None and units not in UNITS:
+    if units is not None and (not isinstance(units, str) or units not in UNITS):
         raise ValueError(f'units = {units!r} is none of {", ".join(UNITS)}; give e.g. units="mm"')
     in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
     raw = _from_object(source) if in_memory else _from_file(source)
@@ -149,7 +149,7 @@ def _from_object(source: Any) -> _Raw:
 def _from_file(source: Any) -> _Raw:
     path, data = mesh_bytes(source)
     name, suffix = path.name, path.suffix.lower()
-    _check_whole(name, suffix, data)
+    check_whole(name, suffix, data)
     try:
         vertices, triangles, stated = _loaded(data, suffix)
     except Exception as error:  # the loaders raise whatever their parsing runs into
@@ -173,6 +173,8 @@ def mesh_bytes(source: Any) -> tuple[Path, bytes]:
             f"a {type(source).__name__} is no mesh; give a path or an object with vertices and faces"
         ) from None
     name, suffix = path.name, path.suffix.lower()
+    if len(name) > 255 or "\0" in str(path):
+        raise ValueError(f"{name[:40]}... is no name of a file; give the path of a mesh file")
     if path.is_dir():
         raise ValueError(f"{path} is a directory; give the path of a mesh file")
     if not path.is_file():
@@ -252,38 +254,6 @@ def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None]
             count += len(points)
     unit = stated.pop() if len(stated) == 1 and suffix == ".glb" else None
     return np.concatenate(vertices), np.concatenate(triangles), unit or ("m" if suffix == ".glb" else None)
-
-
-def _check_whole(name: str, suffix: str, data: bytes) -> None:
-    """Raise ValueError if the file is shorter than it says, which the loaders do not all see."""
-    cut = f"{name} is cut short or no {suffix[1:].upper()}"
-    if suffix == ".stl":
-        count = int.from_bytes(data[80:84], "little")
-        if len(data) >= 84 and len(data) == 84 + 50 * count:
-            return
-        if b"\0" in data[:84] or not data.lstrip().lower().startswith(b"solid"):
-            raise ValueError(f"{cut}: {count} triangles take {84 + 50 * count} bytes, it has {len(data)}")
-        text = data.lower()
-        if b"endsolid" not in text or len(re.findall(rb"\bfacet\b", text)) != text.count(b"endfacet"):
-            begun, ended = len(re.findall(rb"\bfacet\b", text)), text.count(b"endfacet")
-            raise ValueError(f"{cut}: {begun} facets are begun, {ended} ended, and 'endsolid' has to follow")
-    elif suffix == ".glb":
-        length = int.from_bytes(data[8:12], "little")
-        if data[:4] != b"glTF" or length != len(data):
-            raise ValueError(f"{cut}: its header states {length} bytes, it has {len(data)}")
-    elif suffix == ".ply":
-        head, _, body = data.partition(b"end_header")
-        rows = sum(int(n) for n in re.findall(rb"^\s*element\s+\w+\s+(\d+)", head, re.MULTILINE))
-        if not body:
-            raise ValueError(f"{cut}: its header has no end")
-        if b"ascii" in head and (found := len([line for line in body.splitlines() if line.strip()])) < rows:
-            raise ValueError(f"{cut}: its header states {rows} rows, it has {found}")
-    elif suffix == ".off":
-        lines = [line for line in (raw.partition(b"#")[0].split() for raw in data.splitlines()) if line]
-        numbers = [word for line in lines[:2] for word in line if word.isdigit()]
-        held = len(lines) - (1 if lines and len(lines[0]) > 1 else 2)
-        if len(numbers) >= 2 and held < int(numbers[0]) + int(numbers[1]):
-            raise ValueError(f"{cut}: its header states {int(numbers[0]) + int(numbers[1])} rows, it has {held}")
 
 
 def _check_numbers(raw: _Raw) -> None:

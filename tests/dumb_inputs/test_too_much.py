@@ -25,7 +25,8 @@ def small_map():
 ASKED = {
     "rays": (lambda line: cr.launch(FLOW, line, length=1.0, n_rays=10**10), "GB of memory"),
     "steps": (lambda line: cr.launch(FLOW, line, length=1.0, n_steps=10**10), "GB of memory"),
-    "length": (lambda line: cr.launch(FLOW, line, length=1e12), "GB of memory"),
+    "length": (lambda line: cr.launch(FLOW, line, length=1e12), "more than 100000 sizes of the body"),
+    "long rays": (lambda line: cr.launch(FLOW, line, length=9e4, n_rays=10**5), "GB of memory"),
     "points": (lambda line: cr.shadow_line(BODY, (1, 0, 0), n_points=10**10), "GB of memory"),
     "grid": (
         lambda line: cr.build_phase_map(BODY, horizon=0.5, grid=(10**6, 10**6), cache=False),

@@ -81,7 +81,7 @@ def test_step_far_too_large_is_an_error_not_a_nan():
         ([1.0, 0, 0], [0, 1, 0], [1.0, 0.5], "ascend"),
         ([1.0, 0, 0], [0, 1, 0], np.nan, "finite"),
         ([1.0, 0, 0], [0, 1, 0], [], "finite"),
-        ("point", [0, 1, 0], 1.0, "not arrays"),
+        ("point", [0, 1, 0], 1.0, "not an array of numbers"),
     ],
 )
 def test_bad_input_is_named(points, directions, times, match):

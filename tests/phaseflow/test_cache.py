@@ -167,3 +167,36 @@ def test_second_process_waits_and_opens_the_same_map(tmp_path):
     assert [process.returncode for process in both] == [0, 0]
     assert sorted("tracing" in text for text in said) == [False, True]
     assert len([p for p in tmp_path.iterdir() if p.is_dir()]) == 1
+
+
+@pytest.mark.parametrize("content", [3, [1], "map", None])
+def test_a_signed_manifest_that_is_no_table(content, folder):
+    from creeping.storage.folder import content_digest
+
+    (folder / MANIFEST).write_text(json.dumps({"content": content, "blake2b": content_digest(content)}))
+    with pytest.raises(cr.StoredMapError, match="no readable phase map"):
+        cr.load_phase_map(folder, BODY)
+
+
+@pytest.mark.parametrize("key", ["parameters", "times", "nodes", "error"])
+def test_a_signed_manifest_that_lacks_something(key, folder):
+    edit(folder, lambda content: content.pop(key))
+    with pytest.raises(cr.StoredMapError, match="incomplete"):
+        cr.load_phase_map(folder, BODY)
+
+
+ODD = {
+    "nodes": [[12], [12, 12, 12, 12], ["12", 12, 12], [1.5, 12, 12], [-4, 12, 12], 3, None],
+    "periodic": [[True], [1, 0], [True, True, True], "ab"],
+    "degree": [4, "3", None, 1e300],
+    "times": [[], None, [float("nan")]],
+    "model": [None, 3, "none"],
+    "body": [None, "Sphere"],
+}
+
+
+@pytest.mark.parametrize("key, value", [(key, value) for key, values in ODD.items() for value in values])
+def test_a_signed_manifest_with_odd_values(key, value, folder):
+    edit(folder, lambda content: content.__setitem__(key, value))
+    with pytest.raises(cr.StoredMapError):
+        cr.load_phase_map(folder, BODY)

@@ -1,9 +1,12 @@
 """Options of a mesh, what its cache keeps, and grids of very fine meshes."""
 
+import hashlib
+import io
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
 import scatterers as sc
 from creeping.geometry.surface import project
@@ -50,3 +53,39 @@ def test_fine_meshes_are_fitted_on_the_grid_that_suffices(monkeypatch):
     n = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     mean -= 0.5 * np.einsum("ni,nij,nj->n", n, hessian, n) / np.linalg.norm(gradient, axis=1)
     assert np.sqrt(np.mean((mean - 1) ** 2)) < 2e-3
+
+
+SIGNED = {
+    "no archive": lambda content: b"none",
+    "cut short": lambda content: content[: len(content) // 2],
+    "damaged inside": lambda content: content[:2000] + bytes(500) + content[2500:],
+    "text without a report": lambda content: repacked(content, text=np.frombuffer(b'{"fit": 3}', dtype=np.uint8)),
+    "report of another kind": lambda content: repacked(
+        content,
+        text=np.frombuffer(b'{"fit": 3, "reach": 1, "quality": {}, "repairs": []}', dtype=np.uint8),
+    ),
+    "flat coefficients": lambda content: repacked(content, **{"fine-coefficients": np.zeros(5)}),
+    "few coefficients": lambda content: repacked(content, **{"coarse-coefficients": np.zeros((2, 2, 2))}),
+    "NaN": lambda content: repacked(content, **{"fine-coefficients": np.full((9, 9, 9), np.nan)}),
+    "grid of no size": lambda content: repacked(content, **{"fine-grid": np.zeros((2, 3))}),
+}
+
+
+def repacked(content, **changed):
+    with np.load(io.BytesIO(content)) as held:
+        arrays = {name: held[name] for name in held.files} | changed
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)
+    return packed.getvalue()
+
+
+@pytest.mark.parametrize("which", SIGNED)
+def test_a_stored_fit_that_is_signed_and_none_is_made_anew(which, tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    first = sc.Mesh(ball, cache=tmp_path)
+    (place,) = tmp_path.glob("*.npz")
+    whole = place.read_bytes()
+    content = SIGNED[which](whole[32:])
+    place.write_bytes(hashlib.blake2b(content, digest_size=32).digest() + content)
+    assert sc.Mesh(ball, cache=tmp_path).level([1.1, 0, 0]) == first.level([1.1, 0, 0])
+    assert place.read_bytes()[32:100] == whole[32:100] and len(place.read_bytes()) == len(whole)

@@ -13,6 +13,7 @@ from creeping.field.currents.lit import lit_currents
 from creeping.field.currents.nodes import LitNodes, RayNodes, lit_nodes, ray_nodes
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.surface import surface_waves
+from creeping.geometry.arguments import one_of
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
 
@@ -49,6 +50,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
     >>> currents.extinction < 0.02, bool(currents.error([(0, 1, 0)])[0] < 0.05)
     (True, True)
     """
+    one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, 2)

@@ -190,7 +190,7 @@ class SurfaceCurrents:
 
     def changed(self, points: ArrayLike) -> FloatArray:
         """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
-        x = as_points(points)
+        x = as_points(points).reshape(-1, 3)
         lit, dark = (self._field(np.where(part, self.change, 0.0), x) for part in (self.lit, ~self.lit))
         return np.asarray(np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside)
 

@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.errors import IntegrationError, InvalidInputError, ToleranceError
+from creeping.errors import IntegrationError, ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
 from creeping.geodesics.states import pack
+from creeping.geometry.arguments import checked_body, folder_path, number_between, positive_number, reporter
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import Progress, require_checked, sampled_errors, upper_bound
 from creeping.phaseflow.cache import cached_phase_map, is_cached
@@ -92,19 +93,19 @@ def choose_flow(
     >>> type(flow).__name__, flow.error.rms < 1e-6             # few rays do not pay for a map
     ('DirectFlow', True)
     """
-    if not (isinstance(n_rays, (int, np.integer)) and n_rays >= 1):
-        raise InvalidInputError(f"n_rays = {n_rays!r} is not a whole number >= 1")
-    if not 1e-12 <= tolerance <= 1e-1:
-        raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-12 and 1e-1")
+    checked_body(body)
+    tolerance = number_between(tolerance, "tolerance", 1e-12, 1e-1)
+    length = positive_number(length, "length")
+    cache = cache if isinstance(cache, bool) else folder_path(cache, "cache")
     spec = MapSpec(
         body=body,
-        tolerance=max(float(tolerance), 1e-9),
+        tolerance=max(tolerance, 1e-9),
         length=length,
         n_steps=n_steps,
         n_rays=n_rays,
-        carry_jacobi=bool(carry_jacobi),
+        carry_jacobi=carry_jacobi,
     )
-    report: Progress = progress or (lambda _: None)
+    report = reporter(progress)
     require_checked(body)
     if cache is False:
         return _chosen(spec, tolerance, False, False, report)

@@ -9,6 +9,16 @@ import numpy as np
 from creeping._typing import Any
 from creeping.errors import InvalidInputError, SurfaceError, ToleranceError
 from creeping.geodesics.equations import natural_horizon
+from creeping.geometry.arguments import (
+    checked_body,
+    flag,
+    folder_path,
+    number_between,
+    positive_number,
+    reporter,
+    shown,
+    whole_number,
+)
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import (
     Plan,
@@ -105,6 +115,8 @@ def build_phase_map(
     >>> pm.horizon, pm.error.rms < 1e-9
     (0.5, True)
     """
+    checked_body(body)
+    report = reporter(progress)
     if tolerance is None and grid is None:
         tolerance = 1e-6
     spec = MapSpec(
@@ -122,9 +134,7 @@ def build_phase_map(
         time_step=time_step,
         stages=stages,
     )
-    if not isinstance(cache, (bool, str, Path)):
-        raise InvalidInputError(f"cache = {cache!r} is neither True, False nor a folder")
-    report: Progress = progress or (lambda _: None)
+    cache = cache if isinstance(cache, bool) else folder_path(cache, "cache")
     if cache is False:
         return spec.build(report)
     return cached_phase_map(body, spec.key(), lambda: spec.build(report), folder=cache, progress=report)
@@ -158,12 +168,8 @@ class MapSpec:
     seconds: float = float("inf")
 
     def __post_init__(self) -> None:
+        self._plain_numbers()
         tolerance, precision = self.tolerance, self.precision
-        if tolerance is not None and not 1e-9 <= tolerance <= 1e-1:
-            raise InvalidInputError(f"tolerance = {tolerance!r} is not between 1e-9 and 1e-1")
-        for name, value in (("horizon", self.horizon), ("length", self.length)):
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise InvalidInputError(f"{name} = {value!r} is not a positive finite number")
         for name, value, most in (("horizon", self.horizon, MOST_HORIZON), ("length", self.length, MOST_LENGTH)):
             # a length of some sizes need not wait for what the curvature of the body says
             if value is not None and value > 8 * size(self.body) and value > most * natural_horizon(self.body):
@@ -173,22 +179,17 @@ class MapSpec:
                 )
         if self.length is not None and tolerance is None:
             raise InvalidInputError("length belongs to a tolerance: give both, or horizon and grid alone")
-        n_steps, n_rays = self.n_steps, self.n_rays
-        if not isinstance(n_steps, (int, np.integer)) or n_steps < 1 or (n_steps > 1 and self.length is None):
-            raise InvalidInputError(f"n_steps = {n_steps!r}: give a whole number >= 1, and the length they divide")
-        if not isinstance(n_rays, (int, np.integer)) or n_rays < 1:
-            raise InvalidInputError(f"n_rays = {n_rays!r} is not a whole number >= 1")
+        if self.n_steps > 1 and self.length is None:
+            raise InvalidInputError(f"n_steps = {self.n_steps!r}: give the length they divide as well")
+        for name in ("degree", "precision", "method"):
+            if not isinstance(getattr(self, name), (str, int, type(None))):
+                raise InvalidInputError(f"{name} = {shown(getattr(self, name))} is neither a text nor a number")
         if self.degree not in (None, 3, 5):
             raise InvalidInputError(f"degree = {self.degree!r}: splines of degree 3 and 5 are built")
         if precision not in (None, "single", "double"):
             raise InvalidInputError(f"precision = {precision!r} is neither 'single' nor 'double'")
         if self.method not in ("direct", "tower"):
             raise InvalidInputError(f"method = {self.method!r} is neither 'direct' nor 'tower'")
-        # plain numbers, which can be stored
-        for name in ("tolerance", "length", "horizon"):
-            object.__setattr__(self, name, getattr(self, name) and float(getattr(self, name)))
-        object.__setattr__(self, "n_steps", int(n_steps))
-        object.__setattr__(self, "n_rays", int(n_rays))
         # what is wrong with the grid or the tower is found here
         if self.nodes is not None:
             cells = float(np.prod(self.nodes, dtype=float))
@@ -201,6 +202,19 @@ class MapSpec:
             _ = self.tower
         elif self.time_step is not None or self.stages is not None:
             raise InvalidInputError("time_step and stages belong to method='tower'")
+
+    def _plain_numbers(self) -> None:
+        """Make numbers those of Python, which can be stored."""
+        found: dict[str, Any] = {name: whole_number(getattr(self, name), name) for name in ("n_steps", "n_rays")}
+        if self.tolerance is not None:
+            found["tolerance"] = number_between(self.tolerance, "tolerance", 1e-9, 1e-1)
+        for name in ("horizon", "length"):
+            if getattr(self, name) is not None:
+                found[name] = positive_number(getattr(self, name), name)
+        found["carry_jacobi"] = flag(self.carry_jacobi, "carry_jacobi")
+        within_budget(64.0 * found["n_steps"], f"{found['n_steps']} steps", "ask for fewer")
+        for name, value in found.items():
+            object.__setattr__(self, name, value)
 
     @cached_property
     def periodic(self) -> tuple[bool, bool]:
@@ -280,6 +294,8 @@ def _common_periodicity(body: Surface) -> tuple[bool, bool]:
 
 def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool], cells: int) -> tuple[int, int, int]:
     try:
+        if not isinstance(grid, (tuple, list, np.ndarray)) or len(grid) > 3:
+            raise TypeError
         nodes = tuple(int(n) for n in grid)
         whole = all(n == g for n, g in zip(nodes, grid, strict=True))
     except (TypeError, ValueError):
@@ -289,14 +305,15 @@ def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool], cell
     least = [degree + 1 if wraps else max(degree + 5, cells + 1 + 2 * MARGIN) for wraps in periodic] + [degree + 1]
     if len(nodes) != 3 or not whole or any(n < m for n, m in zip(nodes, least, strict=True)):
         raise InvalidInputError(
-            f"grid = {grid!r}: give two or three whole numbers of at least {least} for degree {degree}"
+            f"grid = {shown(grid)}: give two or three whole numbers of at least {least} for degree {degree}"
         )
     return nodes
 
 
 def _tower_base(horizon: Any, time_step: Any, stages: Any) -> tuple[float, int, int]:
     """Check that B = (T0/tau)^(1/S) is a whole number >= 2."""
-    if not (isinstance(stages, int) and stages >= 1 and np.isfinite(time_step) and 0 < time_step < horizon):
+    time_step, stages = positive_number(time_step, "time_step"), whole_number(stages, "stages")
+    if time_step >= horizon:
         raise InvalidInputError(
             f"time_step = {time_step!r} and stages = {stages!r} do not make a tower below {horizon:g}"
         )

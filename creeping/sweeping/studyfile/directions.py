@@ -1,6 +1,7 @@
 """Tables of directions in study files: kinds of sets, and files that hold them."""
 
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 
@@ -122,7 +123,7 @@ def _from_file(path: Path) -> FloatArray:
             )
         # mapped, so that a header that promises more than the file holds is an error before memory is asked for
         found = np.lib.format.open_memmap(path, mode="r") if kind == ".npy" else _table(path)
-    except (OSError, ValueError, OverflowError) as error:
+    except (OSError, ValueError, OverflowError, TokenError, SyntaxError, TypeError) as error:
         if isinstance(error, CreepingError):
             raise
         raise InvalidInputError(f"cannot read directions from {path}: {error}") from error

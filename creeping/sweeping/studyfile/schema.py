@@ -97,7 +97,10 @@ def _converted(value: Any, kind: str) -> Any:
     if kind == "texts":
         return (value,) if isinstance(value, str) else tuple(value)
     if kind == "wavenumbers" and isinstance(value, dict):
-        return tuple(np.linspace(value["first"], value["last"], value["count"]).tolist())
+        return tuple(np.linspace(float(value["first"]), float(value["last"]), value["count"]).tolist())
+    if kind in ("number", "positive", "length") and isinstance(value, int) and abs(value) > 2**53:
+        # beyond the whole numbers of numpy
+        return float(value)
     if kind == "wavenumbers":
         return tuple(map(float, value if isinstance(value, list) else [value]))
     return value

@@ -253,3 +253,19 @@ def test_a_study_that_is_not_there(tmp_path):
 def test_wavenumbers_over_a_range(tmp_path):
     study = parse_study(EXAMPLE.replace("[20.0, 40.0]", "{ first = 5.0, last = 8.0, count = 4 }"), folder=tmp_path)
     assert study.request.wavenumbers == (5.0, 6.0, 7.0, 8.0)
+
+
+def test_an_array_file_whose_head_is_no_head(tmp_path):
+    np.save(tmp_path / "d.npy", np.eye(3))
+    data = (tmp_path / "d.npy").read_bytes()
+    (tmp_path / "d.npy").write_bytes(data.replace(b"'shape': (3, 3), }", b"'shape': (3, 3)[ ("))
+    (found,) = mistakes(f'{HEAD}[incidences]\nkind = "file"\npath = "d.npy"', tmp_path)
+    assert "cannot read directions from" in found
+
+
+def test_whole_numbers_that_are_none_of_numpy(tmp_path):
+    whole = 10**30
+    theta = f"theta_deg_min = 0\ntheta_deg_max = {whole}\ntheta_count = 2"
+    phi = "phi_deg_min = 0\nphi_deg_max = 9\nphi_count = 1"
+    found = directions(tmp_path, 'kind = "theta-phi"', theta, phi)
+    assert found.shape == (2, 3)

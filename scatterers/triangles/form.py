@@ -1,0 +1,136 @@
+"""Whether a mesh file is whole and of the form it states: what loaders pass over would become another body.
+
+They drop bytes that are no characters, from within numbers too, and numbers beyond those that a row should have.
+"""
+
+import re
+
+
+def check_whole(name: str, suffix: str, data: bytes) -> None:
+    """Refuse a file that is shorter than it says, or whose rows are none of its format.
+
+    Raises
+    ------
+    ValueError
+    """
+    check = {".stl": _stl, ".glb": _glb, ".ply": _ply, ".off": _off, ".obj": _obj}.get(suffix)
+    if check is not None:
+        check(name, f"{name} is cut short or no {suffix[1:].upper()}", data)
+
+
+def _stl(name: str, cut: str, data: bytes) -> None:
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) >= 84 and len(data) == 84 + 50 * count:
+        return
+    if b"\0" in data[:84] or not data.lstrip().lower().startswith(b"solid"):
+        raise ValueError(f"{cut}: {count} triangles take {84 + 50 * count} bytes, it has {len(data)}")
+    text = data.lower()
+    if b"endsolid" not in text or len(re.findall(rb"\bfacet\b", text)) != text.count(b"endfacet"):
+        begun, ended = len(re.findall(rb"\bfacet\b", text)), text.count(b"endfacet")
+        raise ValueError(f"{cut}: {begun} facets are begun, {ended} ended, and 'endsolid' has to follow")
+    _plain(name, [line for line in text.splitlines() if line.split()[:1] not in ([b"solid"], [b"endsolid"])])
+
+
+def _glb(name: str, cut: str, data: bytes) -> None:
+    length = int.from_bytes(data[8:12], "little")
+    if data[:4] != b"glTF" or length != len(data):
+        raise ValueError(f"{cut}: its header states {length} bytes, it has {len(data)}")
+
+
+def _ply(name: str, cut: str, data: bytes) -> None:
+    head, _, body = data.partition(b"end_header")
+    elements = re.findall(rb"^\s*element\s+(\w+)\s+(\d+)\s*$((?:\s*(?:property|comment)\b.*$)*)", head, re.MULTILINE)
+    if not body:
+        raise ValueError(f"{cut}: its header has no end")
+    for what, names in [
+        ("element", [kind for kind, _, _ in elements]),
+        *(("property", re.findall(rb"(\w+)[ \t\r]*$", properties, re.MULTILINE)) for _, _, properties in elements),
+    ]:
+        if len(set(names)) < len(names):
+            raise ValueError(f"the header of {name} names one {what} twice; export it again")
+    if b"ascii" not in head:
+        return
+    lines = [line for line in body.splitlines() if line.strip()]
+    rows = sum(int(count) for _, count, _ in elements)
+    if len(lines) != rows:
+        raise ValueError(f"{cut}: its header states {rows} rows, it has {len(lines)}")
+    _plain(name, lines)
+    at = 0
+    for kind, count, properties in elements:
+        mine = lines[at : at + int(count)]
+        at += int(count)
+        # the length of a list stands before it
+        plain = len(re.findall(rb"^\s*property\s+(?!list\b)", properties, re.MULTILINE))
+        if b"list" not in properties:
+            _columns(name, mine, plain, kind.decode("latin-1"))
+        elif plain == 0 and len(re.findall(rb"\blist\b", properties)) == 1:
+            _lists(name, mine)
+
+
+def _off(name: str, cut: str, data: bytes) -> None:
+    lines = [line for line in (raw.partition(b"#")[0].split() for raw in data.splitlines()) if line]
+    joined = bool(lines) and len(lines[0]) > 1
+    numbers = [word for line in lines[:2] for word in line if word.isdigit()]
+    held = len(lines) - (1 if joined else 2)
+    if len(numbers) < 2:
+        return
+    vertices, faces = int(numbers[0]), int(numbers[1])
+    if held != vertices + faces:
+        raise ValueError(f"{cut}: its header states {vertices + faces} rows, it has {held}")
+    rows = [b" ".join(line) for line in lines[1 if joined else 2 :]]
+    _plain(name, rows)
+    # COFF and its like have colours and normals besides
+    if lines[0][0].upper() == b"OFF":
+        _columns(name, rows[:vertices], 3, "vertex")
+    _lists(name, rows[vertices:], exact=False)
+
+
+def _obj(name: str, cut: str, data: bytes) -> None:
+    rows = [line.split() for line in data.splitlines()]
+    geometry = [row for row in rows if row[:1] in ([b"v"], [b"f"])]
+    _plain(name, [b" ".join(row) for row in geometry])
+    torn = sum(bool(row) and re.match(rb"[-+.]?\d", row[0]) is not None for row in rows)
+    if torn:
+        raise ValueError(f"{_of(torn, 'text', name)} a number where a word should be; export it again")
+    # x y z, with a weight or a colour
+    wrong = [row for row in geometry if row[0] == b"v" and _length(row) - 1 not in (3, 4, 6, 7)]
+    few = sum(row[0] == b"f" and _length(row) < 4 for row in geometry)
+    if few:
+        raise ValueError(f"{_of(few, 'face', name)} less than 3 corners; export it again")
+    if wrong:
+        raise ValueError(f"{_of(len(wrong), 'vertex', name)} not 3, 4, 6 or 7 numbers; export it again")
+
+
+def _length(row: list[bytes]) -> int:
+    """Words before a comment."""
+    return next((k for k, word in enumerate(row) if word.startswith(b"#")), len(row))
+
+
+def _plain(name: str, rows: list[bytes]) -> None:
+    """Refuse rows with bytes that loaders leave out of numbers: what is no ASCII, and underlines, as in Python."""
+    wrong = sum(not row.isascii() or b"_" in row for row in rows)
+    if wrong:
+        raise ValueError(f"{_of(wrong, 'text', name)} bytes that are no characters of numbers; export it again")
+
+
+def _columns(name: str, rows: list[bytes], count: int, kind: str) -> None:
+    wrong = sum(len(row.split()) != count for row in rows)
+    if wrong:
+        raise ValueError(f"{_of(wrong, kind, name)} not {count} numbers; export it again")
+
+
+def _lists(name: str, rows: list[bytes], *, exact: bool = True) -> None:
+    """Refuse rows of lists whose number of members is not what stands first; colours may follow if not exact."""
+    wrong = 0
+    for row in rows:
+        first, *members = row.split()
+        count = int(first) if first.isdigit() and len(first) < 10 else -1
+        fits = len(members) == count or (not exact and len(members) > count >= 3)
+        fits &= all(word.isdigit() for word in members[: max(count, 0)])
+        wrong += not fits
+    if wrong:
+        raise ValueError(f"{_of(wrong, 'face', name)} another number of corners than they state; export it again")
+
+
+def _of(count: int, kind: str, name: str) -> str:
+    return f"{count} {kind} row{'s' if count > 1 else ''} of {name} {'have' if count > 1 else 'has'}"

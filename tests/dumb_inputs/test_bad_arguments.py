@@ -1,0 +1,210 @@
+"""Arguments of another kind than was asked for: each refused by its name, by an error of ours."""
+
+import datetime
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.geometry.arguments import positive_number, real_array, whole_number
+
+BODY = sc.Ellipsoid(1.2, 0.8, 0.8)
+FLOW = cr.DirectFlow(BODY, rtol=1e-8)
+X, P = [[1.2, 0, 0]], [[0, 1, 0]]
+
+
+@pytest.fixture(scope="module")
+def line():
+    return cr.shadow_line(BODY, (0, 0, 1), n_points=64)
+
+
+@pytest.fixture(scope="module")
+def fan(line):
+    return cr.launch(FLOW, line, length=2.0, n_rays=16, n_steps=16)
+
+
+NUMBERS_THAT_ARE_NONE = {
+    "complex": (np.array([1 + 1j]), "complex"),
+    "text": ("1.0", "not an array of numbers"),
+    "texts": (["1", "2"], "not an array of numbers"),
+    "text among numbers": (np.array(["1", 2.0], dtype=object), "texts or complex"),
+    "dates": (np.array(["2020-01-01"], dtype="datetime64[D]"), "not an array of numbers"),
+    "flags": ([True, False], "not an array of numbers"),
+    "masked": (np.ma.masked_array([1.0, 2.0], mask=[True, False]), "masked"),
+    "ragged": ([[1.0], [1.0, 2.0]], "not an array of numbers"),
+    "too many": (range(10**12), "are more than"),
+    "too large": (np.broadcast_to(1.0, (10**12,)), "GB of memory"),
+    "too long a number": ([10**400], "not an array of numbers"),
+    "an object": ([object()], "not an array of numbers"),
+}
+
+
+@pytest.mark.parametrize("which", NUMBERS_THAT_ARE_NONE)
+def test_arrays_that_are_no_numbers(which):
+    values, match = NUMBERS_THAT_ARE_NONE[which]
+    with pytest.raises(cr.InvalidInputError, match=f"lengths.*{match}"):
+        real_array(values, "lengths")
+
+
+@pytest.mark.parametrize(
+    "value", [None, "2", b"2", 2j, [2.0], np.ones(1), datetime.timedelta(1), np.timedelta64(2), True]
+)
+def test_numbers_that_are_none(value):
+    with pytest.raises(cr.InvalidInputError, match="gap = "):
+        positive_number(value, "gap")
+    with pytest.raises(cr.InvalidInputError, match="count = "):
+        whole_number(value, "count")
+
+
+@pytest.mark.parametrize("value", [2, 2.0, np.float32(2), np.int8(2), np.array(2.0)])
+def test_numbers_of_any_type(value):
+    assert positive_number(value, "gap") == 2.0
+
+
+WITH_BODY = {
+    "shadow_line": lambda body: cr.shadow_line(body, (0, 0, 1)),
+    "check_surface": cr.check_surface,
+    "trace": lambda body: cr.trace(body, X, P, 1.0),
+    "DirectFlow": cr.DirectFlow,
+    "build_phase_map": lambda body: cr.build_phase_map(body, horizon=0.5, cache=False),
+    "choose_flow": lambda body: cr.choose_flow(body, n_rays=4, length=1.0, cache=False),
+    "load_phase_map": lambda body: cr.load_phase_map("nowhere", body),
+}
+NO_BODIES = {"none": None, "number": 3, "class": sc.Sphere, "flow": FLOW, "array": np.ones(3), "text": "sphere"}
+
+
+@pytest.mark.parametrize("which", NO_BODIES)
+@pytest.mark.parametrize("name", WITH_BODY)
+def test_what_is_no_body(name, which):
+    with pytest.raises(cr.InvalidInputError, match=r"body = .* (is no body|is a class)"):
+        WITH_BODY[name](NO_BODIES[which])
+
+
+def test_a_body_with_members_that_are_no_methods():
+    class Hollow:
+        level = gradient = hessian = bounds = atlas = None
+
+    with pytest.raises(cr.InvalidInputError, match="that are no methods"):
+        cr.check_surface(Hollow())
+
+
+WITH_FAN = {
+    "iso_phase_curves": lambda fan: cr.iso_phase_curves(fan, [0.5]),
+    "surface_field": lambda fan: cr.surface_field(fan, wavenumber=10.0),
+    "near_field": lambda fan: cr.near_field(fan, [[0, 0, 2]], wavenumber=10.0),
+    "far_field": lambda fan: cr.far_field(fan, [[0, 0, 1]], wavenumber=10.0),
+    "far_field_uncertainty": lambda fan: cr.far_field_uncertainty(fan, [[0, 0, 1]], wavenumber=10.0),
+    "surface_currents": lambda fan: cr.surface_currents(fan, wavenumber=10.0),
+    "body_uncertainty": cr.body_uncertainty,
+    "validity": lambda fan: cr.validity(fan, wavenumber=10.0),
+}
+
+
+@pytest.mark.parametrize("value", [None, 3, BODY, FLOW, [1, 2]], ids=repr)
+@pytest.mark.parametrize("name", WITH_FAN)
+def test_what_is_no_fan(name, value):
+    with pytest.raises(cr.InvalidInputError, match=r"fan = .* is no RayFan; make one by creeping.launch"):
+        WITH_FAN[name](value)
+
+
+@pytest.mark.parametrize("value", [None, 3, BODY, cr.DirectFlow], ids=repr)
+def test_what_is_no_flow_or_line(line, value):
+    with pytest.raises(cr.InvalidInputError, match="is no flow"):
+        cr.launch(value, line, length=1.0)
+    with pytest.raises(cr.InvalidInputError, match="is no flow"):
+        cr.sweep_directions(value, [(0, 0, 1)], wavenumbers=10.0)
+    with pytest.raises(cr.InvalidInputError, match="is no ShadowLine"):
+        cr.launch(FLOW, value, length=1.0)
+
+
+def sweep(**options):
+    return cr.sweep_directions(FLOW, [(0, 0, 1)], wavenumbers=9.0, **options)
+
+
+CALLS = {
+    "steps of states": (lambda line, fan: FLOW.transport(np.ones((2, 7)), [1.0]), "states have shape"),
+    "states": (lambda line, fan: FLOW.transport(None, [1.0]), "states"),
+    "times": (lambda line, fan: FLOW.transport(np.ones((2, 6)), None), "times"),
+    "rtol": (lambda line, fan: cr.DirectFlow(BODY, rtol="1e-8"), "rtol"),
+    "error": (lambda line, fan: cr.DirectFlow(BODY, error=3), "no ErrorEstimate"),
+    "launch from": (lambda line, fan: line.launch_points(8, launch_from="everywhere"), "neither 'attached' nor"),
+    "launch points": (lambda line, fan: line.launch_points(None), "n_rays"),
+    "arcs": (lambda line, fan: line.arcs(np.ones(3)), "neither 'attached' nor"),
+    "gap": (lambda line, fan: cr.launch(FLOW, line, length=1.0, max_gap="x"), "max_gap"),
+    "length": (lambda line, fan: cr.launch(FLOW, line, length=np.ones(2)), "length"),
+    "of": (lambda line, fan: cr.iso_phase_curves(fan, [1.0], of=np.ones(2)), "neither 'travel_time'"),
+    "tolerance": (lambda line, fan: cr.build_phase_map(BODY, tolerance="1e-6", cache=False), "tolerance"),
+    "degree": (lambda line, fan: cr.build_phase_map(BODY, degree=np.ones(3), cache=False), "degree"),
+    "progress": (lambda line, fan: cr.build_phase_map(BODY, progress=3, cache=False), "cannot be called"),
+    "length of a choice": (lambda line, fan: cr.choose_flow(BODY, n_rays=3, length=None), "length"),
+    "boundary": (lambda line, fan: sweep(boundary=3), "boundary"),
+    "store": (lambda line, fan: sweep(store=3), "store"),
+    "whole length": (lambda line, fan: sweep(length=10**400), "length"),
+    "wavenumber": (lambda line, fan: cr.far_field(fan, [(0, 0, 1)], wavenumber=1e300), "another unit of length"),
+    "admittance": (lambda line, fan: cr.ImpedanceBoundary("0.5"), "not a complex number"),
+    "length beyond all": (lambda line, fan: cr.launch(FLOW, line, length=2**63, n_steps=8), "sizes of the body"),
+    "length of a sweep": (lambda line, fan: sweep(length=1e16), "sizes of the body"),
+    "length below all": (lambda line, fan: sweep(length=1e-9), "less than 1e-06 sizes of the body"),
+    "points of a line": (lambda line, fan: cr.shadow_line(BODY, (0, 0, 1), n_points=10**400), "n_points"),
+    "duration": (lambda line, fan: cr.launch(FLOW, line, length=np.timedelta64(3, "s")), "length"),
+    "number of directions": (lambda line, fan: cr.fibonacci_directions(np.timedelta64(3, "s")), "n = "),
+    "chunk": (lambda line, fan: sweep(chunk=np.timedelta64(3, "s")), "chunk"),
+    "grid without end": (lambda line, fan: cr.build_phase_map(BODY, grid=range(10**12), cache=False), "grid"),
+    "cache": (lambda line, fan: cr.build_phase_map(BODY, cache="a\0b"), "cache"),
+    "long name": (lambda line, fan: cr.choose_flow(BODY, n_rays=3, length=1.0, cache="a" * 300), "cache"),
+    "steps of a map": (lambda line, fan: cr.build_phase_map(BODY, length=1.0, n_steps=2**40, cache=False), "GB of"),
+    "far off": (lambda line, fan: cr.near_field(fan, [[1e300] * 3], wavenumber=9.0), "beyond 1e.15"),
+    "order": (lambda line, fan: cr.surface_field(fan, wavenumber=9.0, order=np.ones(2)), "order"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("which", CALLS)
+def test_arguments_of_another_kind(line, fan, which):
+    call, match = CALLS[which]
+    with pytest.raises(cr.CreepingError, match=match):
+        call(line, fan)
+
+
+def test_growth_is_asked_for_lengths():
+    growth = cr.ErrorGrowth(lengths=(1.0, 2.0), rms=(1e-9, 2e-9), max=(3e-9, 6e-9), bound=9e-9)
+    for ask in (growth.rms_after, growth.trusted_length):
+        for value in (None, "1", float("nan"), -1.0):
+            with pytest.raises(cr.InvalidInputError):
+                ask(value)
+
+
+@pytest.mark.parametrize("folder", [None, 3, "", "a\0b", []])
+def test_folders_that_are_none(folder):
+    with pytest.raises(cr.InvalidInputError, match="folder"):
+        cr.load_phase_map(folder, BODY)
+
+
+def test_a_cache_that_cannot_be_written_is_gone_without():
+    said = []
+    cr.build_phase_map(BODY, horizon=0.5, grid=(12, 12), degree=3, cache="/proc", progress=said.append)
+    assert any("no cache in /proc" in line for line in said)
+
+
+def test_one_point_is_as_good_as_many(fan):
+    currents = cr.surface_currents(fan, wavenumber=10.0)
+    assert currents.changed([0.0, 0.0, 1.0]).shape == (1,)
+
+
+def test_bodies_refuse_as_well():
+    with pytest.raises(ValueError, match="not a finite number"):
+        sc.Sphere(10**400)
+    with pytest.raises(ValueError, match="are not numbers"):
+        sc.Implicit("x**2 + y**2 + z**2 - 1", range(10**12))
+    with pytest.raises(ValueError, match="neither True nor False"):
+        sc.Implicit("x**2 + y**2 + z**2 - 1", allow_rough=1j)
+    with pytest.raises(ValueError, match=r"whole numbers from .* to 1000"):
+        sc.Gridded.sampled(BODY, 2**31)
+    with pytest.raises(ValueError, match="no name of a file"):
+        sc.examined_mesh("a" * 5000, "m")
+    with pytest.raises(ValueError, match="is no body"):
+        sc.Gridded.sampled(None)
+    with pytest.raises(ValueError, match="nodes = None"):
+        sc.Gridded.sampled(BODY, None)
+    with pytest.raises(ValueError, match="is none of"):
+        sc.examined_mesh("body.stl", np.ones(2))
