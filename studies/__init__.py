@@ -22,6 +22,7 @@ FIGURES = {
     "field-cut": "figure_field_cut",
     "field-body": "figure_field_body",
     "field-decay": "figure_field_decay",
+    "field-benchmarks": "figure_benchmarks",
     "mesh-quality": "figure_mesh_quality",
     "sweep-cross-section": "figure_cross_section",
     "sweep-sphere-rcs": "figure_sphere_rcs",
