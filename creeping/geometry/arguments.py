@@ -201,15 +201,18 @@ def one_of(value: Any, name: str, kind: type, made_by: str) -> None:
         raise InvalidInputError(f"{name} = {shown(value)} is no {kind.__name__}; make one by {made_by}")
 
 
-def checked_body(body: Surface) -> None:
+def checked_body(body: Surface, *, charts: bool = True) -> None:
     """Refuse what lacks the members of a body; whether they fit each other is not looked at.
+
+    ``charts`` says whether its atlas is needed.
 
     Raises
     ------
     InvalidInputError
     """
     # a property such as the atlas is expensive, so it is sought in the class first
-    missing = [name for name in MEMBERS if not (hasattr(type(body), name) or hasattr(body, name))]
+    needed = MEMBERS if charts else MEMBERS[:-1]
+    missing = [name for name in needed if not (hasattr(type(body), name) or hasattr(body, name))]
     if isinstance(body, type):
         raise InvalidInputError(f"body = {shown(body)} is a class; make a body of it")
     if missing or not all(callable(getattr(body, name)) for name in MEMBERS[:3]):

@@ -183,7 +183,7 @@ class ShadowLine(DrawnOnBody):
     def launch_points(self, n_rays: int, launch_from: str = "attached") -> LaunchPoints:
         """So many launch points on the arcs, as `shadow_lines` gives them: n is 1."""
         checked_launch_from(launch_from)
-        n_rays = whole_number(n_rays, "n_rays")
+        n_rays = whole_number(n_rays, "n_rays", 0)
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
         found = finished(self.body, self.direction, self.nodes, n_rays, every=launch_from == "all")
         return LaunchPoints.unpacked(self.direction[None], found.launched[None], found.places[None])
@@ -244,7 +244,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     >>> [round(curve.length, 6) for curve in line.curves]          # outer and inner equator
     [9.424778, 3.141593]
     """
-    checked_body(body)
+    checked_body(body, charts=False)
     d = unit_direction(direction)
     n_points = whole_number(n_points, "n_points", 16)
     within_budget(150.0 * n_points, f"{n_points} points of the shadow line", "ask for fewer")

@@ -1,4 +1,4 @@
-"""What one wants of the fields of a sweep, as ``dataset.creeping``: totals, cross sections, decibels, polarisations.
+"""What one wants of the fields of a sweep, as ``dataset.field``: totals, cross sections, decibels, polarisations.
 
 The dataset holds the parts of each field; sums and logarithms are made when they are asked for.
 """
@@ -27,7 +27,7 @@ class SweepFields:
     >>> import creeping as cr, scatterers as sc
     >>> flow = cr.DirectFlow(sc.Sphere(), rtol=1e-6)
     >>> ds = cr.sweep_directions(flow, [(0, 0, 1)], wavenumbers=30.0, boundary="pec", n_rays=32)
-    >>> float(ds.creeping.polarisation("VV").dbsm[0, 0].round(1))                # 10 log10(pi radius^2)
+    >>> float(ds.field.polarisation("VV").dbsm[0, 0].round(1))                # 10 log10(pi radius^2)
     5.0
     """
 
@@ -109,8 +109,8 @@ class SweepFields:
 
 
 def register() -> Any:
-    """Make ``dataset.creeping`` known to xarray, once, and return xarray."""
+    """Make ``dataset.field`` known to xarray, once, and return xarray."""
     xarray = required("xarray", use="sweeps need", extra="sweep")
-    if not hasattr(xarray.Dataset, "creeping"):
-        xarray.register_dataset_accessor("creeping")(SweepFields)
+    if not hasattr(xarray.Dataset, "field"):
+        xarray.register_dataset_accessor("field")(SweepFields)
     return xarray

@@ -70,7 +70,7 @@ def backscatter(
     -------
     xarray.Dataset
         As of `creeping.sweep_directions`, with coordinates ``azimuth`` and ``elevation`` of the incidences in degrees;
-        ``dataset.creeping`` has totals, decibels and polarisations.
+        ``dataset.field`` has totals, decibels and polarisations.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def backscatter(
     --------
     >>> import creeping as cr, scatterers as sc
     >>> ds = cr.backscatter(sc.Sphere(0.15), wavenumbers=cr.wavenumber("10 GHz"))
-    >>> float(ds.creeping.polarisation("VV").dbsm.squeeze().round(1))            # 10 log10(pi radius^2) is -11.5
+    >>> float(ds.field.polarisation("VV").dbsm.squeeze().round(1))            # 10 log10(pi radius^2) is -11.5
     -11.4
     """
     azimuths, elevations = _angles(azimuth, elevation)
@@ -129,7 +129,7 @@ def bistatic(
     --------
     >>> import creeping as cr, scatterers as sc
     >>> ds = cr.bistatic(sc.Sphere(), wavenumbers=20.0, azimuth=[0.0, 90.0], boundary="soft")
-    >>> ds.creeping.total.sizes["observer"]
+    >>> ds.field.total.sizes["observer"]
     2
     """
     azimuths, elevations = _angles(azimuth, elevation)

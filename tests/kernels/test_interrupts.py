@@ -26,8 +26,8 @@ LONG = {
     "f.transport(s, np.array([9e3]))",
     "flow of one block": "f, s = small(), rays(64, 12); f.leap(s, 1); ready()\n"
     "while True: f.transport(s, np.array([4e4]))",
-    "trace": "s = rays(64, 6); x = s[:, :3], s[:, 3:]; cr.trace(body, *x, np.ones(1)); ready(); "
-    "cr.trace(body, *x, np.linspace(1, 3e6, 500), rtol=1e-12)",
+    "trace": "s = rays(64, 6); x = s[:, :3], s[:, 3:]; cr.trace(body, *x, np.ones(1)); ready()"
+    "\nwhile True: cr.trace(body, *x, np.linspace(1, 3e5, 500), rtol=1e-12)",
     "attenuation": "s = rays(20_000, 12); direct.transport(s[:64], np.ones(1)); ready(); "
     "direct.transport(s, np.array([9e3]))",
     "map build": "body = sc.TwistedEllipsoid(); ready()\n"

@@ -22,7 +22,7 @@ def test_sphere_over_frequency_against_mie(band):
     k = band["wavenumber"].values
     exact = [abs(sphere.pec_amplitudes(one, RADIUS, [-1.0])[0][0]) / one for one in k]
     for name in ("HH", "VV"):
-        fields = band.creeping.polarisation(name)
+        fields = band.field.polarisation(name)
         size, error = (abs(v.values.squeeze()) for v in (fields.total, fields.error))
         assert np.all(np.abs(size - exact) <= error)
         # the smallest has ka = 12.6
@@ -32,19 +32,19 @@ def test_sphere_over_frequency_against_mie(band):
 
 def test_labels_and_units(band):
     assert band["scattered"].values.tolist() == ["theta", "phi"]
-    cross = band.creeping.polarisation("HV").dbsm
+    cross = band.field.polarisation("HV").dbsm
     assert cross.attrs["units"] == "dBsm" and np.all(cross < -60)
-    np.testing.assert_allclose(band.creeping.cross_section, 4 * np.pi * abs(band.creeping.total) ** 2)
-    np.testing.assert_allclose(band.creeping.target_strength, band.creeping.dbsm - 10 * np.log10(4 * np.pi))
+    np.testing.assert_allclose(band.field.cross_section, 4 * np.pi * abs(band.field.total) ** 2)
+    np.testing.assert_allclose(band.field.target_strength, band.field.dbsm - 10 * np.log10(4 * np.pi))
     with pytest.raises(cr.InvalidInputError, match="polarisation"):
-        band.creeping.polarisation("XX")
+        band.field.polarisation("XX")
     assert [power("m", 2), power("L", 2)] == ["m2", "L^2"]
 
 
 def test_echo_of_a_dataset(band):
     echo = echo_of(band, "rcs", ("VV", "HH"), "")
     assert echo.total.shape == (2, 1, len(band["wavenumber"]))
-    np.testing.assert_allclose(echo.levels()[0, 0], band.creeping.polarisation("VV").dbsm[0])
+    np.testing.assert_allclose(echo.levels()[0, 0], band.field.polarisation("VV").dbsm[0])
     assert set(echo.parts) == {"creeping", "reflected"}
 
 
@@ -54,7 +54,7 @@ def test_angles_are_where_the_radar_is():
     ds = cr.backscatter(body, wavenumbers=k, azimuth=[0.0, 90.0], elevation=[0.0, 0.0], boundary="hard", cache=False)
     np.testing.assert_allclose(ds["direction"].values, [[-1, 0, 0], [0, -1, 0]], atol=1e-12)
     # broadside is the brighter: geometrical optics has sqrt(rho1 rho2)/2
-    f = abs(ds.creeping.total.values.squeeze())
+    f = abs(ds.field.total.values.squeeze())
     np.testing.assert_allclose(f, [0.1 * 0.2 / 0.3 / 2, 0.3 * 0.2 / 0.1 / 2], rtol=0.1)
 
 
@@ -69,7 +69,7 @@ def test_bistatic_is_the_far_field():
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), wavenumber=15.0)
     r = np.stack([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0 * azimuth], axis=1)
     far = cr.far_field(fan, r, wavenumber=15.0)
-    found = ds.creeping.total.values.squeeze()
+    found = ds.field.total.values.squeeze()
     assert np.all(np.abs(found - far.total) < far.error)
     echo = echo_of(ds, "ts", ("soft",), "azimuth", sound_speed=1500.0)
     np.testing.assert_allclose(echo.incidence, (30.0, 20.0))

@@ -7,6 +7,7 @@ import xarray
 
 import creeping as cr
 import scatterers as sc
+from creeping.storage import extras
 from creeping.sweeping import results as dataset
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
@@ -99,7 +100,7 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
     def gone(name):
         raise ModuleNotFoundError(name=name)
 
-    monkeypatch.setattr(dataset, "import_module", gone)
+    monkeypatch.setattr(extras, "import_module", gone)
     with pytest.raises(cr.CreepingError, match=r"need xarray: pip install 'creeping\[sweep\]'"):
         cr.sweep_directions(fake.FLOW, [(0, 0, 1)], quantity="rays")
 
