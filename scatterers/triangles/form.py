@@ -5,6 +5,18 @@ They drop bytes that are no characters, from within numbers too, and numbers bey
 
 import re
 
+PLY_BYTES = {
+    name: size
+    for size, names in {
+        1: (b"char", b"uchar", b"int8", b"uint8"),
+        2: (b"short", b"ushort", b"int16", b"uint16"),
+        4: (b"int", b"uint", b"float", b"int32", b"uint32", b"float32"),
+        8: (b"double", b"float64", b"int64", b"uint64"),
+    }.items()
+    for name in names
+}
+"""Sizes of the numbers of a binary PLY."""
+
 
 def check_whole(name: str, suffix: str, data: bytes) -> None:
     """Refuse a file that is shorter than it says, or whose rows are none of its format.
@@ -49,6 +61,7 @@ def _ply(name: str, cut: str, data: bytes) -> None:
         if len(set(names)) < len(names):
             raise ValueError(f"the header of {name} names one {what} twice; export it again")
     if b"ascii" not in head:
+        _ply_bytes(name, cut, b"big_endian" in head, elements, body[body.find(b"\n") + 1 :])
         return
     lines = [line for line in body.splitlines() if line.strip()]
     rows = sum(int(count) for _, count, _ in elements)
@@ -65,6 +78,38 @@ def _ply(name: str, cut: str, data: bytes) -> None:
             _columns(name, mine, plain, kind.decode("latin-1"))
         elif plain == 0 and len(re.findall(rb"\blist\b", properties)) == 1:
             _lists(name, mine)
+
+
+def _ply_bytes(name: str, cut: str, big: bool, elements: list[tuple[bytes, bytes, bytes]], body: bytes) -> None:
+    """Refuse a binary PLY whose rows do not fill it; loaders take the length of its first list for that of all."""
+    at = 0
+    for _, count, properties in elements:
+        kinds = [line.split()[1:-1] for line in properties.strip().splitlines() if line.split()[:1] == [b"property"]]
+        lists = [kind for kind in kinds if kind[0] == b"list"]
+        if len(lists) > 1 or any(word not in PLY_BYTES for kind in kinds for word in kind if word != b"list"):
+            return
+        fixed = sum(PLY_BYTES[kind[0]] for kind in kinds if kind[0] != b"list")
+        if not lists:
+            at += fixed * int(count)
+            continue
+        place = sum(PLY_BYTES[kind[0]] for kind in kinds[: kinds.index(lists[0])])
+        wide, item = PLY_BYTES[lists[0][1]], PLY_BYTES[lists[0][2]]
+        # all as long as the first, in most files
+        length = int.from_bytes(body[at + place : at + place + wide], "big" if big else "little")
+        step = fixed + wide + item * length
+        first = body[at + place : at + place + wide]
+        if all(
+            body[at + place + k : at + step * int(count) : step] == first[k : k + 1] * int(count) for k in range(wide)
+        ):
+            at += step * int(count)
+            continue
+        for _ in range(int(count)):
+            length = int.from_bytes(body[at + place : at + place + wide], "big" if big else "little")
+            at += fixed + wide + item * length
+            if at > len(body):
+                break
+    if at != len(body):
+        raise ValueError(f"{cut}: its rows take {at} bytes, it has {len(body)}")
 
 
 def _off(name: str, cut: str, data: bytes) -> None:

@@ -84,3 +84,15 @@ def test_a_row_that_is_torn_in_two(tmp_path):
     damaged = replaced(FILES["a.obj"], 40, lambda row: row[:-5] + b"\n" + row[-5:])
     with pytest.raises(ValueError, match=r"1 text row of a.obj has a number where a word should be"):
         read(tmp_path, "a.obj", damaged)
+
+
+@pytest.mark.parametrize("face", [0, 900, 1279])
+@pytest.mark.parametrize("corners", [2, 4, 255])
+def test_binary_faces_of_other_lengths(face, corners, tmp_path):
+    data = bytearray(seeds.ply(binary=True))
+    assert len(read(tmp_path, "a.ply", bytes(data))[0].triangles) == 1280
+    at = len(data) - 13 * (1280 - face)
+    assert data[at] == 3
+    data[at] = corners
+    with pytest.raises(ValueError, match="cut short or no PLY"):
+        read(tmp_path, "a.ply", bytes(data))
