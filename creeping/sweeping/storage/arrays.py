@@ -13,7 +13,7 @@ from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.sweeping.results import require
 from creeping.sweeping.storage.damage import ROOT
-from creeping.sweeping.storage.layout import ERRORS, STATUS, UNDONE
+from creeping.sweeping.storage.layout import ERRORS, STATUS, SUMS, UNDONE
 
 
 class StoreArrays:
@@ -44,6 +44,10 @@ class StoreArrays:
             if not exists(self.chunk_file(name, task)) and self.array(STATUS)[task] != UNDONE:
                 # zarr would read the fill value
                 raise ValueError("its chunk is missing")
+            if self.array(STATUS)[task] != UNDONE and name in self.variables:
+                known = self.array(SUMS)[task][self.variables.index(name)]
+                if checksum(self.chunk_file(name, task)) != known:
+                    raise ValueError("its chunk is another than the one that was written")
             return self.array(name)[self.rows(task)]
 
     def lazily(self, name: str) -> Any:
@@ -116,6 +120,13 @@ def exists(chunk: Path) -> bool:
         return chunk.stat().st_size > 0
     except OSError:
         return False
+
+
+def checksum(chunk: Path) -> int:
+    """CRC-32C at the end of a chunk's file, which zarr compares with the rest of it."""
+    with open(chunk, "rb") as stream:
+        stream.seek(-4, os.SEEK_END)
+        return int.from_bytes(stream.read(4), "little")
 
 
 def _block(*, store: StoreArrays, variable: str, block_id: tuple[int, ...]) -> Any:

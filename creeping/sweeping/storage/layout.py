@@ -16,7 +16,7 @@ from creeping.sweeping.results import coordinates, require, sweep_attributes, va
 from creeping.sweeping.storage.damage import STUDY, file_digests, is_whole, sealed
 
 SCHEMA = 2
-STATUS, ERRORS = "task_status", "incidence_error"
+STATUS, SUMS, ERRORS = "task_status", "task_checksums", "incidence_error"
 UNDONE, DONE, WITH_FAILURES = 0, 1, 2
 ERROR_BYTES = 256
 """Bytes kept of the message of a failed incidence, UTF-8, zeros after it."""
@@ -41,6 +41,9 @@ def write_empty(folder: Path, plan: SweepPlan) -> None:
         _create(group, name, shape, variable.dtype, dims, words, first=plan.chunk, fill=variable.fill)
     words = {"description": "0 missing, 1 done, 2 done but for failed incidences; written last"}
     _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=UNDONE)
+    words = {"description": "CRC-32C at the end of each variable's chunk, in the order of the study's list"}
+    size = (plan.tasks, len(request.variables))
+    _create(group, SUMS, size, "uint32", ("task", "variable"), words, first=1, fill=0)
     words = {"description": "why an incidence failed, UTF-8, zeros after it"}
     _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
     # as xarray writes it: which arrays are coordinates

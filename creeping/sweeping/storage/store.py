@@ -26,7 +26,7 @@ from creeping.storage.folder import content_digest
 from creeping.sweeping.accessor import register
 from creeping.sweeping.plan import Arrays, SweepPlan, differing, open_flow, save_flow
 from creeping.sweeping.results import MISSING, SHOWN, count_attributes, require
-from creeping.sweeping.storage.arrays import StoreArrays, exists
+from creeping.sweeping.storage.arrays import StoreArrays, checksum, exists
 from creeping.sweeping.storage.damage import ROOT, SEAL, STUDY, STUDY_FILE, damaged_files, read_document, sealed
 from creeping.sweeping.storage.layout import (
     DONE,
@@ -34,6 +34,7 @@ from creeping.sweeping.storage.layout import (
     ERRORS,
     SCHEMA,
     STATUS,
+    SUMS,
     UNDONE,
     WITH_FAILURES,
     write_empty,
@@ -222,6 +223,8 @@ class SweepStore(StoreArrays):
             if arrays[name].shape != expected:
                 raise CreepingError(f"the sweeper gave {name} of shape {arrays[name].shape}, not {expected}: a mistake")
             self.put(name, rows, arrays[name])
+        sums = [checksum(self.chunk_file(name, task)) for name in self.variables]
+        self.put(SUMS, slice(task, task + 1), np.array([sums], dtype=np.uint32))
         if errors:
             texts = np.zeros((rows.stop - rows.start, ERROR_BYTES), dtype=np.uint8)
             for row, text in errors.items():

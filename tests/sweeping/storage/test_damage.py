@@ -149,3 +149,13 @@ def test_another_installation_does_not_write_what_it_would_not_have_written(whol
     with pytest.raises(cr.CreepingError, match="would write another one; compute the sweep anew"):
         open_store(PLAN, folder, resume=True)
     assert [p.name for p in tmp_path.iterdir()] == ["s.zarr"]
+
+
+def test_a_chunk_of_another_task_is_told(whole, tmp_path):
+    folder = tmp_path / "s.zarr"
+    shutil.copytree(whole[0], folder)
+    shutil.copy(folder / "line_length/c/1", folder / "line_length/c/2")
+    dataset = SweepStore.open(folder).dataset()
+    with pytest.raises(cr.CreepingError, match="line_length of task 2 .* another than the one that was written"):
+        dataset.line_length.load()
+    assert [task for task, _ in SweepStore.open(folder).verify()] == [2]
