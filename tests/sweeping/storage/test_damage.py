@@ -156,6 +156,6 @@ def test_a_chunk_of_another_task_is_told(whole, tmp_path):
     shutil.copytree(whole[0], folder)
     shutil.copy(folder / "line_length/c/1", folder / "line_length/c/2")
     dataset = SweepStore.open(folder).dataset()
-    with pytest.raises(cr.CreepingError, match="line_length of task 2 .* another than the one that was written"):
+    with pytest.raises(cr.CreepingError, match=r"line_length of task 2 .* another than the one that was written"):
         dataset.line_length.load()
     assert [task for task, _ in SweepStore.open(folder).verify()] == [2]
