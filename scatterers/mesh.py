@@ -92,6 +92,9 @@ class Mesh(FittedBody):
         progress: Callable[[str], None] | None = None,
     ) -> None:
         report = checked_options(units, allow_rough, cache, progress)
+        in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
+        if in_memory and units is None and getattr(source, "units", None) is None:
+            self.unit = "L"
         key = key_of("mesh", _content(source), units=units, allow_rough=allow_rough)
         self._open(key, cache, speed, lambda: self._points(source, units, allow_rough, report), report)
 

@@ -120,12 +120,16 @@ class FarField(Drawn):
         largest = np.max(size, initial=0.0, where=finite)
         missing = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
         off = self.stated_error
-        error = "" if off is None else f"; error by {self.error_source} {off[0]:.2g} L rms, {off[1]:.2g} L at most"
+        error = (
+            ""
+            if off is None
+            else f"; error by {self.error_source} {off[0]:.2g} {self.unit} rms, {off[1]:.2g} {self.unit} at most"
+        )
         return (
             f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
             f"order {self.order}{self._range})\n"
             f"  {served or 'none'}; {int(self.unresolved.sum())} unresolved{missing}\n"
-            f"  |f| up to {largest:.4g} L{error}"
+            f"  |f| up to {largest:.4g} {self.unit}{error}"
         )
 
     @property

@@ -31,6 +31,7 @@ from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
+from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_near
 from creeping.shadow.occlusion import occluded
@@ -137,6 +138,7 @@ def _result(field: Served, fan: RayFan, points: FloatArray, k: float, boundary: 
         boundary=boundary_name(boundary),
         order=order,
         validity=validity(fan, wavenumber=k),
+        length_unit=unit_of(fan.body),
     )
 
 

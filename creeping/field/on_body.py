@@ -40,6 +40,7 @@ from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
+from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
 from creeping.rays.tracer import ray_points
@@ -129,6 +130,7 @@ def surface_field(
         boundary=boundary_name(boundary),
         order=order,
         validity=validity(fan, wavenumber=k),
+        length_unit=unit_of(fan.body),
     )
 
 
@@ -163,6 +165,7 @@ def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, o
         boundary=boundary_name(boundary),
         order=order,
         validity=validity(fan, wavenumber=k),
+        length_unit=unit_of(fan.body),
     )
 
 

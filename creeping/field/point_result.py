@@ -95,6 +95,8 @@ class PointField(ArrayResult, Shown):
     order : int
     validity : Validity
         Least k rho and largest kappa_t rho/m^2 on the fan's rays.
+    length_unit : str
+        "m" where the body knows it, else "L".
     """
 
     points: FloatArray
@@ -107,6 +109,7 @@ class PointField(ArrayResult, Shown):
     boundary: str
     order: int
     validity: Validity | None = field(default=None, kw_only=True)
+    length_unit: str = field(default="L", kw_only=True)
 
     @property
     def ok(self) -> BoolArray:
@@ -160,7 +163,7 @@ class NearField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
         As of every field at points; ``method`` is "currents", "layer" between them and the
         body, or "rays"; on the body "lit", "rays", "lit+rays", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
@@ -191,7 +194,7 @@ class SurfaceField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
         As of every field at points; ``method`` is "lit", "rays" or, in the penumbra, "lit+rays".
     lit, creeping : (...) complex
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
@@ -214,4 +217,4 @@ class SurfaceField(PointField):
     @property
     def unit(self) -> str:
         """Unit of the values."""
-        return "1/L" if self.boundary == "soft" else super().unit
+        return f"1/{self.length_unit}" if self.boundary == "soft" else super().unit

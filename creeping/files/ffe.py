@@ -117,7 +117,8 @@ def _lines(far: "FarField", theta: FloatArray, phi: FloatArray, direction: Array
     yield "##File Format: 8"
     yield f"##Source: creeping {__version__}"
     yield f"** {far.boundary} boundary, order {far.order}, k = {far.wavenumber!r} 1/L"
-    yield "** frequency: L is taken as the metre and the wave's speed as that of light"
+    taken = "" if far.unit == "m" else "L is taken as the metre and "
+    yield f"** frequency: {taken}the wave's speed as that of light"
     yield "** time factor exp(+jwt): complex conjugates of the far field f of creeping, exp(-iwt)"
     yield from _trust(far)
     if not vector:
