@@ -132,7 +132,7 @@ class Mesh(FittedBody):
             distance=partial(signed_distance, mesh.vertices, jets),
             mean_curvature=None if noisy else mean,
             quality=quality,
-            notes={"repairs": list(mesh.repairs)},
+            notes={"repairs": list(mesh.repairs), "source": source_name(source)},
         )
 
 
@@ -194,3 +194,8 @@ def _content(source: Any) -> bytes:
         return json.dumps(stated).encode() + b"".join(array.tobytes() for array in arrays)
     path, data = mesh_bytes(source)
     return path.suffix.lower().encode() + b"\0" + data
+
+
+def source_name(source: Any) -> str:
+    """Name of a file without its folder; nothing of a mesh in memory."""
+    return Path(source).name if isinstance(source, (str, Path)) else ""

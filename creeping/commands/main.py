@@ -44,8 +44,12 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line (of the process, unless arguments are given) and exit with its code."""
     from creeping.errors import CreepingError
 
+    given = sys.argv[1:] if arguments is None else arguments
+    if sorted(given) == ["--json", "--version"]:
+        print(json.dumps(_upkeep.versions(), indent=1))
+        raise SystemExit(0)
     try:
-        code = app(sys.argv[1:] if arguments is None else arguments)
+        code = app(given)
     except CreepingError as error:
         print(f"creeping: {error}", file=sys.stderr)
         code = 3

@@ -8,6 +8,9 @@ currents at a lower wavenumber (`creeping.field.extrapolated`) where the method 
 Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

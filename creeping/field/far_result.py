@@ -1,5 +1,8 @@
 """What a far field is: complex amplitudes by direction, their parts, and what is to be thought of them."""
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -98,7 +101,7 @@ class FarField(Drawn):
         """Target strength 20 log10 |f|, dB relative to a metre if L is the metre, as of sonar: as ``total``."""
         return decibels(self.total)
 
-    def to_xarray(self) -> "xarray.Dataset":
+    def to_xarray(self) -> xarray.Dataset:
         """Amplitudes, parts, error and cross section with names on their axes: an ``xarray.Dataset``.
 
         Dimensions are ``direction``, of a conductor ``scattered`` and ``incident`` too, "theta" and "phi"; coordinates
@@ -108,7 +111,7 @@ class FarField(Drawn):
 
         return far_dataset(self)
 
-    def to_dataframe(self) -> "pandas.DataFrame":
+    def to_dataframe(self) -> pandas.DataFrame:
         """The same as a ``pandas.DataFrame``, one row for each direction, of a conductor for each component of it."""
         return self.to_xarray().drop_vars("vector").drop_dims("axis", errors="ignore").to_dataframe()
 

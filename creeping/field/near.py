@@ -11,6 +11,9 @@ far less. So rays serve in the shadow where nothing is the matter with them and 
 Sources: [LK59], [CK13]; Derivations, F8, F17 and F20.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import numpy as np
 
 from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray

@@ -18,6 +18,9 @@ Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on fo
 on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import numpy as np
 
 from creeping._typing import ArrayLike, ComplexArray, FloatArray

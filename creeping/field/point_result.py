@@ -3,6 +3,9 @@
 Results act as arrays of their values (`creeping.field.array_result`).
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import TYPE_CHECKING
@@ -131,14 +134,14 @@ class PointField(ArrayResult, Shown):
         """Unit of the values."""
         return "of the incident wave"
 
-    def to_xarray(self) -> "xarray.Dataset":
+    def to_xarray(self) -> xarray.Dataset:
         """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
         from creeping.field.labelled import point_dataset
 
         own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
         return point_dataset(self, tuple(sorted(own)))
 
-    def to_dataframe(self) -> "pandas.DataFrame":
+    def to_dataframe(self) -> pandas.DataFrame:
         """The same as a ``pandas.DataFrame``, one row a point."""
         return self.to_xarray().to_dataframe()
 

@@ -1,5 +1,8 @@
 """Pictures of the far field in one plane: decibels against the angle, over straight axes or round a circle."""
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -48,7 +51,7 @@ class Curve:
         """Whether it sets the range: parts, which are thinner, may vanish."""
         return bool(self.style["linewidth"] > 0.8)
 
-    def ordered(self, order: IntArray, label: str) -> "Curve":
+    def ordered(self, order: IntArray, label: str) -> Curve:
         """The same with its points in another order, and another label."""
         band = None if self.band is None else self.band[:, order]
         doubt = None if self.doubt is None else self.doubt[order]
@@ -58,7 +61,7 @@ class Curve:
 def far_cut_picture(
     path: str | os.PathLike[str],
     angles: ArrayLike,
-    fields: Mapping[str, "FarField | ComplexArray"],
+    fields: Mapping[str, FarField | ComplexArray],
     *,
     kind: str = "cartesian",
     quantity: str = "amplitude",
@@ -185,7 +188,7 @@ def level_name(quantity: str, unit: str) -> str:
 
 def cut_curves(
     count: int,
-    fields: Mapping[str, "FarField | ComplexArray"],
+    fields: Mapping[str, FarField | ComplexArray],
     *,
     quantity: str = "amplitude",
     exact: ComplexArray | None = None,

@@ -4,6 +4,9 @@ Angles are those of the radar or of the observer as seen from the body, in degre
 from the plane z = 0. The wave of a radar at (azimuth, elevation) travels the other way.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -42,7 +45,7 @@ def backscatter(
     n_rays: int = 192,
     cache: bool = True,
     progress: Progress | None = None,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Field in the direction of the radar, for each of its angles and wavenumbers.
 
     Parameters
@@ -99,7 +102,7 @@ def bistatic(
     n_rays: int = 192,
     cache: bool = True,
     progress: Progress | None = None,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Field towards observers around the body, for one incidence.
 
     Parameters
@@ -157,7 +160,7 @@ def _swept(
     asked: dict[str, Any],
     cache: bool,
     progress: Progress | None,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Sweep, in blocks of wavenumbers where there are few incidences, so that progress is told in time."""
     library = register()
     numbers = np.atleast_1d(np.asarray(wavenumbers))
@@ -188,16 +191,14 @@ def _swept(
     return joined.assign_attrs(seconds=round(seconds, 3))
 
 
-def _with_angles(
-    found: "xarray.Dataset", dimension: str, azimuths: FloatArray, elevations: FloatArray
-) -> "xarray.Dataset":
+def _with_angles(found: xarray.Dataset, dimension: str, azimuths: FloatArray, elevations: FloatArray) -> xarray.Dataset:
     words = {"units": "degree", "long_name": "as seen from the body"}
     angles = {"azimuth": azimuths, "elevation": elevations}
     return found.assign_coords({name: (dimension, values, words) for name, values in angles.items()})
 
 
 def echo_of(
-    dataset: "xarray.Dataset",
+    dataset: xarray.Dataset,
     quantity: str,
     channels: tuple[str, ...],
     angle_name: str,
