@@ -115,5 +115,5 @@ class Cad(FittedBody):
             distance=partial(signed_distance, found.mesh.vertices, jets),
             mean_curvature=np.where(jets.fitted & ~quality.bad, jets.mean, np.nan),
             quality=quality,
-            notes={"repairs": list(found.mesh.repairs), "edges": list(found.edges)},
+            notes={"source": path.name, "repairs": list(found.mesh.repairs), "edges": list(found.edges)},
         )

@@ -92,6 +92,9 @@ class Mesh(FittedBody):
         progress: Callable[[str], None] | None = None,
     ) -> None:
         report = checked_options(units, allow_rough, cache, progress)
+        in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
+        if in_memory and units is None and getattr(source, "units", None) is None:
+            self.unit = "L"
         key = key_of("mesh", _content(source), units=units, allow_rough=allow_rough)
         self._open(key, cache, speed, lambda: self._points(source, units, allow_rough, report), report)
 
@@ -129,7 +132,7 @@ class Mesh(FittedBody):
             distance=partial(signed_distance, mesh.vertices, jets),
             mean_curvature=None if noisy else mean,
             quality=quality,
-            notes={"repairs": list(mesh.repairs)},
+            notes={"repairs": list(mesh.repairs), "source": source_name(source)},
         )
 
 
@@ -191,3 +194,8 @@ def _content(source: Any) -> bytes:
         return json.dumps(stated).encode() + b"".join(array.tobytes() for array in arrays)
     path, data = mesh_bytes(source)
     return path.suffix.lower().encode() + b"\0" + data
+
+
+def source_name(source: Any) -> str:
+    """Name of a file without its folder; nothing of a mesh in memory."""
+    return Path(source).name if isinstance(source, (str, Path)) else ""

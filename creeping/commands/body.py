@@ -86,6 +86,12 @@ def parse_body(
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
+def short_name(text: str) -> str:
+    """Name of a body in a title: of a file without its folder, of a long expression its beginning."""
+    name = Path(text).name if Path(text).suffix.lower() in MESHES + CAD else text
+    return name if len(name) <= 60 else name[:57] + "..."
+
+
 def _with_charts(shape: Any, progress: Progress | None) -> Any:
     """Body whose charts are made: every flow needs them, and of thin or sharp parts there may be none."""
     if progress:

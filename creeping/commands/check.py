@@ -13,6 +13,9 @@ Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON
 Wavenumber = Annotated[
     float | None, Parameter(help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths.")
 ]
+Frequency = Annotated[str | None, Parameter(help='Instead of k, e.g. "10GHz": lengths are metres then.')]
+Wavelength = Annotated[str | None, Parameter(help='Instead of k, e.g. "3cm".')]
+SoundSpeed = Annotated[float | None, Parameter(help="With a frequency: of the medium, m/s; light if not given.")]
 Output = Annotated[
     Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")
 ]
@@ -25,6 +28,9 @@ def check(
     units: Units = None,
     allow_rough: AllowRough = False,
     wavenumber: Wavenumber = None,
+    frequency: Frequency = None,
+    wavelength: Wavelength = None,
+    sound_speed: SoundSpeed = None,
     output: Output = None,
     json_: Json = False,
 ) -> int:
@@ -36,13 +42,19 @@ def check(
 
     if wavenumber is not None and not 0 < wavenumber < float("inf"):
         raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
+    if any(value is not None for value in (wavenumber, frequency, wavelength, sound_speed)):
+        from creeping.commands.wave import asked_wavenumber
+
+        wavenumber, _ = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
     suffix = Path(body).suffix.lower()
-    if output is not None and suffix not in MESHES:
-        raise InvalidInputError(f"-o is for the picture of a mesh ({', '.join(MESHES)}); {body!r} is none")
     if wavenumber is not None and speed is not None:
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out one of --speed and --wavenumber")
     answer: dict[str, Any] = {}
     texts: list[str] = []
+    if output is not None and suffix not in MESHES:
+        # the rest of the check is worth having
+        texts.append(f"no picture: quality.png is drawn of meshes ({', '.join(MESHES)}); {body!r} is none")
+        output = None
     shape, refusal = None, None
     try:
         shape = parse_body(body, speed, units=units, allow_rough=allow_rough)
@@ -50,7 +62,7 @@ def check(
         if suffix not in MESHES:
             raise
         refusal = error
-    if refusal is not None or output is not None:
+    if (refusal is not None and suffix in MESHES) or output is not None:
         # what is known of a mesh that can be read is worth more than the refusal alone
         _mesh(body, units, wavenumber, output, answer, texts)
     if shape is None:
@@ -70,8 +82,9 @@ def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts
     rows = [asdict(c) | {"ok": c.ok} for c in report.checks]
     answer |= {"genus": report.genus, "area": report.area, "checks": rows}
     if getattr(shape, "fit", None) is not None:
+        told = "quality" in answer
         answer |= {"fit": shape.fit.to_json(), "quality": shape.quality.to_json(), "repairs": list(shape.repairs)}
-        if not texts:
+        if not told:
             texts += [*shape.repairs, shape.quality.summary(wavenumber)]
         texts.append(str(shape.fit))
     texts.append(str(report))
@@ -84,10 +97,17 @@ def _range(shape: Any, wavenumber: float, answer: dict[str, Any], texts: list[st
     """Whether the field's expansions hold, on rays of evenly spread incidences."""
     from math import isfinite
 
+    from creeping.errors import CreepingError
     from creeping.field.validity_range import body_validity, validity_words
     from creeping.rays.reach import INCIDENCES
 
-    found = body_validity(shape, wavenumber=wavenumber)
+    try:
+        found = body_validity(shape, wavenumber=wavenumber)
+    except CreepingError as error:
+        # of the check the rest stands
+        answer["validity"] = None
+        texts.append(f"k = {wavenumber:g}: k rho is not told: {error}")
+        return
     answer["validity"] = {name: value if isfinite(value) else None for name, value in found._asdict().items()}
     if isfinite(found.least_k_rho):
         texts.append(f"k = {wavenumber:g}, on rays of {INCIDENCES} incidences: {validity_words(found)}")

@@ -48,6 +48,9 @@ Column = Annotated[
 Align = Annotated[float, Parameter(group=_output, help="Largest shift of the measured angles that is tried, degrees.")]
 Folder = Annotated[Path | None, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
 Pictures = Annotated[bool, Parameter(group=_output, help="Draw pictures; --no-pictures leaves them out.")]
+Formats = Annotated[
+    str, Parameter(name="--format", group=_output, help="Tables: csv or mat (MATLAB), or both joined by a comma.")
+]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
 Cache = Annotated[bool, Parameter(help="Keep the phase map for the next run.")]
 
@@ -72,6 +75,7 @@ def rcs(
     allow_rough: AllowRough = False,
     cache: Cache = True,
     pictures: Pictures = True,
+    formats: Formats = "csv",
     json_: Json = False,
 ) -> int:
     """Radar cross section of a perfect conductor in dBsm: over angle, over frequency, or both."""
@@ -79,8 +83,9 @@ def rcs(
     asked |= {"polarisation": polarisation, "boundary": "pec"}
     asked |= {"monostatic": monostatic, "bistatic": bistatic, "incidence": incidence}
     made: dict[str, Any] = {"units": units, "allow_rough": allow_rough, "cache": cache}
+    written: dict[str, Any] = {"pictures": pictures, "formats": formats}
     measured = (compare, column, align)
-    return _echo("rcs", body, asked, made, method, measured, output or Path("rcs"), pictures=pictures, as_json=json_)
+    return _echo("rcs", body, asked, made, method, measured, output or Path("rcs"), written, as_json=json_)
 
 
 def ts(
@@ -102,6 +107,7 @@ def ts(
     allow_rough: AllowRough = False,
     cache: Cache = True,
     pictures: Pictures = True,
+    formats: Formats = "csv",
     json_: Json = False,
 ) -> int:
     """Target strength of a body in dB re 1 m: over angle, over frequency, or both."""
@@ -113,8 +119,9 @@ def ts(
     asked |= {"polarisation": None, "boundary": boundary}
     asked |= {"monostatic": monostatic, "bistatic": bistatic, "incidence": incidence}
     made: dict[str, Any] = {"units": units, "allow_rough": allow_rough, "cache": cache}
+    written: dict[str, Any] = {"pictures": pictures, "formats": formats}
     measured = (compare, column, align)
-    return _echo("ts", body, asked, made, method, measured, output or Path("ts"), pictures=pictures, as_json=json_)
+    return _echo("ts", body, asked, made, method, measured, output or Path("ts"), written, as_json=json_)
 
 
 def _echo(
@@ -125,8 +132,8 @@ def _echo(
     method: str,
     measured: tuple[Path | None, str | None, float],
     output: Path,
+    written: dict[str, Any],
     *,
-    pictures: bool,
     as_json: bool,
 ) -> int:
     from creeping.commands import echo_report
@@ -137,6 +144,7 @@ def _echo(
     started = time.perf_counter()
     request = echo_request(quantity, **asked)
     boundary = parse_boundary(request.boundary)
+    written["formats"] = echo_report.table_formats(written["formats"])
     # before the time is spent
     reference = echo_report.reference_of(request, *measured[:2])
 
@@ -152,9 +160,9 @@ def _echo(
     dataset = echo_report.computed(shape, request, boundary, azimuths, elevations, method, made["cache"], meter.told)
     echo = echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
     computed = time.perf_counter()
-    progress("tables and pictures" if pictures else "tables")
+    progress("tables and pictures" if written["pictures"] else "tables")
     compared = echo_report.compared(echo, reference, measured[2])
-    names, extra = echo_report.write_results(output, echo, compared, shape, body, pictures=pictures)
+    names, extra = echo_report.write_results(output, echo, compared, shape, body, **written)
     summary = echo_report.summary_of(body, request, echo, dataset) | extra
     now = time.perf_counter()
     summary |= {"seconds": round(now - started, 2), "seconds_of_fields": round(computed - ready, 2)}

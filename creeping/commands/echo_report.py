@@ -13,11 +13,12 @@ from creeping.field.boundary import BoundaryLike
 from creeping.field.comparison import Comparison, compare
 from creeping.field.echo import Echo
 from creeping.field.slant_range import RangeProfile, range_profile
-from creeping.files import read_cut, write_echo, write_profile
+from creeping.files import read_cut, write_echo, write_mat, write_profile
 from creeping.files.measured import MeasuredCut
 from creeping.geometry.surface import Surface
 from creeping.sweeping.echoes import backscatter, bistatic
 
+FORMATS = ("csv", "mat")
 LEAST_BAND = 16
 """Frequencies from which a band has a range profile."""
 
@@ -89,8 +90,30 @@ def compared(echo: Echo, reference: dict[str, tuple[MeasuredCut, FloatArray]], a
     return found
 
 
+def table_formats(text: str) -> tuple[str, ...]:
+    """Kinds of tables that are asked for.
+
+    Raises
+    ------
+    InvalidInputError
+        If one is unknown, or given twice.
+    """
+    names = tuple(name.strip().lower() for name in text.split(","))
+    unknown = [name for name in names if name not in FORMATS]
+    if unknown or len(set(names)) < len(names):
+        raise InvalidInputError(f"--format {text!r}: give some of {', '.join(FORMATS)}, each once")
+    return names
+
+
 def write_results(
-    output: Path, echo: Echo, comparisons: dict[str, Comparison], body: Surface, name: str, *, pictures: bool
+    output: Path,
+    echo: Echo,
+    comparisons: dict[str, Comparison],
+    body: Surface,
+    name: str,
+    *,
+    pictures: bool,
+    formats: tuple[str, ...] = ("csv",),
 ) -> tuple[list[str], dict[str, Any]]:
     """Write tables and pictures; their names, and what they add to the summary."""
     try:
@@ -98,8 +121,10 @@ def write_results(
     except OSError as error:
         raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
     stem = echo.quantity
-    write_echo(output / f"{stem}.csv", echo)
-    names = [f"{stem}.csv"]
+    writers = {"csv": write_echo, "mat": write_mat}
+    names = [f"{stem}.{kind}" for kind in formats]
+    for kind in formats:
+        writers[kind](output / f"{stem}.{kind}", echo)
     extra: dict[str, Any] = {}
     for channel, found in comparisons.items():
         extra.setdefault("compared", {})[channel] = found.summary()

@@ -8,9 +8,9 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.frequency import wavenumber
+from creeping.field.lobes import lobe_step
 from creeping.geometry.surface import Surface
 from creeping.sweeping.accessor import POLARISATIONS
-from creeping.sweeping.echoes import lobe_step
 
 AXES = {"az": "azimuth", "el": "elevation"}
 WHOLE = {"azimuth": (0.0, 360.0), "elevation": (-90.0, 90.0)}

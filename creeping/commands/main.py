@@ -19,7 +19,8 @@ from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body
+from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body, short_name
+from creeping.commands.compiling import told_of_compilation
 
 app = App(
     name="creeping",
@@ -43,8 +44,12 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line (of the process, unless arguments are given) and exit with its code."""
     from creeping.errors import CreepingError
 
+    given = sys.argv[1:] if arguments is None else arguments
+    if sorted(given) == ["--json", "--version"]:
+        print(json.dumps(_upkeep.versions(), indent=1))
+        raise SystemExit(0)
     try:
-        code = app(sys.argv[1:] if arguments is None else arguments)
+        code = app(given)
     except CreepingError as error:
         print(f"creeping: {error}", file=sys.stderr)
         code = 3
@@ -93,6 +98,13 @@ def run(
     units: Units = None,
     allow_rough: AllowRough = False,
     wavenumber: Annotated[float | None, Parameter(group=_field, help="k, 1/L: adds the field to the results.")] = None,
+    frequency: Annotated[
+        str | None, Parameter(group=_field, help='Instead of k, e.g. "10GHz": lengths are metres then.')
+    ] = None,
+    wavelength: Annotated[str | None, Parameter(group=_field, help='Instead of k, e.g. "3cm".')] = None,
+    sound_speed: Annotated[
+        float | None, Parameter(group=_field, help="With a frequency: of the medium, m/s; that of light if not given.")
+    ] = None,
     boundary: Annotated[
         str | None, Parameter(group=_field, help="soft (if not given), hard, pec or impedance:ETA, e.g. 0.5+0.2j.")
     ] = None,
@@ -101,12 +113,18 @@ def run(
         Parameter(
             group=_field,
             negative="",
-            help="Where the far field is wanted; may be repeated. cut:PHI is theta from -180 to 180 in the plane PHI, "
-            "grid:STEP all theta and phi (gives far.ffe), THETA,PHI one direction, backscatter the way back. "
+            help="Where the far field is wanted; may be repeated. cut:PHI:STEP is theta from -180 to 180 in the plane "
+            "PHI, without STEP one that fits the lobes, grid:STEP all theta and phi (gives far.ffe), THETA,PHI one "
+            "direction, backscatter the way back. "
             "If not given, the cut through the direction of the wave.",
         ),
     ] = None,
+    polarisation: Annotated[
+        str | None,
+        Parameter(group=_field, help="Of a conductor in far.png: HH, VV, HV, VH, joined by commas. HH,VV."),
+    ] = None,
     cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
+    pictures: Annotated[bool, Parameter(group=_output, help="Draw pictures; --no-pictures leaves them out.")] = True,
     backend: Annotated[
         Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")
     ] = "auto",
@@ -124,12 +142,16 @@ def run(
     for name, value in (("length", length), ("spacing", spacing)):
         if isinstance(value, float) and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
-    job = _field_run.job(wavenumber, boundary, observe, direction, weighted=speed is not None)
-    with _Progress(quiet=json_) as progress:
+    wave: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": sound_speed}
+    wave |= {"polarisation": polarisation, "weighted": speed is not None}
+    job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
+    with _Progress(quiet=json_) as progress, told_of_compilation(progress):
         shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
+        if job:
+            job = job.fitted(shape)
         progress("shadow line")
         line = cr.shadow_line(shape, direction)
-        length = ray_length(line, length, wavenumber=wavenumber)
+        length = ray_length(line, length, wavenumber=job.wavenumber if job else None)
         progress("flow")
         carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, progress)
         progress("creeping rays")
@@ -140,10 +162,11 @@ def run(
         if job:
             progress("field")
             far, field_seconds = job.far_field(fan)
-        progress("pictures and files")
-        summary["files"], summary["drawn_by"] = _run_results.write_results(output, line, fan, curves, backend)
+        progress("pictures and files" if pictures else "files")
+        drawn_with = backend if pictures else None
+        summary["files"], summary["drawn_by"] = _run_results.write_results(output, line, fan, curves, drawn_with)
         if job:
-            summary["field"], names = job.write(far, fan, output, backend)
+            summary["field"], names = job.write(far, fan, output, backend, short_name(body), pictures=pictures)
             summary["field"]["seconds"] = field_seconds
             summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)

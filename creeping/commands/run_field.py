@@ -10,24 +10,33 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import FloatArray
+from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
-from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.currents.kept import kept_currents
+from creeping.field.decibels import cross_section_decibels
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
+from creeping.field.lobes import lobe_step
 from creeping.field.polarisation import turned_to_azimuth
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
 from creeping.geometry.directions import unit_direction
+from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
 
 ORDER = 2
+DPI = 200
+"""Of pictures."""
 PARTS = ("creeping", "reflected", "forward")
 MOST = 200_000
 """Directions of one run."""
-FORMS = "cut:PHI, grid:STEP, THETA,PHI or backscatter, in degrees"
+FORMS = "cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, in degrees"
+FINEST = 0.05
+"""Step, degrees, of a cut that is not given one, at the least."""
+POLARISATIONS = {"VV": "tt", "VH": "tp", "HV": "pt", "HH": "pp"}
+"""Received and transmitted, V along theta and H along phi, and the names of the components in pictures."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +48,17 @@ class Target:
     theta: FloatArray
     phi: FloatArray
     directions: FloatArray
+    fits_lobes: bool = False
+    """Whether its step is to be as fine as the lobes ask for."""
+
+    def fitted(self, step: float) -> "Target":
+        """The same cut with a step, degrees, if it has none of its own that is finer."""
+        return _cut(self.text, float(np.degrees(self.phi[0])), step) if self.fits_lobes and step < 1 else self
+
+    @property
+    def angles(self) -> FloatArray:
+        """Angle along a cut (m,), degrees, theta with its sign; NaN of what is none."""
+        return np.degrees(self.theta) if self.kind == "cut" else np.full(len(self.directions), np.nan)
 
     @property
     def frames(self) -> FloatArray:
@@ -55,6 +75,30 @@ class Job:
     wavenumber: float
     boundary: BoundaryLike
     targets: tuple[Target, ...]
+    unit: str | None = None
+    """Of lengths: "m" if a frequency was asked for, else what the body says."""
+    frequency: float | None = None
+    components: tuple[str, ...] = ("tt", "pp")
+
+    def fitted(self, body: Surface) -> "Job":
+        """The job with cuts whose step fits the lobes, of those that have none given."""
+        step = max(lobe_step(body, self.wavenumber, monostatic=False), FINEST)
+        found = replace(self, targets=tuple(target.fitted(step) for target in self.targets))
+        found.check_count()
+        return found
+
+    def check_count(self) -> None:
+        """Refuse more directions than are bearable."""
+        count = sum(len(target.directions) for target in self.targets)
+        if count > MOST:
+            raise InvalidInputError(f"--observe asks for {count} directions; {MOST} are the most: give a coarser step")
+
+    def told(self, unit: str) -> str:
+        """Wavenumber and frequency in words."""
+        wave = f"k = {self.wavenumber:g}/{unit}"
+        if self.frequency is None:
+            return wave
+        return f"{frequency_words(self.frequency)}, {wave}"
 
     def far_field(self, fan: RayFan) -> tuple[FarField, float]:
         """Far field in the directions of all targets, one after the other, and the seconds that it took."""
@@ -67,21 +111,29 @@ class Job:
             # of a component and of the other at a pole, which the turn may exchange
             error = np.sqrt(np.einsum("nab,nbc->nac", turn**2, far.error**2))
             far = replace(far, **parts, error=error)
+        far = replace(far, unit=self.unit or far.unit)
         return far, round(time.perf_counter() - started, 2)
 
-    def write(self, far: FarField, fan: RayFan, output: Path, backend: str) -> tuple[dict[str, Any], list[str]]:
-        """Write the files of a far field; returns the entry of the summary and their names."""
-        names = self._write(far, fan, output, backend)
+    def write(
+        self, far: FarField, fan: RayFan, output: Path, backend: str, name: str, *, pictures: bool = True
+    ) -> tuple[dict[str, Any], list[str]]:
+        """Write the files of a far field of the body ``name``; returns the entry of the summary and their names."""
+        names = self._tables(far, fan, output)
+        if pictures:
+            names += self._pictures(far, fan, output, backend, name)
         methods, counts = np.unique(far.method, return_counts=True)
         size = np.abs(far.total)
         finite = np.isfinite(size)
         entry = {
             "wavenumber": self.wavenumber,
+            "frequency": self.frequency,
+            "unit": far.unit,
             "boundary": far.boundary,
             "order": far.order,
             "observe": [target.text for target in self.targets],
             "directions": len(far.directions),
             "largest": float(np.max(size[finite], initial=0.0)),
+            "largest_db": _finite(cross_section_decibels(np.max(size[finite], initial=0.0))),
             "not_finite": int(np.sum(~finite)),
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
@@ -105,35 +157,56 @@ class Job:
             return {"rms": None, "max": None, "reason": "no direction has a finite field on both bodies"}
         return {"rms": float(np.sqrt(np.mean(known**2))), "max": float(known.max()), "reason": None}
 
-    def _write(self, far: FarField, fan: RayFan, output: Path, backend: str) -> list[str]:
-        names = ["far.csv"]
-        files.write_csv(output / "far.csv", far=far)
+    def _pieces(self, far: FarField) -> list[FarField]:
+        """The far field of each target."""
         ends = np.cumsum([len(target.directions) for target in self.targets])
-        pieces = [_part(far, end - len(t.directions), end) for t, end in zip(self.targets, ends, strict=True)]
-        cuts = {
-            f"φ = {np.degrees(t.phi[0]):g}°": piece
-            for t, piece in zip(self.targets, pieces, strict=True)
-            if t.kind == "cut"
-        }
-        if any(np.any(np.isfinite(piece.total) & (piece.total != 0)) for piece in cuts.values()):
-            angles = next(t.theta for t in self.targets if t.kind == "cut")
-            plotting.far_cut_picture(output / "far.png", angles, cuts, parts=len(cuts) == 1, angle_name="θ")
-            names.append("far.png")
-        for target, piece in zip(self.targets, pieces, strict=True):
+        return [_part(far, end - len(t.directions), end) for t, end in zip(self.targets, ends, strict=True)]
+
+    def _tables(self, far: FarField, fan: RayFan, output: Path) -> list[str]:
+        names = ["far.csv"]
+        texts = [target.text for target in self.targets for _ in target.directions]
+        angles = np.concatenate([target.angles for target in self.targets])
+        files.write_csv(output / "far.csv", far=far, observed=(texts, angles))
+        for target, piece in zip(self.targets, self._pieces(far), strict=True):
             # a .ffe file holds no infinity; the table does
             if target.kind == "grid" and np.all(np.isfinite(piece.total)):
                 where = output / "far.ffe"
                 files.write_ffe(where, piece, target.theta, target.phi, direction=fan.line.direction)
                 names.append(where.name)
+        return names
+
+    def _pictures(self, far: FarField, fan: RayFan, output: Path, backend: str, name: str) -> list[str]:
+        names = []
+        title = f"{name}\n{self.told(far.unit)}, {far.boundary}".replace("$", r"\$")
+        # cuts of one step are one picture
+        cuts: dict[int, dict[str, FarField]] = {}
+        for target, piece in zip(self.targets, self._pieces(far), strict=True):
+            if target.kind == "cut":
+                cuts.setdefault(len(target.theta), {})[f"φ = {np.degrees(target.phi[0]):g}°"] = piece
+        drawn = [one for one in cuts.values() if any(_visible(piece) for piece in one.values())]
+        for number, group in enumerate(drawn, 1):
+            theta = next(t.theta for t in self.targets if len(t.theta) == len(next(iter(group.values())).total))
+            words: dict[str, Any] = {"quantity": "rcs", "components": self.components, "title": title, "dpi": DPI}
+            names.append("far.png" if number == 1 else f"far_{number}.png")
+            plotting.far_cut_picture(output / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
         if far.error_by == "extinction":
             currents = kept_currents(fan, self.wavenumber, self.boundary)
-            plotting.currents_picture(output / "field.png", currents, backend=backend)
+            plotting.currents_picture(output / "field.png", currents, backend=backend, dpi=DPI)
             names.append("field.png")
         elif self.boundary != "pec":
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
-            plotting.surface_field_picture(output / "field.png", fan, backend=backend, **options)
+            plotting.surface_field_picture(output / "field.png", fan, backend=backend, dpi=DPI, **options)
             names.append("field.png")
         return names
+
+
+def _visible(piece: FarField) -> bool:
+    """Whether a field has a value that can be drawn in decibels."""
+    return bool(np.any(np.isfinite(piece.total) & (piece.total != 0)))
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def job(
@@ -143,34 +216,52 @@ def job(
     direction: Sequence[float],
     *,
     weighted: bool = False,
+    frequency: str | None = None,
+    wavelength: str | None = None,
+    sound_speed: float | None = None,
+    polarisation: str | None = None,
 ) -> Job | None:
-    """What the options ask for, None without a wavenumber.
+    """What the options ask for, None without a wavenumber, a frequency or a wavelength.
 
     Raises
     ------
     InvalidInputError
         On a bad option, or one that needs ``--wavenumber``.
     """
-    if wavenumber is None:
-        stray = [name for name, value in (("--boundary", boundary), ("--observe", observe)) if value]
+    given = [wavenumber, frequency, wavelength]
+    if all(value is None for value in given):
+        options = (("--boundary", boundary), ("--observe", observe), ("--polarisation", polarisation))
+        stray = [name for name, value in (*options, ("--sound-speed", sound_speed)) if value]
         if stray:
             verb = "needs" if len(stray) == 1 else "need"
-            raise InvalidInputError(f"{' and '.join(stray)} {verb} --wavenumber, which asks for the field")
+            raise InvalidInputError(
+                f"{' and '.join(stray)} {verb} --wavenumber or --frequency, which ask for the field"
+            )
         return None
     if weighted:
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out --speed, or the field")
+    k, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
     d = unit_direction(direction)
     targets = tuple(parse_target(text, d) for text in observe or [_own_cut(d)])
     if sum(target.kind == "grid" for target in targets) > 1:
         raise InvalidInputError("--observe names several grids; give one, far.ffe holds no more")
-    count = sum(len(target.directions) for target in targets)
-    if count > MOST:
-        raise InvalidInputError(f"--observe asks for {count} directions; {MOST} are the most: give a coarser grid")
-    try:
-        k = checked(wavenumber, ORDER)
-    except CreepingError as error:
-        raise InvalidInputError(f"--{error}") from error
-    return Job(k, _boundary(boundary or "soft"), targets)
+    kind = _boundary(boundary or "soft")
+    unit = "m" if wavenumber is None else None
+    found = Job(k, kind, targets, unit, hertz, _components(polarisation, kind))
+    found.check_count()
+    return found
+
+
+def _components(polarisation: str | None, boundary: BoundaryLike) -> tuple[str, ...]:
+    """Components that pictures show."""
+    if polarisation is None:
+        return ("tt", "pp")
+    names = [name.strip().upper() for name in polarisation.split(",")]
+    if boundary != "pec":
+        raise InvalidInputError("--polarisation is of a conductor; give it with --boundary pec")
+    if not set(names) <= set(POLARISATIONS) or len(set(names)) < len(names):
+        raise InvalidInputError(f"--polarisation {polarisation!r}: give some of {', '.join(POLARISATIONS)}, each once")
+    return tuple(POLARISATIONS[name] for name in names)
 
 
 def _boundary(text: str) -> BoundaryLike:
@@ -193,9 +284,9 @@ def parse_target(text: str, direction: FloatArray) -> Target:
     if text == "backscatter":
         return Target("point", text, np.zeros(0), np.zeros(0), -direction[None])
     if name == "cut":
-        plane = _numbers(text, rest, 1)
-        theta, phi = np.radians(np.arange(-180.0, 181.0)), np.radians(plane)
-        return Target("cut", text, theta, phi, grid_directions(theta, phi))
+        plane, colon, given = rest.partition(":")
+        (azimuth,) = _numbers(text, plane, 1)
+        return _cut(text, azimuth, _numbers(text, given, 1)[0]) if colon else _cut(text, azimuth, 1.0, fits=True)
     if name == "grid":
         (step,) = _numbers(text, rest, 1)
         parts = 180 / step if step > 0 else 0.0
@@ -213,6 +304,19 @@ def parse_target(text: str, direction: FloatArray) -> Target:
         raise InvalidInputError(f"--observe {text!r}: theta is not between 0 and 180 degrees")
     angles = np.radians(pair[:1]), np.radians(pair[1:])
     return Target("point", text, *angles, grid_directions(*angles))
+
+
+def _cut(text: str, azimuth: float, step: float, *, fits: bool = False) -> Target:
+    """Directions of a plane from theta = -180 to 180 degrees."""
+    parts = 360 / step if step > 0 else 0.0
+    if not (0 < step <= 90 and abs(parts - round(parts)) < 1e-6):
+        raise InvalidInputError(
+            f"--observe {text!r}: the step must divide 360 degrees and be at most 90, e.g. cut:0:0.5"
+        )
+    if parts > MOST:
+        raise InvalidInputError(f"--observe {text!r} asks for more than {MOST} directions; give a coarser step")
+    theta, phi = np.radians(np.linspace(-180.0, 180.0, round(parts) + 1)), np.radians([azimuth])
+    return Target("cut", text, theta, phi, grid_directions(theta, phi), fits)
 
 
 def _numbers(text: str, rest: str, count: int) -> list[float]:

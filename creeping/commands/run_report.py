@@ -62,8 +62,14 @@ def _of_the_body(fan: Any) -> dict[str, Any]:
     }
 
 
-def write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend: str) -> tuple[list[str], str]:
-    """Write pictures and data files; their names, and what drew the pictures."""
+DPI = 200
+"""Of pictures."""
+
+
+def write_results(
+    output: Path, line: Any, fan: Any, curves: list[Any], backend: str | None
+) -> tuple[list[str], str | None]:
+    """Write data files and pictures, none without a backend; their names, and what drew the pictures."""
     from creeping import files, plotting
     from creeping.errors import InvalidInputError
 
@@ -78,12 +84,27 @@ def write_results(output: Path, line: Any, fan: Any, curves: list[Any], backend:
     files.write_csv(output / "line.csv", line=line)
     files.write_csv(output / "rays.csv", fan=fan)
     files.write_csv(output / "curves.csv", curves=curves)
-    drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend)
-    plotting.parameter_picture(output / "parameters.png", line, fan, curves)
-    names = ["rays.png", "parameters.png"] + [
-        f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")
-    ]
-    return [*names, "summary.json"], str(drawn_by)
+    names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")], None
+    if backend is not None:
+        drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend, dpi=DPI)
+        plotting.parameter_picture(output / "parameters.png", line, fan, curves, dpi=DPI)
+        names = ["rays.png", "parameters.png", *names]
+    return [*names, "summary.json"], drawn_by
+
+
+def _wave(field: dict[str, Any]) -> str:
+    """Wavenumber, and the frequency that was asked for."""
+    from creeping.commands.wave import frequency_words
+
+    told = f"k = {field['wavenumber']:g}"
+    return told if field["frequency"] is None else f"{frequency_words(field['frequency'])}, {told}"
+
+
+def _level(field: dict[str, Any]) -> str:
+    """Largest cross section in decibels."""
+    if field["largest_db"] is None:
+        return ""
+    return f" ({field['largest_db']:.2f} {'dBsm' if field['unit'] == 'm' else 'dB re 1 L^2'})"
 
 
 def readable(summary: dict[str, Any], output: Path) -> str:
@@ -123,8 +144,8 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     if "field" in summary:
         f = summary["field"]
         rows.append(
-            f"field: k = {f['wavenumber']:g}, {f['boundary']}, {f['directions']} directions, "
-            f"|f| up to {f['largest']:.4g}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
+            f"field: {_wave(f)}, {f['boundary']}, {f['directions']} directions, "
+            f"|f| up to {f['largest']:.4g} {f['unit']}{_level(f)}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
         )
         k_rho, transverse = f["validity"]["least_k_rho"], f["validity"]["largest_transverse"]
         if k_rho is not None:
@@ -137,6 +158,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             off = f["uncertain_by"]
             known = off["reason"] or f"rms {off['rms']:.1e}, max {off['max']:.1e}"
             rows.append(f"error of the field because of the body: {known}")
-    rows.append(f"{summary['iso_phase_curves']} iso-phase curves; 3-D picture by {summary['drawn_by']}")
+    drawn = f"3-D picture by {summary['drawn_by']}" if summary["drawn_by"] else "no pictures"
+    rows.append(f"{summary['iso_phase_curves']} iso-phase curves; {drawn}")
     rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
     return "\n".join(rows)

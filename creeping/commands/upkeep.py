@@ -1,6 +1,7 @@
 """Commands that look after an installation: stored maps and fitted bodies, and what the machine offers."""
 
 import json
+import re
 import time
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,7 @@ from cyclopts import Parameter
 
 from creeping._version import __version__
 
+LIBRARIES = ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh")
 OPTIONAL = {
     "sympy": "expressions",
     "gmsh": "CAD files; GPL",
@@ -20,23 +22,64 @@ OPTIONAL = {
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 
 
+def versions() -> dict[str, str | None]:
+    """Versions of the package, of Python and of the libraries that results depend on, None of what is not there."""
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    found: dict[str, str | None] = {"creeping": __version__, "python": platform.python_version()}
+    for name in (*LIBRARIES, *OPTIONAL):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = None
+    return found
+
+
+def plain_numbers(text: str) -> str:
+    """Text of a body with its hexadecimal floats as decimal ones.
+
+    Examples
+    --------
+    >>> plain_numbers("Ellipsoid(a=0x1.3333333333333p+0, b=-0x1.999999999999ap-1)")
+    'Ellipsoid(a=1.2, b=-0.8)'
+    """
+    return re.sub(r"-?0x[01]\.?[0-9a-f]*p[+-]?\d+", lambda found: repr(float.fromhex(found[0])), text)
+
+
+def _sources() -> dict[str, str]:
+    """Names of the files that fitted bodies were made from, by the names of the fits; of those that know."""
+    from scatterers.spline import cache as _fit_cache
+
+    kept = ((file.stem, _fit_cache.load(file.parent, file.stem)) for file in _fits())
+    return {stem: str(found[1]["source"]) for stem, found in kept if found and found[1].get("source")}
+
+
 def list_maps(*, json_: Json = False) -> int:
     """List the stored maps and fitted bodies."""
     from creeping.errors import CreepingError
     from creeping.phaseflow import cache as caching
     from creeping.storage import folder as storing
 
-    rows = []
+    rows, sources = [], _sources()
     for folder in _stored():
         size = sum(f.stat().st_size for f in folder.iterdir())
         try:
             content = storing.read_manifest(folder)
             rows.append(
-                {"map": folder.name, "MB": round(size / 1e6, 1), "body": content["body"], "error": content["error"][0]}
+                {
+                    "map": folder.name,
+                    "MB": round(size / 1e6, 1),
+                    "body": _readable(content["body"], sources),
+                    "error": content["error"][0],
+                }
             )
         except CreepingError as error:
             rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": f"unreadable: {error}", "error": None})
-    fits = [{"fit": file.stem, "MB": round(file.stat().st_size / 1e6, 1)} for file in _fits()]
+    fits = [
+        {"fit": file.stem, "source": sources.get(file.stem), "MB": round(file.stat().st_size / 1e6, 1)}
+        for file in _fits()
+    ]
     if json_:
         print(json.dumps([*rows, *fits], indent=1))
     else:
@@ -46,8 +89,15 @@ def list_maps(*, json_: Json = False) -> int:
         for row in rows:
             print(f"  {row['map']}  {row['MB']:8.1f} MB  {row['body']}")
         for row in fits:
-            print(f"  {row['fit']}  {row['MB']:8.1f} MB")
+            print(f"  {row['fit']}  {row['MB']:8.1f} MB  {row['source'] or ''}".rstrip())
     return 0
+
+
+def _readable(body: str, sources: dict[str, str]) -> str:
+    """A body in decimal numbers, and by the name of its file."""
+    text = plain_numbers(str(body))
+    name = next((name for stem, name in sources.items() if stem in text), None)
+    return text if name is None else f"{name}: {text}"
 
 
 def verify_maps() -> int:
@@ -121,7 +171,7 @@ def doctor() -> int:
 
     print(f"creeping {__version__}, Python {platform.python_version()}, {os.cpu_count()} cores")
     missing = 0
-    for name in ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh", *OPTIONAL):
+    for name in (*LIBRARIES, *OPTIONAL):
         try:
             print(f"  {name} {version(name)}")
         except PackageNotFoundError:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from creeping._typing import ArrayLike, FloatArray
+from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.arguments import positive_number, real_array
+from creeping.geometry.arguments import positive_number, real_array, shown
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
@@ -41,6 +41,12 @@ def checked(wavenumber: float, order: int) -> float:
     """The wavenumber, if it and the order are usable."""
     if isinstance(wavenumber, complex | np.complexfloating):
         raise InvalidInputError(f"wavenumber = {wavenumber!r} is complex; give a real one: losses belong to the medium")
+    given: Any = wavenumber
+    if isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim):
+        raise InvalidInputError(
+            f"wavenumber = {shown(wavenumber)} is not one number; for several frequencies call "
+            "creeping.backscatter, creeping.bistatic or creeping.sweep_directions"
+        )
     k = positive_number(wavenumber, "wavenumber")
     if not LEAST_WAVENUMBER <= k <= LARGEST_WAVENUMBER:
         raise InvalidInputError(f"wavenumber = {k:g} has squares that are no numbers; take another unit of length")

@@ -106,7 +106,22 @@ def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
     known = {"soft": (SOFT,), "hard": (HARD,), "pec": (ELECTRIC_SOFT, ELECTRIC_HARD)}
     if isinstance(boundary, str) and boundary in known:
         return known[boundary]
-    raise InvalidInputError(f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or ImpedanceBoundary(admittance)")
+    raise InvalidInputError(
+        f"boundary = {boundary!r} is not 'soft', 'hard', 'pec' or ImpedanceBoundary(admittance){meant(boundary, known)}"
+    )
+
+
+def meant(given: object, known: Iterable[str]) -> str:
+    """What a text in other letters may have meant, as the end of a message.
+
+    Examples
+    --------
+    >>> meant("PEC", ["soft", "pec"]), meant("firm", ["soft", "pec"])
+    ("; did you mean 'pec'?", '')
+    """
+    name = given.strip().lower() if isinstance(given, str) else ""
+    name = {"conductor": "pec", "dirichlet": "soft", "neumann": "hard", "rigid": "hard"}.get(name, name)
+    return f"; did you mean {name!r}?" if name in known else ""
 
 
 def boundary_name(boundary: BoundaryLike) -> str:
@@ -138,7 +153,9 @@ def parse_boundary(text: str) -> BoundaryLike:
         return scalar[text]
     name, _, number = text.partition(":")
     if name != "impedance":
-        raise InvalidInputError(f"boundary {text!r} is not soft, hard, pec or impedance:ETA, e.g. impedance:0.5+0.2j")
+        raise InvalidInputError(
+            f"boundary {text!r} is not soft, hard, pec or impedance:ETA, e.g. impedance:0.5+0.2j{meant(text, scalar)}"
+        )
     try:
         admittance = complex(number.replace(" ", ""))
     except ValueError:

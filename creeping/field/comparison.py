@@ -6,6 +6,9 @@
 Sources: [KCY20] for the measure.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

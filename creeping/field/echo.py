@@ -6,6 +6,9 @@
 Sources: [S08] for the cross section, [U83] for target strength.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

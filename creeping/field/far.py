@@ -8,6 +8,9 @@ currents at a lower wavenumber (`creeping.field.extrapolated`) where the method 
 Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +27,7 @@ from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.geometry.arguments import one_of
+from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 
 
@@ -86,12 +90,13 @@ def far_field(
     if method == "currents" or cheap:
         try:
             far = _by_currents(kept_currents(fan, k, boundary), r, boundary)
-            return replace(far, validity=validity(fan, wavenumber=k))
+            return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
         except SurfaceError:
             if method == "currents":
                 raise
     geometry = far_geometry(fan, r)
-    far = replace(field_of(geometry, k, boundary, order), validity=validity(fan, wavenumber=k))
+    far = field_of(geometry, k, boundary, order)
+    far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     level = measured_level(fan, k, boundary) if method == "auto" and order == 2 and len(r) else None
     return level.applied(far) if level else far
 

@@ -1,5 +1,8 @@
 """What a far field is: complex amplitudes by direction, their parts, and what is to be thought of them."""
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -98,7 +101,7 @@ class FarField(Drawn):
         """Target strength 20 log10 |f|, dB relative to a metre if L is the metre, as of sonar: as ``total``."""
         return decibels(self.total)
 
-    def to_xarray(self) -> "xarray.Dataset":
+    def to_xarray(self) -> xarray.Dataset:
         """Amplitudes, parts, error and cross section with names on their axes: an ``xarray.Dataset``.
 
         Dimensions are ``direction``, of a conductor ``scattered`` and ``incident`` too, "theta" and "phi"; coordinates
@@ -108,7 +111,7 @@ class FarField(Drawn):
 
         return far_dataset(self)
 
-    def to_dataframe(self) -> "pandas.DataFrame":
+    def to_dataframe(self) -> pandas.DataFrame:
         """The same as a ``pandas.DataFrame``, one row for each direction, of a conductor for each component of it."""
         return self.to_xarray().drop_vars("vector").drop_dims("axis", errors="ignore").to_dataframe()
 
@@ -120,12 +123,16 @@ class FarField(Drawn):
         largest = np.max(size, initial=0.0, where=finite)
         missing = f", {int(np.sum(~finite))} not finite" if not np.all(finite) else ""
         off = self.stated_error
-        error = "" if off is None else f"; error by {self.error_source} {off[0]:.2g} L rms, {off[1]:.2g} L at most"
+        error = (
+            ""
+            if off is None
+            else f"; error by {self.error_source} {off[0]:.2g} {self.unit} rms, {off[1]:.2g} {self.unit} at most"
+        )
         return (
             f"FarField({len(self.directions)} directions, k = {self.wavenumber:g}, {self.boundary}, "
             f"order {self.order}{self._range})\n"
             f"  {served or 'none'}; {int(self.unresolved.sum())} unresolved{missing}\n"
-            f"  |f| up to {largest:.4g} L{error}"
+            f"  |f| up to {largest:.4g} {self.unit}{error}"
         )
 
     @property

@@ -5,6 +5,9 @@ c is the speed of light in a vacuum, or a given speed of sound.
 Sources: [BIPM19] for the speed of light, which is exact.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import re
 
 import numpy as np

@@ -79,9 +79,9 @@ def point_dataset(field: "PointField", parts: tuple[str, ...]) -> "xarray.Datase
     library = required("xarray", use="labelled results need", extra="sweep")
     flat = field.points.reshape(-1, 3)
     coordinates: dict[str, Any] = {
-        name: (("point",), flat[:, i], {"units": "L"}) for i, name in enumerate(("x", "y", "z"))
+        name: (("point",), flat[:, i], {"units": field.length_unit}) for i, name in enumerate(("x", "y", "z"))
     }
-    coordinates["wavenumber"] = ((), field.wavenumber, {"units": "1/L", "long_name": "k"})
+    coordinates["wavenumber"] = ((), field.wavenumber, {"units": power(field.length_unit, -1), "long_name": "k"})
     variables: dict[str, Any] = {"total": (("point",), field.values.reshape(-1), {"units": field.unit})}
     for name in (*parts, "error"):
         variables[name] = (("point",), np.reshape(getattr(field, name), -1), {"units": field.unit})

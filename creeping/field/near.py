@@ -11,6 +11,9 @@ far less. So rays serve in the shadow where nothing is the matter with them and 
 Sources: [LK59], [CK13]; Derivations, F8, F17 and F20.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import numpy as np
 
 from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
@@ -31,6 +34,7 @@ from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
+from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_near
 from creeping.shadow.occlusion import occluded
@@ -137,6 +141,7 @@ def _result(field: Served, fan: RayFan, points: FloatArray, k: float, boundary: 
         boundary=boundary_name(boundary),
         order=order,
         validity=validity(fan, wavenumber=k),
+        length_unit=unit_of(fan.body),
     )
 
 

@@ -18,6 +18,9 @@ Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on fo
 on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import numpy as np
 
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
@@ -40,6 +43,7 @@ from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
+from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan, RayStatus
 from creeping.rays.shedding import shed_on
 from creeping.rays.tracer import ray_points
@@ -129,6 +133,7 @@ def surface_field(
         boundary=boundary_name(boundary),
         order=order,
         validity=validity(fan, wavenumber=k),
+        length_unit=unit_of(fan.body),
     )
 
 
@@ -163,6 +168,7 @@ def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, o
         boundary=boundary_name(boundary),
         order=order,
         validity=validity(fan, wavenumber=k),
+        length_unit=unit_of(fan.body),
     )
 
 

@@ -3,6 +3,9 @@
 Results act as arrays of their values (`creeping.field.array_result`).
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import TYPE_CHECKING
@@ -95,6 +98,8 @@ class PointField(ArrayResult, Shown):
     order : int
     validity : Validity
         Least k rho and largest kappa_t rho/m^2 on the fan's rays.
+    length_unit : str
+        "m" where the body knows it, else "L".
     """
 
     points: FloatArray
@@ -107,6 +112,7 @@ class PointField(ArrayResult, Shown):
     boundary: str
     order: int
     validity: Validity | None = field(default=None, kw_only=True)
+    length_unit: str = field(default="L", kw_only=True)
 
     @property
     def ok(self) -> BoolArray:
@@ -128,14 +134,14 @@ class PointField(ArrayResult, Shown):
         """Unit of the values."""
         return "of the incident wave"
 
-    def to_xarray(self) -> "xarray.Dataset":
+    def to_xarray(self) -> xarray.Dataset:
         """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
         from creeping.field.labelled import point_dataset
 
         own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
         return point_dataset(self, tuple(sorted(own)))
 
-    def to_dataframe(self) -> "pandas.DataFrame":
+    def to_dataframe(self) -> pandas.DataFrame:
         """The same as a ``pandas.DataFrame``, one row a point."""
         return self.to_xarray().to_dataframe()
 
@@ -160,7 +166,7 @@ class NearField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
         As of every field at points; ``method`` is "currents", "layer" between them and the
         body, or "rays"; on the body "lit", "rays", "lit+rays", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
@@ -191,7 +197,7 @@ class SurfaceField(PointField):
 
     Attributes
     ----------
-    points, values, error, error_by, status, method, wavenumber, boundary, order, validity
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
         As of every field at points; ``method`` is "lit", "rays" or, in the penumbra, "lit+rays".
     lit, creeping : (...) complex
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
@@ -214,4 +220,4 @@ class SurfaceField(PointField):
     @property
     def unit(self) -> str:
         """Unit of the values."""
-        return "1/L" if self.boundary == "soft" else super().unit
+        return f"1/{self.length_unit}" if self.boundary == "soft" else super().unit

@@ -9,6 +9,9 @@ bound what a strong echo hides. Ranges repeat after pi/dk; two echoes are told a
 Sources: [H78] for the windows; Derivations, F21.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

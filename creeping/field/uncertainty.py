@@ -1,5 +1,8 @@
 """How uncertain a far field is because its body is known only approximately."""
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray

@@ -1,12 +1,13 @@
 """A far field as a table: one row per direction, the total and its parts, for a vector field each component."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.field.decibels import decibels
+from creeping.field.decibels import cross_section_decibels, decibels
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
@@ -24,9 +25,10 @@ def angles_of(directions: FloatArray) -> FloatArray:
     return np.stack([np.arctan2(across, z), np.where(phi >= 2 * np.pi, 0.0, phi)], axis=-1)
 
 
-def notes(far: "FarField") -> dict[str, str]:
+def notes(far: "FarField", *, observed: bool = False) -> dict[str, str]:
     """Columns and what they hold."""
-    of = f"k = {far.wavenumber!r} 1/L, {far.boundary} boundary, order {far.order}, time factor exp(-i w t)"
+    unit = far.unit
+    of = f"k = {far.wavenumber!r} 1/{unit}, {far.boundary} boundary, order {far.order}, time factor exp(-i w t)"
     columns = {
         "x": "direction from the body to the observer",
         "y": "direction",
@@ -36,30 +38,37 @@ def notes(far: "FarField") -> dict[str, str]:
     }
     for suffix in _suffixes(far):
         name = f", {_spelled(suffix)} by {_spelled(suffix[0] + suffix[2:])} incident" if suffix else ""
-        columns[f"re{suffix}"] = f"real part of the far field f, L{name}; {of}"
+        columns[f"re{suffix}"] = f"real part of the far field f, {unit}{name}; {of}"
         columns[f"im{suffix}"] = "imaginary part"
         columns[f"dB{suffix}"] = "20 log10 |f|, -inf where f is 0"
-        columns[f"error{suffix}"] = f"error of f, L, {_error_of(far)}"
+        area = "dBsm" if unit == "m" else f"dB re 1 {unit}^2"
+        columns[f"rcs_dB{suffix}"] = f"10 log10(4 pi |f|^2), {area}"
+        columns[f"error{suffix}"] = f"error of f, {unit}, {_error_of(far)}"
         for part in PARTS:
-            columns[f"{part}_re{suffix}"] = f"part of f, L{name}"
+            columns[f"{part}_re{suffix}"] = f"part of f, {unit}{name}"
             columns[f"{part}_im{suffix}"] = "imaginary part"
     columns["method"] = "what served the creeping part"
     columns["unresolved"] = "1 where a part was not found, its expansion fails or the error is large"
+    if observed:
+        columns["observe"] = "what was asked for, its commas blanks"
+        columns["angle"] = "degrees along a cut, theta with the sign of its side; nan of what is no cut"
     return columns
 
 
-def rows(far: "FarField") -> Iterable[tuple[Any, ...]]:
+def rows(far: "FarField", observed: "tuple[Sequence[str], FloatArray] | None" = None) -> Iterable[tuple[Any, ...]]:
     """One tuple for each direction, in the order of `notes`."""
     columns: list[Any] = [*np.asarray(far.directions).T, *np.degrees(angles_of(far.directions)).T]
     for k in range(len(_suffixes(far))):
         total = _component(far.total, k)
-        columns += [total.real, total.imag, decibels(total), _component(far.error, k)]
+        columns += [total.real, total.imag, decibels(total), cross_section_decibels(total), _component(far.error, k)]
         for part in PARTS:
             values = _component(getattr(far, part), k)
             columns += [values.real, values.imag]
     numbers = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
-    for row, method, lost in zip(numbers, far.method, far.unresolved, strict=True):
-        yield (*row, method, int(lost))
+    texts, angles = observed or ((), np.zeros(0))
+    ends = zip((text.replace(",", " ") for text in texts), angles.tolist(), strict=True) if observed else repeat(())
+    for row, method, lost, end in zip(numbers, far.method, far.unresolved, ends, strict=False):
+        yield (*row, method, int(lost), *end)
 
 
 def _error_of(far: "FarField") -> str:

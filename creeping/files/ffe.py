@@ -7,6 +7,9 @@ Its time factor is e^{+jωt} and ours e^{-iωt}, so every number is written conj
 Rows run over θ first, then φ, in degrees.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -38,7 +41,7 @@ def grid_directions(theta: ArrayLike, phi: ArrayLike) -> FloatArray:
 
 def write_ffe(
     path: str | os.PathLike[str],
-    far: "FarField",
+    far: FarField,
     theta: ArrayLike,
     phi: ArrayLike,
     *,
@@ -81,7 +84,7 @@ def write_ffe(
         stream.writelines(line + "\n" for line in _lines(far, t, p, direction))
 
 
-def _check_grid(far: "FarField", theta: FloatArray, phi: FloatArray) -> None:
+def _check_grid(far: FarField, theta: FloatArray, phi: FloatArray) -> None:
     remedy = "; give far_field the directions of grid_directions(theta, phi)"
     if theta.ndim != 1 or phi.ndim != 1 or not (np.all(np.isfinite(theta)) and np.all(np.isfinite(phi))):
         raise InvalidInputError(f"theta {theta.shape} and phi {phi.shape} are not axes (t,), (p,) of finite radians")
@@ -101,7 +104,7 @@ def _check_grid(far: "FarField", theta: FloatArray, phi: FloatArray) -> None:
         )
 
 
-def _trust(far: "FarField") -> Iterator[str]:
+def _trust(far: FarField) -> Iterator[str]:
     """Comments on the errors, which the format has no columns for."""
     served = ", ".join(sorted({str(name) for name in far.method}))
     doubtful = f"{int(np.sum(far.unresolved))} of {len(far.method)} directions"
@@ -111,13 +114,14 @@ def _trust(far: "FarField") -> Iterator[str]:
         yield f"** error of |f| by {far.error_source}: {rms:.3e} m rms over the directions, {worst:.3e} m at most"
 
 
-def _lines(far: "FarField", theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:
+def _lines(far: FarField, theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:
     vector = np.ndim(far.total) == 3
     yield "##File Type: Far field"
     yield "##File Format: 8"
     yield f"##Source: creeping {__version__}"
     yield f"** {far.boundary} boundary, order {far.order}, k = {far.wavenumber!r} 1/L"
-    yield "** frequency: L is taken as the metre and the wave's speed as that of light"
+    taken = "" if far.unit == "m" else "L is taken as the metre and "
+    yield f"** frequency: {taken}the wave's speed as that of light"
     yield "** time factor exp(+jwt): complex conjugates of the far field f of creeping, exp(-iwt)"
     yield from _trust(far)
     if not vector:
@@ -147,7 +151,7 @@ def _lines(far: "FarField", theta: FloatArray, phi: FloatArray, direction: Array
             yield " " + "".join(f"{value:26.16E}" for value in (*row, float(np.sum(sections))))
 
 
-def _components(far: "FarField", theta: FloatArray, phi: FloatArray, incident: int) -> ComplexArray:
+def _components(far: FarField, theta: FloatArray, phi: FloatArray, incident: int) -> ComplexArray:
     """θ̂ and φ̂ components for one incident polarisation (t, p, 2); at a pole those of the row's φ, not of φ = 0."""
     total = np.asarray(far.total)
     if total.ndim == 1:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from creeping._typing import Any
+from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.files import far_table as _far_table
 from creeping.files.polylines import polydata
@@ -82,6 +82,7 @@ def write_csv(
     fan: RayFan | None = None,
     curves: Sequence[IsoPhaseCurve] | None = None,
     far: "FarField | None" = None,
+    observed: tuple[Sequence[str], FloatArray] | None = None,
 ) -> None:
     """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
 
@@ -91,6 +92,8 @@ def write_csv(
         File to write; replaced at once when complete.
     line, fan, curves, far
         Exactly one of them: they have different columns.
+    observed : (texts, angles), optional
+        Of a far field: what each direction was asked for as, and its angle along the cut (m,), degrees.
 
     Raises
     ------
@@ -113,7 +116,7 @@ def write_csv(
         elif curves is not None:
             _write_table(stream, _CURVE_NOTES, _curve_rows(curves))
         elif far is not None:
-            _write_table(stream, _far_table.notes(far), _far_table.rows(far))
+            _write_table(stream, _far_table.notes(far, observed=observed is not None), _far_table.rows(far, observed))
 
 
 _POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}

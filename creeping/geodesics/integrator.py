@@ -3,6 +3,9 @@
 Blocks of rays advance with one step for the block, and each accepted step is put back on T1Q.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple

@@ -98,24 +98,31 @@ def of_far(far: "FarField") -> Facts:
         angles = np.degrees(angles_of(far.directions))
         yield "theta", _range(angles[:, 0], "degrees")
         yield "phi", _range(angles[:, 1], "degrees")
-    yield "wavenumber", f"{far.wavenumber:g} 1/L (wavelength {2 * np.pi / far.wavenumber:.6g} L)"
+    yield "wavenumber", f"{far.wavenumber:g} 1/{far.unit} (wavelength {2 * np.pi / far.wavenumber:.6g} {far.unit})"
     yield "boundary", far.boundary
     yield "order", str(far.order)
     if total.ndim == 3:
         yield "components", "θ and φ scattered by θ and φ incident"
     for name, count in sorted(Counter(far.method.tolist()).items()):
         yield f"served by {name or 'nothing'}", f"{count} directions"
-    yield "largest |f|", f"{largest:.6g} L"
+    yield "largest |f|", f"{largest:.6g} {far.unit}"
     if largest > 0:
-        yield "largest 4π|f|²", f"{10 * np.log10(4 * np.pi * largest**2):.2f} dB re 1 L²"
+        yield (
+            "largest 4π|f|²",
+            f"{10 * np.log10(4 * np.pi * largest**2):.2f} " + ("dBsm" if far.unit == "m" else f"dB re 1 {far.unit}²"),
+        )
     yield "unresolved", f"{int(far.unresolved.sum())} directions"
     yield from _lost(total)
 
 
 def of_points(field: "PointField") -> Facts:
     """Facts of a near or surface field."""
+    unit = field.length_unit
     yield "points", " x ".join(map(str, field.shape)) or "1"
-    yield "wavenumber", f"{field.wavenumber:g} 1/L (wavelength {2 * np.pi / field.wavenumber:.6g} L)"
+    yield (
+        "wavenumber",
+        f"{field.wavenumber:g} 1/{unit} (wavelength {2 * np.pi / field.wavenumber:.6g} {unit})",
+    )
     yield "boundary", field.boundary
     yield "order", str(field.order)
     for name, count in sorted(Counter(field.method.ravel().tolist()).items()):

@@ -16,6 +16,8 @@ from creeping.shadow.status import STATUSES
 BODY_COLOUR = "#dfe5ea"
 RAY_COLOUR = "#55606b"
 ARROW_COLOUR = "#1b1b1b"
+FADED, FADED_WIDTH = 0.4, 0.5
+"""Opacity and width, points, of iso-phase curves where rays have detached."""
 HIDDEN = 0.22  # share of its ink that a line behind the body keeps
 # apart in lightness as well as in hue, and apart from the map of the iso-phase levels
 STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#c2185b"}
@@ -73,15 +75,41 @@ def strokes(
         found += ray_strokes(fan, rays, np.inf if until is None else until)
     colours = LevelColours.of(curves)
     for curve in curves:
-        points = closed(np.asarray(curve.points)) if curve.closed else np.asarray(curve.points)
+        bound, free = curve_pieces(curve, fan, curve.points)
         # levels are read off the colour bar; a single one has none
         label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
-        found.append(Stroke([points], colours(curve.level), 0.9, label=label, rank=1))
+        colour = colours(curve.level)
+        found += [Stroke(bound, colour, 0.9, label=label, rank=1)] if bound else []
+        found += [Stroke(free, colour, FADED_WIDTH, alpha=FADED, rank=1)] if free else []
     for status in STATUSES:
         pieces = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
         if pieces:
             found.append(Stroke(pieces, STATUS_COLOURS[status], 1.8, label=f"shadow line, {status}", rank=2))
     return found
+
+
+def curve_pieces(
+    curve: IsoPhaseCurve, fan: RayFan | None, points: FloatArray
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Pieces of an iso-phase curve where its rays creep, and where they have detached: (k, d) each.
+
+    ``points`` (m, d) are its points, or their parameters. Without the curve's fan nothing counts as detached.
+    """
+    points = np.asarray(points)
+    detached = np.zeros(len(points), dtype=bool)
+    rays = getattr(curve, "rays", np.zeros(0, dtype=int))
+    if fan is not None and len(rays) == len(points) and np.max(rays, initial=-1) < len(fan.points):
+        start = fan.eikonal[:, 0] - fan.travel_time[0] if curve.of == "eikonal" else np.zeros(len(fan.points))
+        detached = curve.level - start[rays] > fan.detachment[rays]
+    if curve.closed:
+        points, detached = closed(points), np.append(detached, detached[:1])
+    if not np.any(detached):
+        return [points], []
+    # one point more at either end, so that the parts join
+    free = detached.copy()
+    free[1:] |= detached[:-1]
+    free[:-1] |= detached[1:]
+    return list(runs(points, ~detached)), list(runs(points, free))
 
 
 def chosen_rays(fan: RayFan, rays: int) -> list[int]:

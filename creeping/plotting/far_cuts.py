@@ -1,5 +1,8 @@
 """Pictures of the far field in one plane: decibels against the angle, over straight axes or round a circle."""
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -48,7 +51,7 @@ class Curve:
         """Whether it sets the range: parts, which are thinner, may vanish."""
         return bool(self.style["linewidth"] > 0.8)
 
-    def ordered(self, order: IntArray, label: str) -> "Curve":
+    def ordered(self, order: IntArray, label: str) -> Curve:
         """The same with its points in another order, and another label."""
         band = None if self.band is None else self.band[:, order]
         doubt = None if self.doubt is None else self.doubt[order]
@@ -58,7 +61,7 @@ class Curve:
 def far_cut_picture(
     path: str | os.PathLike[str],
     angles: ArrayLike,
-    fields: Mapping[str, "FarField | ComplexArray"],
+    fields: Mapping[str, FarField | ComplexArray],
     *,
     kind: str = "cartesian",
     quantity: str = "amplitude",
@@ -68,6 +71,7 @@ def far_cut_picture(
     span: float = 60.0,
     angle_name: str = "angle",
     title: str | None = None,
+    unit: str | None = None,
     dpi: int = 300,
 ) -> None:
     """Write a PNG of far fields against the angle in one plane, with the bands of their errors.
@@ -85,7 +89,7 @@ def far_cut_picture(
     kind : str
         "cartesian", or "polar": angle 0 at the top, clockwise.
     quantity : str
-        "amplitude", 20 log10 |f|, or "rcs", 10 log10(4π|f|²): dBsm where L is the metre.
+        "amplitude", 20 log10 |f|, or "rcs", 10 log10(4π|f|²): dBsm where lengths are known to be metres.
     exact : complex (m,) or (m, 2, 2), L, optional
         Reference, drawn thin and black under the others.
     parts : bool
@@ -98,6 +102,8 @@ def far_cut_picture(
         Name of the angle on the axis.
     title : str, optional
         By default the wavenumber and the boundary, where all fields share them.
+    unit : str, optional
+        Of lengths; by default that of the fields.
     dpi : int
 
     Raises
@@ -115,7 +121,7 @@ def far_cut_picture(
     figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
-    draw_cut(ax, angle, curves, heights, quantity=quantity, angle_name=angle_name)
+    draw_cut(ax, angle, curves, heights, quantity=quantity, angle_name=angle_name, unit=unit or _unit(fields))
     ax.set_title(_title(fields) if title is None else title, fontsize=9)
     add_legend(ax, fresh=True)
     save_figure(figure, path, dpi)
@@ -182,7 +188,7 @@ def level_name(quantity: str, unit: str) -> str:
 
 def cut_curves(
     count: int,
-    fields: Mapping[str, "FarField | ComplexArray"],
+    fields: Mapping[str, FarField | ComplexArray],
     *,
     quantity: str = "amplitude",
     exact: ComplexArray | None = None,
@@ -296,8 +302,16 @@ def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: s
     ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
 
 
+def _unit(fields: Mapping[str, Any]) -> str:
+    """Unit of lengths that all fields share."""
+    units = {getattr(field, "unit", "L") for field in fields.values()}
+    return units.pop() if len(units) == 1 else "L"
+
+
 def _title(fields: Mapping[str, Any]) -> str:
     known = {
-        f"k = {field.wavenumber:g}/L, {field.boundary} boundary" for field in fields.values() if hasattr(field, "total")
+        f"k = {field.wavenumber:g}/{getattr(field, 'unit', 'L')}, {field.boundary} boundary"
+        for field in fields.values()
+        if hasattr(field, "total")
     }
     return known.pop() if len(known) == 1 else ""

@@ -30,7 +30,7 @@ def plot_far(
     components: Sequence[str] = ("tt", "pp"),
     angles: ArrayLike | None = None,
     angle_name: str = "angle",
-    unit: str = "m",
+    unit: str | None = None,
     span: float = 60.0,
     legend: bool | None = None,
 ) -> Any:
@@ -45,7 +45,7 @@ def plot_far(
     ax : matplotlib.axes.Axes, optional
         By default those of a new figure.
     quantity : {"rcs", "amplitude"}
-        10 log10(4π|f|²), dBsm where lengths are metres, or 20 log10 |f|.
+        10 log10(4π|f|²), dBsm where lengths are known to be metres, or 20 log10 |f|.
     parts : bool
         Whether to draw the creeping, reflected and forward part as thin lines.
     components : sequence of str
@@ -54,8 +54,8 @@ def plot_far(
         Angle of each direction, joined in this order; by default found from the directions.
     angle_name : str
         Name of ``angles``.
-    unit : str
-        Unit of the body's lengths.
+    unit : str, optional
+        Of lengths; by default that of the result, "m" where the body knows it.
     span : float, dB
         Range below the highest value.
     legend : bool
@@ -77,15 +77,22 @@ def plot_far(
         cut = CutAngles(given, angle_name, np.arange(len(given)))
     curves = cut_curves(len(cut.values), {"total": far}, quantity=quantity, parts=parts, components=components)
     heights = shown_range([curve.levels for curve in curves if curve.thick], span)
-    curves = [curve.ordered(cut.order, curve.label.removeprefix("total, ")) for curve in curves]
+    curves = [curve.ordered(cut.order, _short(curve.label)) for curve in curves]
     fresh, ax = axes_or_new(ax, PAGE)
-    draw_cut(ax, cut.values[cut.order], curves, heights, quantity=quantity, unit=unit, angle_name=cut.name)
+    draw_cut(ax, cut.values[cut.order], curves, heights, quantity=quantity, unit=unit or far.unit, angle_name=cut.name)
     _mark(ax, cut.values[cut.order], curves, heights[1])
     if fresh:
         # a boundary's name is the user's and no formula
-        ax.set_title(f"k = {far.wavenumber:g}/L, {far.boundary} boundary", fontsize=9, parse_math=False)
+        ax.set_title(
+            f"k = {far.wavenumber:g}/{unit or far.unit}, {far.boundary} boundary", fontsize=9, parse_math=False
+        )
     add_legend(ax, fresh, legend)
     return ax
+
+
+def _short(label: str) -> str:
+    """Label without the name of the whole, where something else tells: "total" alone stays."""
+    return label.removeprefix("total").lstrip(", ") or label
 
 
 def _mark(ax: Any, angle: FloatArray, curves: Sequence[Curve], high: float) -> None:

@@ -9,14 +9,13 @@ from creeping.errors import InvalidInputError
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import LEVEL_NAMES
 from creeping.plotting._view import View
-from creeping.plotting.parameter_plane import draw_curves, frame, plot_parameters
+from creeping.plotting.parameter_plane import draw_curves, frame, is_torus, page_size, plot_parameters
 from creeping.plotting.pictures import add_legend, axes_or_new, drawn_page
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowCurve, ShadowLine
 
 KINDS = ("parameters", "3d")
-PLANE = (6.4, 4.4)  # inches
 
 
 def line_of(curve: ShadowCurve) -> ShadowLine:
@@ -74,7 +73,7 @@ def plot_line(
         return plot_rays_3d(line, fan, curves, ax=ax, view=view, legend=bool(legend), **shown)
     if view is not None:
         raise InvalidInputError("a view is for kind='3d'; the plane of the parameters has none")
-    fresh, ax = axes_or_new(ax, PLANE)
+    fresh, ax = axes_or_new(ax, page_size(torus=is_torus(line)))
     return plot_parameters(line, fan, curves, ax=ax, legend=fresh if legend is None else legend, **shown)
 
 
@@ -111,7 +110,10 @@ def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None,
         If the kind is unknown or not that of the axes.
     """
     space = _in_space(ax, kind)
-    fresh, ax = axes_or_new(ax, PLANE, projection="3d" if space else None)
+    # the body is not known here: a polar angle is never negative, that of a torus takes both signs
+    torus = bool(np.any(curve.parameters[:, 0] < 0))
+    page = (6.4, 4.4) if space else page_size(torus=torus)
+    fresh, ax = axes_or_new(ax, page, projection="3d" if space else None)
     if space:
         points = np.concatenate([curve.points, curve.points[: int(curve.closed)]])
         # above the body of a picture, which orders what it draws by hand
@@ -123,8 +125,7 @@ def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None,
         framed = bool(ax.get_xlabel())
         draw_curves(ax, [curve])
         if not framed:
-            # the body is not known here: a polar angle is never negative, that of a torus takes both signs
-            frame(ax, torus=bool(np.any(curve.parameters[:, 0] < 0)))
+            frame(ax, torus=torus)
     add_legend(ax, fresh, legend)
     return ax
 

@@ -5,7 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.plotting._strokes import STATUS_COLOURS, LevelColours, ray_strokes, status_pieces
+from creeping.plotting._strokes import (
+    FADED,
+    FADED_WIDTH,
+    STATUS_COLOURS,
+    LevelColours,
+    curve_pieces,
+    ray_strokes,
+    status_pieces,
+)
 from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
@@ -46,7 +54,7 @@ def plot_parameters(
     if ax is None:
         from matplotlib import pyplot
 
-        ax = pyplot.figure(figsize=(6.4, 4.4), dpi=150, layout="constrained").add_subplot()
+        ax = pyplot.figure(figsize=page_size(torus=is_torus(line)), dpi=150, layout="constrained").add_subplot()
     body = line.body
     if fan is not None:
         # finer than in space: near a pole phi turns fast
@@ -55,7 +63,7 @@ def plot_parameters(
                 piece for points in stroke.lines for piece in split_at_seam(body.parameters(points), closed=False)
             ]
             _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
-    colours = draw_curves(ax, curves)
+    colours = draw_curves(ax, curves, fan)
     for status in STATUSES:
         lines = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
         pieces = _in_plane(body, lines)
@@ -66,13 +74,24 @@ def plot_parameters(
     return ax
 
 
-def draw_curves(ax: Any, curves: Sequence[IsoPhaseCurve]) -> LevelColours:
-    """Draw iso-phase curves, and return the colours of their levels."""
+def page_size(*, torus: bool) -> tuple[float, float]:
+    """Width and height, inches, of a page that the plane fills, with a legend below and a bar beside it."""
+    return (6.4, 5.9) if torus else (6.4, 3.6)
+
+
+def draw_curves(ax: Any, curves: Sequence[IsoPhaseCurve], fan: RayFan | None = None) -> LevelColours:
+    """Draw iso-phase curves, faint where rays of their fan have detached, and return the colours of their levels."""
     colours = LevelColours.of(curves)
     for curve in curves:
         # levels are read off the colour bar; a single one has none
         label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
-        _add(ax, curve.parameter_pieces, color=colours(curve.level), linewidth=1.0, label=label, zorder=3)
+        bound, free = (
+            [piece for part in parts for piece in split_at_seam(part, closed=False)]
+            for parts in curve_pieces(curve, fan, curve.parameters)
+        )
+        colour = colours(curve.level)
+        _add(ax, bound, color=colour, linewidth=1.0, label=label, zorder=3)
+        _add(ax, free, color=colour, linewidth=FADED_WIDTH, alpha=FADED, zorder=3)
     return colours
 
 

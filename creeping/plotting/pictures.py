@@ -92,9 +92,9 @@ def parameter_picture(
     CreepingError
         If the file cannot be written.
     """
-    from creeping.plotting.parameter_plane import plot_parameters
+    from creeping.plotting.parameter_plane import is_torus, page_size, plot_parameters
 
-    figure = new_figure((6.4, 4.4))
+    figure = new_figure(page_size(torus=is_torus(line)))
     figure.set_layout_engine("constrained")
     plot_parameters(line, fan, curves, ax=figure.add_subplot(), rays=rays, until=until)
     save_figure(figure, path, dpi)

@@ -6,6 +6,9 @@ polynomial with the positions, velocities x' and accelerations x'' of both ends,
 Sources: [YC06b]; Derivations, R14.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -8,6 +8,9 @@ Seen from outside, the lit side (n.d < 0) is on the left of T. The line is that 
 the last bit; next to a singular direction, where that cannot be certain, its topology is proven (`following`).
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
+from creeping.field.labelled import power
 from creeping.storage.extras import required
 
 if TYPE_CHECKING:
@@ -33,6 +34,12 @@ class SweepFields:
 
     def __init__(self, dataset: "xarray.Dataset") -> None:
         self.dataset = dataset
+
+    @property
+    def unit(self) -> str:
+        """Unit of lengths: "m" where the body knows it, else "L"."""
+        stated = self.dataset["wavenumber"].attrs.get("units") if "wavenumber" in self.dataset.coords else None
+        return "m" if stated == power("m", -1) else "L"
 
     @property
     def total(self) -> "xarray.DataArray":
@@ -63,17 +70,18 @@ class SweepFields:
     def cross_section(self) -> "xarray.DataArray":
         """4 pi |f|^2, L^2."""
         found = 4 * np.pi * abs(self.total) ** 2
-        return found.assign_attrs(units="L2", long_name="cross section 4 pi |f|^2")
+        return found.assign_attrs(units=power(self.unit, 2), long_name="cross section 4 pi |f|^2")
 
     @property
     def dbsm(self) -> "xarray.DataArray":
-        """Radar cross section, 10 log10(4 pi |f|^2): dB relative to a square metre if L is the metre."""
-        return self._decibels(self.total, 4 * np.pi, "dBsm", "radar cross section")
+        """Radar cross section, 10 log10(4 pi |f|^2): dBsm where the body knows that L is the metre."""
+        units = "dBsm" if self.unit == "m" else "dB re 1 L^2"
+        return self._decibels(self.total, 4 * np.pi, units, "radar cross section")
 
     @property
     def target_strength(self) -> "xarray.DataArray":
         """Target strength, 20 log10 |f|: dB relative to a metre if L is the metre."""
-        return self._decibels(self.total, 1.0, "dB", "target strength, re 1 m")
+        return self._decibels(self.total, 1.0, f"dB re 1 {self.unit}", "target strength")
 
     def polarisation(self, name: str) -> "SweepFields":
         """Fields of one polarisation of a conductor, "HH", "HV", "VH" or "VV": received, then transmitted.
@@ -99,7 +107,7 @@ class SweepFields:
         if not names:
             raise InvalidInputError("the dataset has no field; ask for quantity 'monostatic' or 'bistatic'")
         found: xarray.DataArray = sum((self.dataset[name] for name in names[1:]), self.dataset[names[0]])
-        return found.assign_attrs(units="L", long_name="far-field amplitude f")
+        return found.assign_attrs(units=self.unit, long_name="far-field amplitude f")
 
     def _decibels(self, values: "xarray.DataArray", factor: float, units: str, text: str) -> "xarray.DataArray":
         with np.errstate(divide="ignore"):

@@ -4,6 +4,9 @@ Angles are those of the radar or of the observer as seen from the body, in degre
 from the plane z = 0. The wave of a radar at (azimuth, elevation) travels the other way.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -24,10 +27,6 @@ from creeping.sweeping.run import sweep_directions
 if TYPE_CHECKING:
     import xarray
 
-PER_LOBE = 4
-"""Angles for each lobe of a pattern."""
-NICE = (1.0, 0.5, 0.25, 0.2, 0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001)
-"""Steps of a cut, degrees, the largest that fits is taken."""
 BLOCK = 24
 """Wavenumbers of one call where incidences are few: how often progress is told."""
 MOST = 10_000_000
@@ -46,7 +45,7 @@ def backscatter(
     n_rays: int = 192,
     cache: bool = True,
     progress: Progress | None = None,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Field in the direction of the radar, for each of its angles and wavenumbers.
 
     Parameters
@@ -103,7 +102,7 @@ def bistatic(
     n_rays: int = 192,
     cache: bool = True,
     progress: Progress | None = None,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Field towards observers around the body, for one incidence.
 
     Parameters
@@ -140,21 +139,6 @@ def bistatic(
     return _with_angles(found, "observer", azimuths, elevations)
 
 
-def lobe_step(body: Surface, wavenumber: float, *, monostatic: bool) -> float:
-    """Step of a cut, degrees, with PER_LOBE angles for each lobe: lambda/D of a bistatic pattern, half in backscatter.
-
-    Examples
-    --------
-    >>> import scatterers as sc
-    >>> lobe_step(sc.Sphere(), 60.0, monostatic=True)
-    0.25
-    """
-    longest = float(np.max(np.ptp(body.bounds, axis=0)))
-    lobe = 2 * np.pi / (float(checked(wavenumber, 2)) * longest) / (2 if monostatic else 1)
-    wanted = np.degrees(lobe) / PER_LOBE
-    return next((step for step in NICE if step <= wanted), NICE[-1])
-
-
 def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, FloatArray]:
     try:
         a, e = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in (azimuth, elevation)))
@@ -176,7 +160,7 @@ def _swept(
     asked: dict[str, Any],
     cache: bool,
     progress: Progress | None,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Sweep, in blocks of wavenumbers where there are few incidences, so that progress is told in time."""
     library = register()
     numbers = np.atleast_1d(np.asarray(wavenumbers))
@@ -207,16 +191,14 @@ def _swept(
     return joined.assign_attrs(seconds=round(seconds, 3))
 
 
-def _with_angles(
-    found: "xarray.Dataset", dimension: str, azimuths: FloatArray, elevations: FloatArray
-) -> "xarray.Dataset":
+def _with_angles(found: xarray.Dataset, dimension: str, azimuths: FloatArray, elevations: FloatArray) -> xarray.Dataset:
     words = {"units": "degree", "long_name": "as seen from the body"}
     angles = {"azimuth": azimuths, "elevation": elevations}
     return found.assign_coords({name: (dimension, values, words) for name, values in angles.items()})
 
 
 def echo_of(
-    dataset: "xarray.Dataset",
+    dataset: xarray.Dataset,
     quantity: str,
     channels: tuple[str, ...],
     angle_name: str,

@@ -158,7 +158,12 @@ class SweepRequest:
         elif self.method != "rays" and self.order != 2:
             yield f"method = {self.method!r} has no order {self.order}; give method 'rays'"
         if (self.quantity == "bistatic") != bool(self.observation):
-            yield "observation directions go with quantity 'bistatic', and with no other"
+            remedy = (
+                "needs observation directions: give observation=, unit vectors (m, 3) from the body to the observers"
+                if self.quantity == "bistatic"
+                else "has none; observation directions belong to quantity 'bistatic'"
+            )
+            yield f"quantity {self.quantity!r} {remedy}"
 
     @property
     def scalar_boundaries(self) -> tuple[str, ...]:

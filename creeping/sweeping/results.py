@@ -9,7 +9,9 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
+from creeping.field.labelled import power
 from creeping.geometry.directions import angles_of
+from creeping.geometry.unit import unit_of
 from creeping.shadow.status import INCIDENCE_STATUSES
 from creeping.storage.extras import required
 from creeping.sweeping.accessor import register
@@ -144,7 +146,19 @@ def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]], s
     counts = count_attributes(arrays["incidence_status"], errors, seconds)
     words = sweep_attributes(plan) | counts
     found: xarray.Dataset = register().Dataset(variables, coordinates(request, plan.incidences), words)
-    return found
+    return in_unit(found, unit_of(plan.body))
+
+
+def in_unit(dataset: "xarray.Dataset", unit: str) -> "xarray.Dataset":
+    """The dataset with attributes for lengths in another unit than L, which the numbers are in: the same object."""
+    if unit == "L":
+        return dataset
+    for values in dataset.variables.values():
+        text = str(values.attrs.get("units", ""))
+        if "L" in text:
+            values.attrs["units"] = power(unit, -1) if text == "1/L" else text.replace("L", unit)
+    dataset.attrs["conventions"] = CONVENTIONS.replace("the unit L of the body", f"{unit}").replace("L", unit)
+    return dataset
 
 
 def without_complex(dataset: "xarray.Dataset") -> "xarray.Dataset":

@@ -1,5 +1,8 @@
 """Sweeps over incident directions, in this process or on a cluster."""
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -47,7 +50,7 @@ def sweep_directions(
     client: Any = None,
     chunk: int | None = None,
     progress: Progress | None = None,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Creeping rays, or their field, for many directions of incidence.
 
     Parameters
@@ -143,7 +146,7 @@ def sweep_directions(
     return opened.dataset()
 
 
-def in_memory(plan: SweepPlan, progress: Progress | None = None) -> "xarray.Dataset":
+def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Dataset:
     """Dataset of a plan, computed in this process and kept in memory.
 
     Raises

@@ -123,7 +123,11 @@ class FittedBody(SplineBody):
         The same body fitted on a coarser grid: what differs on it is uncertain.
     repairs : tuple of str
         What was changed in the source.
+    unit : str
+        "m": lengths are metres, whatever the unit in the file; "L" of a mesh in memory that states none.
     """
+
+    unit = "m"
 
     def _open(
         self, key: str, cache: bool | str | Path, speed: Any, make: Callable[[], PointCloud], progress: Progress

@@ -104,6 +104,8 @@ def parse(text: str) -> Any:
                 return -build(operand, depth + 1)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return build(operand, depth + 1)
+            case ast.BinOp(op=ast.BitXor()):
+                raise ValueError(f"expression {shown(text)} contains ^, which is no power here; write x**2, not x^2")
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
                 a, b = build(left, depth + 1), build(right, depth + 1)
                 if isinstance(op, ast.Pow):

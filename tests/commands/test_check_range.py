@@ -5,6 +5,7 @@ import json
 import pytest
 
 from creeping.commands import main as cli
+from creeping.errors import CreepingError
 
 
 def check(capsys, *arguments):
@@ -33,3 +34,26 @@ def test_as_json(capsys):
 def test_a_weighted_body_has_no_field(capsys):
     code, said = check(capsys, "sphere", "--speed", "1+x/4", "--wavenumber", "54")
     assert code == 3 and "constant speed" in said.err
+
+
+def test_by_frequency(capsys):
+    code, said = check(capsys, "sphere:radius=0.15", "--frequency", "10GHz")
+    # k a of light at 10 GHz
+    assert code == 0 and "k = 209.585, on rays of 12 incidences: k rho >= 31.4" in said.out
+    code, said = check(capsys, "sphere", "--frequency", "10GHz", "--wavenumber", "3")
+    assert code == 3 and "give one of" in said.err
+
+
+def test_a_folder_for_what_is_no_mesh_is_told_of(tmp_path, capsys):
+    code, said = check(capsys, "sphere", "-o", str(tmp_path / "out"))
+    assert code == 0 and "no picture: quality.png is drawn of meshes" in said.out and "genus 0" in said.out
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_fails_of_k_rho_leaves_the_rest(capsys, monkeypatch):
+    def fails(*_, **__):
+        raise CreepingError("one incidence is singular")
+
+    monkeypatch.setattr("creeping.field.validity_range.body_validity", fails)
+    code, said = check(capsys, "sphere", "--wavenumber", "20")
+    assert code == 0 and "genus 0" in said.out and "k rho is not told: one incidence is singular" in said.out

@@ -51,9 +51,24 @@ def test_map_of_target_strength_without_pictures(tmp_path, capsys):
         "--boundary",
         "hard",
     ]
-    assert ran("ts", *words, "--monostatic", "az:0:20:10", "-o", tmp_path, "--no-pictures", "--json", "--no-cache") == 0
+    assert (
+        ran(
+            "ts",
+            *words,
+            "--monostatic",
+            "az:0:20:10",
+            "-o",
+            tmp_path,
+            "--no-pictures",
+            "--json",
+            "--no-cache",
+            "--format",
+            "csv,mat",
+        )
+        == 0
+    )
     summary = json.loads(capsys.readouterr().out)
-    assert summary["unit"] == "dB re 1 m" and summary["files"] == ["ts.csv", "summary.json"]
+    assert summary["unit"] == "dB re 1 m" and summary["files"] == ["ts.csv", "ts.mat", "summary.json"]
     rows = table(tmp_path / "ts.csv")
     assert len(rows) == 6 and {row["azimuth_deg"] for row in rows} == {"0.0", "10.0", "20.0"}
     # sqrt(rho1 rho2)/2 at the nose: b c/a/2
@@ -117,3 +132,9 @@ def test_a_reference_that_does_not_fit_is_refused_first(tmp_path, capsys):
     assert ran("rcs", "sphere", "--frequency", "1GHz", "--polarisation", "HH", "--compare", given, "-o", tmp_path) == 3
     assert "--column" in capsys.readouterr().err
     assert ran("ts", "sphere", "--frequency", "1kHz", "--sound-speed", 1500, "--boundary", "pec") == 3
+
+
+def test_formats_are_checked_before_anything_is_computed(capsys, tmp_path):
+    for text in ("xls", "csv,csv"):
+        assert ran("rcs", "sphere", "--frequency", "1GHz", "--format", text, "-o", tmp_path / "x") == 3
+        assert "give some of csv, mat" in capsys.readouterr().err

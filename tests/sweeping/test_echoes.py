@@ -6,7 +6,8 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.labelled import power
-from creeping.sweeping.echoes import echo_of, lobe_step
+from creeping.field.lobes import lobe_step
+from creeping.sweeping.echoes import echo_of
 from studies.reference import sphere
 
 RADIUS = 0.15
@@ -33,7 +34,7 @@ def test_sphere_over_frequency_against_mie(band):
 def test_labels_and_units(band):
     assert band["scattered"].values.tolist() == ["theta", "phi"]
     cross = band.field.polarisation("HV").dbsm
-    assert cross.attrs["units"] == "dBsm" and np.all(cross < -60)
+    assert cross.attrs["units"] == "dB re 1 L^2" and np.all(cross < -60)
     np.testing.assert_allclose(band.field.cross_section, 4 * np.pi * abs(band.field.total) ** 2)
     np.testing.assert_allclose(band.field.target_strength, band.field.dbsm - 10 * np.log10(4 * np.pi))
     with pytest.raises(cr.InvalidInputError, match="polarisation"):

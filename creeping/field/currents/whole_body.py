@@ -22,6 +22,9 @@ their place, since epsilon is smaller beside the true error there.
 Sources: [F46], [LK59], [CK13, sec. 3.2]; Derivations, F16 and F17.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar

@@ -1,0 +1,197 @@
+"""Far fields from FEKO text (.ffe), those of `write_ffe` and of others.
+
+The file's time factor is e^{+jωt} and ours e^{-iωt}: numbers are conjugated, and come back as they were written.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.frequency import wavenumber
+
+MOST_BYTES = 512_000_000
+MOST_BLOCKS = 10_000
+LONGEST = 4096
+"""Characters of a line."""
+COLUMNS = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)")
+_KEY = re.compile(r'#\s*([^:"]+?)\s*:\s*(.*)')
+
+
+@dataclass(frozen=True, eq=False)
+class FfeBlock:
+    """One request of a .ffe file: a far field in n directions at one frequency, for one incident wave.
+
+    Attributes
+    ----------
+    name : str
+        Of the configuration.
+    frequency : float, Hz
+    theta, phi : (n,), degrees
+    field : (n, 2) complex
+        Along θ̂ and φ̂ of each row's own angles, time factor e^{-iωt}: f in metres if 1 V/m is incident, else rE in V.
+    keys : dict
+        What else the file says of the block.
+    """
+
+    name: str
+    frequency: float
+    theta: FloatArray
+    phi: FloatArray
+    field: ComplexArray
+    keys: dict[str, str]
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit directions (n, 3)."""
+        t, p = np.radians(self.theta), np.radians(self.phi)
+        return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+
+    @property
+    def wavenumber(self) -> float:
+        """k, 1/m, of light."""
+        return float(wavenumber(self.frequency))
+
+    @property
+    def incidence(self) -> tuple[float, float] | None:
+        """Where the incident wave comes from: theta and phi, degrees; None if the file does not say."""
+        numbers = re.findall(r"[-+.\dEe]+", self.keys.get("Incident Wave Direction", ""))
+        try:
+            return (float(numbers[0]), float(numbers[1])) if len(numbers) == 2 else None
+        except ValueError:
+            return None
+
+
+@dataclass
+class _Open:
+    """A block while it is read."""
+
+    keys: dict[str, str] = field(default_factory=dict)
+    columns: list[int] = field(default_factory=list)
+    count: int = 0
+    rows: list[list[float]] = field(default_factory=list)
+
+
+def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
+    """Read a FEKO far-field file.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Returns
+    -------
+    tuple of FfeBlock
+        In the order of the file.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is no such file, or damaged; with the number of the line.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, creeping as cr, scatterers as sc
+    >>> from creeping.files import read_ffe, write_ffe
+    >>> from creeping.files.ffe import grid_directions
+    >>> fan = cr.launch(cr.DirectFlow(sc.Sphere(), rtol=1e-6), cr.shadow_line(sc.Sphere(), (0, 0, 1)), n_rays=16)
+    >>> theta, phi = np.radians([30.0, 60.0]), np.radians([0.0, 90.0])
+    >>> far = cr.far_field(fan, grid_directions(theta, phi), wavenumber=30.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_ffe(f"{folder}/far.ffe", far, theta, phi)
+    ...     block, = read_ffe(f"{folder}/far.ffe")
+    >>> block.name, round(block.wavenumber, 9), bool(np.all(block.field[:2, 0] == far.total[[0, 2]]))
+    ('incident_scalar', 30.0, True)
+    """
+    file = Path(path)
+    try:
+        nbytes = file.stat().st_size
+        if nbytes > MOST_BYTES:
+            raise InvalidInputError(f"{file} has {nbytes / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} are the most")
+        with file.open(encoding="utf-8", errors="replace") as stream:
+            found = tuple(_blocks(file, stream))
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
+    if not found:
+        raise InvalidInputError(f"{file} has no far field: no rows below a header of {', '.join(COLUMNS)}")
+    return found
+
+
+def _blocks(file: Path, stream: Iterator[str]) -> Iterator[FfeBlock]:
+    block, number, blocks = _Open(), 0, 0
+    for number, raw in enumerate(stream, 1):
+        line = raw.strip()
+        if len(line) > LONGEST:
+            raise InvalidInputError(f"{file}, line {number}: {len(line)} characters, more than {LONGEST}")
+        if not line or line.startswith(("##", "**")):
+            continue
+        if line.startswith("#"):
+            if block.rows:
+                yield _closed(file, number, block)
+                blocks, block = blocks + 1, _Open()
+                if blocks >= MOST_BLOCKS:
+                    raise InvalidInputError(f"{file}, line {number}: more than {MOST_BLOCKS} blocks")
+            _header(file, number, line, block)
+        else:
+            block.rows.append(_row(file, number, line, block))
+    if block.rows:
+        yield _closed(file, number, block)
+
+
+def _header(file: Path, number: int, line: str, block: _Open) -> None:
+    """Take over a key, or the names of the columns."""
+    key = _KEY.fullmatch(line)
+    if key:
+        block.keys[key[1]] = key[2]
+        return
+    names = re.findall(r'"([^"]*)"', line)
+    missing = [name for name in COLUMNS if name not in names]
+    if missing:
+        raise InvalidInputError(f"{file}, line {number}: no column {missing[0]} among {', '.join(names) or 'none'}")
+    block.columns, block.count = [names.index(name) for name in COLUMNS], len(names)
+
+
+def _row(file: Path, number: int, line: str, block: _Open) -> list[float]:
+    cells = line.split()
+    if not block.columns:
+        raise InvalidInputError(f"{file}, line {number}: a row before the names of the columns")
+    if len(cells) != block.count:
+        raise InvalidInputError(f"{file}, line {number}: {len(cells)} numbers in {block.count} columns")
+    try:
+        values = [float(cells[at]) for at in block.columns]
+    except ValueError as error:
+        raise InvalidInputError(f"{file}, line {number}: {error}") from None
+    if not np.all(np.isfinite(values)):
+        raise InvalidInputError(f"{file}, line {number}: a number is not finite")
+    return values
+
+
+def _closed(file: Path, number: int, block: _Open) -> FfeBlock:
+    """The block that ends before a line."""
+    sizes = []
+    for key in ("No. of Theta Samples", "No. of Phi Samples"):
+        try:
+            sizes.append(int(block.keys[key]))
+        except (KeyError, ValueError):
+            raise InvalidInputError(f"{file}, block before line {number}: no whole number as {key!r}") from None
+    if sizes[0] * sizes[1] != len(block.rows):
+        raise InvalidInputError(
+            f"{file}, block before line {number}: {len(block.rows)} rows, not {sizes[0]} theta x {sizes[1]} phi"
+        )
+    try:
+        hertz = float(block.keys["Frequency"])
+    except (KeyError, ValueError):
+        hertz = np.nan
+    if not (np.isfinite(hertz) and hertz > 0):
+        raise InvalidInputError(f"{file}, block before line {number}: no positive number as 'Frequency'")
+    rows = np.array(block.rows)
+    e = np.stack([rows[:, 2] + 1j * rows[:, 3], rows[:, 4] + 1j * rows[:, 5]], axis=-1)
+    name = block.keys.get("Configuration Name", "")
+    return FfeBlock(name, hertz, rows[:, 0], rows[:, 1], np.conj(e), dict(block.keys))

@@ -1,0 +1,151 @@
+"""``creeping run``: frequencies, units, steps of cuts, what is drawn, what stands in the table."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.commands import run_field
+from creeping.commands.body import short_name
+from creeping.commands.compiling import told_of_compilation
+from creeping.commands.main import main
+from creeping.errors import InvalidInputError
+from creeping.field.lobes import lobe_step
+from studies.reference import sphere
+
+X = (1.0, 0.0, 0.0)
+
+
+def ran(*words):
+    with pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return end.value.code
+
+
+def table(file):
+    return list(csv.DictReader(line for line in file.read_text().splitlines() if line[0] != "#"))
+
+
+def test_a_frequency_is_in_metres_and_dbsm(tmp_path, capsys):
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--length", "0.5", "--no-pictures"]
+    field = ["--frequency", "6GHz", "--boundary", "pec", "--observe", "backscatter", "--observe", "cut:0:90"]
+    assert ran("run", "sphere:radius=0.15", *options, *field, "-o", tmp_path) == 0
+    said = capsys.readouterr().out
+    assert "6 GHz, k = 125.751" in said and "dBsm" in said and "no pictures" in said
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert not [name for name in summary["files"] if name.endswith(".png")]
+    assert sorted(summary["files"]) == sorted(file.name for file in tmp_path.iterdir())
+    assert summary["field"]["unit"] == "m" and summary["field"]["frequency"] == pytest.approx(6e9)
+    rows = table(tmp_path / "far.csv")
+    assert [row["observe"] for row in rows] == ["backscatter"] + 5 * ["cut:0:90"]
+    np.testing.assert_allclose([float(row["angle"]) for row in rows], [np.nan, -180, -90, 0, 90, 180])
+    exact = abs(sphere.pec_amplitudes(125.751, 0.15, [-1.0])[0][0]) / 125.751
+    assert float(rows[0]["rcs_dB_tt"]) == pytest.approx(10 * np.log10(4 * np.pi * exact**2), abs=0.1)
+
+
+def test_dbsm_is_not_claimed_of_an_unknown_unit(tmp_path, capsys):
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 16, "--length", 1, "--no-pictures"]
+    assert ran("run", "sphere", *options, "--wavenumber", 20, "--observe", "backscatter", "-o", tmp_path) == 0
+    assert "dBsm" not in capsys.readouterr().out + (tmp_path / "far.csv").read_text()
+
+
+def test_cuts_fit_their_lobes():
+    job = run_field.job(400.0, None, ["cut:30", "cut:0:2", "backscatter"], X)
+    fitted = job.fitted(sc.Sphere())
+    step = lobe_step(sc.Sphere(), 400.0, monostatic=False)
+    # lobes are lambda/D wide: four angles or more to each
+    assert np.radians(step) <= 2 * np.pi / 400 / 2 / 4
+    counts = [len(target.directions) for target in fitted.targets]
+    assert counts == [round(360 / step) + 1, 181, 1]
+    assert np.degrees(fitted.targets[0].phi[0]) == pytest.approx(30)
+    # of the finest lobes no more than is bearable
+    huge = run_field.job(1e6, None, ["cut:30"], X).fitted(sc.Sphere())
+    assert len(huge.targets[0].directions) == 7201
+
+
+@pytest.mark.parametrize(
+    ("words", "match"),
+    [
+        ({"frequency": "2:3:1GHz"}, "range"),
+        ({"frequency": "10"}, None),
+        ({"wavelength": "3"}, "no unit"),
+        ({"frequency": "10GHz", "wavelength": "3cm"}, "give one of"),
+        ({"frequency": "10 parsec"}, "--frequency: .*unknown unit"),
+        ({"frequency": "10GHz", "polarisation": "HH"}, "of a conductor"),
+        ({"frequency": "10GHz", "boundary": "pec", "polarisation": "HX"}, "give some of"),
+        ({"sound_speed": 1500.0}, "--sound-speed needs"),
+    ],
+)
+def test_the_wave_is_asked_for_once(words, match):
+    asked = {"boundary": None} | words
+    boundary = asked.pop("boundary")
+    if match is None:
+        assert run_field.job(None, boundary, None, X, **asked).wavenumber == pytest.approx(cr.wavenumber(10.0))
+        return
+    with pytest.raises(InvalidInputError, match=match):
+        run_field.job(None, boundary, None, X, **asked)
+
+
+def test_sound_has_its_speed():
+    job = run_field.job(None, "hard", None, X, frequency="38kHz", sound_speed=1477.0)
+    assert job.wavenumber == pytest.approx(2 * np.pi * 38e3 / 1477) and job.unit == "m"
+    assert job.told("m") == "38 kHz, k = 161.653/m"
+
+
+@pytest.mark.parametrize("step", ["0", "7", "-1", "0.0001", "x"])
+def test_steps_of_cuts_are_checked(step):
+    with pytest.raises(InvalidInputError, match="cut:0"):
+        run_field.job(20.0, None, [f"cut:0:{step}"], X)
+
+
+def test_a_cut_across_the_wave_is_smooth_through_the_poles():
+    # d along x and the cut at 90 degrees: at the poles theta-theta and phi-theta had each other's values
+    job = run_field.job(12.0, "pec", ["cut:90"], X)
+    body = sc.Ellipsoid(1.2, 0.8, 0.6)
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-7), cr.shadow_line(body, X), length=3.0, n_rays=32)
+    far, _ = job.far_field(fan)
+    # both unit vectors turn round at a pole
+    before, at, after = far.total[[179, 180, 181]]
+    np.testing.assert_allclose(at, 0.5 * (after - before), atol=1e-3 * np.abs(at).max())
+    # y -> -y leaves body and incident phi alone, and turns that of theta round
+    assert np.abs(at[[0, 1], [0, 1]]).max() < 5e-3 * np.abs(at[[0, 1], [1, 0]]).min()
+
+
+def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
+    drawn = {}
+
+    def picture(path, angles, fields, **words):
+        drawn[path.name] = (len(angles), list(fields), words)
+
+    monkeypatch.setattr("creeping.plotting.far_cut_picture", picture)
+    monkeypatch.setattr("creeping.plotting.currents_picture", lambda *_, **__: None)
+    asked = {"polarisation": "HV,VV", "frequency": "0.5GHz"}
+    job = run_field.job(None, "pec", ["cut:90", "cut:0", "cut:0:20"], X, **asked)
+    body = sc.Sphere()
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, X), length=1.0, n_rays=16)
+    entry, names = job.write(job.far_field(fan)[0], fan, tmp_path, "matplotlib", "ball$")
+    assert {"far.png", "far_2.png", "far.csv"} <= set(names) and entry["unit"] == "m"
+    assert drawn["far.png"][:2] == (361, ["φ = 90°", "φ = 0°"]) and drawn["far_2.png"][0] == 19
+    words = drawn["far.png"][2]
+    assert words["components"] == ("pt", "tt") and words["quantity"] == "rcs"
+    assert words["title"].startswith("ball\\$\n500 MHz, k = ") and words["title"].endswith(", pec")
+
+
+def test_names_of_bodies_in_titles():
+    assert short_name("/home/someone/hull.stl") == "hull.stl"
+    assert short_name("sphere:radius=2") == "sphere:radius=2" and len(short_name("x + " * 40)) == 60
+
+
+def test_compilation_is_told_once():
+    from numba import njit
+
+    said = []
+    with told_of_compilation(said.append):
+        njit(lambda x: x + 1)(1.0)
+        njit(lambda x: x + 2)(1.0)
+    assert len(said) == 1 and "compiling" in said[0]
+    njit(lambda x: x + 3)(1.0)
+    assert len(said) == 1
