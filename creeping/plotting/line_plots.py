@@ -111,7 +111,7 @@ def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None,
         If the kind is unknown or not that of the axes.
     """
     space = _in_space(ax, kind)
-    fresh, ax = axes_or_new(ax, PLANE, projection="3d" if space else None)
+    fresh, ax = axes_or_new(ax, PLANE, space=space)
     if space:
         points = np.concatenate([curve.points, curve.points[: int(curve.closed)]])
         # above the body of a picture, which orders what it draws by hand
