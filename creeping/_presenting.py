@@ -44,8 +44,8 @@ class Drawn(Shown):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Axes to draw on; by default those of a new figure outside pyplot, which opens no window:
-            ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
+            Axes to draw on; by default those of a new figure outside pyplot, which opens no window: notebooks show it
+            as the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
         **options
             ``legend=True`` adds a legend to axes that were given; a new figure has one. All others depend on the type,
             see `creeping.plotting.line_plots` and `creeping.plotting.level_plots`:

@@ -20,13 +20,13 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.phaseflow.grid import Grid
 from creeping.plotting._strokes import Stroke
 from creeping.plotting._view import View
+from creeping.plotting.palette import COLOURS
 from studies._curves import draw_curves, tag
 from studies._measured import end_error, error_card, headline, map_card
 
 BODY = sc.Ellipsoid(1.2, 0.8, 0.8)
 GRID = Grid((16, 16, 64), 3, (False, False))
 FACES = ("$+x$", "$-x$", "$+y$", "$-y$", "$+z$", "$-z$")
-COLOURS = ("#c2185b", "#8a5a00", "#00695c", "#6a1b9a", "#1565c0", "#37474f")
 VIEW = View(float(np.radians(-52)), float(np.radians(26)))
 TIME = 4.0
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.field.echo import Echo
-from creeping.plotting.far_cuts import COLOURS, EXACT
+from creeping.plotting.palette import COLOURS, EXACT
 from creeping.plotting.pictures import new_figure
 from studies.benchmarks import (
     BOUNDARIES,

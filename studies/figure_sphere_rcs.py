@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.plotting.far_cuts import COLOURS, EXACT
+from creeping.plotting.palette import COLOURS, EXACT
 from creeping.plotting.pictures import new_figure
 from studies.reference import sphere
 

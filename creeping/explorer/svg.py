@@ -13,7 +13,7 @@ from creeping.explorer.preview import requested_curves
 from creeping.explorer.refined import Refined
 from creeping.field.decibels import cross_section_decibels, shown_range
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, status_pieces
-from creeping.plotting.far_cuts import COLOURS
+from creeping.plotting.palette import COLOURS
 from creeping.plotting.parameter_plane import is_torus
 from creeping.rays.angle_seams import split_at_seam
 

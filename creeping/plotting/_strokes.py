@@ -20,7 +20,7 @@ FADED, FADED_WIDTH = 0.4, 0.5
 """Opacity and width, points, of iso-phase curves where rays have detached."""
 HIDDEN = 0.22  # share of its ink that a line behind the body keeps
 # apart in lightness as well as in hue, and apart from the map of the iso-phase levels
-STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#c2185b"}
+STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#d6409f"}
 LEVEL_NAMES = {"travel_time": "travel time", "eikonal": "eikonal"}
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.field.decibels import shown_range
 from creeping.field.echo import LEVELS
-from creeping.plotting.far_cuts import COLOURS, Curve, draw_cut
+from creeping.plotting.far_cuts import Curve, draw_cut
+from creeping.plotting.palette import GREY, curve_style
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from creeping.field.echo import Echo
     from creeping.field.slant_range import RangeProfile
 
-STYLES = ("-", "--", "-.", ":")
 PREFIXES = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
 SPAN = 60.0
 """Range of levels, dB."""
@@ -73,7 +73,7 @@ def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str 
         ax.plot(x, np.maximum(curve.levels, floor), label=curve.label, **curve.style)
     doubtful = echo.unresolved[:, 0].any(axis=0)
     if doubtful.any():
-        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color="#5a6872", clip_on=False, label="unresolved")
+        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=GREY, clip_on=False, label="unresolved")
     ax.set_xlim(x[0], x[-1])
     ax.set_ylim(low, high)
     _dressed(ax, f"frequency ({unit})", _level(echo), title)
@@ -119,7 +119,7 @@ def range_picture(
     curves = {channel: echo.levels(found.values) for channel, found in profiles.items()}
     low, high = shown_range(curves.values(), SPAN)
     for number, (channel, found) in enumerate(profiles.items()):
-        ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **_style(number))
+        ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **curve_style(number))
     ax.set_xlim(-extent, extent)
     ax.set_ylim(low, high)
     _dressed(ax, "range along the line of sight (m), from the radar", _level(echo), title)
@@ -152,11 +152,11 @@ def comparison_picture(
     figure.set_layout_engine("constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     for number, (channel, found) in enumerate(comparisons.items()):
-        x, style = found.values / scale, _style(number)
+        x, style = found.values / scale, curve_style(number)
         above.plot(x, found.levels, label=channel, **style)
         above.plot(x, found.reference, label=f"{channel}, given", **style | {"linewidth": 3.2, "alpha": 0.3})
         below.plot(x, found.residual, label=f"_{channel}", **style)
-    below.axhline(0.0, color="#5a6872", linewidth=0.6)
+    below.axhline(0.0, color=GREY, linewidth=0.6)
     _dressed(above, "", _level(echo), title)
     _dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)", "")
     add_legend(above, fresh=True)
@@ -169,12 +169,8 @@ def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
     for number, channel in enumerate(echo.channels):
         here = (number, *at)
         finite: FloatArray = np.where(np.isposinf(levels[here]), np.nan, levels[here])
-        found.append(Curve(channel, finite, _style(number), bounds[(slice(None), *here)], echo.unresolved[here]))
+        found.append(Curve(channel, finite, curve_style(number), bounds[(slice(None), *here)], echo.unresolved[here]))
     return found
-
-
-def _style(number: int) -> dict[str, Any]:
-    return {"color": COLOURS[number % len(COLOURS)], "linestyle": STYLES[number % len(STYLES)], "linewidth": 1.3}
 
 
 def _level(echo: "Echo") -> str:

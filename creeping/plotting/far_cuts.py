@@ -13,6 +13,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import cross_section_decibels, decibels, shown_range
+from creeping.plotting.palette import COLOURS, EXACT, curve_style
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -25,9 +26,7 @@ QUANTITIES = {
 }
 COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
 """Scattered by incident component of a vector field: t is θ̂, p is φ̂."""
-COLOURS = ("#0b6fb8", "#d1495b", "#2a9d4e", "#8e5ea2", "#e08e0b", "#5a6872")
 PARTS = {"creeping": "--", "reflected": "-.", "forward": ":"}
-EXACT = "#111111"
 HATCHED: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
 """Of angles at which a field is unresolved."""
 
@@ -208,8 +207,8 @@ def cut_curves(
     for label, field in fields.items():
         whole = field if isinstance(field, np.ndarray) else getattr(field, "total", field)
         for suffix, pick in _picks(label, whole, count, components):
-            colour = COLOURS[len(thick) % len(COLOURS)]
-            style = {"color": colour, "linewidth": 1.3}
+            style = curve_style(len(thick))
+            colour = style["color"]
             doubt = getattr(field, "unresolved", None)
             levels, band = _levels(pick(whole), quantity), _band(field, pick, quantity)
             thick.append(Curve(label + suffix, levels, style, band, doubt))

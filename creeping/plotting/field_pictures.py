@@ -20,7 +20,7 @@ from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays
 from creeping.plotting._view import View
 from creeping.plotting.coloured_body import NOTHING, cells_of, painted
-from creeping.plotting.far_cuts import COLOURS
+from creeping.plotting.palette import curve_style
 from creeping.plotting.pictures import chosen_backend, new_figure, save_figure
 from creeping.rays.fan import RayFan
 
@@ -148,7 +148,7 @@ def decay_picture(
     starts = levels[:, : max(2, levels.shape[1] // 8)]
     low, high = shown_range([np.clip(levels, -np.inf, np.nanmax(starts) + 10.0)], span)
     for number, (ray, level) in enumerate(zip(picked, levels, strict=True)):
-        _draw_decay(ax, fan, ray, level, COLOURS[number % len(COLOURS)])
+        _draw_decay(ax, fan, ray, level, curve_style(number, 1.2))
     ax.set_xlim(0.0, float(fan.travel_time[-1]))
     ax.set_ylim(low, high)
     ax.set_xlabel("arclength from the shadow line (L)", fontsize=9)
@@ -165,14 +165,14 @@ def decay_picture(
     save_figure(figure, path, dpi)
 
 
-def _draw_decay(ax: Any, fan: RayFan, ray: int, level: FloatArray, colour: str) -> None:
-    ax.plot(fan.travel_time, level, color=colour, linewidth=1.2, label=f"ray {ray}")
+def _draw_decay(ax: Any, fan: RayFan, ray: int, level: FloatArray, style: dict[str, Any]) -> None:
+    ax.plot(fan.travel_time, level, label=f"ray {ray}", **style)
     passed = np.diff(fan.caustic_index[ray])
     for step in np.flatnonzero(passed > 0):
         J = fan.spreading[ray, step : step + 2]
         share = J[0] / (J[0] - J[1]) if J[0] * J[1] < 0 else 0.5
         at = fan.travel_time[step] + share * (fan.travel_time[step + 1] - fan.travel_time[step])
-        ax.axvline(at, color=colour, alpha=0.7, **CAUSTIC)
+        ax.axvline(at, color=style["color"], alpha=0.7, **CAUSTIC)
 
 
 def _name(kind: Boundary) -> str:

@@ -10,7 +10,8 @@ from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import shown_range
 from creeping.plotting._cut_angles import CutAngles, cut_angles
-from creeping.plotting.far_cuts import COLOURS, Curve, checked_angles, cut_curves, draw_cut
+from creeping.plotting.far_cuts import Curve, checked_angles, cut_curves, draw_cut
+from creeping.plotting.palette import COLOURS, GREY, curve_style
 from creeping.plotting.pictures import add_legend, axes_or_new
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from creeping.phaseflow.phase_map import PhaseMap
 
 PAGE = (6.4, 4.2)  # inches
-GREY = COLOURS[-1]
 
 
 def plot_far(
@@ -133,13 +133,13 @@ def plot_growth(flow: "PhaseMap", ax: Any = None, *, tolerance: float | None = N
     fresh, ax = axes_or_new(ax, PAGE)
     lengths = (flow.horizon,) if growth is None else growth.lengths
     rms, largest = ((error.rms,), (error.max,)) if growth is None else (growth.rms, growth.max)
-    for values, name, colour in ((largest, "max", COLOURS[1]), (rms, "rms", COLOURS[0])):
-        ax.plot(lengths, values, color=colour, linewidth=1.3, marker="o", markersize=4, label=name)
+    for number, name, values in ((1, "max", largest), (0, "rms", rms)):
+        ax.plot(lengths, values, marker="os"[number], markersize=4, label=name, **curve_style(number))
     if growth is not None:
         ax.plot(lengths[-1:], [growth.bound], "_", color=COLOURS[0], markersize=12, label="bound of the rms")
     tolerance = flow.parameters.get("tolerance") if tolerance is None else tolerance
     if tolerance is not None:
-        ax.axhline(tolerance, color=GREY, linewidth=0.9, linestyle="--", label=f"tolerance {tolerance:.3g}")
+        ax.axhline(tolerance, color=GREY, linewidth=0.9, linestyle=":", label=f"tolerance {tolerance:.3g}")
     ax.set_yscale("log")
     weighted = getattr(flow.body, "speed", None) is not None
     ax.set_xlabel("travel time of the ray" if weighted else "length of the ray (L)", fontsize=9)

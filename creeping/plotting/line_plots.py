@@ -113,7 +113,7 @@ def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None,
     # the body is not known here: a polar angle is never negative, that of a torus takes both signs
     torus = bool(np.any(curve.parameters[:, 0] < 0))
     page = (6.4, 4.4) if space else page_size(torus=torus)
-    fresh, ax = axes_or_new(ax, page, projection="3d" if space else None)
+    fresh, ax = axes_or_new(ax, page, space=space)
     if space:
         points = np.concatenate([curve.points, curve.points[: int(curve.closed)]])
         # above the body of a picture, which orders what it draws by hand

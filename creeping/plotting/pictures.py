@@ -125,22 +125,21 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
 
 
 def new_figure(inches: tuple[float, float]) -> Any:
-    """Return a figure outside pyplot: no window, no global state, whatever the user's backend."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    """Return a figure outside pyplot: no window, no global state, whatever the user's backend; notebooks show it."""
+    from creeping.plotting._inline import made
 
-    figure = Figure(figsize=inches, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
+    return made(inches)
 
 
-def axes_or_new(ax: Any, inches: tuple[float, float], *, projection: str | None = None) -> tuple[bool, Any]:
-    """Whether the axes are new, and the axes: those given, or those of a new figure."""
+def axes_or_new(ax: Any, inches: tuple[float, float], *, space: bool = False) -> tuple[bool, Any]:
+    """Whether the axes are new, and the axes: those given, or those of a new figure, of the plane or of space."""
     if ax is not None:
         return False, ax
+    from creeping.plotting._inline import InlineAxes, InlineAxes3D
+
     figure = new_figure(inches)
     figure.set_layout_engine("constrained")
-    return True, figure.add_subplot(projection=projection)
+    return True, figure.add_subplot(axes_class=InlineAxes3D if space else InlineAxes)
 
 
 def add_legend(ax: Any, fresh: bool, legend: bool | None = None) -> None:
@@ -175,8 +174,9 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
 
 def _draw_matplotlib(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
     from creeping.plotting import axes3d
+    from creeping.plotting._inline import InlineAxes3D
 
-    axes3d.draw(figure.add_axes(place, projection="3d"), drawing)
+    axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
 
 
 def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:

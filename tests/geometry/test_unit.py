@@ -65,5 +65,5 @@ def test_sweeps_say_metres_of_a_body_that_knows():
         "m": {"wavenumber": "m-1", "creeping": "m", "line_length": "m"},
         "L": {"wavenumber": "1/L", "creeping": "L", "line_length": "L"},
     }
-    assert [found[name].creeping.dbsm.attrs["units"] for name in "mL"] == ["dBsm", "dB re 1 L^2"]
+    assert [found[name].field.dbsm.attrs["units"] for name in "mL"] == ["dBsm", "dB re 1 L^2"]
     assert "metre" not in found["L"].attrs["conventions"] and "1/m" in found["m"].attrs["conventions"]

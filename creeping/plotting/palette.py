@@ -1,0 +1,28 @@
+"""Colours and line styles of curves, told apart by people who see red and green alike, and in print without colour.
+
+Any two colours differ by 12 or more (CIEDE2000), also as seen in deuteranopia and protanopia, and each stands on white
+with a contrast of 3 to 1; `tests/plotting/test_palette.py` holds them to it.
+
+Sources: [MOF09] for the simulation.
+"""
+
+from creeping._typing import Any
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a0f45", "#3a92fa")
+STYLES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1.6)),
+    (0, (5, 1.6, 1, 1.6)),
+    (0, (1.2, 1.2)),
+    (0, (9, 1.6)),
+    (0, (5, 1.6, 1, 1.6, 1, 1.6)),
+)
+"""Of matplotlib: no two curves of a picture have the same one until all are taken."""
+GREY = "#5a6872"
+"""Of marks and lines that are no curve."""
+EXACT = "#111111"
+
+
+def curve_style(number: int, width: float = 1.3) -> dict[str, Any]:
+    """Look of a curve by its number in a picture, for matplotlib."""
+    return {"color": COLOURS[number % len(COLOURS)], "linestyle": STYLES[number % len(STYLES)], "linewidth": width}
