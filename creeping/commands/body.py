@@ -54,20 +54,19 @@ def parse_body(
     import scatterers
     from creeping.errors import InvalidInputError
 
-    suffix = Path(text).suffix.lower()
-    is_file = suffix in MESHES + CAD
-    if units is not None and not is_file:
+    suffix, of_file = Path(text).suffix.lower(), is_file(text)
+    if units is not None and not of_file:
         raise InvalidInputError(f"--units belongs to a file; {text!r} is none")
     name, _, rest = text.partition(":")
     if name in BODIES and allow_rough:
         raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is smooth")
-    if not (is_file or name in BODIES or _like_expression(text)):
+    if not (of_file or name in BODIES or _like_expression(text)):
         raise InvalidInputError(
             f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
             f"({', '.join(MESHES + CAD)}), or an expression in x, y, z"
         )
     try:
-        if is_file:
+        if of_file:
             kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
             shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=progress)
             return _with_charts(shape, progress)
@@ -86,10 +85,15 @@ def parse_body(
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
-def short_name(text: str) -> str:
-    """Name of a body in a title: of a file without its folder, of a long expression its beginning."""
-    name = Path(text).name if Path(text).suffix.lower() in MESHES + CAD else text
-    return name if len(name) <= 60 else name[:57] + "..."
+def is_file(text: str) -> bool:
+    """Whether a BODY names a file, whose lengths are metres."""
+    return Path(text).suffix.lower() in MESHES + CAD
+
+
+def title_of(text: str) -> str:
+    """Name of a BODY for titles: what was typed, of a file its name, cut if long."""
+    name = Path(text).name if is_file(text) else " ".join(text.split())
+    return name if len(name) <= 60 else f"{name[:57]}..."
 
 
 def _with_charts(shape: Any, progress: Progress | None) -> Any:

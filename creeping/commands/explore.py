@@ -2,11 +2,11 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body
+from creeping.commands.body import AllowRough, Body, SpeedOption, Units, is_file, parse_body, title_of
 
 _field = Group("Field")
 _page = Group("Page")
@@ -24,7 +24,15 @@ def explore(
         float | None, Parameter(help="Of iso-phase curves; an eighth of the length, 0 for none.")
     ] = None,
     wavenumber: Annotated[float | None, Parameter(group=_field, help="In 1/L; 40 over the body's size.")] = None,
-    boundary: Annotated[Literal["soft", "hard"], Parameter(group=_field, help="Of the field shown.")] = "hard",
+    frequency: Annotated[
+        str | None, Parameter(group=_field, help='Instead, e.g. "10GHz" or "3cm": lengths are metres then.')
+    ] = None,
+    sound_speed: Annotated[
+        float | None, Parameter(group=_field, help="Of the medium, m/s, if the wave is sound; light if not given.")
+    ] = None,
+    boundary: Annotated[
+        str, Parameter(group=_field, help="soft, hard, pec, or impedance:ETA, e.g. impedance:0.5+0.2j.")
+    ] = "hard",
     export: Annotated[
         Path | None, Parameter(group=_page, help="Write one incidence as an HTML file, and serve nothing.")
     ] = None,
@@ -54,21 +62,41 @@ def explore(
         raise CreepingError(f"the page needs viser ({error}); pip install 'creeping[web]'") from error
     shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
     extent = size(shape)
+    wavenumber, metres = _wave(wavenumber, frequency, sound_speed, body)
     theta, phi = angles(unit_direction(direction))
     k = _round(40 / extent) if wavenumber is None else wavenumber
     far = _round(body_length(shape, k if k > 0 and speed is None else None)) if length is None else length
     gap = _round(far / 8) if spacing is None else spacing
     # the cut runs through the direction of the wave
-    request = ViewRequest(theta, phi, rays, far, gap, k, boundary, cut=float(round(phi)))
+    cut = float(round(phi))
+    request = ViewRequest(theta, phi, rays, far, gap, k, boundary, cut, metres=metres, sound_speed=sound_speed)
+    name = title_of(body)
     flow = _flow(shape, request, MOVES if export is None else 1, tolerance, cache, progress)
     if export is not None:
         from creeping.explorer.export import export_page
 
-        found = export_page(export, flow, request)
+        found = export_page(export, flow, request, name=name)
         megabytes, rms = export.stat().st_size / 1e6, found.fan.error.rms
         print(f"{export}  {megabytes:.1f} MB  {len(found.fan.points)} rays, rms {rms:.1e}")
         return 0
-    return _serve(flow, request, port, browser, progress)
+    return _serve(flow, request, port, name, browser, progress)
+
+
+def _wave(
+    wavenumber: float | None, frequency: str | None, sound_speed: float | None, body: str
+) -> tuple[float | None, bool]:
+    """Wavenumber, if one was given, and whether lengths are metres."""
+    from creeping.errors import InvalidInputError
+    from creeping.field.frequency import wavenumber as of_text
+
+    metres = frequency is not None or sound_speed is not None or is_file(body)
+    if frequency is None:
+        return wavenumber, metres
+    if wavenumber is not None:
+        raise InvalidInputError("give --wavenumber or --frequency, not both")
+    if ":" in frequency:
+        raise InvalidInputError(f"--frequency {frequency!r} is a range; the page has one, and a slider")
+    return float(of_text(frequency, sound_speed=sound_speed)), metres
 
 
 def _flow(body: Any, request: Any, moves: int, tolerance: float, cache: bool, progress: Any) -> Any:
@@ -94,13 +122,13 @@ def _round(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def _serve(flow: Any, request: Any, port: int, browser: bool, progress: Any) -> int:
+def _serve(flow: Any, request: Any, port: int, name: str, browser: bool, progress: Any) -> int:
     import webbrowser
 
     from creeping.explorer.page import Explorer
 
     progress("preparing the page; kernels are compiled once, which takes about a minute")
-    page = Explorer(flow, request, port=port)
+    page = Explorer(flow, request, port=port, name=name)
     try:
         if page.server.get_port() != port:
             progress(f"port {port} is in use")

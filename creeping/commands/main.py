@@ -19,7 +19,7 @@ from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body, short_name
+from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body, title_of
 from creeping.commands.compiling import told_of_compilation
 
 app = App(
@@ -166,7 +166,7 @@ def run(
         drawn_with = backend if pictures else None
         summary["files"], summary["drawn_by"] = _run_results.write_results(output, line, fan, curves, drawn_with)
         if job:
-            summary["field"], names = job.write(far, fan, output, backend, short_name(body), pictures=pictures)
+            summary["field"], names = job.write(far, fan, output, backend, title_of(body), pictures=pictures)
             summary["field"]["seconds"] = field_seconds
             summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)

@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from creeping._typing import FloatArray
 
 Bytes = NDArray[np.uint8]
-RANGE = (-50.0, 6.0)
-"""Of the field's colours, dB relative to the incident wave: fixed, so that pictures of two incidences compare."""
+MOST, LEAST, STEP = 60.0, 10.0, 5.0
+"""Largest and smallest range of the field's colours, and what its ends are multiples of, dB."""
+KEPT = 7.5
+"""By how much data may leave their range or fall short of it, dB, before it changes: it does not flicker."""
+Span = tuple[float, float]
 ENDED = (150, 156, 162)
 """Colour where a ray has ended or no ray passes."""
 
@@ -44,13 +47,35 @@ class ColourTable:
         return f"#{r:02x}{g:02x}{b:02x}"
 
 
+_SHARE = np.arange(256) / 255
+LINEAR: Bytes = np.round(255 * np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SHARE + 0.055) / 1.055) ** 2.4)).astype(
+    np.uint8
+)
+"""Bytes of colours as the page takes them at vertices, where it has light and no sRGB."""
 FIELD_COLOURS = ColourTable("magma")
 LEVEL_COLOURS = ColourTable("viridis", 0.0, 0.9)
 
 
-def field_colours(levels: FloatArray) -> Bytes:
+def fitted_span(levels: FloatArray | None, before: Span | None = None) -> Span:
+    """Range of colours that fits decibels (...), relative to the incident wave; the one before while that fits too.
+
+    Neither the few points beside a caustic nor those in the deepest shadow stretch it.
+    """
+    finite = np.zeros(0) if levels is None else levels[np.isfinite(levels)]
+    if not len(finite):
+        return before or (-50.0, 5.0)
+    least, most = np.percentile(finite, [1.0, 99.0])
+    if before and abs(most - before[1]) < KEPT and abs(max(least, most - MOST) - before[0]) < KEPT:
+        return before
+    high = float(STEP * np.ceil(most / STEP))
+    low = float(STEP * np.floor(max(least, high - MOST) / STEP))
+    return min(low, high - LEAST), high
+
+
+def field_colours(levels: FloatArray, span: Span) -> Bytes:
     """Colours of decibels (...): ENDED where they are -inf or NaN, the highest on caustics (inf)."""
-    share = (np.nan_to_num(levels, nan=RANGE[0], posinf=RANGE[1], neginf=RANGE[0]) - RANGE[0]) / (RANGE[1] - RANGE[0])
+    low, high = span
+    share = (np.nan_to_num(levels, nan=low, posinf=high, neginf=low) - low) / (high - low)
     out = FIELD_COLOURS(share)
     out[~(levels > -np.inf)] = ENDED
     return out

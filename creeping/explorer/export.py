@@ -4,14 +4,15 @@ import html
 import os
 from pathlib import Path
 
-from creeping.explorer.colours import RANGE
+from creeping.explorer.colours import fitted_span
 from creeping.explorer.page import LocalServer
-from creeping.explorer.preview import preview_of, step_of
+from creeping.explorer.preview import Preview, preview_of, step_of
 from creeping.explorer.refined import Refined, refined_view
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.scene import DrawnBody, Scene
 from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import colour_bar, refined_text
+from creeping.explorer.text import legend, refined_text, validity_text
+from creeping.explorer.titled import with_title
 from creeping.files import write_text
 from creeping.rays.transport import Flow
 
@@ -22,7 +23,7 @@ background:rgba(255,255,255,.92);font:12px/1.4 sans-serif;color:#222;z-index:10}
 """
 
 
-def export_page(path: str | os.PathLike[str], flow: Flow, request: ViewRequest) -> Refined:
+def export_page(path: str | os.PathLike[str], flow: Flow, request: ViewRequest, *, name: str | None = None) -> Refined:
     """Write a self-contained page of one incidence.
 
     Parameters
@@ -31,6 +32,8 @@ def export_page(path: str | os.PathLike[str], flow: Flow, request: ViewRequest) 
         HTML file to write.
     flow : PhaseMap or DirectFlow
     request : ViewRequest
+    name : str, optional
+        Of the body, the page's title; by default what the body says of itself.
 
     Returns
     -------
@@ -44,6 +47,13 @@ def export_page(path: str | os.PathLike[str], flow: Flow, request: ViewRequest) 
     CreepingError
         If the file cannot be written.
     """
+    page, found = page_of(flow, request, name)
+    write_text(Path(path), page)
+    return found
+
+
+def page_of(flow: Flow, request: ViewRequest, name: str | None = None) -> tuple[str, Refined]:
+    """Text of the page, and what it shows; arguments as of `export_page`."""
     model = DrawnBody.of(flow.body)
     frame = preview_of(flow, request, step_of(flow.body))
     found = refined_view(flow, frame, model.mesh.vertices)
@@ -53,24 +63,26 @@ def export_page(path: str | os.PathLike[str], flow: Flow, request: ViewRequest) 
         scene = Scene(server, model, still=True)
         scene.look(request.direction)
         scene.turn(request.direction)
-        scene.show(frame)
-        scene.refine(found, scene.painted_mesh(found))
+        span = fitted_span(frame.levels if found.body_levels is None else found.body_levels)
+        scene.show(frame, span)
+        scene.refine(found, scene.painted_mesh(found, span))
         page = server.scene.as_html()
     finally:
         server.stop()
-    write_text(Path(path), with_panel(page, repr(flow.body), found))
-    return found
+    return with_panel(page, name or repr(flow.body), frame, found, legend(frame, span, still=True)), found
 
 
-def with_panel(page: str, title: str, found: Refined) -> str:
+def with_panel(page: str, title: str, frame: Preview, found: Refined, bar: str) -> str:
     """The page of a scene with the numbers and plane pictures beside it."""
-    bar = "" if found.body_levels is None else colour_bar(RANGE, found.request.boundary)
-    text = "".join(f"<p>{html.escape(part)}</p>" for part in refined_text(found).split("\n\n"))
+    words = refined_text(found)
+    if frame.validity is not None:
+        words = f"{validity_text(frame.validity).replace('**', '')}\n\n{words}"
+    text = "".join(f"<p>{html.escape(part)}</p>" for part in words.split("\n\n"))
     angles = f"theta {found.request.theta:.1f}, phi {found.request.phi:.1f} degrees"
     panel = (
         f'<style>{STYLE}</style><aside id="creeping"><h1>{html.escape(title)}</h1><p>{angles}</p>{text}'
-        f"{bar}{plane_svg(found)}{cut_svg(found)}</aside>"
+        f"{bar}{plane_svg(found)}{cut_svg(found.request, found.cut_angles, found.far)}</aside>"
     )
-    page = page.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>", 1)
+    page = with_title(page, title)
     end = page.rindex("</body>")
     return page[:end] + panel + page[end:]

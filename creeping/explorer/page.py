@@ -18,32 +18,41 @@ import viser
 
 from creeping._typing import Any
 from creeping.errors import CreepingError
-from creeping.explorer.colours import RANGE
+from creeping.explorer.colours import Span, fitted_span
 from creeping.explorer.door import Door
 from creeping.explorer.latest import Latest
 from creeping.explorer.preview import Preview, preview_of, step_of
-from creeping.explorer.refined import refined_view
+from creeping.explorer.refined import far_cut, refined_view
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles
 from creeping.explorer.scene import DrawnBody, Scene, turned
-from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import colour_bar, preview_text, refined_text
+from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
+from creeping.explorer.text import legend, preview_text, refined_text
+from creeping.explorer.titled import titled
+from creeping.explorer.units import wave_scale
+from creeping.field.currents.kept import expected_nodes
+from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
 
 HOST = "127.0.0.1"
 REST = 0.4
 """Seconds for which the hand rests before work begins that would hold up its next move."""
+FOLLOWING = 4.0
+"""Step of the far-field cut while the hand moves, degrees."""
+PACE, FOLLOWED = 0.25, 60_000
+"""Seconds between two such cuts at least, and nodes of the body's currents up to which they are made, in about half a
+second; beyond, the cut waits until the hand rests."""
 
 
 class LocalServer(viser.ViserServer):  # type: ignore[misc]
     """A quiet server for this machine alone."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, name: str = "creeping") -> None:
         self.door = Door(lambda: len(self._websock_server._live_connections))
         # the address is shown by whoever starts it
         try:
-            with redirect_stdout(StringIO()), self.door.installed():
-                super().__init__(HOST, port, label="creeping", verbose=False)
+            with redirect_stdout(StringIO()), self.door.installed(), titled(name):
+                super().__init__(HOST, port, label=name, verbose=False)
         except CreepingError:
             self.stop()
             raise
@@ -68,14 +77,17 @@ class Explorer:
         What is shown first.
     port : int
         The next free one is taken if it is in use.
+    name : str
+        Of the body, the page's title.
 
     Attributes
     ----------
-    seconds : deque of float
-        What the last frames took, from the request to the message.
+    seconds, cut_seconds : deque of float
+        What the last frames took, from the request to the message, plane and numbers included; and the cuts
+        that follow.
     """
 
-    def __init__(self, flow: Flow, request: ViewRequest, *, port: int = 8080) -> None:
+    def __init__(self, flow: Flow, request: ViewRequest, *, port: int = 8080, name: str = "creeping") -> None:
         self.flow, self.request = flow, request
         self.model = DrawnBody.of(flow.body)
         self.step = step_of(flow.body)
@@ -83,10 +95,14 @@ class Explorer:
         with suppress(CreepingError):
             preview_of(flow, request, self.step)
         self.seconds: deque[float] = deque(maxlen=1000)
+        self.cut_seconds: deque[float] = deque(maxlen=1000)
+        self._span: Span | None = None
+        self._refined = 0
         self._asking, self._drawing = RLock(), RLock()
         self._requests: Latest[ViewRequest] = Latest()
         self._frames: Latest[tuple[Preview, int]] = Latest()
-        self.server = LocalServer(port)
+        self._cuts: Latest[tuple[Preview, int]] = Latest()
+        self.server = LocalServer(port, name)
         try:
             self.scene = Scene(self.server, self.model)
             self._controls()
@@ -95,7 +111,7 @@ class Explorer:
         except BaseException:
             self.server.stop()
             raise
-        self._workers = [Thread(target=work, daemon=True) for work in (self._preview, self._refine)]
+        self._workers = [Thread(target=work, daemon=True) for work in (self._preview, self._follow, self._refine)]
         for worker in self._workers:
             worker.start()
         self._requests.put(request)
@@ -118,8 +134,8 @@ class Explorer:
 
     def close(self) -> None:
         """Stop the workers and the server."""
-        self._requests.close()
-        self._frames.close()
+        for queue in (self._requests, self._frames, self._cuts):
+            queue.close()
         for worker in self._workers:
             worker.join(timeout=5.0)
         self.server.stop()
@@ -127,13 +143,17 @@ class Explorer:
     def _controls(self) -> None:
         gui, request, extent = self.server.gui, self.request, size(self.flow.body)
         gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+        kind, _, eta = request.boundary.partition(":")
+        self._eta = eta or "1"
+        self.scale = wave_scale(request)
+        values = (5 / extent, 400 / extent, request.wavenumber)
+        wave = _range(*(value / self.scale.per_unit for value in values))
         sliders = {
             "theta": gui.add_slider("theta (degrees)", 0.0, 180.0, 0.1, request.theta, hint="Where the wave travels"),
             "phi": gui.add_slider("phi (degrees)", -180.0, 180.0, 0.1, request.phi),
-            "wavenumber": gui.add_slider(
-                "wavenumber (1/L)", *_range(5 / extent, 400 / extent, request.wavenumber), request.wavenumber
-            ),
-            "boundary": gui.add_dropdown("boundary", BOUNDARIES, initial_value=request.boundary),
+            "wavenumber": gui.add_slider(self.scale.name, *wave, request.wavenumber / self.scale.per_unit),
+            "boundary": gui.add_dropdown("boundary", BOUNDARIES, initial_value=kind),
+            "eta": gui.add_text("impedance: eta", self._eta, hint="du/dn + i k eta u = 0, e.g. 0.5+0.2j"),
             "length": gui.add_slider(
                 "length of rays", *_range(0.2 * extent, 6 * extent, request.length), request.length
             ),
@@ -156,11 +176,32 @@ class Explorer:
         if event.client is None:
             return
         with self._asking:
-            value = event.target.value
-            if not self.ask(**{name: int(value) if name == "rays" else value}):
-                event.target.value = getattr(self.request, name)
+            if not self._wished(name, event.target.value):
+                event.target.value = self._shown(name)
             elif name in ("theta", "phi"):
                 self.scene.turn(self.request.direction)
+
+    def _wished(self, name: str, value: Any) -> bool:
+        """Ask for the value of a control; whether it can be had."""
+        if name == "eta":
+            if self.request.boundary.startswith("impedance") and not self.ask(boundary=f"impedance:{value}"):
+                return False
+            self._eta = value
+            return True
+        if name == "boundary" and value == "impedance":
+            value = f"impedance:{self._eta}"
+        if name == "wavenumber":
+            value = value * self.scale.per_unit
+        return self.ask(**{name: int(value) if name == "rays" else value})
+
+    def _shown(self, name: str) -> Any:
+        """Value of a control for the request as it is."""
+        if name == "eta":
+            return self._eta
+        if name == "boundary":
+            return self.request.boundary.partition(":")[0]
+        value = getattr(self.request, name)
+        return value / self.scale.per_unit if name == "wavenumber" else value
 
     def _dragged(self, event: Any) -> None:
         if event.client is None:
@@ -181,17 +222,50 @@ class Explorer:
             began = time.perf_counter()
             try:
                 frame = preview_of(self.flow, request, self.step)
+                self._span = span = fitted_span(frame.levels, self._span)
+                plane, bar = preview_plane_svg(frame), legend(frame, span)
+                text = preview_text(frame, time.perf_counter() - began, span)
                 with self._drawing:
-                    self.scene.show(frame)
-                    self.found.content = ""
+                    self.scene.show(frame, span)
+                    self.found.content, self.plane.content = "", plane
+                    # what has not changed is not sent again
+                    if bar != self.bar.content:
+                        self.bar.content = bar
+                    self.status.content = text
                 self.seconds.append(time.perf_counter() - began)
-                self.bar.content = "" if frame.levels is None else colour_bar(RANGE, request.boundary)
-                self.status.content = preview_text(frame, self.seconds[-1], RANGE)
             except Exception as error:
                 self.status.content = error_text(error)
             if frame is not None:
                 # after a request that failed the last frame is still the one on the page, and may be refined
                 self._frames.put((frame, number))
+                self._cuts.put((frame, number))
+
+    def _follow(self) -> None:
+        """Let the far-field cut follow the frames, at a pace of its own: it takes longer than they do."""
+        angles = np.arange(-180.0, 180.0 + FOLLOWING / 2, FOLLOWING)
+        while (taken := self._cuts.take()) is not None:
+            (frame, number), _ = taken
+            request, began = frame.request, time.perf_counter()
+            try:
+                if speed_of(self.flow.body) is not None or not self._follows(frame):
+                    continue
+                cut = cut_svg(request, angles, far_cut(frame.fan, request, angles))
+                self.cut_seconds.append(time.perf_counter() - began)
+                with self._drawing:
+                    # the refined cut of this request, if it came first, is the better one
+                    if self._refined < number:
+                        self.cut.content = cut
+            except CreepingError:
+                # the refined view says what is wrong
+                continue
+            except Exception as error:
+                self.status.content = error_text(error)
+            # the hand comes first: as long a rest as the work took
+            time.sleep(max(PACE, time.perf_counter() - began))
+
+    def _follows(self, frame: Preview) -> bool:
+        """Whether the cut of a frame can be had while the hand moves."""
+        return len(frame.fan.points) > 0 and expected_nodes(frame.fan, frame.request.wavenumber) < FOLLOWED
 
     def _refine(self) -> None:
         """Follow up when the hand rests."""
@@ -206,11 +280,13 @@ class Explorer:
                 found = None if stale() else refined_view(self.flow, frame, self.model.mesh.vertices, stale)
                 if found is None:
                     continue
-                text, plane, cut = refined_text(found), plane_svg(found), cut_svg(found)
-                paint = self.scene.painted_mesh(found)
+                text, plane = refined_text(found), plane_svg(found)
+                cut = cut_svg(found.request, found.cut_angles, found.far)
+                paint = self.scene.painted_mesh(found, self._span or fitted_span(found.body_levels))
                 with self._drawing:
                     # a frame that was shown meanwhile is newer than this
                     if not stale():
+                        self._refined = number
                         self.scene.refine(found, paint)
                         self.found.content, self.plane.content, self.cut.content = text, plane, cut
             except Exception as error:

@@ -12,6 +12,7 @@ from creeping._typing import FloatArray, IntArray
 from creeping.explorer.request import ViewRequest
 from creeping.field.decibels import decibels
 from creeping.field.on_rays import ray_magnitude
+from creeping.field.validity_range import Validity, validity
 from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
@@ -43,13 +44,13 @@ class Preview:
 
     @cached_property
     def levels(self) -> FloatArray | None:
-        """20 log10 of |u|, or |du/dn|/k of a soft body, along the rays (rays, steps); None on a weighted body.
+        """20 log10 of |u|, |du/dn|/k of a soft body or |n x H| of a conductor along the rays (rays, steps).
 
-        -inf where a ray has ended, inf on caustics.
+        -inf where a ray has ended, inf on caustics; None on a weighted body.
         """
         if speed_of(self.fan.body) is not None:
             return None
-        return decibels(ray_magnitude(self.fan, wavenumber=self.request.wavenumber, boundary=self.request.boundary))
+        return decibels(ray_magnitude(self.fan, wavenumber=self.request.wavenumber, boundary=self.request.on_rays))
 
     @cached_property
     def ray_segments(self) -> FloatArray:
@@ -57,20 +58,35 @@ class Preview:
         return segments(self.fan.points)
 
     @cached_property
+    def curves(self) -> list[IsoPhaseCurve]:
+        """Iso-phase curves."""
+        return requested_curves(self.request, self.fan)
+
+    @cached_property
     def level_segments(self) -> tuple[FloatArray, FloatArray]:
         """Segments of the iso-phase curves (m, 2, 3), and the level of each (m,)."""
-        curves = requested_curves(self.request, self.fan)
+        curves = self.curves
         pieces = [segments(c.points[None], closed=c.closed) for c in curves]
         return joined(pieces), np.concatenate(
             [np.zeros(0), *(np.full(len(p), c.level) for p, c in zip(pieces, curves, strict=True))]
         )
 
     @cached_property
-    def launch_segments(self) -> FloatArray:
-        """The attached part of the shadow line through the launch points (m, 2, 3)."""
+    def launch_arcs(self) -> list[FloatArray]:
+        """The attached part of the shadow line through the launch points, closed where it is: each (n, 3)."""
         start, fan = self.fan.points[:, 0], self.fan
-        arcs = [np.flatnonzero(fan.arc_index == k) for k in range(len(fan.closed_arcs))]
-        return joined([segments(start[a][None], closed=c) for a, c in zip(arcs, fan.closed_arcs, strict=True)])
+        arcs = [start[fan.arc_index == k] for k in range(len(fan.closed_arcs))]
+        return [np.concatenate([a, a[: int(c)]]) for a, c in zip(arcs, fan.closed_arcs, strict=True)]
+
+    @cached_property
+    def launch_segments(self) -> FloatArray:
+        """The same as segments (m, 2, 3)."""
+        return joined([segments(arc[None]) for arc in self.launch_arcs])
+
+    @cached_property
+    def validity(self) -> Validity | None:
+        """How far the wave is from the limit of short waves; None on a weighted body."""
+        return None if self.levels is None else validity(self.fan, wavenumber=self.request.wavenumber)
 
 
 def preview_of(flow: Flow, request: ViewRequest, step: float) -> Preview:

@@ -11,10 +11,12 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.explorer.preview import Preview
 from creeping.explorer.request import ViewRequest
+from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.speed import speed_of
+from creeping.plotting.coloured_body import current_levels
 from creeping.plotting.field_pictures import surface_levels
 from creeping.rays.fan import RayFan, end_error, launch
 from creeping.rays.transport import Flow
@@ -40,7 +42,8 @@ class Refined:
     fan : RayFan
         With rays inserted where neighbours part: that of the fields.
     body_levels : (n,) or None
-        20 log10 of the total field on the vertices of the mesh; NaN where no ray passes, None on a weighted body.
+        20 log10 of the total field on the vertices of the mesh, of a conductor of |n x H|, the root mean square of both
+        polarisations; NaN where no ray passes, None on a weighted body and where it costs too much.
     cut_angles : (m,), degrees
         Theta of the cut, from -180 to 180 through the directions of azimuth ``request.cut`` and its opposite.
     far : FarField or None
@@ -74,14 +77,32 @@ def refined_view(flow: Flow, frame: Preview, vertices: FloatArray, stale: IsStal
     angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
     if speed_of(body) is not None:
         return Refined(request, drawn, line, fan, None, angles, None)
+    levels = _body_levels(fan, request, vertices, stale)
+    if stale():
+        return None
+    return Refined(request, drawn, line, fan, levels, angles, far_cut(fan, request, angles))
+
+
+def far_cut(fan: RayFan, request: ViewRequest, angles: FloatArray) -> FarField:
+    """Far field of the cut at theta (m,), degrees."""
+    return far_field(fan, cut_directions(angles, request.cut), wavenumber=request.wavenumber, boundary=request.kind)
+
+
+def _body_levels(fan: RayFan, request: ViewRequest, vertices: FloatArray, stale: IsStale) -> FloatArray | None:
+    """Levels of the total field at points of the body (n, 3); None of a conductor whose currents cost too much."""
+    k = request.wavenumber
+    if request.boundary == "pec":
+        # the far-field cut takes the same currents
+        if not affordable(fan, 2 * round(360 / CUT_STEP), k, distant=True):
+            return None
+        return current_levels(kept_currents(fan, k, "pec"), vertices)
     levels = np.empty(len(vertices))
     for first in range(0, len(vertices), BLOCK):
         part = slice(first, first + BLOCK)
-        levels[part] = surface_levels(fan, vertices[part], wavenumber=request.wavenumber, boundary=request.boundary)
+        levels[part] = surface_levels(fan, vertices[part], wavenumber=k, boundary=request.kind)
         if stale():
             return None
-    far = far_field(fan, cut_directions(angles, request.cut), wavenumber=request.wavenumber, boundary=request.boundary)
-    return Refined(request, drawn, line, fan, levels, angles, far)
+    return levels
 
 
 def cut_directions(angles: FloatArray, azimuth: float) -> FloatArray:

@@ -4,16 +4,15 @@ d = (sin θ cos φ, sin θ sin φ, cos θ)
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.boundary import parse_boundary
+from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.geometry.directions import angles_of, directions_from_angles
 
-BOUNDARIES = ("soft", "hard")
+BOUNDARIES = ("soft", "hard", "pec", "impedance")
 RAYS = (16, 1024)
 """Fewest and most rays."""
 LEVELS = 400
@@ -34,9 +33,14 @@ class ViewRequest:
     spacing : float, L
         Between iso-phase curves; 0 for none.
     wavenumber : float, 1/L
-    boundary : {"soft", "hard"}
+    boundary : str
+        "soft", "hard", "pec" or "impedance:ETA".
     cut : float, degrees
         Azimuth of the half plane whose directions the far-field cut runs through, with its opposite.
+    metres : bool
+        Whether lengths are metres: then there are frequencies and dBsm.
+    sound_speed : float, m/s, optional
+        Of the medium, if the wave is sound; light if not given.
     """
 
     theta: float
@@ -45,8 +49,10 @@ class ViewRequest:
     length: float
     spacing: float
     wavenumber: float
-    boundary: Literal["soft", "hard"]
+    boundary: str
     cut: float = 0.0
+    metres: bool = False
+    sound_speed: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("theta", "phi", "length", "spacing", "wavenumber", "cut"):
@@ -62,14 +68,29 @@ class ViewRequest:
             )
         if self.spacing and self.length / self.spacing > LEVELS:
             raise InvalidInputError(f"spacing = {self.spacing:g} makes more than {LEVELS} curves; widen it")
+        if not isinstance(self.boundary, str):
+            raise InvalidInputError(f"boundary = {self.boundary!r} is no text")
         parse_boundary(self.boundary)
-        if self.boundary not in BOUNDARIES:
-            raise InvalidInputError(f"boundary = {self.boundary!r} is not one of {', '.join(BOUNDARIES)}")
+        if self.sound_speed is not None and not self.metres:
+            raise InvalidInputError("sound_speed is of a body in metres")
 
     @property
     def direction(self) -> FloatArray:
         """Unit vector d (3,)."""
         return directions_from_angles(*np.radians([self.theta, self.phi]))
+
+    @property
+    def kind(self) -> BoundaryLike:
+        """The boundary as fields take it."""
+        return parse_boundary(self.boundary)
+
+    @property
+    def on_rays(self) -> BoundaryLike:
+        """Boundary of the field along rays: of a conductor the wave with E along the normal, which decays less.
+
+        Its |n x H| is |u| of the hard boundary to first order.
+        """
+        return "hard" if self.boundary == "pec" else self.kind
 
     @property
     def levels(self) -> FloatArray:

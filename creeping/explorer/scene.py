@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.explorer.colours import ENDED, LEVEL_COLOURS, field_colours
+from creeping.explorer.colours import ENDED, LEVEL_COLOURS, LINEAR, Span, field_colours
 from creeping.explorer.preview import NOTHING, Preview, joined, outline, segments
 from creeping.explorer.refined import Refined
 from creeping.field.on_rays import creeps
@@ -24,7 +24,7 @@ INSET = 0.004
 """How much smaller the drawn body is, in body sizes."""
 CAMERA = 3.9
 """Distance of the camera, in radii of the body's box."""
-WIDTHS = {"rays": 1.0, "levels": 2.0, "line": 4.0, "outline": 1.5}
+WIDTHS = {"rays": 1.5, "levels": 2.0, "line": 4.0, "outline": 1.5}
 """Of lines, in pixels."""
 
 
@@ -115,14 +115,14 @@ class Scene:
         """Turn the arrow of the incidence."""
         self.incidence.wxyz = quaternion(direction)
 
-    def show(self, frame: Preview) -> None:
+    def show(self, frame: Preview, span: Span) -> None:
         """Draw what follows at once; the field on the body is hidden until it is known again."""
         levels = frame.levels
         if levels is None:
             alive = creeps(frame.fan)[..., None]
             colours = np.where(alive, np.array(rgb(RAY_COLOUR)), np.array(ENDED)).astype(np.uint8)
         else:
-            colours = field_colours(levels)
+            colours = field_colours(levels, span)
         pairs = np.stack([colours[:, :-1], colours[:, 1:]], axis=2).reshape(-1, 2, 3)
         curves, of = frame.level_segments
         shades = np.repeat(LEVEL_COLOURS(of / frame.fan.length)[:, None], 2, axis=1)
@@ -137,7 +137,7 @@ class Scene:
             for status in ("occluded", "concave"):
                 self._line(f"line/{status}", NOTHING, STATUS_COLOURS[status])
 
-    def painted_mesh(self, found: Refined) -> Any:
+    def painted_mesh(self, found: Refined, span: Span) -> Any:
         """The body in the colours of the field on it, None without a field."""
         import trimesh
 
@@ -147,7 +147,7 @@ class Scene:
             self.model.inset,
             self.model.mesh.triangles,
             vertex_normals=self.model.normals,
-            vertex_colors=field_colours(found.body_levels),
+            vertex_colors=LINEAR[field_colours(found.body_levels, span)],
             process=False,
         )
 
@@ -170,7 +170,7 @@ class Scene:
             if handle is not None:
                 handle.visible = False
             return
-        paint = np.array(rgb(colours), dtype=np.uint8) if isinstance(colours, str) else colours
+        paint = np.array(rgb(colours), dtype=np.uint8) if isinstance(colours, str) else LINEAR[colours]
         if handle is None:
             width = WIDTHS[name.split("/")[0]]
             self._lines[name] = self.scene.add_line_segments(

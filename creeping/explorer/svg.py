@@ -4,23 +4,33 @@ Written as text, since they follow the incidence: a picture of matplotlib takes 
 """
 
 from collections.abc import Iterable, Sequence
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.explorer.colours import LEVEL_COLOURS
-from creeping.explorer.preview import requested_curves
+from creeping.explorer.preview import Preview, requested_curves
 from creeping.explorer.refined import Refined
-from creeping.field.decibels import cross_section_decibels, shown_range
+from creeping.explorer.request import ViewRequest
+from creeping.explorer.units import far_levels, far_name
+from creeping.field.decibels import shown_range
+from creeping.field.far_result import FarField
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, status_pieces
-from creeping.plotting.palette import COLOURS
+from creeping.plotting.palette import COLOURS, EXACT
 from creeping.plotting.parameter_plane import is_torus
 from creeping.rays.angle_seams import split_at_seam
+from creeping.rays.fan import RayFan
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 34.0, 8.0, 8.0, 30.0
 """Of a picture and its margins, in units of the drawing."""
 DRAWN = 48
 """Rays drawn at most."""
+PARTS = ("creeping", "reflected")
+"""Curves of a cut that are parts of another."""
+DASHES = ("", "5,2", "1.5,1.5")
+STATUS_DASHES = {"attached": "", "occluded": "6,2", "concave": "2,2"}
 SPAN = 60.0
 """Of the far-field cut, dB."""
 
@@ -37,15 +47,23 @@ class _Axes:
         tall = self.height - TOP - BOTTOM
         return np.stack([across, TOP + (self.y[1] - points[:, 1]) / (self.y[1] - self.y[0]) * tall], axis=1)
 
-    def line(self, points: FloatArray) -> str:
-        """Path of a polyline of data (m, 2)."""
-        return "M" + "L".join(f"{x:.1f},{y:.1f}" for x, y in self.place(points))
-
-    def lines(self, pieces: Iterable[FloatArray], colour: str, width: float, opacity: float = 1.0) -> str:
+    def lines(
+        self, pieces: Iterable[FloatArray], colour: str, width: float, opacity: float = 1.0, dashes: str = ""
+    ) -> str:
         """All pieces as one element, nothing if there are none."""
-        path = "".join(self.line(piece) for piece in pieces if len(piece) > 1)
+        kept = [piece for piece in pieces if len(piece) > 1]
+        if not kept:
+            return ""
+        # all at once: each small array costs as much as a hundred points
+        places = np.round(self.place(np.concatenate(kept)), 1).tolist()
+        texts, path, first = [f"{x:.5g},{y:.5g}" for x, y in places], "", 0
+        for piece in kept:
+            path += "M" + "L".join(texts[first : first + len(piece)])
+            first += len(piece)
         style = f'fill="none" stroke="{colour}" stroke-width="{width}" stroke-opacity="{opacity}"'
-        return f'<path d="{path}" {style} stroke-linejoin="round"/>' if path else ""
+        if dashes:
+            style += f' stroke-dasharray="{dashes}"'
+        return f'<path d="{path}" {style} stroke-linejoin="round"/>'
 
     def frame(self, x_ticks: Sequence[float], y_ticks: Sequence[float], x_name: str, y_name: str) -> str:
         """Box, ticks and names."""
@@ -70,56 +88,116 @@ class _Axes:
 
 def plane_svg(found: Refined) -> str:
     """Shadow line, rays and iso-phase curves over (phi, theta), degrees."""
-    line, fan, body = found.line, found.fan, found.line.body
-    torus = is_torus(line)
-    axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
-    chosen = np.unique(np.linspace(0, len(fan.points) - 1, min(DRAWN, len(fan.points))).astype(int))
-    parts = [axes.lines(_flat(body.parameters(fan.points[k]) for k in chosen), RAY_COLOUR, 0.5, 0.6)]
-    for curve in requested_curves(found.request, fan):
-        pieces = [np.degrees(piece[:, ::-1]) for piece in curve.parameter_pieces]
-        parts.append(axes.lines(pieces, LEVEL_COLOURS.hexadecimal(curve.level / fan.length), 0.9))
-    for status, colour in STATUS_COLOURS.items():
-        drawn = [piece for c in line.curves for piece in status_pieces(c.points, c.status, status)]
-        parts.append(axes.lines(_flat(body.parameters(piece) for piece in drawn), colour, 1.8))
-    ticks = range(-180, 181, 90) if torus else range(0, 181, 45)
-    frame = axes.frame(range(-180, 181, 60), ticks, ("psi" if torus else "phi") + " (degrees)", "theta (degrees)")
-    return _picture("plane", axes.height, [*parts, frame])
-
-
-def cut_svg(found: Refined) -> str:
-    """Far field in dB over theta, unresolved directions as circles; empty for a weighted body."""
-    if found.far is None:
-        return ""
-    curves = {
-        "total": found.far.total,
-        "creeping": found.far.creeping,
-        "reflected": found.far.reflected,
+    lines = {
+        status: [piece for c in found.line.curves for piece in status_pieces(c.points, c.status, status)]
+        for status in STATUS_COLOURS
     }
-    levels = {name: cross_section_decibels(values) for name, values in curves.items()}
-    low, high = shown_range([levels["total"]], SPAN, step=10.0)
+    body, fan = found.fan.body, found.fan
+    rays = _flat(body.parameters(fan.points[k]) for k in _some(fan, DRAWN))
+    curves = [
+        (curve.level / fan.length, [np.degrees(piece[:, ::-1]) for piece in curve.parameter_pieces])
+        for curve in requested_curves(found.request, fan)
+    ]
+    flat = {status: _flat(body.parameters(piece) for piece in pieces) for status, pieces in lines.items()}
+    return _plane(is_torus(found.line), rays, curves, flat)
+
+
+def preview_plane_svg(frame: Preview) -> str:
+    """The same while the hand moves: fewer rays and points, of the line what is attached, gaps at the seam."""
+    body, fan = frame.fan.body, frame.fan
+    chosen = _some(fan, DRAWN // 2)
+    rays = _broken(body.parameters(fan.points[chosen, ::2])) if len(chosen) else []
+    curves = []
+    for curve in frame.curves:
+        points = curve.parameters[:: 1 + len(curve.parameters) // 100]
+        if curve.closed:
+            points = np.concatenate([points, points[:1]])
+        curves.append((curve.level / fan.length, _broken(points[None])))
+    line = [piece for arc in frame.launch_arcs for piece in _broken(body.parameters(arc)[None])]
+    return _plane(is_torus(fan.line), rays, curves, {"attached": line})
+
+
+Pieces = list[FloatArray]
+
+
+def _plane(torus: bool, rays: Pieces, curves: list[tuple[float, Pieces]], lines: dict[str, Pieces]) -> str:
+    """Pieces (k, 2) of rays, of curves by the share of their level, and of lines by status: phi and theta, degrees."""
+    axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
+    parts = [axes.lines(rays, RAY_COLOUR, 0.5, 0.6)]
+    parts += [axes.lines(pieces, LEVEL_COLOURS.hexadecimal(share), 0.9) for share, pieces in curves]
+    parts += [axes.lines(p, STATUS_COLOURS[s], 1.8, dashes=STATUS_DASHES[s]) for s, p in lines.items()]
+    return _picture("plane", axes.height, [*parts, _plane_frame(torus)])
+
+
+@cache
+def _plane_frame(torus: bool) -> str:
+    axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
+    ticks = range(-180, 181, 90) if torus else range(0, 181, 45)
+    return axes.frame(range(-180, 181, 60), ticks, ("psi" if torus else "phi") + " (degrees)", "theta (degrees)")
+
+
+def _some(fan: RayFan, most: int) -> IntArray:
+    """Numbers of rays, evenly spread."""
+    return np.unique(np.linspace(0, len(fan.points) - 1, min(most, len(fan.points))).astype(np.intp))
+
+
+def cut_svg(request: ViewRequest, angles: FloatArray, far: FarField | None) -> str:
+    """Far field in dB over theta (m,), degrees, unresolved directions as circles; empty for a weighted body."""
+    if far is None:
+        return ""
+    curves = _cut_curves(far)
+    levels = {name: far_levels(request, values) for name, values in curves.items()}
+    whole = [levels[name] for name in levels if name not in PARTS]
+    low, high = shown_range(whole, SPAN, step=10.0)
     axes = _Axes((-180, 180), (low, high), 0.56 * WIDTH)
-    parts = []
+    doubt = far.unresolved
+    runs = np.split(np.arange(len(doubt)), np.flatnonzero(np.diff(doubt)) + 1)
+    parts, across = [], LEFT + 8.0
     for number, name in reversed(list(enumerate(levels))):
-        inside = np.stack([found.cut_angles, np.clip(levels[name], low, high)], axis=1)
-        colour = "#111111" if name == "total" else COLOURS[number - 1]
-        if name == "total":
-            # what is not resolved is no curve
-            doubt = found.far.unresolved
-            runs = np.split(np.arange(len(doubt)), np.flatnonzero(np.diff(doubt)) + 1)
-            parts.append(axes.lines([inside[run] for run in runs if not doubt[run[0]]], colour, 1.2))
-            parts += [
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.5" fill="none" stroke="#888"/>'
-                for x, y in axes.place(inside[doubt])
-            ]
-        else:
-            parts.append(axes.lines([inside], colour, 0.8))
-        label = f'x="{LEFT + 8 + 60 * number}" y="{TOP + 11}" font-size="9" font-family="sans-serif"'
-        parts.append(f'<text {label} fill="{colour}">{name}</text>')
+        inside = np.stack([angles, np.clip(np.nan_to_num(levels[name], nan=low), low, high)], axis=1)
+        colour, dashes = (EXACT if number == 0 else COLOURS[number - 1]), DASHES[number]
+        if name in PARTS:
+            parts.append(axes.lines([inside], colour, 0.8, dashes=dashes))
+            continue
+        # what is not resolved is no curve
+        parts.append(axes.lines([inside[run] for run in runs if not doubt[run[0]]], colour, 1.2, dashes=dashes))
+        parts += [
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.5" fill="none" stroke="#888"/>'
+            for x, y in axes.place(inside[doubt])
+        ]
+    for number, name in enumerate(levels):
+        colour = EXACT if number == 0 else COLOURS[number - 1]
+        dash = f' stroke-dasharray="{DASHES[number]}"' if DASHES[number] else ""
+        parts.append(f'<path d="M{across:.0f},{TOP + 8}h16" stroke="{colour}" stroke-width="1.2"{dash}/>')
+        label = f'x="{across + 19:.0f}" y="{TOP + 11}" font-size="9" font-family="sans-serif"'
+        parts.append(f'<text {label} fill="#333">{name}</text>')
+        across += 80
     ticks = np.arange(low, high + 1, 20.0 if high - low > 40 else 10.0)
     frame = axes.frame(
-        range(-180, 181, 60), ticks.tolist(), f"theta (degrees), phi = {found.request.cut:g}", "dB of 4π|f|²"
+        range(-180, 181, 60), ticks.tolist(), f"theta (degrees), phi = {request.cut:g}", far_name(request)
     )
     return _picture("cut", axes.height, [*parts, frame])
+
+
+def _cut_curves(far: FarField) -> dict[str, ComplexArray]:
+    """What a cut draws: of a conductor both copolarised components."""
+    if far.total.ndim > 1:
+        return {"θθ": far.total[:, 0, 0], "φφ": far.total[:, 1, 1]}
+    return {"total": far.total, "creeping": far.creeping, "reflected": far.reflected}
+
+
+def _broken(parameters: FloatArray) -> list[FloatArray]:
+    """The same of curves of n points each (m, n, 2), with a gap where an angle jumps from one end to the other."""
+    flat = np.degrees(parameters[..., ::-1])
+    jumps = np.any(np.abs(np.diff(flat, axis=1)) > 180, axis=2)
+    # what is not finite is left out
+    jumps |= ~np.all(np.isfinite(flat[:, 1:]), axis=2)
+    whole = np.flatnonzero(~jumps.any(axis=1))
+    pieces = list(flat[whole])
+    for k in np.flatnonzero(jumps.any(axis=1)):
+        ends = [0, *(np.flatnonzero(jumps[k]) + 1).tolist(), flat.shape[1]]
+        pieces += [flat[k, a:b] for a, b in pairwise(ends) if b - a > 1]
+    return [piece for piece in pieces if np.isfinite(piece[0, 0])]
 
 
 def _flat(curves: Iterable[FloatArray]) -> list[FloatArray]:

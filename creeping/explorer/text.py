@@ -3,9 +3,12 @@
 import numpy as np
 
 from creeping._version import __version__
-from creeping.explorer.colours import FIELD_COLOURS
+from creeping.explorer.colours import ENDED, FIELD_COLOURS, LEVEL_COLOURS, ColourTable, Span
 from creeping.explorer.preview import Preview
 from creeping.explorer.refined import Refined
+from creeping.explorer.units import wave_text
+from creeping.field.validity_range import WITHIN, Validity, validity_words
+from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS
 from creeping.rays.fan import RayFan
 
 
@@ -14,10 +17,20 @@ def preview_text(frame: Preview, seconds: float, span: tuple[float, float]) -> s
     request, fan = frame.request, frame.fan
     at = f"theta {request.theta:.1f}, phi {request.phi:.1f} degrees"
     kind = "" if frame.levels is None else f"; colours: {span[0]:g} to {span[1]:g} dB, {field_name(request.boundary)}"
+    wave = "" if frame.validity is None else f"\n\n{wave_text(request)}; {validity_text(frame.validity)}"
     return (
         f"d = ({', '.join(f'{c:.4f}' for c in request.direction)}), {at}\n\n"
-        f"{_counts(fan)}; length {fan.length:.3g}; {1e3 * seconds:.0f} ms{kind}"
+        f"{_counts(fan)}; length {fan.length:.3g}; {1e3 * seconds:.0f} ms{kind}{wave}"
     )
+
+
+def validity_text(found: Validity) -> str:
+    """How far the wave is from the limit of short waves, bold beyond the range of the expansions."""
+    if np.isnan(found.least_k_rho):
+        return "no ray to judge the wave by"
+    inside = found.least_k_rho >= WITHIN[0] and found.largest_transverse <= WITHIN[1]
+    words = validity_words(found)
+    return words if inside else f"**{words}**"
 
 
 def refined_text(found: Refined) -> str:
@@ -33,7 +46,7 @@ def refined_text(found: Refined) -> str:
     if found.far is not None:
         doubt, fan, request = int(np.sum(found.far.unresolved)), found.fan, found.request
         lines.append(
-            f"fields of {len(fan.points)} rays, rms {fan.error.rms:.1e}: k = {request.wavenumber:g} 1/L, "
+            f"fields of {len(fan.points)} rays, rms {fan.error.rms:.1e}: {wave_text(request)}, "
             f"{request.boundary}; {doubt} of {len(found.cut_angles)} directions of the cut unresolved"
         )
     else:
@@ -43,22 +56,49 @@ def refined_text(found: Refined) -> str:
 
 def field_name(boundary: str) -> str:
     """What the colours show."""
-    return "|du/dn|/k" if boundary == "soft" else "|u|"
+    return {"soft": "|du/dn|/k", "pec": "|n × H|"}.get(boundary, "|u|")
 
 
-def colour_bar(span: tuple[float, float], boundary: str) -> str:
-    """A bar of the field's colours as SVG."""
+def legend(frame: Preview, span: Span, *, still: bool = False) -> str:
+    """What the colours in space stand for, as SVG; with the arcs that turn the incidence unless ``still``."""
+    rows = []
+    if frame.levels is not None:
+        field = f"20 log10 {field_name(frame.request.boundary)}, rays and body"
+        rows.append(_bar("field", FIELD_COLOURS, (f"{span[0]:g} dB", field, f"{span[1]:g} dB")))
+    if frame.request.spacing:
+        rows.append(_bar("levels", LEVEL_COLOURS, ("0", "iso-phase curves: travel time", f"{frame.fan.length:.3g}")))
+    line = dict(zip(("shadow line", "occluded", "concave"), STATUS_COLOURS.values(), strict=True))
+    rows.append(_keys(line | {"outline": RAY_COLOUR, "no ray": "#{:02x}{:02x}{:02x}".format(*ENDED)}))
+    if not still:
+        rows.append(_keys(ARCS))
+    placed = "".join(f'<g transform="translate(0 {24 * number})">{row}</g>' for number, row in enumerate(rows))
+    box = f'viewBox="0 0 360 {24 * len(rows)}" width="100%"'
+    return f'<svg id="bar" xmlns="http://www.w3.org/2000/svg" {box}>{placed}</svg>'
+
+
+ARCS = {"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}
+"""Of the handles on the page, in the colours that they have there."""
+_TEXT = 'font-size="9" font-family="sans-serif" fill="#333"'
+
+
+def _bar(name: str, colours: ColourTable, words: tuple[str, str, str]) -> str:
+    """A bar of colours with words below its lower end, middle and upper end."""
     stops = "".join(
-        f'<stop offset="{share:.2f}" stop-color="{FIELD_COLOURS.hexadecimal(share)}"/>'
-        for share in np.linspace(0, 1, 9)
+        f'<stop offset="{share:.2f}" stop-color="{colours.hexadecimal(share)}"/>' for share in np.linspace(0, 1, 9)
     )
-    text = 'font-size="9" font-family="sans-serif" fill="#333"'
-    return (
-        '<svg id="bar" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 360 26" width="100%"><defs>'
-        f'<linearGradient id="field">{stops}</linearGradient></defs>'
-        '<rect x="34" y="2" width="318" height="9" fill="url(#field)"/>'
-        f'<text x="34" y="22" {text}>{span[0]:g} dB</text><text x="352" y="22" text-anchor="end" {text}>{span[1]:g} dB'
-        f'</text><text x="193" y="22" text-anchor="middle" {text}>20 log10 {field_name(boundary)}</text></svg>'
+    ends = zip(words, (8, 180, 352), ("start", "middle", "end"), strict=True)
+    text = "".join(f'<text x="{x}" y="20" text-anchor="{anchor}" {_TEXT}>{word}</text>' for word, x, anchor in ends)
+    fill = f'<defs><linearGradient id="{name}">{stops}</linearGradient></defs>'
+    return f'{fill}<rect x="8" y="2" width="344" height="8" fill="url(#{name})"/>{text}'
+
+
+def _keys(colours: dict[str, str]) -> str:
+    """Short lines of colours with their names in a row."""
+    step = 352 / len(colours)
+    return "".join(
+        f'<path d="M{8 + step * n:.0f},12h12" stroke="{colour}" stroke-width="3"/>'
+        f'<text x="{23 + step * n:.0f}" y="15" {_TEXT}>{name}</text>'
+        for n, (name, colour) in enumerate(colours.items())
     )
 
 

@@ -78,13 +78,21 @@ def currents_picture(
     drawing = compose(
         shadow_line(currents.body, currents.direction), view=view, cells=cells or cells_of(currents.body, k)
     )
-    levels = decibels(_magnitudes(currents, drawing.mesh.vertices, incident))
+    levels = current_levels(currents, drawing.mesh.vertices, incident)
     name = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
     label = f"20 log$_{{10}}${name} (dB)\nk = {k:g}/L, {currents.boundary.kind}"
     save_figure(
         painted(drawing, levels, span=span, label=label, bare="no current", backend=backend, dpi=dpi), path, dpi
     )
     return backend
+
+
+def current_levels(currents: SurfaceCurrents, points: FloatArray, incident: str | None = None) -> FloatArray:
+    """20 log10 of the magnitude of the currents at points of the body: (n, 3) -> (n,), NaN where there are none.
+
+    |n x H| of a conductor, of one incident polarisation or the root mean square of both; |u|, |du/dn|/k if soft.
+    """
+    return decibels(_magnitudes(currents, points, incident))
 
 
 def _magnitudes(currents: SurfaceCurrents, points: FloatArray, incident: str | None) -> FloatArray:

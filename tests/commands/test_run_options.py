@@ -9,7 +9,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.commands import run_field
-from creeping.commands.body import short_name
+from creeping.commands.body import title_of
 from creeping.commands.compiling import told_of_compilation
 from creeping.commands.main import main
 from creeping.errors import InvalidInputError
@@ -135,8 +135,8 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
 
 
 def test_names_of_bodies_in_titles():
-    assert short_name("/home/someone/hull.stl") == "hull.stl"
-    assert short_name("sphere:radius=2") == "sphere:radius=2" and len(short_name("x + " * 40)) == 60
+    assert title_of("/home/someone/hull.stl") == "hull.stl"
+    assert title_of("sphere:radius=2") == "sphere:radius=2" and len(title_of("x + " * 40)) == 60
 
 
 def test_compilation_is_told_once():

@@ -73,7 +73,11 @@ def test_the_command_writes_it(tmp_path, capsys):
         (["--rays", "8"], 3),
         (["--direction", "0", "0", "0"], 3),
         (["--port", "0"], 3),
-        (["--boundary", "pec"], 2),
+        (["--boundary", "wet"], 3),
+        (["--wavenumber", "20", "--frequency", "1GHz"], 3),
+        (["--frequency", "1:2:1GHz"], 3),
+        (["--frequency", "fast"], 3),
+        (["--sound-speed", "-1", "--frequency", "38kHz"], 3),
         (["--length", "nan"], 3),
         (["--wavenumber", "0"], 3),
     ],
@@ -82,3 +86,37 @@ def test_the_command_refuses(arguments, code, tmp_path, capsys):
     with pytest.raises(SystemExit) as caught:
         cli.main(["explore", "sphere", *arguments, "--export", str(tmp_path / "page.html")])
     assert caught.value.code == code and list(tmp_path.iterdir()) == []
+
+
+def test_a_notebook_holds_the_page(tmp_path, browser):
+    from creeping.explorer.notebook import page
+
+    line = cr.shadow_line(BODY, direction=(1, 1, 1))
+    fan = cr.launch(cr.DirectFlow(BODY), line, length=1.5, n_rays=32)
+    made = page(fan, wavenumber=20.0, boundary=cr.ImpedanceBoundary(0.5))
+    assert made.title.startswith("Ellipsoid(") and "impedance:0.5" in made.text and "MB)" in repr(made)
+    (tmp_path / "notebook.html").write_text(f"<!doctype html><html><body>{made._repr_html_()}</body></html>")
+    browser.open((tmp_path / "notebook.html").as_uri())
+    browser.driver.switch_to.frame(0)
+    assert browser.driver.find_element("id", "plane").rect["height"] > 50
+    assert browser.driver.find_element("tag name", "canvas").rect["height"] > 50
+    assert browser.errors() == []
+    assert browser.requests_outside() == []
+    made.save(tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_text() == made.text
+
+
+def test_names_are_titles(tmp_path):
+    from creeping.commands.body import title_of
+
+    assert [title_of(text) for text in ("torus", "some/where/hull.stl", "x**2 +\n y**2 + z**2 - 1")] == [
+        "torus",
+        "hull.stl",
+        "x**2 + y**2 + z**2 - 1",
+    ]
+    assert len(title_of("x + " * 100)) == 60
+    with pytest.raises(SystemExit) as caught:
+        arguments = ["--rays", "16", "--frequency", "1GHz", "--boundary", "pec", "--export", str(tmp_path / "a.html")]
+        cli.main(["explore", "sphere", *arguments])
+    page = (tmp_path / "a.html").read_text()
+    assert caught.value.code == 0 and "<title>sphere</title>" in page and "1 GHz" in page and "dBsm" in page

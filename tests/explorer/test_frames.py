@@ -7,16 +7,24 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.explorer.colours import ENDED, FIELD_COLOURS, RANGE, field_colours
+from creeping.explorer.colours import ENDED, FIELD_COLOURS, LINEAR, field_colours, fitted_span
 from creeping.explorer.preview import outline, preview_of, segments, step_of, steps_of
 from creeping.explorer.refined import cut_directions, refined_view
 from creeping.explorer.request import ViewRequest
-from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import colour_bar, preview_text, refined_text
+from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
+from creeping.explorer.text import legend, preview_text, refined_text
+from creeping.explorer.units import far_levels, wave_scale, wave_text
 from creeping.geometry.surface import normal
 from creeping.geometry.triangulation import triangulate
 
 REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
+
+
+RANGE = (-50.0, 5.0)
+
+
+def cut_of(found):
+    return cut_svg(found.request, found.cut_angles, found.far)
 
 
 def found_of(body, request=REQUEST):
@@ -102,15 +110,15 @@ def test_long_rays_get_longer_steps():
 
 
 def test_pictures_are_svg_of_finite_numbers(twisted):
-    _, _, found = twisted
-    for text in (plane_svg(found), cut_svg(found), colour_bar(RANGE, "hard")):
+    frame, _, found = twisted
+    for text in (plane_svg(found), preview_plane_svg(frame), cut_of(found), legend(frame, RANGE)):
         assert text.startswith("<svg") and text.endswith("</svg>") and "nan" not in text and "inf" not in text
         assert not re.search(r"(src|href)=", text)
 
 
 def test_a_weighted_body_has_rays_and_no_field():
     frame, _, found = found_of(sc.Sphere(speed="1 + 0.3*x"))
-    assert frame.levels is None and found.body_levels is None and found.far is None and cut_svg(found) == ""
+    assert frame.levels is None and found.body_levels is None and found.far is None and cut_of(found) == ""
     assert "no field" in refined_text(found) and "dB" not in preview_text(frame, 0.01, RANGE)
     assert plane_svg(found).count("<path") > 3
 
@@ -123,10 +131,14 @@ def test_a_torus_is_drawn_all_the_way_round():
 
 def test_colours_of_levels():
     low, high = RANGE
-    colours = field_colours(np.array([-np.inf, np.nan, low - 20, low, high, np.inf]))
+    colours = field_colours(np.array([-np.inf, np.nan, low - 20, low, high, np.inf]), RANGE)
     assert colours[:2].tolist() == [list(ENDED)] * 2
     assert colours[2].tolist() == colours[3].tolist() == FIELD_COLOURS.table[0].tolist()
     assert colours[4].tolist() == colours[5].tolist() == FIELD_COLOURS.table[255].tolist()
+
+
+def test_vertices_take_light():
+    assert LINEAR[[0, 10, 188, 255]].tolist() == [0, 1, 128, 255]
 
 
 def test_closed_lines_return():
@@ -134,3 +146,57 @@ def test_closed_lines_return():
     assert segments(square).shape == (2, 2, 3)
     closed = segments(square, closed=True)
     np.testing.assert_array_equal(closed[-1], [[1, 1, 0], [0, 0, 0]])
+
+
+def test_the_range_of_colours_fits_and_stays():
+    levels = np.linspace(-33.0, 2.0, 500)
+    span = fitted_span(np.concatenate([levels, [-np.inf, np.nan, np.inf]]))
+    assert span == (-35.0, 5.0)
+    # a little more changes nothing, much more does; at most 60 dB
+    assert fitted_span(levels + 4, span) == span
+    assert fitted_span(levels - 20, span) == (-55.0, -15.0)
+    assert fitted_span(np.linspace(-200, 3, 500)) == (-55.0, 5.0)
+    assert fitted_span(np.full(4, -np.inf), span) == fitted_span(None, span) == span
+
+
+@pytest.mark.parametrize("boundary, name", [("pec", "|n × H|"), ("soft", "|du/dn|/k"), ("impedance:0.5+0.2j", "|u|")])
+def test_every_boundary_has_its_field(boundary, name):
+    frame, mesh, found = found_of(sc.Sphere(), REQUEST.changed(boundary=boundary, wavenumber=12.0))
+    assert frame.levels.shape == frame.fan.spreading.shape and name in legend(frame, RANGE)
+    assert found.body_levels.shape == (len(mesh.vertices),) and np.isfinite(found.body_levels).mean() > 0.5
+    assert ("φφ" in cut_of(found)) == (boundary == "pec") and found.far.boundary == boundary
+    if boundary == "pec":
+        # physical optics where the wave meets the body: |n x H| = 2
+        front = mesh.vertices @ REQUEST.direction < -0.98
+        np.testing.assert_allclose(found.body_levels[front], 20 * np.log10(2), atol=0.5)
+
+
+def test_metres_have_frequencies():
+    request = REQUEST.changed(metres=True, wavenumber=209.585)
+    name, per_unit = wave_scale(request)
+    assert name == "frequency (GHz)" and 209.585 / per_unit == pytest.approx(10.0, abs=1e-4)
+    assert "10 GHz, wavelength 0.03 m" in wave_text(request)
+    sound = REQUEST.changed(metres=True, sound_speed=1477.0, wavenumber=161.653)
+    assert wave_scale(sound).name == "frequency (kHz)" and "38 kHz" in wave_text(sound)
+    # a cross section of 4 pi square metres, and |f| = 1 m
+    assert far_levels(request, np.ones(1))[0] == pytest.approx(10.99, abs=0.01)
+    assert far_levels(sound, np.ones(1))[0] == pytest.approx(0.0)
+    assert wave_scale(REQUEST) == ("wavenumber (1/L)", 1.0)
+
+
+def test_waves_that_are_too_long_are_flagged():
+    body = sc.Sphere()
+    for k, flagged in ((3.0, True), (30.0, False)):
+        frame = preview_of(cr.DirectFlow(body), REQUEST.changed(wavenumber=k), step_of(body))
+        text = preview_text(frame, 0.01, RANGE)
+        assert f"k rho >= {k:g}" in text and ("**k rho" in text) == flagged
+
+
+def test_lines_break_where_an_angle_jumps():
+    from creeping.explorer.svg import _broken
+
+    theta = np.full(6, 1.0)
+    phi = np.radians([150.0, 170.0, 179.0, -170.0, -150.0, np.nan])
+    pieces = _broken(np.stack([theta, phi], axis=1)[None])
+    assert [len(piece) for piece in pieces] == [3, 2]
+    assert all(np.isfinite(piece).all() for piece in pieces)

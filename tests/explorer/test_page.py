@@ -36,7 +36,7 @@ def rays_of(page, **values):
 
 def refined_view(page, seconds=60.0):
     until = time.monotonic() + seconds
-    while not page.plane.content:
+    while not page.found.content:
         assert time.monotonic() < until, page.status.content
         time.sleep(0.1)
 
@@ -64,6 +64,59 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
     assert np.max(np.abs(held - first)) > 1e-3
     assert browser.errors() == []
     assert browser.requests_outside(urlsplit(page.address).netloc) == []
+
+
+def test_the_plane_and_the_cut_follow_the_hand(page, monkeypatch):
+    from creeping.explorer import page as module
+
+    refined_view(page)
+    plane, cut = page.plane.content, page.cut.content
+    # the hand does not rest
+    monkeypatch.setattr(module, "REST", 1000.0)
+    page.ask(theta=70.0)
+    until = time.monotonic() + 60
+    while page.plane.content == plane or page.cut.content == cut:
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    assert page.found.content == "" and page.cut.content.startswith("<svg")
+    page._requests.close()
+
+
+def test_the_wave_and_the_boundary_are_set_by_hand(page):
+    class Event:
+        client = object()
+
+    def slide(name, value):
+        Event.target = page.sliders[name]
+        Event.target.value = value
+        page._slid(name, Event)
+
+    slide("boundary", "pec")
+    assert page.request.boundary == "pec"
+    slide("boundary", "impedance")
+    assert page.request.boundary == "impedance:1"
+    slide("eta", "0.5+0.2j")
+    assert page.request.boundary == "impedance:0.5+0.2j"
+    slide("eta", "wet")
+    assert page.request.boundary == "impedance:0.5+0.2j" and page.sliders["eta"].value == "0.5+0.2j"
+    slide("wavenumber", 42.0)
+    assert page.request.wavenumber == 42.0
+
+
+def test_the_title_is_that_of_the_body(browser):
+    from creeping.explorer.page import Explorer
+
+    request = REQUEST.changed(metres=True, wavenumber=41.9)
+    made = Explorer(cr.DirectFlow(sc.Sphere()), request, port=8160, name="hull <1>.stl")
+    try:
+        browser.open(made.address)
+        assert browser.driver.title == "hull <1>.stl"
+        assert made.sliders["wavenumber"].label == "frequency (GHz)"
+        assert made.sliders["wavenumber"].value == pytest.approx(2.0, abs=0.01)
+        browser.segments(64 * round(REQUEST.length / made.step))
+        assert browser.errors() == []
+    finally:
+        made.close()
 
 
 def test_the_arrow_turns_the_sliders_and_the_program_turns_nothing(page):

@@ -54,7 +54,7 @@ def by_name(path):
 
 def test_there_are_the_pages():
     expected = "accuracy benchmarks conventions derivations_bodies derivations_field derivations_rays echoes index"
-    more = "limitations notation own_body performance sweeps theory"
+    more = "limitations notation notebooks own_body performance sweeps theory"
     assert [page.stem for page in PAGES] == [*expected.split(), *more.split()]
 
 
@@ -84,7 +84,7 @@ def test_dotted_names_are_there(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=by_name)
-def test_short_names_are_public(page):
+def test_title_ofs_are_public(page):
     for alias, package in (("cr", creeping), ("sc", scatterers)):
         codes = [*inline(page), *blocks(page, "python")]
         names = {name for code in codes for name in re.findall(rf"(?<![\w.]){alias}\.(\w+)", code)}
