@@ -16,7 +16,7 @@ def told_of_compilation(progress: Callable[[str], None]) -> Iterator[None]:
         def on_start(self, event: Any) -> None:
             if not self.told:
                 self.told = True
-                progress("compiling kernels, once for this machine: some 20 s")
+                progress("compiling kernels, once for this machine: up to a minute")
 
         def on_end(self, event: Any) -> None:
             pass

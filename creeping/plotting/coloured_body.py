@@ -116,6 +116,7 @@ def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[Complex
     Nodes about a point are smoothed by a Gaussian, each with its phase carried along to the point: where rays of
     several sheets pass they add up, as they do in the field.
     """
+    from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
 
     k = currents.wavenumber
@@ -123,6 +124,7 @@ def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[Complex
     n = normal(currents.body, points)
     tree = cKDTree(currents.points)
     total, share = np.zeros((len(points), *currents.values.shape[1:]), dtype=complex), np.zeros(len(points))
+    flat = currents.values.reshape(len(currents.points), -1)
     for first in range(0, len(points), BLOCK):
         part = slice(first, first + BLOCK)
         pairs = cKDTree(points[part]).sparse_distance_matrix(tree, REACH * width, output_type="ndarray")
@@ -133,9 +135,11 @@ def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[Complex
         weight = np.exp(-0.5 * (distance / width) ** 2) * currents.weights[node]
         weight /= 2 * np.pi * width**2 * (1 - np.exp(-0.5 * REACH**2))
         phase = k * np.einsum("nc,nc->n", currents.travel[node], points[row] - currents.points[node])
-        carried = (weight * np.exp(1j * phase)).reshape(-1, *(1,) * (currents.values.ndim - 1))
-        np.add.at(total, row, carried * currents.values[node])
-        np.add.at(share, row, weight)
+        count = len(points[part])
+        shape = (count, len(currents.points))
+        summed = csr_array((weight * np.exp(1j * phase), (row - first, node)), shape=shape)
+        total[part] = (summed @ flat).reshape(count, *currents.values.shape[1:])
+        share[part] = np.bincount(row - first, weight, count)
     return total, share > COVERED
 
 

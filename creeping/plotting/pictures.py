@@ -18,6 +18,8 @@ from creeping.storage.atomic import written_aside
 
 BACKENDS = ("auto", "pyvista", "matplotlib")
 WIDTH = 6.4  # inches
+FINER = 1.6
+"""Pixels of what OpenGL renders for each of the file, along a side."""
 Place = tuple[float, float, float, float]  # left, bottom, width, height, as shares of the figure
 
 
@@ -184,10 +186,10 @@ def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None
     from creeping.plotting import scene
 
     ax = figure.add_axes(place)
-    # twice the pixels of the file: reduced on saving, which smooths every edge
+    # more pixels than the file has: reduced on saving, which smooths every edge
     inches = figure.get_size_inches()
-    width, height = (round(2 * dpi * float(size) * share) for size, share in zip(inches, place[2:], strict=True))
-    image = scene.render(drawing, (width, height), scale=2 * dpi / 72)
+    width, height = (round(FINER * dpi * float(size) * share) for size, share in zip(inches, place[2:], strict=True))
+    image = scene.render(drawing, (width, height), scale=FINER * dpi / 72)
     low, high = drawing.frame
     middle = 0.5 * (low + high)
     half_height = max(0.5 * float(high[1] - low[1]), 0.5 * float(high[0] - low[0]) * height / width)

@@ -28,6 +28,8 @@ def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:
         Pieces in order; no step of a piece exceeds pi/2.
     """
     path = np.concatenate([parameters, parameters[:1]]) if closed else parameters
+    if np.all(np.abs(np.diff(path, axis=0)) <= POLE_JUMP):
+        return [np.array(path)] if len(path) > 1 else []
     pieces: list[FloatArray] = []
     current = [path[0]]
     for after in path[1:]:
