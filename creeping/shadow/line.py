@@ -186,7 +186,7 @@ class ShadowLine(DrawnOnBody):
     def launch_points(self, n_rays: int, launch_from: str = "attached") -> LaunchPoints:
         """So many launch points on the arcs, as `shadow_lines` gives them: n is 1."""
         checked_launch_from(launch_from)
-        n_rays = whole_number(n_rays, "n_rays")
+        n_rays = whole_number(n_rays, "n_rays", 0)
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
         found = finished(self.body, self.direction, self.nodes, n_rays, every=launch_from == "all")
         return LaunchPoints.unpacked(self.direction[None], found.launched[None], found.places[None])
