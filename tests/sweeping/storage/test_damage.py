@@ -118,9 +118,9 @@ def test_a_chunk_lost_after_opening_is_told(whole, tmp_path):
     shutil.copytree(whole[0], folder)
     dataset = SweepStore.open(folder).dataset()
     (folder / "creeping/c/2/0/0").unlink()
-    np.testing.assert_array_equal(dataset.creeping[:4], whole[1].creeping[:4])
+    np.testing.assert_array_equal(dataset["creeping"][:4], whole[1]["creeping"][:4])
     with pytest.raises(cr.CreepingError, match=r"creeping of task 2 \(incidences 4 to 5\).*chunk is missing"):
-        dataset.creeping.load()
+        dataset["creeping"].load()
     store = open_store(PLAN, folder, resume=True)
     assert store.missing() == [2]
 

@@ -29,17 +29,17 @@ def filled(folder, **options):
 def test_a_store_holds_what_memory_holds(tmp_path):
     plan, store = filled(tmp_path / "s.zarr")
     ds, memory = store.dataset(), in_memory(plan)
-    assert ds.creeping.chunks[0] == (4, 4, 4, 4, 2)
+    assert ds["creeping"].chunks[0] == (4, 4, 4, 4, 2)
     assert ds.attrs["incidences_ok"] == 18 and ds.attrs["incidences_missing"] == 0
     timed = {"seconds", "study"}
     assert {k: v for k, v in ds.attrs.items() if k not in timed} == {
         k: v for k, v in memory.attrs.items() if k not in timed
     }
     xarray.testing.assert_identical(ds.load().drop_attrs(), memory.drop_attrs())
-    assert np.array_equal(ds.creeping.values, fake.creeping_of(18))
+    assert np.array_equal(ds["creeping"].values, fake.creeping_of(18))
     # also without this package
     with xarray.open_zarr(store.folder, consolidated=False) as plain:
-        assert plain.creeping.dims == ("incidence", "boundary", "wavenumber") and "theta" in plain.coords
+        assert plain["creeping"].dims == ("incidence", "boundary", "wavenumber") and "theta" in plain.coords
 
 
 @pytest.mark.parametrize("quantity", ["rays", "bistatic"])
@@ -81,7 +81,7 @@ def test_resuming_does_what_is_missing_and_nothing_else(tmp_path, monkeypatch):
     store = SweepStore.create(tmp_path / "s.zarr", plan)
     assert not fill(plan, store, most=2) and store.missing() == [2, 3, 4]
     partial = store.dataset()
-    assert partial.attrs["incidences_missing"] == 10 and np.isnan(partial.creeping[8:]).all()
+    assert partial.attrs["incidences_missing"] == 10 and np.isnan(partial["creeping"][8:]).all()
     # where nothing is given nothing is resolved
     assert partial.unresolved[8:].all() and not partial.unresolved[:8].any()
     diary = tmp_path / "diary"
@@ -195,7 +195,7 @@ def test_a_full_disk_is_one_clear_error_and_loses_nothing(tmp_path, monkeypatch)
     monkeypatch.undo()
     kept = 5 - len(store.missing())
     assert kept == 40 // (len(store.variables) + 1)
-    assert np.array_equal(store.dataset().creeping[: 4 * kept], fake.creeping_of(18)[: 4 * kept])
+    assert np.array_equal(store.dataset()["creeping"][: 4 * kept], fake.creeping_of(18)[: 4 * kept])
     assert fill(plan, store)
     filled(tmp_path / "whole.zarr")
     assert fake.bytes_of(store.folder) == fake.bytes_of(tmp_path / "whole.zarr")
@@ -223,7 +223,7 @@ def test_damage_is_found_named_and_repaired(tmp_path, harm):
     if harm != "gone":
         assert "incidences 4 to 7" in found[0][1]
         with pytest.raises(cr.CreepingError, match=r"creeping of task [14] .* is damaged"):
-            store.dataset().creeping.load()
+            store.dataset()["creeping"].load()
     else:
         with pytest.raises(cr.CreepingError, match=r"creeping of task 1 .* is missing .*2 such tasks.*resume"):
             store.dataset()
@@ -255,7 +255,7 @@ def test_poison_costs_one_incidence_and_is_tried_again(tmp_path, monkeypatch):
     plan, store = filled(tmp_path / "s.zarr")
     ds = store.dataset()
     assert np.flatnonzero(ds.incidence_status == FAILED).tolist() == [5, 17]
-    assert np.flatnonzero(np.isnan(ds.creeping[:, 0, 0])).tolist() == [5, 17]
+    assert np.flatnonzero(np.isnan(ds["creeping"][:, 0, 0])).tolist() == [5, 17]
     assert store.failures() == [
         (5, "ArithmeticError: a poisonous incidence"),
         (17, "ArithmeticError: a poisonous incidence"),
@@ -268,7 +268,7 @@ def test_poison_costs_one_incidence_and_is_tried_again(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert fill(plan, store) and store.failures() == []
     ds = store.dataset()
-    assert "errors" not in ds.attrs and np.array_equal(ds.creeping, fake.creeping_of(18))
+    assert "errors" not in ds.attrs and np.array_equal(ds["creeping"], fake.creeping_of(18))
 
 
 def test_a_long_message_is_cut_and_a_wrong_shape_is_told(tmp_path):
