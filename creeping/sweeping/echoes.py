@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 BLOCK = 24
 """Wavenumbers of one call where incidences are few: how often progress is told."""
+TASK = 32
+"""Incidences of one task where they are many."""
 MOST = 10_000_000
 """Values of one call."""
 Progress = Callable[[int, int, float], None]
@@ -175,7 +177,9 @@ def _swept(
     length = body_length(body, float(k.min()))
     flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
     if len(incidences) >= 8:
-        return sweep_directions(flow, incidences, wavenumbers=k, length=length, progress=progress, **asked)
+        # small enough that progress is told in time, large enough that a task is not all overhead
+        options: dict[str, Any] = {"chunk": TASK, "progress": progress}
+        return sweep_directions(flow, incidences, wavenumbers=k, length=length, **options, **asked)
     found, seconds = [], 0.0
     for first in range(0, len(k), BLOCK):
         part = k[first : first + BLOCK]

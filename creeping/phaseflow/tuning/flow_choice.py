@@ -132,7 +132,7 @@ def _chosen(
     assert length is not None
     cost = tracing_cost(body)
     if n_rays * length * cost < QUICK and not stored:
-        progress(f"direct integration: {n_rays} rays take about {n_rays * length * cost:.1g} s")
+        progress(f"direct integration: carrying {n_rays} rays takes about {n_rays * length * cost:.1g} s, fields apart")
         return _untuned_direct(body, length, n_steps, tolerance)
     direct, each = tuned_direct(body, length, n_steps, tolerance, carry_jacobi)
     if not stored:
@@ -163,7 +163,7 @@ def _chosen(
 def _worth_building(spec: MapSpec, direct: float, cost: float, tolerance: float) -> tuple[list[Candidate], str]:
     """Candidates for a map, and the reason to build none of them, if there is one; ``direct`` in nominal seconds."""
     body = spec.body
-    time = f"{spec.n_rays} rays take about {direct:.2g} s"
+    time = f"carrying {spec.n_rays} rays takes about {direct:.2g} s, fields apart"
     if tolerance < 1e-9:
         return [], f"no map reaches such a tolerance; {time}"
     # what the smallest map takes, so that probing is not begun in vain
