@@ -22,7 +22,7 @@ from creeping.files import read_cut
 from creeping.sweeping.echoes import echo_of
 
 AUSTIN = "austin_IA_s7f6_bistatic.csv"
-FREQUENCIES, ANGLES = "Benchmark_Frequency_TS.csv", "Benchmark_Angle_TS.csv"
+FREQUENCIES = "Benchmark_Frequency_TS.csv"
 SOUND = 1477.3
 """Speed of sound of Jech's tables, m/s."""
 SMALL, LONG = 0.01, 0.07

@@ -146,7 +146,7 @@ def _echo(
     boundary = parse_boundary(request.boundary)
     written["formats"] = echo_report.table_formats(written["formats"])
     # before the time is spent
-    reference = echo_report.reference_of(request, *measured[:2])
+    reference = echo_report.reference_of(request, *measured)
 
     def progress(text: str) -> None:
         if not as_json:
@@ -161,9 +161,9 @@ def _echo(
     echo = echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
     computed = time.perf_counter()
     progress("tables and pictures" if written["pictures"] else "tables")
-    compared = echo_report.compared(echo, reference, measured[2])
+    compared, refused = echo_report.compared(echo, reference, measured[2])
     names, extra = echo_report.write_results(output, echo, compared, shape, body, **written)
-    summary = echo_report.summary_of(body, request, echo, dataset) | extra
+    summary = echo_report.summary_of(body, request, echo, dataset) | extra | refused
     now = time.perf_counter()
     summary |= {"seconds": round(now - started, 2), "seconds_of_fields": round(computed - ready, 2)}
     summary["files"] = [*names, "summary.json"]

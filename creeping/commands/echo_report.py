@@ -8,6 +8,7 @@ import numpy as np
 from creeping import plotting
 from creeping._typing import FloatArray
 from creeping._version import __version__
+from creeping.commands.echo_request import EchoRequest
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.field.comparison import Comparison, compare
@@ -15,7 +16,9 @@ from creeping.field.echo import Echo
 from creeping.field.slant_range import RangeProfile, range_profile
 from creeping.files import read_cut, write_echo, write_mat, write_profile
 from creeping.files.measured import MeasuredCut
+from creeping.geometry.directions import directions_from_azimuth_elevation
 from creeping.geometry.surface import Surface
+from creeping.shadow.status import FAILED, SINGULAR
 from creeping.sweeping.echoes import backscatter, bistatic
 
 FORMATS = ("csv", "mat")
@@ -25,7 +28,7 @@ LEAST_BAND = 16
 
 def computed(
     body: Surface,
-    request: Any,
+    request: EchoRequest,
     boundary: BoundaryLike,
     azimuths: FloatArray,
     elevations: FloatArray,
@@ -43,7 +46,9 @@ def computed(
     return bistatic(body, **(asked | {"incidence": request.incidence, "method": chosen}))
 
 
-def reference_of(request: Any, path: Path | None, column: str | None) -> dict[str, tuple[MeasuredCut, FloatArray]]:
+def reference_of(
+    request: EchoRequest, path: Path | None, column: str | None, align: float
+) -> dict[str, tuple[MeasuredCut, FloatArray]]:
     """Measured cut and its levels by channel, of those that it has.
 
     Raises
@@ -52,15 +57,23 @@ def reference_of(request: Any, path: Path | None, column: str | None) -> dict[st
         If the file is no table, lacks the columns, or is over what the request does not vary.
     """
     if path is None:
-        if column is not None:
-            raise InvalidInputError("--column belongs to --compare")
+        stray = [name for name, value in (("--column", column), ("--align", align)) if value]
+        if stray:
+            raise InvalidInputError(f"{' and '.join(stray)}: give --compare as well, what it is about")
         return {}
+    if not (np.isfinite(align) and align >= 0):
+        raise InvalidInputError(f"--align {align!r} is not a finite number of degrees >= 0")
     cut = read_cut(path)
+    if len(request.wavenumbers) > 1 and request.angle_name:
+        raise InvalidInputError("--compare takes a cut or a band; give one frequency, or one direction")
     over = "frequency" if len(request.wavenumbers) > 1 else "angle"
     if cut.over != over or (over == "angle" and not request.angle_name):
         raise InvalidInputError(f"--compare {path} is over {cut.over}; ask for a cut or a band that varies that")
     if column is None:
         found = {channel: cut.of(channel) for channel in request.channels}
+        if len(request.channels) > 1 and len(cut.levels) == 1 and all(v is not None for v in found.values()):
+            # a column without a polarisation's name is of one at most
+            found = {}
     else:
         names = [name.strip() for name in column.split(",")]
         unknown = [name for name in names if name not in cut.levels]
@@ -78,16 +91,22 @@ def reference_of(request: Any, path: Path | None, column: str | None) -> dict[st
     return known
 
 
-def compared(echo: Echo, reference: dict[str, tuple[MeasuredCut, FloatArray]], align: float) -> dict[str, Comparison]:
-    """Comparison by channel."""
-    found, levels, (low, high) = {}, echo.levels(), echo.bounds()
+def compared(
+    echo: Echo, reference: dict[str, tuple[MeasuredCut, FloatArray]], align: float
+) -> tuple[dict[str, Comparison], dict[str, Any]]:
+    """Comparison by channel, and for the summary why there is none; ``align`` in degrees."""
+    found, refused, levels, (low, high) = {}, {}, echo.levels(), echo.bounds()
     for channel, (cut, given) in reference.items():
         c = echo.channels.index(channel)
         at = (c, 0, slice(None)) if cut.over == "frequency" else (c, slice(None), 0)
         values = echo.hertz if cut.over == "frequency" else echo.angles
         most = align if cut.over == "angle" else 0.0
-        found[channel] = compare(values, levels[at], cut.values, given, low=low[at], high=high[at], align=most)
-    return found
+        try:
+            found[channel] = compare(values, levels[at], cut.values, given, low=low[at], high=high[at], align=most)
+        except InvalidInputError as error:
+            # the results are written all the same
+            refused[channel] = str(error)
+    return found, {"not_compared": refused} if refused else {}
 
 
 def table_formats(text: str) -> tuple[str, ...]:
@@ -135,11 +154,18 @@ def write_results(
         extra["range_resolution"] = next(iter(profiles.values())).resolution
         extra["range_repeats"] = float(np.pi / np.diff(echo.wavenumbers).mean())
     if pictures:
-        names += _drawn(output, stem, echo, profiles, float(np.linalg.norm(np.ptp(body.bounds, axis=0))), name)
+        names += _drawn(output, stem, echo, profiles, _ranges(echo, body), name)
         if comparisons:
             plotting.comparison_picture(output / "compared.png", echo, comparisons, title=_title(echo, name))
             names.append("compared.png")
     return names, extra
+
+
+def _ranges(echo: Echo, body: Surface) -> tuple[float, float]:
+    """Ranges, metres, nine tenths of the diagonal of the body's box to both sides of its middle."""
+    d = -directions_from_azimuth_elevation(*np.radians((echo.azimuth[0], echo.elevation[0])))
+    middle, diagonal = float(np.mean(body.bounds, axis=0) @ d), float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
+    return middle - 0.9 * diagonal, middle + 0.9 * diagonal
 
 
 def _profiles(echo: Echo) -> dict[str, RangeProfile]:
@@ -156,7 +182,7 @@ def _profiles(echo: Echo) -> dict[str, RangeProfile]:
 
 
 def _drawn(
-    output: Path, stem: str, echo: Echo, profiles: dict[str, RangeProfile], extent: float, name: str
+    output: Path, stem: str, echo: Echo, profiles: dict[str, RangeProfile], span: tuple[float, float], name: str
 ) -> list[str]:
     words: dict[str, Any] = {"title": _title(echo, name)}
     several, band = len(echo.azimuth) > 1, len(echo.wavenumbers) > 1
@@ -170,8 +196,7 @@ def _drawn(
     if band and not several:
         jobs.append((f"{stem}.png", lambda path: plotting.echo_band_picture(path, echo, **words)))
     if profiles:
-        far = min(0.9 * extent, -float(next(iter(profiles.values())).range[0]))
-        jobs.append(("range.png", lambda path: plotting.range_picture(path, profiles, echo, far, **words)))
+        jobs.append(("range.png", lambda path: plotting.range_picture(path, profiles, echo, span, **words)))
     names = []
     for file, draw in jobs:
         try:
@@ -195,7 +220,7 @@ def _title(echo: Echo, name: str) -> str:
     return ", ".join(word for word in words if word)
 
 
-def summary_of(body: str, request: Any, echo: Echo, dataset: Any) -> dict[str, Any]:
+def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dict[str, Any]:
     """What the summary file holds."""
     least, largest = dataset["least_k_rho"].values, dataset["largest_transverse"].values
     return {
@@ -208,7 +233,8 @@ def summary_of(body: str, request: Any, echo: Echo, dataset: Any) -> dict[str, A
             "least_k_rho": _extreme(np.nanmin, least),
             "largest_transverse": _extreme(np.nanmax, largest),
         },
-        "failed_incidences": int(np.sum(dataset["incidence_status"].values == 4)),
+        "failed_incidences": int(np.sum(np.isin(dataset["incidence_status"].values, (SINGULAR, FAILED)))),
+        "errors": dataset.attrs.get("errors"),
         "digest": dataset.attrs.get("sweep_digest"),
     }
 
@@ -237,12 +263,15 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     if least is not None and largest is not None:
         rows.append(f"on the rays k rho >= {least:.3g}, kappa_t rho/m^2 <= {largest:.2g}")
     if summary["failed_incidences"]:
-        rows.append(f"{summary['failed_incidences']} incidences failed: their rows are NaN")
+        rows.append(f"{summary['failed_incidences']} incidences are singular or failed: their rows are NaN")
+        rows += str(summary["errors"] or "").splitlines()[:3]
     if "range_resolution" in summary:
         rows.append(
             f"range profile: resolution {summary['range_resolution']:.3g} m, repeats after "
             f"{summary['range_repeats']:.3g} m"
         )
+    for channel, why in summary.get("not_compared", {}).items():
+        rows.append(f"{channel} is not compared: {why}")
     for channel, off in summary.get("compared", {}).items():
         rows.append(
             f"{channel} against the reference at {off['places']:g} places: mean {off['mean_db']:+.3g} dB, rms "

@@ -7,7 +7,8 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.frequency import wavenumber
+from creeping.field.boundary import boundary_name, parse_boundary
+from creeping.field.frequency import is_length, wavenumber
 from creeping.field.lobes import lobe_step
 from creeping.geometry.surface import Surface
 from creeping.sweeping.accessor import POLARISATIONS
@@ -97,9 +98,9 @@ def echo_request(
         raise InvalidInputError("--monostatic and --bistatic are both given; give one")
     text, option = (frequency, "--frequency") if frequency is not None else (wavelength, "--wavelength")
     assert text is not None
-    if wavelength is not None and not any(unit in wavelength for unit in ("m", "µ")):
-        raise InvalidInputError(f"--wavelength {wavelength!r} has no unit; give e.g. 3cm")
     try:
+        if is_length(text) != (wavelength is not None):
+            raise InvalidInputError(f"{text!r} is a {'wavelength' if wavelength is None else 'frequency'}")
         numbers = np.unique(np.atleast_1d(wavenumber(text, sound_speed=sound_speed)))
     except InvalidInputError as error:
         raise InvalidInputError(f"{option}: {error}") from error
@@ -128,7 +129,8 @@ def _channels(polarisation: str | None, boundary: str) -> tuple[str, ...]:
     if boundary != "pec":
         if polarisation is not None:
             raise InvalidInputError("--polarisation is of a conductor; sound has none")
-        return (boundary,)
+        # as datasets name it
+        return (boundary_name(parse_boundary(boundary)),)
     names = tuple(name.strip().upper() for name in (polarisation or "HH,VV").split(","))
     unknown = [name for name in names if name not in POLARISATIONS]
     if unknown or len(set(names)) < len(names):

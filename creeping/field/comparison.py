@@ -16,6 +16,8 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 
+OVERLAP = 0.9
+"""Share of the places that a shift has to leave."""
 FLOOR = 80.0
 """Depth below the reference's largest value at which levels are cut off, dB."""
 
@@ -123,11 +125,11 @@ def compare(
         raise InvalidInputError("values are not ascending")
     if not (np.isfinite(align) and align >= 0):
         raise InvalidInputError(f"align = {align!r} is not a finite number >= 0")
-    shifts = np.linspace(-align, align, 201) if align else np.zeros(1)
-    # a level of its own, as calibrations have, is no shift
-    off = [_spread(x, y, at + shift, given) for shift in shifts]
-    best = int(np.nanargmin(off)) if np.any(np.isfinite(off)) else 0
-    shift = float(shifts[best])
+    # the least shift of those that are as good
+    shifts = sorted(np.linspace(-align, align, 201) if align else np.zeros(1), key=abs)
+    least = OVERLAP * np.sum(_usable(x, y, at, given))
+    off = [_spread(x, y, at + shift, given, least) for shift in shifts]
+    shift = float(shifts[int(np.nanargmin(off)) if np.any(np.isfinite(off)) else 0])
     ok = _usable(x, y, at + shift, given)
     if not np.any(ok):
         raise InvalidInputError(
@@ -138,7 +140,8 @@ def compare(
     within = np.nan
     if low is not None and high is not None:
         bottom, top = (np.interp(there, x, np.maximum(_pair(x, v, "bounds")[1], -1e3)) for v in (low, high))
-        within = float(np.mean((given[ok] >= bottom) & (given[ok] <= top)))
+        known = np.isfinite(bottom) & np.isfinite(top)
+        within = float(np.mean(((given[ok] >= bottom) & (given[ok] <= top))[known])) if np.any(known) else np.nan
     return Comparison(there, np.interp(there, x, y), given[ok], shift, within)
 
 
@@ -154,6 +157,7 @@ def _usable(x: FloatArray, y: FloatArray, at: FloatArray, given: FloatArray) -> 
     return np.asarray(inside & np.isfinite(np.interp(at, x, y)))
 
 
-def _spread(x: FloatArray, y: FloatArray, at: FloatArray, given: FloatArray) -> float:
+def _spread(x: FloatArray, y: FloatArray, at: FloatArray, given: FloatArray, least: float) -> float:
+    """Standard deviation of the residual: a level of its own, as calibrations have, is no shift."""
     ok = _usable(x, y, at, given)
-    return float(np.std(np.interp(at[ok], x, y) - given[ok])) if np.any(ok) else np.nan
+    return float(np.std(np.interp(at[ok], x, y) - given[ok])) if np.any(ok) and np.sum(ok) >= least else np.nan

@@ -78,9 +78,12 @@ class Echo:
         if self.quantity not in LEVELS:
             raise InvalidInputError(f"quantity {self.quantity!r} is none of {', '.join(LEVELS)}")
         shape = (len(self.channels), len(self.azimuth), len(self.wavenumbers))
-        for name, values in {**self.parts, "error": self.error, "unresolved": self.unresolved}.items():
+        flags = {"error": self.error, "unresolved": self.unresolved, "by_currents": self.by_currents}
+        for name, values in {**self.parts, **flags}.items():
             if values.shape != shape:
                 raise InvalidInputError(f"{name} of an echo has shape {values.shape}, not {shape}")
+        if self.elevation.shape != self.azimuth.shape:
+            raise InvalidInputError(f"elevation has shape {self.elevation.shape}, not {self.azimuth.shape}")
 
     @property
     def total(self) -> ComplexArray:
@@ -119,7 +122,11 @@ class Echo:
             "channels": list(self.channels),
             "angles": len(self.azimuth),
             "frequencies": len(self.wavenumbers),
-            "largest": {c: _finite(np.max(v, initial=-np.inf)) for c, v in zip(self.channels, levels, strict=True)},
+            "largest": {
+                c: _finite(np.max(v, initial=-np.inf, where=np.isfinite(v)))
+                for c, v in zip(self.channels, levels, strict=True)
+            },
+            "not_finite": int(np.sum(~np.isfinite(self.total))),
             "error_db_median": _finite(np.median(known)) if known.size else None,
             "error_db_95": _finite(np.quantile(known, 0.95)) if known.size else None,
             "unresolved": int(self.unresolved.sum()),

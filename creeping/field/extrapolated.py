@@ -106,7 +106,7 @@ def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:
     off = np.abs(rays.total - currents.far(r))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = (off / rays.error).reshape(-1)
-    ratio = ratio[np.isfinite(ratio)]
+    ratio = np.minimum(ratio[~np.isnan(ratio)], 1e9)
     shared = currents.extinction * currents.mean_amplitude
     if not len(ratio) or not np.isfinite(shared):
         return None

@@ -154,18 +154,18 @@ class _Parts:
         total = np.abs(self.creeping + self.reflected + self.forward)
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
         failing = np.maximum(self.failing_size, self.left_out)
-        without = self.dark > DARK * largest
-        return np.asarray((self.missing & (self.in_forward > 0)) | (failing > MATTERS * largest) | without)
+        without = ~(self.dark <= DARK * largest)
+        return np.asarray((self.missing & (self.in_forward > 0)) | ~(failing <= MATTERS * largest) | without)
 
     def error(self) -> FloatArray:
         """Size of what is left out, what has an expansion that fails, and what is beyond both orders, L."""
         error = np.hypot(np.hypot(self.left_out, self.failing_size), self.dark)
-        error = np.hypot(error.reshape(-1, *(1,) * (self.creeping.ndim - 1)), np.sqrt(self.doubt))
+        g, more = self.geometry, (1,) * (self.creeping.ndim - 1)
+        # where most of the forward lobe is one sum over the rim, its error falls like that of Fock's currents
+        scale = (g.mean_root_radius * np.cbrt(self.wavenumber / 2)).reshape(-1, *more)
+        ahead = self.unsure * AHEAD * np.abs(self.forward) / scale**4
+        error = np.hypot(error.reshape(-1, *more), np.hypot(np.sqrt(self.doubt), ahead))
         return np.asarray(np.where(np.isfinite(error), error, np.nan))
-
-    def _note_failing(self, observer: IntArray, wave: ComplexArray, failing: BoolArray) -> None:
-        """Note the size of contributions (n,) whose expansion fails."""
-        np.add.at(self.failing_size, observer, np.where(failing, np.abs(wave), 0.0))
 
     def add(self, number: int, kind: Boundary) -> None:
         """Add every part of one scalar problem."""
@@ -233,9 +233,6 @@ class _Parts:
             # any normal of the plane of d and r will do, and any vector across d where they are one
             aside = np.cross(line.direction, off_axis(g.directions[ahead], line.direction))
             self.forward += self._summed(number, ahead, np.asarray(wave), aside, aside)
-        # where most of it is one sum over the rim, its error is a share of it that falls like that of Fock's currents
-        scale = (g.mean_root_radius * np.cbrt(k / 2)).reshape(-1, *(1,) * (self.forward.ndim - 1))
-        self.doubt += (self.unsure * AHEAD * np.abs(self.forward) / scale**4) ** 2
 
     def _add_apart(
         self,

@@ -19,7 +19,7 @@ LIGHT = 299_792_458.0
 """Speed of light in a vacuum, m/s."""
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "thz": 1e12}
 """Units of frequency by their names in small letters, 1/s."""
-METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9}
+METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 """Units of wavelength, m."""
 MOST = 100_000
 """Frequencies of one range."""
@@ -59,10 +59,27 @@ def wavenumber(value: str | ArrayLike, *, sound_speed: float | None = None) -> f
     if not isinstance(value, str):
         hertz = _positive(value, "frequency")
         return float(2 * np.pi * hertz / speed) if hertz.ndim == 0 else np.asarray(2 * np.pi * hertz / speed)
-    numbers, scale, is_length = _parsed(value)
-    values = _positive(scale * numbers, "frequency" if not is_length else "wavelength")
-    found = 2 * np.pi / values if is_length else 2 * np.pi * values / speed
+    numbers, scale, of_length = _parsed(value)
+    values = _positive(scale * numbers, "frequency" if not of_length else "wavelength")
+    with np.errstate(over="ignore"):
+        found = _positive(2 * np.pi / values if of_length else 2 * np.pi * values / speed, "wavenumber")
     return np.asarray(found) if ":" in value else float(found[0])
+
+
+def is_length(text: str) -> bool:
+    """Whether a text is of wavelengths, else of frequencies.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is neither.
+
+    Examples
+    --------
+    >>> is_length("3 cm"), is_length("300 MHz")
+    (True, False)
+    """
+    return _parsed(text)[2]
 
 
 def frequency(wavenumber: ArrayLike, *, sound_speed: float | None = None) -> float | FloatArray:
@@ -80,6 +97,8 @@ def frequency(wavenumber: ArrayLike, *, sound_speed: float | None = None) -> flo
 def _speed(sound_speed: float | None) -> float:
     if sound_speed is None:
         return LIGHT
+    if np.ndim(sound_speed) or isinstance(sound_speed, (str, bool)):
+        raise InvalidInputError(f"sound_speed = {sound_speed!r} is no number of m/s")
     return float(_positive(sound_speed, "sound_speed"))
 
 

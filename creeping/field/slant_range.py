@@ -22,7 +22,7 @@ from creeping.errors import InvalidInputError
 WINDOWS = ("hann", "none", "taylor")
 PADDING = 8
 """Samples of the profile for each one that the band resolves."""
-EQUAL = 1e-6
+EQUAL = 1e-4
 """How far spacings of the wavenumbers may differ from their mean, as a share of it."""
 
 
@@ -84,7 +84,7 @@ def range_profile(field: ArrayLike, wavenumbers: ArrayLike, *, window: str = "ha
         raise InvalidInputError("a range profile takes finite values; leave out those that are not resolved")
     steps = np.diff(k)
     step = float(np.mean(steps))
-    if not (step > 0 and np.max(np.abs(steps - step)) <= EQUAL * step * len(k)):
+    if not (step > 0 and np.max(np.abs(steps - step)) <= EQUAL * step):
         raise InvalidInputError("a range profile takes ascending, equally spaced wavenumbers")
     weights = _window(window, len(k))
     count = PADDING * len(k)
@@ -108,7 +108,9 @@ def _window(name: str, count: int) -> FloatArray:
 
 def _resolution(weights: FloatArray, step: float) -> float:
     """Full width at half power of the window's transform, L."""
-    fine = 4096
-    shape = np.abs(np.fft.rfft(weights, fine * 8))
-    below = int(np.argmax(shape < shape[0] / np.sqrt(2)))
-    return float(2 * below / (fine * 8) * np.pi / step)
+    count = 64 * len(weights)
+    shape = np.abs(np.fft.rfft(weights, count)) / weights.sum()
+    below = int(np.argmax(shape < np.sqrt(0.5)))
+    # between the bins
+    part = (shape[below - 1] - np.sqrt(0.5)) / (shape[below - 1] - shape[below])
+    return float(2 * (below - 1 + part) / count * np.pi / step)

@@ -21,6 +21,7 @@ HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
 _ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
 _AREA = re.compile(r"(m2|m\^2|sqm|sigma|linear)")
 _OTHER = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
+_RADIANS = re.compile(r"(?<![a-z])rad(ian)?s?(?![a-z])")
 _POLARISATION = re.compile(r"(?<![a-z])(hh|vv|hv|vh)(?![a-z])")
 
 
@@ -78,7 +79,7 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
     header, rows = _table(file, text)
     numbers = np.array(rows, dtype=float)
     names = header or ["angle", *(f"level {i}" for i in range(1, numbers.shape[1]))]
-    at, over, scale = _abscissa(names)
+    at, over, scale = _abscissa(file, names, numbers)
     levels = {}
     for column, name in enumerate(names):
         lower = name.lower()
@@ -97,8 +98,9 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
 
 def _table(file: Path, text: str) -> tuple[list[str], list[list[float]]]:
     """Header, empty if there is none, and rows of numbers, NaN for what is none."""
-    header: list[str] = []
+    headers: list[list[str]] = []
     rows: list[list[float]] = []
+    bare = False
     for number, raw in enumerate(text.splitlines(), 1):
         line = raw.strip()
         if not line:
@@ -106,21 +108,29 @@ def _table(file: Path, text: str) -> tuple[list[str], list[list[float]]]:
         comment = line.startswith(COMMENT)
         cells = _cells(line.lstrip("#%!/ ") if comment else line)
         values = [_number(cell) for cell in cells]
-        if comment or values[0] is None:
-            # the last line of words above the numbers that has as many cells names them
-            if not rows and len(cells) > 1:
-                header = cells
+        if comment or not any(value is not None for value in values):
+            if rows and not comment:
+                raise InvalidInputError(f"{file}, line {number}: words after rows of numbers; give one table in a file")
+            if not rows:
+                headers.append(cells)
+                bare |= not comment
             continue
         if rows and len(values) != len(rows[0]):
             raise InvalidInputError(f"{file}, line {number}: {len(values)} columns where {len(rows[0])} were before")
         rows.append([np.nan if value is None else value for value in values])
     if len(rows) < 2 or len(rows[0]) < 2:
         raise InvalidInputError(f"{file} has no table of two columns and two rows of numbers or more")
-    return (header if len(header) == len(rows[0]) else []), rows
+    # the last line of words above the numbers that has as many cells names them
+    header = next((cells for cells in reversed(headers) if len(cells) == len(rows[0])), [])
+    if bare and not header:
+        raise InvalidInputError(f"{file} has {len(rows[0])} columns, and no line that names as many")
+    if len(set(header)) < len(header):
+        raise InvalidInputError(f"{file} names columns twice: {', '.join(header)}")
+    return header, rows
 
 
 def _cells(line: str) -> list[str]:
-    for separator in (",", ";", "\t"):
+    for separator in (";", "\t", ","):
         if separator in line:
             return [cell.strip().strip('"') for cell in line.split(separator)]
     return line.split()
@@ -137,18 +147,22 @@ def _is_frequency(name: str) -> bool:
     return "freq" in name or any(re.search(rf"(?<![a-z]){unit}(?![a-z])", name) for unit in HERTZ)
 
 
-def _abscissa(names: list[str]) -> tuple[int, str, float]:
-    """Column of the angle or frequency, which of both, and the unit in degrees or Hz."""
-    lower = [name.lower() for name in names]
-    frequencies = [i for i, name in enumerate(lower) if _is_frequency(name)]
-    angles = [i for i, name in enumerate(lower) if i not in frequencies and _ANGLE.search(name) and not _level(name)]
-    if frequencies and (not angles or frequencies[0] < angles[0]):
-        name = lower[frequencies[0]]
-        unit = next((unit for unit in ("ghz", "mhz", "khz") if unit in name), "hz")
-        return frequencies[0], "frequency", HERTZ[unit]
-    if angles:
-        return angles[0], "angle", float(np.degrees(1.0)) if "rad" in lower[angles[0]] else 1.0
-    return 0, "angle", 1.0
+def _abscissa(file: Path, names: list[str], numbers: FloatArray) -> tuple[int, str, float]:
+    """Column of the angle or frequency that varies, which of both, and its unit in degrees or Hz."""
+    found = []
+    for column, name in enumerate(name.lower() for name in names):
+        if _is_frequency(name):
+            unit = next((unit for unit in ("ghz", "mhz", "khz") if unit in name), "hz")
+            found.append((column, "frequency", HERTZ[unit]))
+        elif _ANGLE.search(name) and not _level(name):
+            found.append((column, "angle", float(np.degrees(1.0)) if _RADIANS.search(name) else 1.0))
+    varied = [one for one in found if len(np.unique(numbers[:, one[0]])) > 1]
+    if len(varied) > 1:
+        raise InvalidInputError(f"{file} varies {' and '.join(names[one[0]] for one in varied)}; give a cut of one")
+    at = (varied or found or [(0, "angle", 1.0)])[0]
+    if not np.all(np.isfinite(numbers[:, at[0]])):
+        raise InvalidInputError(f"{file} has rows without a number in the column {names[at[0]]}")
+    return at
 
 
 def _level(name: str) -> bool:

@@ -91,7 +91,8 @@ def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str =
     figure.set_layout_engine("constrained")
     for number, channel in enumerate(echo.channels):
         ax = figure.add_subplot(count, 1, number + 1)
-        grid = np.where(np.isfinite(levels[number]), levels[number], low)
+        # nulls are low, what is not there stays white
+        grid = np.where(np.isneginf(levels[number]), low, levels[number])
         image = ax.pcolormesh(
             echo.angles, echo.hertz / scale, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest"
         )
@@ -107,12 +108,12 @@ def range_picture(
     path: str | os.PathLike[str],
     profiles: "dict[str, RangeProfile]",
     echo: "Echo",
-    extent: float,
+    span: tuple[float, float],
     *,
     title: str = "",
     dpi: int = 200,
 ) -> None:
-    """Write a PNG of range profiles by channel, out to ``extent``, m, to both sides of the origin."""
+    """Write a PNG of range profiles by channel over the ranges ``span``, m, as far as they reach."""
     figure = new_figure((6.4, 4.2))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot()
@@ -120,7 +121,8 @@ def range_picture(
     low, high = shown_range(curves.values(), SPAN)
     for number, (channel, found) in enumerate(profiles.items()):
         ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **curve_style(number))
-    ax.set_xlim(-extent, extent)
+    reach = next(iter(profiles.values())).range
+    ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
     ax.set_ylim(low, high)
     _dressed(ax, "range along the line of sight (m), from the radar", _level(echo), title)
     add_legend(ax, fresh=True)

@@ -14,21 +14,20 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_method, checked_plain
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
+from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.surface import Surface
 from creeping.phaseflow.tuning.flow_choice import choose_flow
 from creeping.rays.reach import body_length
-from creeping.sweeping.accessor import PARTS, SweepFields, register
+from creeping.sweeping.accessor import PARTS, SweepFields
 from creeping.sweeping.run import sweep_directions
 
 if TYPE_CHECKING:
     import xarray
 
-BLOCK = 24
-"""Wavenumbers of one call where incidences are few: how often progress is told."""
 TASK = 32
 """Incidences of one task where they are many."""
 MOST = 10_000_000
@@ -135,7 +134,9 @@ def bistatic(
     """
     azimuths, elevations = _angles(azimuth, elevation)
     observers = directions_from_azimuth_elevation(np.radians(azimuths), np.radians(elevations))
-    radar = directions_from_azimuth_elevation(*np.radians(np.asarray(incidence, dtype=float)))
+    if len(np.shape(incidence)) != 1 or len(incidence) != 2:
+        raise InvalidInputError(f"incidence = {incidence!r} is not (azimuth, elevation) in degrees")
+    radar = directions_from_azimuth_elevation(*(float(np.radians(v[0])) for v in _angles(*incidence)))
     asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "bistatic", "observation": observers}
     found = _swept(body, -radar[None], wavenumbers, asked, cache, progress)
     return _with_angles(found, "observer", azimuths, elevations)
@@ -163,8 +164,11 @@ def _swept(
     cache: bool,
     progress: Progress | None,
 ) -> xarray.Dataset:
-    """Sweep, in blocks of wavenumbers where there are few incidences, so that progress is told in time."""
-    library = register()
+    """Sweep of checked arguments."""
+    checked_body(body)
+    checked_plain(body)
+    checked_method(asked["method"], 2)
+    asked["n_rays"] = whole_number(asked["n_rays"], "n_rays")
     numbers = np.atleast_1d(np.asarray(wavenumbers))
     k = np.array([checked(value, 2) for value in numbers.tolist()])
     if k.ndim != 1 or not k.size:
@@ -176,23 +180,9 @@ def _swept(
         raise InvalidInputError(f"{count} values are asked for at once; {MOST} are the most: give a coarser step")
     length = body_length(body, float(k.min()))
     flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
-    if len(incidences) >= 8:
-        # small enough that progress is told in time, large enough that a task is not all overhead
-        options: dict[str, Any] = {"chunk": TASK, "progress": progress}
-        return sweep_directions(flow, incidences, wavenumbers=k, length=length, **options, **asked)
-    found, seconds = [], 0.0
-    for first in range(0, len(k), BLOCK):
-        part = k[first : first + BLOCK]
-        found.append(sweep_directions(flow, incidences, wavenumbers=part, length=length, **asked))
-        seconds += float(found[-1].attrs["seconds"])
-        if progress:
-            progress(first + len(part), len(k), seconds)
-    joined: xarray.Dataset = found[0]
-    if len(found) > 1:
-        joined = library.concat(
-            found, "wavenumber", data_vars="minimal", coords="minimal", compat="override", join="outer"
-        )
-    return joined.assign_attrs(seconds=round(seconds, 3))
+    # small enough that progress is told in time, large enough that a task is not all overhead
+    options: dict[str, Any] = {"chunk": TASK, "progress": progress, "length": length}
+    return sweep_directions(flow, incidences, wavenumbers=k, **options, **asked)
 
 
 def _with_angles(found: xarray.Dataset, dimension: str, azimuths: FloatArray, elevations: FloatArray) -> xarray.Dataset:
@@ -222,7 +212,7 @@ def echo_of(
     def array(values: Any) -> np.ndarray[Any, Any]:
         return np.asarray(values.transpose(*order).values)
 
-    picked = [fields.polarisation(name) if conductor else SweepFields(first.isel(boundary=0)) for name in channels]
+    picked = [fields.polarisation(name) if conductor else SweepFields(first.sel(boundary=name)) for name in channels]
     parts = [name for name in PARTS if name in picked[0].dataset]
     flags = {name: np.stack([array(one.dataset[name]) for one in picked]) for name in ("unresolved", "error")}
     served = np.stack(

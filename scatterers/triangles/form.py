@@ -60,8 +60,9 @@ def _ply(name: str, cut: str, data: bytes) -> None:
     ]:
         if len(set(names)) < len(names):
             raise ValueError(f"the header of {name} names one {what} twice; export it again")
-    if b"ascii" not in head:
-        _ply_bytes(name, cut, b"big_endian" in head, elements, body[body.find(b"\n") + 1 :])
+    kind = re.search(rb"^\s*format\s+(\w+)", head, re.MULTILINE)
+    if kind is None or kind[1] != b"ascii":
+        _ply_bytes(name, cut, kind is not None and b"big_endian" in kind[1], elements, body[body.find(b"\n") + 1 :])
         return
     lines = [line for line in body.splitlines() if line.strip()]
     rows = sum(int(count) for _, count, _ in elements)
@@ -85,10 +86,14 @@ def _ply_bytes(name: str, cut: str, big: bool, elements: list[tuple[bytes, bytes
     at = 0
     for _, count, properties in elements:
         kinds = [line.split()[1:-1] for line in properties.strip().splitlines() if line.split()[:1] == [b"property"]]
+        if any(len(kind) != (3 if kind[:1] == [b"list"] else 1) for kind in kinds):
+            raise ValueError(f"the header of {name} has a property that is none; export it again")
         lists = [kind for kind in kinds if kind[0] == b"list"]
         if len(lists) > 1 or any(word not in PLY_BYTES for kind in kinds for word in kind if word != b"list"):
             return
         fixed = sum(PLY_BYTES[kind[0]] for kind in kinds if kind[0] != b"list")
+        if int(count) > len(body):
+            raise ValueError(f"{cut}: its header states {int(count):.3g} rows, it has {len(body)} bytes")
         if not lists:
             at += fixed * int(count)
             continue

@@ -94,6 +94,8 @@ GOOD = {
         {"wavelength": "3cm"},
         {"frequency": None, "wavelength": "3"},
         {"frequency": "ten"},
+        {"frequency": "3cm"},
+        {"frequency": None, "wavelength": "300mhz"},
         {"polarisation": "HH,HH"},
         {"polarisation": "left"},
         {"polarisation": "HH", "boundary": "soft"},
@@ -138,3 +140,15 @@ def test_formats_are_checked_before_anything_is_computed(capsys, tmp_path):
     for text in ("xls", "csv,csv"):
         assert ran("rcs", "sphere", "--frequency", "1GHz", "--format", text, "-o", tmp_path / "x") == 3
         assert "give some of csv, mat" in capsys.readouterr().err
+
+
+def test_a_comparison_that_fails_costs_no_results(tmp_path, capsys):
+    given = tmp_path / "given.csv"
+    given.write_text("angle,hard\n200,1\n201,2\n")
+    words = ["sphere:radius=0.1", "--sound-speed", 1500, "--frequency", "60kHz", "--boundary", "hard", "--no-pictures"]
+    words += ["--monostatic", "az:0:2:1", "-o", tmp_path, "--no-cache"]
+    assert ran("ts", *words, "--compare", given) == 0
+    assert "hard is not compared" in capsys.readouterr().out and len(table(tmp_path / "ts.csv")) == 3
+    for stray in (["--align", 1], ["--compare", given, "--align", "nan"]):
+        assert ran("ts", *words, *stray) == 3
+        assert "--align" in capsys.readouterr().err

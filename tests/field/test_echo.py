@@ -89,3 +89,25 @@ def test_comparison_of_strangers():
         cr.compare([0, 1], [0, 0], [5, 6], [0, 0])
     with pytest.raises(cr.InvalidInputError, match="ascending"):
         cr.compare([1, 0], [0, 0], [5, 6], [0, 0])
+
+
+def test_alignment_keeps_the_overlap():
+    x = np.linspace(0, 360, 3601)
+    y = 5 * np.cos(np.radians(3 * x))
+    found = cr.compare(x, y, x[10:3500:10] + 3, y[10:3500:10], align=90.0)
+    assert found.shift == pytest.approx(-3, abs=0.5) and len(found.values) > 300
+    # where all shifts are as good there is none
+    assert cr.compare(x, 0 * x, x[100:200], np.zeros(100), align=5.0).shift == 0
+
+
+def test_resolution_of_long_bands():
+    for n in (100, 3000, 40_000):
+        k = np.linspace(100.0, 200.0, n)
+        assert cr.range_profile(np.ones(n), k, window="none").resolution == pytest.approx(0.0278, rel=0.01)
+
+
+def test_one_failed_row_does_not_hide_the_others():
+    echo = echo_of(0.5, 0.1)
+    echo.parts["creeping"][0, 0, 0] = np.nan
+    summary = echo.summary()
+    assert summary["largest"]["VV"] == pytest.approx(4.971, abs=1e-3) and summary["not_finite"] == 1

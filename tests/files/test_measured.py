@@ -62,3 +62,33 @@ def test_own_table_reads_back(tmp_path):
     values = dict(zip(lines[0].split(","), lines[1].split(","), strict=True))
     assert float(values["level_db"]) == echo.levels()[0, 0, 0] and values["method"] == "rays"
     assert float(values["re_m"]) == 0.5 and float(values["reflected_re_m"]) == 0.375
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "theta_deg,phi_deg,VV_dBsm\n90,0,-20\n90,90,-21\n",
+        "freq_ghz,azimuth_deg,VV_dBsm\n10,0,-20\n10,90,-21\n",
+        "radar azimuth (deg),VV (dBsm)\n0,-20\n90,-21\n",
+        "azimuth_deg,VV\n# measured in 2020, chamber A, day 3\n0,-20\n90,-21\n",
+    ],
+)
+def test_the_column_that_varies_is_the_angle(tmp_path, text):
+    cut = read_cut(written(tmp_path, text))
+    assert cut.over == "angle" and cut.values.tolist() == [0, 90] and cut.of("VV").tolist() == [-20, -21]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "angle,HH\n0,1\n1,2\nangle,VV\n0,3\n1,4\n",
+        "angle,HH,HH\n0,1,2\n1,2,3\n",
+        "angle,HH\n0,1,2\n1,2,3\n",
+        "0,5;-10,2\n1,5;-11,2\n",
+        "theta,phi,HH\n0,1,2\n1,2,3\n",
+        "HH,angle\n-1,0\n-2,\n",
+    ],
+)
+def test_tables_that_would_be_misread_are_refused(tmp_path, text):
+    with pytest.raises(cr.InvalidInputError):
+        read_cut(written(tmp_path, text))

@@ -115,3 +115,23 @@ def test_steps_fit_the_lobes():
         lobe = np.degrees(2 * np.pi / k)
         assert lobe / 10 < lobe_step(ball, k, monostatic=False) <= lobe / 4
         assert lobe / 20 < lobe_step(ball, k, monostatic=True) <= lobe / 8
+
+
+def test_a_wavenumber_without_currents_costs_no_other():
+    ds = cr.bistatic(sc.Sphere(), wavenumbers=[8.0, 1e6], azimuth=[90.0], boundary="soft", n_rays=32, cache=False)
+    assert np.all(np.isfinite(ds.field.total))
+    assert ds["by_currents"].values.squeeze().tolist() == [True, False]
+
+
+@pytest.mark.parametrize("bad", [{"incidence": (0,)}, {"incidence": "ab"}, {"incidence": (0, 100)}, {"n_rays": None}])
+def test_bad_bistatic_requests(bad):
+    with pytest.raises(cr.InvalidInputError):
+        cr.bistatic(sc.Sphere(), wavenumbers=20.0, cache=False, **bad)
+    with pytest.raises(cr.InvalidInputError):
+        cr.backscatter("sphere", wavenumbers=20.0)
+
+
+def test_channels_are_those_of_the_dataset():
+    ds = cr.backscatter(sc.Sphere(), wavenumbers=20.0, boundary="soft", n_rays=32, cache=False)
+    with pytest.raises(KeyError):
+        echo_of(ds, "ts", ("hard",), "")

@@ -96,3 +96,21 @@ def test_binary_faces_of_other_lengths(face, corners, tmp_path):
     data[at] = corners
     with pytest.raises(ValueError, match="cut short or no PLY"):
         read(tmp_path, "a.ply", bytes(data))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"element face 1280", b"element face 10000000000000000000000000"),
+        (b"property float x", b"property float"),
+        (b"property list uchar int vertex_indices", b"property list uchar"),
+    ],
+)
+def test_headers_of_binary_files_that_cannot_be(old, new, tmp_path):
+    with pytest.raises(ValueError, match=r"a\.ply"):
+        read(tmp_path, "a.ply", seeds.ply(binary=True).replace(old, new))
+
+
+def test_a_comment_does_not_make_a_file_text(tmp_path):
+    data = seeds.ply(binary=True).replace(b"comment an ellipsoid", b"comment made from an ascii file")
+    assert len(read(tmp_path, "a.ply", data)[0].triangles) == 1280
