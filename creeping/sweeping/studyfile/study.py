@@ -270,9 +270,7 @@ def _request(
         # what follows from a mistake that is told already is none of its own
         unsure = any(text.startswith(("[study] wavenumbers", "[study] quantity")) for text in mistakes)
         needs = "needs wavenumbers"
-        reasons = [
-            reason for reason in reasons if not (reason.startswith("observation") or (unsure and needs in reason))
-        ]
+        reasons = [reason for reason in reasons if not ("observation" in reason or (unsure and needs in reason))]
         mistakes += [f"[study] {reason.replace(needs, needs + '_per_length')}" for reason in reasons]
         return None
     reason = too_large(request)
