@@ -8,9 +8,9 @@ with θ the angle from d, m̄ the mean of m over the shadow line and W a smooth 
     v = W(min χ; 0.38, 0.52) for θ > 90°      χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > 0.9
     f_rays = Σ -√(m1 m2) √(2/k) P |J'|^(-1/2) e^{-iπN/2} e^{ik(d.x0 + s - r.x)}   all rays with p = r
 
-Its error adds in squares what is left out (`creeping.field.ray_ends`, `creeping.field.reflected_fold`) and what is beyond
-the second order of each ray, 3 |f2 - f1|^2/|f2|, of a specular point 3 T^2 |f| (`creeping.field.reflected`), of the
-forward lobe 2 |f2 - f1| and 0.1 |F|/m̄^4.
+Its error adds in squares what is left out (`creeping.field.ray_ends`, `creeping.field.reflected_fold`) and what is
+beyond the second order of each ray, 3 |f2 - f1|^2/|f2|, of a specular point 3 T^2 |f| (`creeping.field.reflected`), of
+the forward lobe 2 |f2 - f1| and 0.1 |F|/m̄^4.
 
 Sources: [LK59], [P79]; Derivations, F3, F10, F13 to F15. The thresholds of W and these factors were set by trial.
 """
