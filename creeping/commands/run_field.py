@@ -17,6 +17,7 @@ from creeping.field.currents.kept import kept_currents
 from creeping.field.decibels import cross_section_decibels
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
+from creeping.field.labelled import PARTS
 from creeping.field.lobes import lobe_step
 from creeping.field.polarisation import turned_to_azimuth
 from creeping.field.uncertainty import far_field_uncertainty
@@ -29,7 +30,6 @@ from creeping.rays.fan import RayFan
 ORDER = 2
 DPI = 200
 """Of pictures."""
-PARTS = ("creeping", "reflected", "forward")
 MOST = 200_000
 """Directions of one run."""
 FORMS = "cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, in degrees"

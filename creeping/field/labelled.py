@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
 PARTS = ("creeping", "reflected", "forward")
+"""Parts of a far field, whose sum it is."""
 
 
 def power(unit: str, exponent: int) -> str:

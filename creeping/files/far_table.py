@@ -8,11 +8,11 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.field.decibels import cross_section_decibels, decibels
+from creeping.field.labelled import PARTS
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
 
-PARTS = ("creeping", "reflected", "forward")
 _COMPONENTS = ("_tt", "_tp", "_pt", "_pp")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from creeping._typing import Any
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
-from creeping.field.labelled import power
+from creeping.field.labelled import PARTS, power
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from creeping.field.far_result import FarField
 
 ABOUT = "time factor exp(-i w t); far field f exp(i k r)/r; 4 pi |f|^2 is the cross section"
-PARTS = ("creeping", "reflected", "forward")
 
 
 def write_mat(path: str | os.PathLike[str], result: Echo | FarField) -> None:

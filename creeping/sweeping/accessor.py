@@ -9,13 +9,12 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.field.labelled import power
+from creeping.field.labelled import PARTS, power
 from creeping.storage.extras import required
 
 if TYPE_CHECKING:
     import xarray
 
-PARTS = ("creeping", "reflected", "forward")
 POLARISATIONS = {"VV": ("theta", "theta"), "VH": ("theta", "phi"), "HV": ("phi", "theta"), "HH": ("phi", "phi")}
 """Scattered by incident component: V is along theta, vertical where z is up and the wave level, H along phi."""
 

@@ -7,7 +7,6 @@ from the plane z = 0. The wave of a radar at (azimuth, elevation) travels the ot
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,13 +16,14 @@ from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_method, checked_plain
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
+from creeping.field.labelled import PARTS
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.surface import Surface
 from creeping.phaseflow.tuning.flow_choice import choose_flow
 from creeping.rays.reach import body_length
-from creeping.sweeping.accessor import PARTS, SweepFields
-from creeping.sweeping.run import sweep_directions
+from creeping.sweeping.accessor import SweepFields
+from creeping.sweeping.run import Progress, sweep_directions
 
 if TYPE_CHECKING:
     import xarray
@@ -32,7 +32,6 @@ TASK = 32
 """Incidences of one task where they are many."""
 MOST = 10_000_000
 """Values of one call."""
-Progress = Callable[[int, int, float], None]
 
 
 def backscatter(
@@ -58,7 +57,7 @@ def backscatter(
         Where the radar is, as seen from the body; one may be a number.
     boundary : "pec", "soft", "hard" or ImpedanceBoundary
     method : {"auto", "rays", "currents"}
-        As of `creeping.sweep_directions`: "auto" takes currents where rays do not resolve a value and they err less.
+        As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more.
     n_rays : int
         Rays of an incidence.
     cache : bool

@@ -9,7 +9,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
-from creeping.field.labelled import power
+from creeping.field.labelled import COMPONENTS, power
 from creeping.geometry.directions import angles_of
 from creeping.geometry.unit import unit_of
 from creeping.shadow.status import INCIDENCE_STATUSES
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 MISSING = -1
 """Status of an incidence that is not computed yet."""
 STATUS_NAMES = {code: text.partition(":")[0] for code, text in INCIDENCE_STATUSES.items()} | {MISSING: "missing"}
-COMPONENTS = ("theta", "phi")
-"""Components of a conductor's incident and scattered wave."""
 SHOWN = 20
 """Errors of incidences that stand in the attributes."""
 CONVENTIONS = (

@@ -78,7 +78,8 @@ def sweep_directions(
         Of the creeping waves.
     method : {"rays", "auto", "currents"}
         Of the fields. "auto" computes an incidence again by the currents of the whole body where isolated rays leave a
-        direction unresolved, a tenth of a second or so for each boundary and wavenumber, "currents" every one.
+        direction unresolved, a tenth of a second or so for each boundary and wavenumber, "currents" every one that a
+        mesh of the body resolves: ``by_currents`` says which.
     store : path, optional
         Folder for the results (zarr), written task by task; the dataset is read from it when it is used. Without it
         results are in memory.
