@@ -115,6 +115,63 @@ class Surface(Protocol):
         ...
 
 
+class Crease(Protocol):
+    """A curve along which two smooth pieces of a body meet, or a point at which one ends.
+
+    ``kind`` is "edge" (the normal jumps), "joint" (the curvature jumps, the normal does not) or "tip" (one point).
+    """
+
+    @property
+    def kind(self) -> str:
+        """One of "edge", "joint" and "tip"."""
+        ...
+
+    @property
+    def pieces(self) -> tuple[int, int]:
+        """Numbers of the pieces on either side, the same one twice at a tip or where a piece meets itself."""
+        ...
+
+    @property
+    def points(self) -> FloatArray:
+        """Points (n, 3), L, in order; the first comes again at the end of a closed curve. One point of a tip."""
+        ...
+
+
+@runtime_checkable
+class CreasedSurface(Surface, Protocol):
+    """A closed body of smooth pieces: its ``level`` is on each piece that of the piece, and jumps between them.
+
+    Each piece is a `Surface` in its own right, smooth where it bounds the body and a little beyond; of it only
+    ``level``, ``gradient``, ``hessian`` and ``bounds`` are asked for, and ``compiled`` where it has one.
+    """
+
+    @property
+    def pieces(self) -> Sequence[Surface]:
+        """Smooth surfaces that bound the body, one after the other."""
+        ...
+
+    @property
+    def creases(self) -> Sequence[Crease]:
+        """Where pieces meet or end."""
+        ...
+
+    def piece(self, points: FloatArray) -> IntArray:
+        """Number of the piece whose part of the body is nearest: points (..., 3), L, near the body, to (...)."""
+        ...
+
+    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
+        """The body as triangles with sides of about ``edge``, L, at most.
+
+        Returns
+        -------
+        corners, normals : (m, 3, 3), L and 1
+            Counter-clockwise seen from outside; on the piece of the triangle, its normals there.
+        pieces : (m,)
+            No triangle lies on two.
+        """
+        ...
+
+
 def size(body: Surface) -> float:
     """Half the diagonal of the body's box, L: the length that absolute tolerances refer to.
 

@@ -1,0 +1,1 @@
+"""Bodies of smooth pieces that meet in edges, joints and tips."""
