@@ -30,6 +30,8 @@ ON = 1e4
 SPACING, NODES = 1.4, 4e5
 """Grid of a spline in units of the distance of points, and its most nodes."""
 COARSER = 1.35
+STEPS = 180
+"""Of a fit: the borders of a piece take long, and gain little."""
 CLOSELY, ROUGHLY = 5e-5, 1e-3
 """Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
 
@@ -73,7 +75,7 @@ def spline_patch(
         points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
     grid = max(SPACING * spacing, spacing_of(points, NODES))
     fine, coarse = (
-        fit(points, normals, h, distance=distance, mean_curvature=mean, accuracy=accuracy)
+        fit(points, normals, h, distance=distance, mean_curvature=mean, accuracy=accuracy, iterations=STEPS)
         for h in (grid, COARSER * grid)
     )
     return Patch(fine.spline, coarse.spline, "spline", fine.misfit, fine.turn, spacing)
