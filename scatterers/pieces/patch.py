@@ -1,12 +1,12 @@
 """F of one smooth region of a body: a plane or quadric where its points lie on one, else a fitted spline.
 
 A quadric Q = 0 has q of unit length that makes sum ON^2 Q(x)^2 + |n x grad Q(x)|^2 least over points x and normals n,
-which tell it from other quadrics through the points; it is
-taken if all points lie on it within `EXACT` of the body's size, as those of cylinders, cones and balls of engineering
-do, or if what is left, e over a length l, changes curvatures by 8 e/l^2 < `CLOSE` of the largest, as of cylinders that a
-program wrote as splines. As polynomials of degree 2 both kinds are splines of one cell, which go on as they are far
-beyond the region. Other regions are fitted as whole bodies are (`scatterers.spline.fitting`), from their own points
-only, so that nothing is rounded off at their borders; a coarser fit tells how far they are known.
+which tell it from other quadrics through the points. It is taken if all points lie on it within `EXACT` of the body's
+size, as those of cylinders, cones and balls of engineering do, or if what is left, e over a length l, changes
+curvatures by 8 e/l^2 < `CLOSE` of the largest, as of cylinders that a program wrote as splines. As polynomials of
+degree 2 both kinds are splines of one cell, which go on as they are far beyond the region. Other regions are fitted as
+whole bodies are (`scatterers.spline.fitting`), from their own points only, so that nothing is rounded off at their
+borders; a coarser fit tells how far they are known.
 """
 
 from dataclasses import dataclass

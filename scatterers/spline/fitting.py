@@ -206,9 +206,29 @@ class _Equations:
         # 70 is the square sum of a fourth difference's weights
         self.divisor = density + FLOOR * density.max() + 210 * smoothing
 
-    def _plane_distance(self, where: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _nearest(self, where: FloatArray) -> NDArray[np.int64]:
+        """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
+
+        A tree of points takes long where many are equally far, as in the middle of a body.
+        """
+        from scipy.ndimage import distance_transform_edt
+
+        node = np.rint((self.points - self.low) / self.spacing).astype(np.int64) + 2
+        one = np.full(self.shape, -1, dtype=np.int64)
+        one[tuple(node.T)] = np.arange(len(node))
+        cells, index = distance_transform_edt(one < 0, return_indices=True)
+        nearest = one[tuple(index)].ravel()
+        near = np.flatnonzero(cells.ravel() < NEAR + 2)
+        nearest[near] = self.tree.query(where[near])[1]
+        return np.asarray(nearest)
+
+    def _plane_distance(
+        self, where: FloatArray, nearest: NDArray[np.int64] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Distance (m,) to the tangent plane at the nearest point, far from it to the point; and to the point, L."""
-        off, nearest = self.tree.query(where)
+        if nearest is None:
+            nearest = self.tree.query(where)[1]
+        off = np.linalg.norm(where - self.points[nearest], axis=1)
         plane = np.sum((where - self.points[nearest]) * self.normals[nearest], axis=1)
         return np.where(np.abs(plane) > 0.5 * off, plane, np.copysign(off, plane)), off
 
@@ -227,7 +247,7 @@ class _Equations:
 
         axes = [self.low[k] + self.spacing * (np.arange(self.shape[k]) - 2.0) for k in range(3)]
         where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        values, off = self._plane_distance(where)
+        values, off = self._plane_distance(where, self._nearest(where))
         if distance is not None:
             near = np.flatnonzero(off < NEAR * self.spacing)
             found = distance(where[near])
