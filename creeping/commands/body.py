@@ -13,6 +13,13 @@ BODIES = {
     "ellipsoid": "Ellipsoid",
     "torus": "Torus",
     "twisted-ellipsoid": "TwistedEllipsoid",
+    "cylinder": "Cylinder",
+    "capsule": "Capsule",
+    "cone": "Cone",
+    "cone-sphere": "ConeSphere",
+    "ogive": "Ogive",
+    "double-ogive": "DoubleOgive",
+    "almond": "Almond",
 }
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -59,7 +66,7 @@ def parse_body(
         raise InvalidInputError(f"--units belongs to a file; {text!r} is none")
     name, _, rest = text.partition(":")
     if name in BODIES and allow_rough:
-        raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is smooth")
+        raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is taken as it is")
     if not (of_file or name in BODIES or _like_expression(text)):
         raise InvalidInputError(
             f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "

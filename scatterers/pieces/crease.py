@@ -16,7 +16,7 @@ class Crease:
     Attributes
     ----------
     kind : {"edge", "joint", "tip"}
-        The normal jumps; the curvature jumps and the normal does not; one point, without a normal.
+        The normal jumps; the curvature or a derivative of it jumps, the normal does not; one point, without a normal.
     pieces : (int, int)
         On either side; the same twice at a tip, or where a piece meets itself.
     points : (n, 3), L
