@@ -11,6 +11,7 @@ from scatterers.gridded import Gridded
 from scatterers.implicit import Implicit
 from scatterers.mesh import Mesh, examined_mesh
 from scatterers.ogive import DoubleOgive, Ogive
+from scatterers.revolution import Revolution
 from scatterers.speed import ExpressionSpeed
 from scatterers.sphere import Sphere
 from scatterers.torus import Torus
@@ -30,6 +31,7 @@ __all__ = [
     "Implicit",
     "Mesh",
     "Ogive",
+    "Revolution",
     "Sphere",
     "Torus",
     "TwistedEllipsoid",

@@ -266,7 +266,7 @@ def _crossing(z: FloatArray, r: FloatArray) -> Pair | None:
     """Where a polygon crosses itself, None if it does not."""
     p = np.stack([z, r], axis=-1)
     # more would take long, and a profile so fine is smooth
-    p = p[:: max(1, len(p) // 2000)]
+    p = p[:: max(1, len(p) // 600)]
     a, b = p[:-1], p[1:]
 
     def side(of: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
