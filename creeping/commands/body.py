@@ -78,10 +78,10 @@ def parse_body(
             shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=progress)
             return _with_charts(shape, progress)
         if name in BODIES:
-            return _named(name, rest, speed)
+            return _with_charts(_named(name, rest, speed), None)
         if progress:
             progress("examining the expression")
-        return _with_charts(scatterers.Implicit(text, allow_rough=allow_rough, speed=speed), progress)
+        return _with_charts(scatterers.Implicit(text, strict=not allow_rough, speed=speed), progress)
     except InvalidInputError:
         raise
     except (TypeError, ValueError) as error:
@@ -107,7 +107,7 @@ def _with_charts(shape: Any, progress: Progress | None) -> Any:
     """Body whose charts are made: every flow needs them, and of thin or sharp parts there may be none."""
     if progress:
         progress("charts")
-    _ = shape.atlas
+    _ = shape.atlas.charts
     return shape
 
 

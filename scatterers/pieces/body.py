@@ -93,6 +93,12 @@ class NoCharts:
         raise ValueError(self.reason)
 
 
+def no_charts(sharp: Sequence[Crease]) -> NoCharts:
+    """No charts because of edges and tips."""
+    found = f"{len(sharp)} edges and tips, first {sharp[0]!r}" if sharp else "several pieces"
+    return NoCharts(f"the body has {found}: no smooth charts cover it; take its tiles")
+
+
 class Piece(Levelled):
     """Smooth surface, part of which bounds a body.
 
@@ -159,6 +165,4 @@ class CreasedBody(Levelled, Body):
     @property
     def atlas(self) -> Any:
         """None, unless a subclass has one: asking it for charts raises an error that says why."""
-        sharp = [crease for crease in self.creases if crease.kind != "joint"]
-        found = f"{len(sharp)} edges and tips, first {sharp[0]!r}" if sharp else "several pieces"
-        return NoCharts(f"the body has {found}: no smooth charts cover it; take its tiles")
+        return no_charts([crease for crease in self.creases if crease.kind != "joint"])

@@ -294,7 +294,7 @@ def _calls_of_bodies(made: dict[str, Any]) -> dict[str, Call]:
                 "expression": ball,
                 "bounds": [[-2] * 3, [2] * 3],
                 "centre": (0, 0, 0),
-                "allow_rough": False,
+                "strict": False,
                 "speed": None,
             },
         ),
