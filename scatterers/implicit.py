@@ -58,7 +58,8 @@ class Implicit(LevelBody):
         Point that sees the whole body from within, L; only star-shaped bodies have one.
     strict : bool
         Refuse bodies with edges and tips. A body that has them, or joints, is one of smooth pieces: it has the members
-        ``pieces``, ``creases``, ``piece`` and ``tiles``, and charts only if all its creases are joints.
+        ``pieces``, ``creases``, ``piece`` and ``tiles``, and charts only if all its creases are joints. Pieces smaller
+        than a cell of the grid on which the body is looked for, a 64th of its box, may be missed.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
@@ -105,12 +106,15 @@ class Implicit(LevelBody):
             examine(expression, samples, True)
         given = None if centre is None else _point(centre)
         self._shape(expression, samples, given)
-        self._creases = [*self._tips(samples, strict), *self._found_creases(samples, strict)]
+        tips = self._tips(samples, strict)
+        along = self._found_creases(samples, strict)
+        ends = [int(self._numbers(tip[None])[0]) for tip in tips]
+        self._creases = [*(Crease("tip", (k, k), tip[None]) for tip, k in zip(tips, ends, strict=True)), *along]
         if self._creases:
             # only a body of pieces has the members of one: by them it is told from a smooth body
             self.__class__ = CreasedImplicit
 
-    def _tips(self, samples: Samples, strict: bool) -> list[Crease]:
+    def _tips(self, samples: Samples, strict: bool) -> FloatArray:
         points, spacing, size = samples.crossings(), float(samples.spacing.max()), self._diagonal
         flat = singular_points(self.compiled, points, size)
         if len(flat) > MOST_TIPS:
@@ -137,7 +141,7 @@ class Implicit(LevelBody):
                 f"F = 0 is not smooth: it has {len(found)} tips, first {tuple(found[0].round(9).tolist())}; leave "
                 "strict out to take them, or round them off in F"
             )
-        return [Crease("tip", (0, 0), place[None]) for place in found]
+        return found
 
     def _found_creases(self, samples: Samples, strict: bool) -> list[Crease]:
         points, spacing = samples.crossings(), float(samples.spacing.max())

@@ -55,7 +55,9 @@ class Revolved(CreasedBody):
     @cached_property
     def pieces(self) -> Sequence[Piece]:
         """Smooth surfaces that bound the body, one after the other from below."""
-        return [Piece(Compiled(evaluate, "level", self._packed([s])), self._box([s])) for s in self._profile]
+        return [
+            Piece(Compiled(evaluate, "level", self._packed([s], whole=False)), self._box([s])) for s in self._profile
+        ]
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -74,7 +76,9 @@ class Revolved(CreasedBody):
         x[..., iu], x[..., iv], x[..., iw] = local[..., 0], local[..., 1] / self._stretch, local[..., 2]
         return x
 
-    def _packed(self, segments: Sequence[Segment], of_map: FloatArray | None = None) -> FloatArray:
+    def _packed(
+        self, segments: Sequence[Segment], of_map: FloatArray | None = None, *, whole: bool = True
+    ) -> FloatArray:
         """Parameters of the compiled functions."""
         rows, shapes = [], []
         kept = [(segment, *segment.shapes()) for segment in segments]
@@ -95,7 +99,7 @@ class Revolved(CreasedBody):
                 rows.append([*start, *end, piece, kind, where, turned])
             at += sum(map(len, parts))
             shapes += parts
-        place = [*self._axes, self._stretch, len(rows)]
+        place = [*self._axes, self._stretch, float(whole), len(rows)]
         header = np.concatenate([np.full(HEADER, 0.0) if of_map is None else of_map, place])
         return np.concatenate([header, np.ravel(rows), *shapes])
 

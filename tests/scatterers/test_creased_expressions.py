@@ -220,3 +220,12 @@ def test_curvature_jumps_of_named_bodies_and_expressions_agree():
         flat = np.eye(3) - n * n.swapaxes(1, 2)
         shapes.append(flat @ hessian @ flat / slope)
     np.testing.assert_allclose(*shapes, atol=1e-12)
+
+
+def test_a_tip_belongs_to_the_piece_it_ends():
+    # the cone is the second choice here
+    body = sc.Implicit("max(-z, sqrt(x**2 + y**2) - (1 - z))")
+    (tip,) = (crease for crease in body.creases if crease.kind == "tip")
+    ring = np.array([[0.1, 0, 0.9], [0, -0.1, 0.9]])
+    assert tip.pieces == (body.piece(ring)[0],) * 2
+    np.testing.assert_allclose(body.pieces[tip.pieces[0]].level(ring), 0, atol=1e-15)

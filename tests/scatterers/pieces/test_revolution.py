@@ -142,6 +142,20 @@ def test_compiled_functions_equal_their_source(name, rng):
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)
 
 
+@every
+def test_pieces_go_on_smoothly_beyond_their_creases(name, rng):
+    body, step = BODIES[name][0](), 1e-6
+    for crease in body.creases:
+        # about the axis the curvature of a tip has no bound
+        points = crease.points[::9] + 0.02 * rng.normal(size=(len(crease.points[::9]), 3))
+        for number in set(crease.pieces) if crease.kind != "tip" else ():
+            piece = body.pieces[number]
+            slopes = [(piece.level(points + h) - piece.level(points - h)) / (2 * step) for h in step * np.eye(3)]
+            bends = [(piece.gradient(points + h) - piece.gradient(points - h)) / (2 * step) for h in step * np.eye(3)]
+            np.testing.assert_allclose(piece.gradient(points), np.stack(slopes, axis=-1), atol=1e-8)
+            np.testing.assert_allclose(piece.hessian(points), np.stack(bends, axis=-1), atol=1e-6)
+
+
 def test_direction_of_the_profile_does_not_matter(rng):
     points = rng.uniform(-1, 4, (200, 3))
     one, other = (BODIES[name][0]() for name in ("bullet", "turned round"))
