@@ -30,7 +30,7 @@ from scatterers.expression.space import ExpressionSpace
 from scatterers.expression.switches import Switches
 from scatterers.kernels.compiled import Compiled
 from scatterers.pieces.body import Piece, no_charts
-from scatterers.pieces.clipped import Clipped, clip, creases, normals
+from scatterers.pieces.clipped import clip, creases, normals
 from scatterers.pieces.crease import Crease
 from scatterers.pieces.marching import march
 from scatterers.sphere_map.star import star_map
@@ -144,13 +144,17 @@ class Implicit(LevelBody):
         return found
 
     def _found_creases(self, samples: Samples, strict: bool) -> list[Crease]:
-        points, spacing = samples.crossings(), float(samples.spacing.max())
+        spacing = float(samples.spacing.max())
         self._switches = Switches(self.expression)
         if not self._switches.any:
-            refuse_edges(self.compiled, points, spacing)
+            refuse_edges(self.compiled, samples.crossings(), spacing)
             return []
+        # points on the body: next to it, other choices may be made
+        points, triangles = march(self.level, self._bounds, spacing)
         self._switches.met(points)
-        found = creases(self._pieces, self._clipped(spacing), spacing) if len(self._pieces) > 1 else []
+        if len(self._pieces) == 1:
+            return []
+        found = creases(self._pieces, clip(self, self._pieces, self._numbers, points, triangles), spacing)
         edges = [crease for crease in found if crease.kind == "edge"]
         if strict and edges:
             sharpest = max(edges, key=lambda crease: crease.angle)
@@ -168,10 +172,6 @@ class Implicit(LevelBody):
             return [Piece(self.compiled, self._bounds)]
         compiled = [Compiled(self._switches.functions(k).block, "level", np.zeros(1)) for k in range(count)]
         return [Piece(one, self._bounds) for one in compiled]
-
-    def _clipped(self, spacing: float) -> Clipped:
-        points, triangles = march(self.level, self._bounds, spacing)
-        return clip(self, self._pieces, self._numbers, points, triangles)
 
     def _numbers(self, points: FloatArray) -> IntArray:
         flat = np.asarray(points, dtype=float).reshape(-1, 3)
@@ -239,7 +239,8 @@ class CreasedImplicit(Implicit):
             If ``edge`` is not a positive finite number, or so small that the grid is too large.
         """
         positive(edge=edge)
-        clipped = self._clipped(edge / PER_EDGE)
+        points, triangles = march(self.level, self._bounds, edge / PER_EDGE)
+        clipped = clip(self, self._pieces, self._numbers, points, triangles)
         corners, directions = clipped.corners, normals(self._pieces, clipped.corners, clipped.pieces)
         outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         kept = np.all(np.sum(outward[:, None] * directions, axis=-1) > 0, axis=1)

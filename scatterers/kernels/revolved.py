@@ -32,7 +32,7 @@ from scatterers.kernels.spline_constants import HEADER
 
 FloatArray = NDArray[np.float64]
 # where values stand in the flat parameters: the axes of space that are u, v and w, the stretch of v, whether the
-# profile is that of a whole body (1) or of a piece, which goes on beyond its ends (0), the number of segments, their rows
+# profile is of a whole body (1) or of a piece, which goes on beyond its ends (0), the number of segments; their rows
 PLACE, STRETCH, WHOLE, COUNT, ROWS = HEADER, HEADER + 3, HEADER + 4, HEADER + 5, HEADER + 6
 # of a row: points and unit tangents (w, r) at both ends, piece, kind, where its shape begins, sign of the corner before
 START, START_TANGENT, END, END_TANGENT, PIECE, KIND, SHAPE, CORNER, WIDTH = 0, 2, 4, 6, 8, 9, 10, 11, 12

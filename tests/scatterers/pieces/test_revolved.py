@@ -286,6 +286,20 @@ def test_geodesics_on_a_cone_are_lines_of_its_plane(rng):
     )
 
 
+@pytest.mark.parametrize("name", ["ogive", "double ogive", "cone-sphere"])
+def test_rays_keep_clairauts_constant(name, rng):
+    body, phi = BODIES[name], rng.uniform(-3, 3, 10)
+    # around where the body is widest, and across the joint
+    z, heading = np.full(10, 0.2), rng.uniform(-0.4, 0.4, 10)
+    x = project(body, np.stack([np.cos(phi), np.sin(phi), z], axis=-1))
+    p = np.stack([-np.sin(phi) * np.cos(heading), np.cos(phi) * np.cos(heading), np.sin(heading)], axis=-1)
+    _, p0 = cr.trace(body, x, p, 0.0)
+    found, ahead = cr.trace(body, x, p, np.linspace(0.5, 5.0, 10), rtol=1e-12)
+    start = x[:, 0] * p0[:, 1] - x[:, 1] * p0[:, 0]
+    moment = found[..., 0] * ahead[..., 1] - found[..., 1] * ahead[..., 0]
+    np.testing.assert_allclose(moment, np.broadcast_to(start[:, None], moment.shape), atol=GEODESIC)
+
+
 def test_ogives_are_those_published():
     inch = 0.0254
     ogive = sc.Ogive(inch, 10 * inch)
@@ -301,6 +315,18 @@ def test_ogives_are_those_published():
     halves = (published_ogive(z[z < 0], 1, 2.5, np.radians(46.4)), published_ogive(z[z >= 0], 1, 5.0, alpha))
     r = np.concatenate(halves)
     np.testing.assert_allclose(double.level(inch * np.stack([0 * r, r, z], axis=-1)), 0, atol=1e-16)
+
+
+def test_cone_sphere_is_that_published():
+    # inches, z from the joint, the tip below: a cone of 7 degrees over 23.821, a ball of radius 2.947 about 0.359
+    alpha = np.radians(7.0)
+    body = sc.ConeSphere(2.947, 2.947 * (1 + 1 / np.sin(alpha)))
+    z = np.concatenate([np.linspace(-23.8, 0, 30), np.linspace(0.01, 3.3, 30)])
+    with np.errstate(invalid="ignore"):
+        r = np.where(z < 0, np.tan(alpha) * (z + 23.821), 2.947 * np.sqrt(1 - ((z - 0.359) / 2.947) ** 2))
+    points = np.stack([r, 0 * r, 0.359 - z], axis=-1)
+    np.testing.assert_allclose(body.level(points), 0, atol=1e-3)
+    np.testing.assert_array_equal(body.piece(points[1:-1]), z[1:-1] < 0)
 
 
 def test_almond_is_that_published():
