@@ -4,6 +4,8 @@ Sources: [C76, sec. 3-3].
 """
 
 import hashlib
+import operator
+import reprlib
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from itertools import pairwise
@@ -82,15 +84,20 @@ class Revolution(Revolved):
 
 
 def _segments(profile: Any, corners: Iterable[int]) -> list[Segment]:
-    given = [int(k) for k in corners]
-    if not isinstance(profile, np.ndarray) and any(hasattr(one, "tangent") for one in profile):
+    try:
+        given = [operator.index(k) for k in corners]
+    except TypeError:
+        raise ValueError(f"corners {reprlib.repr(corners)} are no numbers of points; give whole numbers") from None
+    if isinstance(profile, (list, tuple)) and profile and all(hasattr(one, "tangent") for one in profile):
         if given:
             raise ValueError("corners belong to a table of points; segments meet in corners of themselves")
         return list(profile)
     try:
         table = numbers(profile)
     except (TypeError, ValueError):
-        raise ValueError("profile is neither a table of points (z, radius) nor segments") from None
+        raise ValueError(
+            f"profile {reprlib.repr(profile)} is neither a table of points (z, radius) nor a list of segments"
+        ) from None
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2:
         raise ValueError(f"profile of shape {table.shape}; give points (n, 2), (z, radius), two at least")
     if bad := int(np.sum(~np.all(np.isfinite(table), axis=1))):

@@ -36,6 +36,7 @@ ON_CREASE = 360
 """Points on a circle that is a crease."""
 SIDE = 0.75
 """Steps along and across the profile in edges of tiles: the third side is then 1.06 edges at most."""
+MOST_TILES = 1e7
 DENSE = 513
 """Points of a segment by which its length is measured."""
 
@@ -156,9 +157,14 @@ class Revolved(CreasedBody):
         Raises
         ------
         ValueError
-            If ``edge`` is not a positive finite number.
+            If ``edge`` is not a positive finite number, or asks for too many tiles.
         """
         positive(edge=edge)
+        long, wide = np.ptp(self.bounds, axis=0).sum() / edge, max(np.ptp(self.bounds, axis=0)) / edge
+        if long * wide > MOST_TILES:
+            raise ValueError(
+                f"edge = {edge!r} asks for some {long * wide:.1g} tiles, more than {MOST_TILES:.0g}; give more"
+            )
         corners, normals, pieces = [], [], []
         for number, segment in enumerate(self._profile):
             u = _steps(segment, SIDE * edge)

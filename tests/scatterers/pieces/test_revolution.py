@@ -182,6 +182,10 @@ def test_fingerprints():
     "profile, corners, what",
     [
         ("text", (), "neither a table of points"),
+        (3, (), "3 is neither|shape"),
+        (None, (), "shape|neither"),
+        ([(0, 0), (1, 1), (2, 0)], 1, "corners 1 are no numbers of points"),
+        ([(0, 0), (1, 1), (2, 0)], [0.5], "give whole numbers"),
         ([(0, 1, 2)], (), r"shape \(1, 3\); give points \(n, 2\)"),
         ([(0, 1)], (), "two at least"),
         ([(0, 0), (np.nan, 1), (2, 0)], (), "1 of 3 points of the profile are not finite"),

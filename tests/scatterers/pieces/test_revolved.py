@@ -381,6 +381,7 @@ def test_fingerprints_tell_bodies_apart():
         (lambda: sc.DoubleOgive(1.0, 2.5, 5.0, upper_angle=46.4), "upper_angle = 46.4 .* angles are radians"),
         (lambda: sc.Almond(-1.0), "length = -1.0 is not positive"),
         (lambda: sc.Cylinder(1.0, 1.0).tiles(0.0), "edge = 0.0 is not positive"),
+        (lambda: sc.Cylinder(1.0, 1.0).tiles(1e-9), "more than 1e.07; give more"),
         (lambda: upward([Line((0, 0), (0, 1))]), "begin and end at radius 0"),
         (lambda: upward([Line((0, 0), (0, 1)), Line((1, 1), (1, 0))]), "the next begins at"),
         (lambda: upward([Line((0, 0), (1, 1)), Line((1, 1), (1, 0)), Line((1, 0), (2, 0))]), "touches the axis"),
