@@ -20,8 +20,8 @@ from functools import cached_property
 from typing import Any
 
 from scatterers.base.body import positive
-from scatterers.pieces.profile import Arc, Segment
-from scatterers.pieces.revolved import Revolved
+from scatterers.exact.profile import Arc, Segment
+from scatterers.exact.revolved import Revolved
 
 WIDE, BACK = 29 / 150, 5 / 12
 FLAT = 3.0

@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.fitted_body import FittedBody, PointCloud, checked_options
-from scatterers.cad_file.files import kind_of, read_cad
+from scatterers.base.clouds import PieceCloud, PointCloud
+from scatterers.base.fitted_body import FittedBody, checked_options
+from scatterers.cad_file.files import CadReading, kind_of, read_cad
+from scatterers.pieces.regions import regions_of
 from scatterers.spline.cache import key_of
+from scatterers.triangles.choice import Choice
 from scatterers.triangles.jet_points import signed_distance
 from scatterers.triangles.jets import osculating_jets
 from scatterers.triangles.quality import assess
@@ -21,6 +24,8 @@ from scatterers.triangles.quality import assess
 FloatArray = NDArray[np.float64]
 POINTS = 10_000
 """Points of the body that are asked for."""
+CURVED = 30
+"""Triangles to a full turn of a curved face of a body with edges."""
 SPACING = 2.0
 """Spacing of the grid in units of the mean distance of neighbouring points."""
 
@@ -36,8 +41,17 @@ class Cad(FittedBody):
         Unit of the numbers. STEP and IGES files state theirs, and another one is an error; BREP files do not.
     points : int
         Points of the body that are fitted; more for bodies with fine detail.
-    allow_rough : bool
-        Take a body that is not smooth everywhere; `non_smooth` says where, and rays that come there end.
+    strict : bool
+        Refuse a body that is not smooth everywhere. Else it is taken in smooth pieces, which end at its `creases`;
+        `non_smooth` says where nothing is known, and rays that come there end.
+    part : str or int, optional
+        Which of several bodies of the file: "largest", or a number from 1 in the order of their areas.
+    cap : float, optional
+        Holes that are at most so large are closed, m; inf for all. Their borders become edges.
+    union : bool
+        Take the outer surface of all bodies, which may cross each other; needs the library manifold3d.
+    sew : float, optional
+        Faces whose borders are at most so far apart are sewn together first, m.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -74,7 +88,11 @@ class Cad(FittedBody):
         units: str | None = None,
         *,
         points: int = POINTS,
-        allow_rough: bool = False,
+        strict: bool = False,
+        part: str | int | None = None,
+        cap: float | None = None,
+        union: bool = False,
+        sew: float | None = None,
         cache: bool | str | Path = True,
         speed: Any = None,
         progress: Callable[[str], None] | None = None,
@@ -82,27 +100,38 @@ class Cad(FittedBody):
         if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or not 500 <= points <= 200_000:
             raise ValueError(f"points = {points!r}; give a whole number from 500 to 200000")
         points = int(points)
-        report = checked_options(units, allow_rough, cache, progress)
+        report = checked_options(units, strict, cache, progress)
         try:
             # before all of it is read
             kind_of(Path(path))
             content = Path(path).suffix.lower().encode() + b"\0" + Path(path).read_bytes()
         except (TypeError, OSError) as error:
             raise ValueError(f"{path} cannot be read: {error}") from None
-        key = key_of("cad", content, units=units, points=points, allow_rough=allow_rough)
-        self._open(key, cache, speed, lambda: self._points(Path(path), units, points, allow_rough, report), report)
+        choice = Choice(part, cap, union)
+        key = key_of("cad", content, units=units, points=points, strict=strict, choice=choice.text, sew=sew)
+        reading = CadReading(units, points, choice, sew)
+        self._open(key, cache, speed, lambda: self._points(Path(path), reading, strict, report), report)
         self.edges = tuple(self._text["edges"])
 
     def _points(
-        self, path: Path, units: str | None, points: int, allow_rough: bool, progress: Callable[[str], None]
-    ) -> PointCloud:
+        self, path: Path, reading: CadReading, strict: bool, progress: Callable[[str], None]
+    ) -> PointCloud | PieceCloud:
         progress("reading the CAD file")
-        found = read_cad(path, units, points, progress=progress)
+        found = read_cad(path, reading, progress=progress)
         jets = osculating_jets(found.mesh.vertices, found.mesh.triangles)
         quality = assess(found.mesh, jets)
-        if found.edges and not allow_rough:
+        if found.edges and strict:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
-        if quality.verdict != "smooth" and not allow_rough:
+        notes = {"source": path.name, "edges": list(found.edges)}
+        if found.creases.any():
+            # fillets ask for more points than faces
+            found = read_cad(path, reading, curved=CURVED, progress=progress)
+            mesh, normals = found.mesh, found.corner_normals
+            regions = regions_of(mesh.vertices, mesh.triangles, sharp=found.creases)
+            return PieceCloud(
+                mesh.vertices, mesh.triangles, regions, normals, quality, notes | {"repairs": list(mesh.repairs)}
+            )
+        if quality.verdict != "smooth" and strict:
             raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
         non_smooth = np.concatenate([found.mesh.vertices[quality.bad], found.non_smooth])
         return PointCloud(
@@ -115,5 +144,5 @@ class Cad(FittedBody):
             distance=partial(signed_distance, found.mesh.vertices, jets),
             mean_curvature=np.where(jets.fitted & ~quality.bad, jets.mean, np.nan),
             quality=quality,
-            notes={"source": path.name, "repairs": list(found.mesh.repairs), "edges": list(found.edges)},
+            notes=notes | {"repairs": list(found.mesh.repairs)},
         )

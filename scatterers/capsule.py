@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 from scatterers.base.body import positive
-from scatterers.pieces.profile import Arc, Line, Segment
-from scatterers.pieces.revolved import Revolved
+from scatterers.exact.profile import Arc, Line, Segment
+from scatterers.exact.revolved import Revolved
 
 
 @dataclass(frozen=True)

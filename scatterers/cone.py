@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any
 
 from scatterers.base.body import finite, positive
-from scatterers.pieces.profile import Line, Segment
-from scatterers.pieces.revolved import Revolved
+from scatterers.exact.profile import Line, Segment
+from scatterers.exact.revolved import Revolved
 
 
 @dataclass(frozen=True)

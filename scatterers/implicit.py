@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from scatterers.base.body import numbers, positive
 from scatterers.base.level_body import LevelBody
+from scatterers.exact.body import SHARP, Piece, no_charts
+from scatterers.exact.clipped import clip, creases, normals
+from scatterers.exact.marching import march
 from scatterers.expression.search import FINE, SIZES, examine, found_box, samples_of, tightened
 from scatterers.expression.singularities import (
     distinct,
@@ -29,10 +32,7 @@ from scatterers.expression.singularities import (
 from scatterers.expression.space import ExpressionSpace
 from scatterers.expression.switches import Switches
 from scatterers.kernels.compiled import Compiled
-from scatterers.pieces.body import Piece, no_charts
-from scatterers.pieces.clipped import clip, creases, normals
 from scatterers.pieces.crease import Crease
-from scatterers.pieces.marching import march
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.samples import Samples
 
@@ -58,8 +58,8 @@ class Implicit(LevelBody):
         Point that sees the whole body from within, L; only star-shaped bodies have one.
     strict : bool
         Refuse bodies with edges and tips. A body that has them, or joints, is one of smooth pieces: it has the members
-        ``pieces``, ``creases``, ``piece`` and ``tiles``, and charts only if all its creases are joints. Pieces smaller
-        than a cell of the grid on which the body is looked for, a 64th of its box, may be missed.
+        ``pieces``, ``creases``, ``piece`` and ``tiles``, and charts only if it has neither edges nor tips. Pieces
+        smaller than a cell of the grid on which the body is looked for, a 64th of its box, may be missed.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
@@ -110,7 +110,7 @@ class Implicit(LevelBody):
         along = self._found_creases(samples, strict)
         ends = [int(self._numbers(tip[None])[0]) for tip in tips]
         self._creases = [*(Crease("tip", (k, k), tip[None]) for tip, k in zip(tips, ends, strict=True)), *along]
-        if self._creases:
+        if any(crease.kind != "seam" for crease in self._creases):
             # only a body of pieces has the members of one: by them it is told from a smooth body
             self.__class__ = CreasedImplicit
 
@@ -248,8 +248,8 @@ class CreasedImplicit(Implicit):
 
     @cached_property
     def atlas(self) -> Any:
-        """Charts of a body with no other creases than joints; asking others for charts raises an error."""
-        sharp = [crease for crease in self._creases if crease.kind != "joint"]
+        """Charts of a body without edges and tips; asking others for charts raises an error."""
+        sharp = [crease for crease in self._creases if crease.kind in SHARP]
         return no_charts(sharp) if sharp else super().atlas
 
 

@@ -17,12 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.fitted_body import FittedBody, PointCloud, checked_options
+from scatterers.base.clouds import PieceCloud, PointCloud
+from scatterers.base.fitted_body import FittedBody, checked_options
+from scatterers.pieces.regions import regions_of
 from scatterers.spline.cache import key_of
 from scatterers.spline.fitting import spacing_of
+from scatterers.triangles.choice import Choice
 from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers.triangles.jet_points import centroids, signed_distance
 from scatterers.triangles.jets import Jets, angle_weighted_normals, osculating_jets
+from scatterers.triangles.parts import MOST_SUBDIVIDED, subdivided
 from scatterers.triangles.quality import MeshQuality, assess
 
 FloatArray = NDArray[np.float64]
@@ -35,6 +39,11 @@ GRID, ENOUGH, SMALL = 1e6, 2.0, 0.2
 at which nothing is lost."""
 NOISE = 2e-4
 """Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
+MOST_SUBDIVISIONS = 3
+FEW_BAD = 0.05
+"""Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
+UNCERTAIN = 0.25
+"""by how far its curvatures depend on the grid, relative to their rms."""
 
 
 class Mesh(FittedBody):
@@ -46,8 +55,18 @@ class Mesh(FittedBody):
         STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
-    allow_rough : bool
-        Take a mesh that is not smooth everywhere; `non_smooth` says where, and rays that come there end.
+    strict : bool
+        Refuse a mesh that is not smooth everywhere, or whose triangles hardly resolve it. Else it is taken in smooth
+        pieces, which end at its `creases`; `non_smooth` says where nothing is known, and rays that come there end.
+    part : str or int, optional
+        Which of several parts of the file: "largest", a number from 1 in the order of their areas, or a name.
+    cap : float, optional
+        Holes that are at most so large are closed, m; inf for all. Their borders become edges.
+    union : bool
+        Take the outer surface of all parts, which may cross each other; needs the library manifold3d.
+    subdivide : {"auto", 1, 2, 3}, optional
+        Loop's subdivision of a coarse mesh of a smooth body, which passes near its vertices; "auto" as often as it
+        takes. `repairs` tell by how much vertices moved.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -86,29 +105,45 @@ class Mesh(FittedBody):
         source: Any,
         units: str | None = None,
         *,
-        allow_rough: bool = False,
+        strict: bool = False,
+        part: str | int | None = None,
+        cap: float | None = None,
+        union: bool = False,
+        subdivide: str | int | None = None,
         cache: bool | str | Path = True,
         speed: Any = None,
         progress: Callable[[str], None] | None = None,
     ) -> None:
-        report = checked_options(units, allow_rough, cache, progress)
+        report = checked_options(units, strict, cache, progress)
         in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
         if in_memory and units is None and getattr(source, "units", None) is None:
             self.unit = "L"
-        key = key_of("mesh", _content(source), units=units, allow_rough=allow_rough)
-        self._open(key, cache, speed, lambda: self._points(source, units, allow_rough, report), report)
+        choice = Choice(part, cap, union, subdivide)
+        key = key_of("mesh", _content(source), units=units, strict=strict, choice=choice.text)
+        self._open(key, cache, speed, lambda: self._points(source, units, strict, choice, report), report)
 
-    def _points(self, source: Any, units: str | None, allow_rough: bool, progress: Callable[[str], None]) -> PointCloud:
-        mesh, jets, quality = _examined(source, units, progress)
-        if quality.verdict not in ("smooth", "noisy") and not allow_rough:
-            raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
-        if quality.bad.any() and quality.verdict != "noisy":
+    def _points(
+        self, source: Any, units: str | None, strict: bool, choice: Choice, progress: Callable[[str], None]
+    ) -> PointCloud | PieceCloud:
+        mesh, jets, quality = _examined(source, units, choice, progress)
+        if quality.verdict not in ("smooth", "noisy"):
+            if strict:
+                raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
+            regions = regions_of(mesh.vertices, mesh.triangles)
+            # creases that end on smooth ground are folds of a coarse mesh, unless most sharp edges are in chains
+            if regions.count > 1 or (regions.crease.any() and quality.verdict == "sharp"):
+                notes = {"repairs": list(mesh.repairs), "source": source_name(source)}
+                return PieceCloud(mesh.vertices, mesh.triangles, regions, None, quality, notes)
+        # nearly all of it bad: a whole fit tells what it is worth
+        coarse = quality.verdict == "too coarse" and quality.bad_share > FEW_BAD
+        bad = quality.bad & (quality.verdict != "noisy") & (not coarse)
+        if bad.any():
             # jets say nothing there, the triangles a little
             usual = angle_weighted_normals(mesh.vertices, mesh.triangles)
-            normals = np.where(quality.bad[:, None], usual, jets.normals)
-            jets = replace(jets, fitted=jets.fitted & ~quality.bad, normals=normals)
+            normals = np.where(bad[:, None], usual, jets.normals)
+            jets = replace(jets, fitted=jets.fitted & ~bad, normals=normals)
         # noise is everywhere, and smoothed away
-        non_smooth = mesh.vertices[quality.bad & (quality.verdict != "noisy")]
+        non_smooth = mesh.vertices[bad]
         points, normals, edge = mesh.vertices, jets.normals, quality.edge_mean
         mean = np.where(jets.fitted, jets.mean, np.nan)
         noisy, wide = quality.noise >= NOISE, spacing_of(points, GRID)
@@ -132,11 +167,20 @@ class Mesh(FittedBody):
             distance=partial(signed_distance, mesh.vertices, jets),
             mean_curvature=None if noisy else mean,
             quality=quality,
+            uncertain=UNCERTAIN if coarse else np.inf,
             notes={"repairs": list(mesh.repairs), "source": source_name(source)},
         )
 
 
-def examined_mesh(source: Any, units: str | None = None) -> tuple[TriangleMesh, MeshQuality]:
+def examined_mesh(
+    source: Any,
+    units: str | None = None,
+    *,
+    part: str | int | None = None,
+    cap: float | None = None,
+    union: bool = False,
+    subdivide: str | int | None = None,
+) -> tuple[TriangleMesh, MeshQuality]:
     """Read a mesh as `Mesh` does, and judge it; also one that `Mesh` refuses as not smooth.
 
     Parameters
@@ -145,13 +189,15 @@ def examined_mesh(source: Any, units: str | None = None) -> tuple[TriangleMesh, 
         As of `Mesh`.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         As of `Mesh`.
+    part, cap, union, subdivide
+        As of `Mesh`.
 
     Returns
     -------
     mesh : TriangleMesh
         Vertices in metres.
     quality : MeshQuality
-        Its verdict is "smooth" if `Mesh` takes the mesh.
+        Its verdict is "smooth" if `Mesh` takes the mesh as one smooth body.
 
     Raises
     ------
@@ -166,18 +212,32 @@ def examined_mesh(source: Any, units: str | None = None) -> tuple[TriangleMesh, 
     >>> quality.verdict
     'sharp'
     """
-    mesh, _, quality = _examined(source, units, lambda _: None)
+    choice = Choice(part, cap, union, subdivide)
+    mesh, _, quality = _examined(source, units, choice, lambda _: None)
     return mesh, quality
 
 
 def _examined(
-    source: Any, units: str | None, progress: Callable[[str], None]
+    source: Any, units: str | None, choice: Choice, progress: Callable[[str], None]
 ) -> tuple[TriangleMesh, Jets, MeshQuality]:
     progress("reading the mesh")
-    mesh = read_mesh(source, units, progress=progress)
-    progress(f"normals of {len(mesh.vertices)} vertices")
-    jets = osculating_jets(mesh.vertices, mesh.triangles)
-    return mesh, jets, assess(mesh, jets)
+    mesh = read_mesh(source, units, choice, progress=progress)
+    times = choice.subdivide
+    found = mesh
+    for count in range(0 if times in (None, "auto") else int(times or 0), MOST_SUBDIVISIONS + 1):
+        if count:
+            notes: list[str] = []
+            finer = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
+            found = TriangleMesh(*finer, (*mesh.repairs, *notes))
+        progress(f"normals of {len(found.vertices)} vertices")
+        jets = osculating_jets(found.vertices, found.triangles)
+        quality = assess(found, jets)
+        enough = quality.verdict != "too coarse" or (count and quality.bad_share < FEW_BAD)
+        if times != "auto" or enough or 4 * len(found.vertices) > MOST_SUBDIVIDED:
+            break
+    for line in found.repairs[len(mesh.repairs) :]:
+        progress(line)
+    return found, jets, quality
 
 
 def _content(source: Any) -> bytes:

@@ -22,8 +22,8 @@ from functools import cached_property
 from typing import Any
 
 from scatterers.base.body import finite, positive
-from scatterers.pieces.profile import Arc, Segment
-from scatterers.pieces.revolved import Revolved
+from scatterers.exact.profile import Arc, Segment
+from scatterers.exact.revolved import Revolved
 
 Pair = tuple[float, float]
 

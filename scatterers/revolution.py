@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scatterers.base.body import numbers
-from scatterers.pieces.profile import Line, Segment, upward
-from scatterers.pieces.revolved import Revolved
-from scatterers.pieces.spline_profile import SplineSegment, smooth_end
+from scatterers.exact.profile import Line, Segment, upward
+from scatterers.exact.revolved import Revolved
+from scatterers.exact.spline_profile import SplineSegment, smooth_end
 
 FloatArray = NDArray[np.float64]
 RIGHT_ANGLE = 0.05
@@ -35,7 +35,7 @@ class Revolution(Revolved):
         Points (z, radius), L, in order along the profile, from one end of the body to the other, joined by quintic
         splines between corners, and by a straight line where two corners follow each other; a point that is given twice
         is a corner. An end off the axis is closed by a plane. An end on the axis is a smooth pole if the profile meets
-        the axis at a right angle, to 0.05 radians, else a tip. Or segments of `scatterers.pieces.profile`, ``Line`` and
+        the axis at a right angle, to 0.05 radians, else a tip. Or segments of `scatterers.exact.profile`, ``Line`` and
         ``Arc``, each beginning where the one before ends.
     corners : iterable of int
         Numbers of points that are corners, too; of an end, a tip.
@@ -59,7 +59,7 @@ class Revolution(Revolved):
     >>> bullet = sc.Revolution([(0, 1), (2, 1), (2, 1), (3, 0.75), (4, 0.0)])
     >>> [crease.kind for crease in bullet.creases]
     ['tip', 'edge', 'edge']
-    >>> from scatterers.pieces.profile import Arc, Line
+    >>> from scatterers.exact.profile import Arc, Line
     >>> half = sc.Revolution([Line((0, 0), (0, 1)), Arc((0, 1), (1, 0), (0, 0))])         # half a ball
     >>> half.creases
     [Crease(edge between pieces 0 and 1, 90 degrees, length 6.28 L, closed)]

@@ -118,12 +118,13 @@ class Surface(Protocol):
 class Crease(Protocol):
     """A curve along which two smooth pieces of a body meet, or a point at which one ends.
 
-    ``kind`` is "edge" (the normal jumps), "joint" (the curvature jumps, the normal does not) or "tip" (one point).
+    ``kind`` is "edge" (the normal jumps), "joint" (the curvature jumps, the normal does not), "tip" (one point) or
+    "seam" (nothing jumps: one smooth surface, known by another F from there on).
     """
 
     @property
     def kind(self) -> str:
-        """One of "edge", "joint" and "tip"."""
+        """One of "edge", "joint", "tip" and "seam"."""
         ...
 
     @property

@@ -2,24 +2,28 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.base.clouds import PieceCloud, PointCloud
 from scatterers.base.level_body import LevelBody
+from scatterers.pieces.crease import Crease
+from scatterers.pieces.fitting import fitted_pieces
+from scatterers.pieces.spline_body import SplinePiece, SplinePieces
 from scatterers.sphere_map.star import star_map
 from scatterers.spline import cache as _fit_cache
+from scatterers.spline.compared import curvatures
 from scatterers.spline.fitting import SMOOTHING, Fitted, fit, tangents
 from scatterers.spline.report import FitReport
 from scatterers.spline.samples import Samples
-from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
+from scatterers.spline.tensor import TensorSpline
 from scatterers.triangles.quality import MeshQuality
 
 if TYPE_CHECKING:
+    from scatterers.atlas.charts import CubeSphereAtlas
     from scatterers.atlas.monge.atlas import MongeAtlas
 
 FloatArray = NDArray[np.float64]
@@ -35,78 +39,77 @@ NORMAL_WEIGHT = 0.1
 SECOND = 0.4
 """Share of noisy points that the second fit sees."""
 CHARTS = "charts-"
-DISTRUSTED = 2.0
-"""Edges about a non-smooth point within which nothing is trusted."""
 FEWEST = 0.1
 """Share of the points that has to be farther off, for a fit to mean anything."""
+SLACK = 0.02
+"""Of the box about a body of pieces, in its largest side."""
 SLOPES = (0.5, 1.6)
 """|grad F| on the body: F is near a signed distance, or the fit has failed."""
 
 
-@dataclass(frozen=True, eq=False)
-class PointCloud:
-    """What a body is fitted to.
+class SplineBody(LevelBody):
+    """Body F = 0 of a spline, or of one for each of its smooth pieces; the coarser fit is one.
 
     Attributes
     ----------
-    points, normals : (n, 3), L and 1
-        On the body, outward.
-    edge : float
-        Mean distance between neighbouring points of the source, L.
-    spacing : float
-        Of the grid that the points determine, L.
-    noise : float
-        Rms distance of the points from a smooth body, L; 0 if it is less than the error of a fit.
-    non_smooth : (m, 3), L
-        Points of the source where it is not smooth.
-    distance : callable
-        Signed distance from the body, (k, 3) -> (k,); NaN where it is not known.
-    mean_curvature : (n,), 1/L, or None
-        At the points, NaN where it is not known; None for noisy points.
-    quality : MeshQuality
-        Of the source.
-    notes : dict
-        Plain values that are kept beside the fit: ``repairs``, and what else a kind of body has to tell.
+    creases : tuple of Crease
+        Edges and seams of a body of pieces; empty if it is smooth.
     """
 
-    points: FloatArray
-    normals: FloatArray
-    edge: float
-    spacing: float
-    noise: float
-    non_smooth: FloatArray
-    distance: Callable[[FloatArray], FloatArray]
-    mean_curvature: FloatArray | None
-    quality: MeshQuality
-    notes: dict[str, Any]
+    _parts: SplinePieces | None = None
 
-    @property
-    def reach(self) -> float:
-        """Distance from non-smooth points within which nothing is trusted, L."""
-        return DISTRUSTED * self.edge
-
-    @cached_property
-    def smooth(self) -> NDArray[np.bool_]:
-        """Points that are farther than that from non-smooth ones: (n,)."""
-        from scipy.spatial import cKDTree
-
-        return np.asarray(np.isinf(cKDTree(self.non_smooth).query(self.points, distance_upper_bound=self.reach)[0]))
-
-
-class SplineBody(LevelBody):
-    """Body F = 0 of a spline; the coarser fit is one."""
-
-    def __init__(self, spline: TensorSpline, digest: str, speed: Any) -> None:
+    def __init__(self, fitted: TensorSpline | SplinePieces, digest: str, speed: Any) -> None:
         self.speed = speed
         self._set_speed()
         self._digest = digest
-        samples = Samples(spline.at_nodes(), spline.origin, spline.spacing)
+        if isinstance(fitted, SplinePieces):
+            self._parts, self._space, self._map = fitted, fitted.space, None
+            corners = fitted.corners.reshape(-1, 3)
+            slack = SLACK * np.ptp(corners, axis=0).max()
+            self._bounds = np.stack([corners.min(axis=0) - slack, corners.max(axis=0) + slack])
+            return
+        samples = Samples(fitted.at_nodes(), fitted.origin, fitted.spacing)
         _require_one_body(samples)
-        sphere_map, _ = star_map(spline, samples, None)
-        self._place(spline, samples, sphere_map)
+        sphere_map, _ = star_map(fitted, samples, None)
+        self._place(fitted, samples, sphere_map)
 
     def _identity(self) -> str:
         return self._digest
+
+    def _shape_texts(self) -> list[str]:
+        # what has creases has no charts
+        return [self._digest] if self.creases else super()._shape_texts()
+
+    @property
+    def creases(self) -> tuple[Crease, ...]:
+        """Where smooth pieces meet."""
+        return () if self._parts is None else self._parts.creases
+
+    @property
+    def pieces(self) -> tuple[SplinePiece, ...]:
+        """The smooth pieces, none of a body that is smooth as a whole."""
+        return () if self._parts is None else self._parts.surfaces
+
+    def piece(self, points: FloatArray) -> NDArray[np.int64]:
+        """Number of the piece that bounds the body nearest to points (..., 3), L, near it: (...)."""
+        if self._parts is None:
+            return np.zeros(np.shape(points)[:-1], dtype=np.int64)
+        return self._parts.space.numbers(points)
+
+    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+        """Triangles of the pieces with sides of at most ``edge``, L: corners, normals (m, 3, 3) and pieces (m,)."""
+        if self._parts is None:
+            raise ValueError("a body that is smooth as a whole has no pieces; its charts cover it")
+        return self._parts.tiles(edge)
+
+    def non_smooth(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Whether points (..., 3), L, lie where the body is not smooth enough, or not known well enough: (...)."""
+        return super().non_smooth(points) if self._parts is None else self._parts.non_smooth(points)
+
+    def _covered(self) -> "CubeSphereAtlas | MongeAtlas":
+        if self._parts is not None:
+            raise ValueError("a body with edges has no charts; its rays go by direct integration")
+        return super()._covered()
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self._digest}, speed={self.speed!r})"
@@ -130,7 +133,12 @@ class FittedBody(SplineBody):
     unit = "m"
 
     def _open(
-        self, key: str, cache: bool | str | Path, speed: Any, make: Callable[[], PointCloud], progress: Progress
+        self,
+        key: str,
+        cache: bool | str | Path,
+        speed: Any,
+        make: Callable[[], PointCloud | PieceCloud],
+        progress: Progress,
     ) -> None:
         """Take the fit from the cache, or make the points and fit them."""
         self.speed = speed
@@ -141,6 +149,7 @@ class FittedBody(SplineBody):
         if found is not None:
             try:
                 self._describe(*found)
+                _ = [_unpacked(found[0], name) for name in ("fine", "coarse")]
             except (TypeError, ValueError, KeyError, AttributeError):
                 # signed, and yet none of ours
                 progress("the stored fit is damaged: fitting again")
@@ -152,7 +161,7 @@ class FittedBody(SplineBody):
         self.coarse_fit = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
         self.coarse_fit._non_smooth, self.coarse_fit._reach = self._non_smooth, self._reach
         if found is None and folder is not None:
-            if not self.star_shaped:
+            if not self.star_shaped and not self.creases:
                 progress("charts")
                 # a body without them can still be looked at; who needs them is told
                 with suppress(ValueError):
@@ -169,8 +178,12 @@ class FittedBody(SplineBody):
         self._text = text
         self._non_smooth, self._reach = arrays["rough"], float(text["reach"])
 
-    def _fitted(self, cloud: PointCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    def _fitted(
+        self, cloud: PointCloud | PieceCloud, progress: Progress
+    ) -> tuple[dict[str, FloatArray], dict[str, Any]]:
         """Arrays and text of the fits, checked."""
+        if isinstance(cloud, PieceCloud):
+            return _fitted_pieces(cloud, progress)
         _require_smooth_points(cloud)
         fine, coarse, smoothing = fits(cloud, progress)
         report = compared(cloud, fine, coarse, smoothing)
@@ -178,6 +191,12 @@ class FittedBody(SplineBody):
             raise ValueError(
                 f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
                 "of 1; it is too thin or too curved for the distance of its points: refine the mesh there"
+            )
+        doubt = report.normal_curvature_error / report.normal_curvature
+        if doubt > cloud.uncertain:
+            raise ValueError(
+                f"the mesh is too coarse: its curvatures are uncertain by {100 * doubt:.0f} %; "
+                f'{cloud.quality.reasons}; or subdivide="auto", which takes a smooth surface near its vertices'
             )
         arrays = (
             {"rough": cloud.non_smooth, "badness": cloud.quality.badness}
@@ -188,12 +207,12 @@ class FittedBody(SplineBody):
         return arrays, text | cloud.notes
 
 
-def checked_options(units: Any, allow_rough: Any, cache: Any, progress: Any) -> Progress:
+def checked_options(units: Any, strict: Any, cache: Any, progress: Any) -> Progress:
     """What to call with progress; ValueError or TypeError on options that are none."""
     if units is not None and not isinstance(units, str):
         raise ValueError(f'units = {units!r} is no text; give e.g. units="mm"')
-    if not isinstance(allow_rough, bool):
-        raise ValueError(f"allow_rough = {allow_rough!r} is neither True nor False")
+    if not isinstance(strict, bool):
+        raise ValueError(f"strict = {strict!r} is neither True nor False")
     if not isinstance(cache, (bool, str, Path)):
         raise ValueError(f"cache = {cache!r} is neither True, False nor a folder")
     if progress is not None and not callable(progress):
@@ -237,7 +256,7 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
     if len(cloud.non_smooth):
         points, normals = points[cloud.smooth], normals[cloud.smooth]
     along = tangents(normals)[0]
-    found = [_curvatures(one.spline, points, along) for one in (fine, coarse)]
+    found = [curvatures(one.spline, points, along) for one in (fine, coarse)]
     (kappa, gauss, slope), (other_kappa, other_gauss, _) = found
 
     def rms(values: FloatArray) -> float:
@@ -260,22 +279,15 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
     )
 
 
-def _curvatures(
-    spline: TensorSpline, points: FloatArray, along: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """kappa_n along tangents and across them (2 n,), K (n,) and |grad F| (n,) at points brought onto the spline."""
-    for _ in range(2):
-        value, gradient, _ = evaluated(spline.compiled, points)
-        points = points - (value / np.sum(gradient**2, axis=1))[:, None] * gradient
-    _, gradient, entries = evaluated(spline.compiled, points)
-    slope = np.linalg.norm(gradient, axis=1)
-    n = gradient / slope[:, None]
-    e = along - np.sum(along * n, axis=1, keepdims=True) * n
-    e /= np.linalg.norm(e, axis=1, keepdims=True)
-    t = np.stack([e, np.cross(n, e)])
-    form = np.einsum("ani,nij,bnj->abn", t, entries[:, SYMMETRIC], t) / slope
-    gauss = form[0, 0] * form[1, 1] - form[0, 1] ** 2
-    return np.concatenate([form[0, 0], form[1, 1]]), gauss, slope
+def _fitted_pieces(cloud: PieceCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Arrays and text of the fits of all pieces."""
+    fitted = fitted_pieces(cloud.vertices, cloud.triangles, cloud.regions, progress, cloud.normals)
+    corners = cloud.vertices[cloud.triangles]
+    arrays = {"rough": np.zeros((0, 3)), "badness": cloud.quality.badness}
+    for name in ("fine", "coarse"):
+        arrays |= SplinePieces.of(fitted, corners, coarse=name == "coarse").arrays(name)
+    text = {"fit": fitted.report().to_json(), "quality": cloud.quality.to_json(), "reach": 0.0}
+    return arrays, text | cloud.notes
 
 
 def _require_smooth_points(cloud: PointCloud) -> None:
@@ -307,6 +319,8 @@ def _packed(spline: TensorSpline, name: str) -> dict[str, FloatArray]:
     }
 
 
-def _unpacked(arrays: dict[str, FloatArray], name: str) -> TensorSpline:
+def _unpacked(arrays: dict[str, FloatArray], name: str) -> TensorSpline | SplinePieces:
+    if f"{name}-table" in arrays:
+        return SplinePieces.restored(arrays, name)
     origin, spacing = arrays[f"{name}-grid"]
     return TensorSpline(np.ascontiguousarray(arrays[f"{name}-coefficients"], dtype=float), origin, spacing)

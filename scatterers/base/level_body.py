@@ -124,6 +124,10 @@ class LevelBody(Body):
         ValueError
             If the body is too thin, or too sharply curved, for charts.
         """
+        return self._covered()
+
+    def _covered(self) -> "CubeSphereAtlas | MongeAtlas":
+        """Make the atlas."""
         if self._map is not None:
             return CubeSphereAtlas(self._map, self._map.compiled_locator)
         from scatterers.atlas.monge.atlas import MongeAtlas

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.triangles.choice import Choice, whole_body
 from scatterers.triangles.files import UNITS, TriangleMesh
 
 FloatArray = NDArray[np.float64]
@@ -24,6 +25,8 @@ TIMEOUT = 600
 MILLIMETRE = 1e-3
 SHARP = 2.0
 """Degrees between the normals of two faces at a common point that make an edge."""
+FAR_OFF = 60.0
+"""Degrees between the normal of a face and that of a triangle of it, beyond which a face has none there."""
 UNCERTAIN = 20.0
 """Degrees between the normal of a face and that of the triangles: at a pole of its parameters a face has none."""
 # what a STEP file may call its length unit
@@ -41,6 +44,10 @@ class CadPoints:
         Its vertices lie on the faces.
     normals : (n, 3)
         Outward; NaN where no face has one.
+    corner_normals : (m, 3, 3)
+        Outward at the corners of the triangles, each of its own face.
+    creases : (e,) bool
+        Edges, in the order of `scatterers.triangles.topology.edges_of`, at which faces do not join smoothly.
     edges : tuple of str
         Where faces do not join smoothly.
     non_smooth : (k, 3), m
@@ -49,12 +56,43 @@ class CadPoints:
 
     mesh: TriangleMesh
     normals: FloatArray
+    corner_normals: FloatArray
+    creases: NDArray[np.bool_]
     edges: tuple[str, ...]
     non_smooth: FloatArray
 
 
-def read_cad(path: Path, units: str | None, points: int, *, progress: Callable[[str], None]) -> CadPoints:
+@dataclass(frozen=True)
+class CadReading:
+    """How a CAD file is read.
+
+    Attributes
+    ----------
+    units : str or None
+    points : int
+        Points of the body that are asked for.
+    choice : Choice
+    sew : float or None
+        Faces whose borders are at most so far apart are sewn together, m.
+    """
+
+    units: str | None
+    points: int
+    choice: Choice
+    sew: float | None = None
+
+    def __post_init__(self) -> None:
+        sew = self.sew
+        if sew is not None and (isinstance(sew, bool) or not isinstance(sew, (int, float)) or not 0 < sew < 1e9):
+            raise ValueError(
+                f"sew = {sew!r} is no distance in m; give the largest gap between faces that belong together"
+            )
+
+
+def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Callable[[str], None]) -> CadPoints:
     """Read a STEP, IGES or BREP file by gmsh.
+
+    With ``curved``, triangles are smaller where faces curve: so many to a full turn.
 
     Raises
     ------
@@ -70,9 +108,9 @@ def read_cad(path: Path, units: str | None, points: int, *, progress: Callable[[
         raise ModuleNotFoundError(
             "CAD files need gmsh: pip install 'creeping[cad]' (gmsh is under the GPL)", name="gmsh"
         )
-    found = _meshed(path, points)
+    found = _meshed(path, reading, curved)
     # a file cut short may have lost its unit: gmsh says more of it
-    scale = _scale(path, kind, units)
+    scale = _scale(path, kind, reading.units)
     number = np.zeros(int(found["nodes"].max(initial=0)) + 1, dtype=np.int64)
     number[found["nodes"]] = np.arange(len(found["nodes"]))
     used, triangles = np.unique(number[found["triangles"]], return_inverse=True)
@@ -80,6 +118,7 @@ def read_cad(path: Path, units: str | None, points: int, *, progress: Callable[[
     repairs: list[str] = []
     before = found["points"][used]
     vertices, triangles = cleaned(path.name, before, triangles, repairs.append, repairs.append)
+    vertices, triangles = whole_body(path.name, vertices, triangles, reading.choice, scale, repairs.append)
     triangles = oriented(path.name, vertices - vertices.mean(0), triangles, repairs.append)
     # an even mesh of a clean file needs no merging; if it was done, points are found again by their place
     place = {tuple(p): k for k, p in enumerate(vertices)}
@@ -91,7 +130,9 @@ def read_cad(path: Path, units: str | None, points: int, *, progress: Callable[[
     normals, edges, sharp = _joined(mesh, at[known], found["face"][known], found["normals"][known])
     for line in repairs:
         progress(line)
-    return CadPoints(mesh, normals, edges, mesh.vertices[sharp])
+    of = _faces_of(triangles, row[found["triangles"].astype(np.int64)], found["of"].astype(np.int64))
+    corners = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
+    return CadPoints(mesh, normals, corners, _creases(mesh, of, corners), edges, mesh.vertices[sharp])
 
 
 def kind_of(path: Path) -> str:
@@ -160,13 +201,14 @@ def _without_strings(text: str) -> str:
     return out + text[k:]
 
 
-def _meshed(path: Path, points: int) -> dict[str, NDArray[np.generic]]:
+def _meshed(path: Path, reading: CadReading, curved: int) -> dict[str, NDArray[np.generic]]:
     """Run the worker and read what it wrote."""
     with tempfile.TemporaryDirectory(prefix="creeping-") as folder:
         out = Path(folder) / "points.npz"
         # -P: modules that happen to lie in the working folder are not imported
         worker = Path(__file__).with_name("worker.py")
-        command = [sys.executable, "-P", str(worker), str(path.resolve()), str(points), str(out)]
+        command = [sys.executable, "-P", str(worker), str(path.resolve()), str(reading.points), str(out)]
+        command += [str(curved), repr(1e3 * float(reading.sew or 0.0))]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, text=True)
         except subprocess.TimeoutExpired:
@@ -182,6 +224,58 @@ def _meshed(path: Path, points: int) -> dict[str, NDArray[np.generic]]:
             raise ValueError(f"{path.name}: gmsh cannot read or mesh it ({reason}); repair the body or export it anew")
         with np.load(out, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
+
+
+def _faces_of(triangles: IntArray, before: IntArray, faces: IntArray) -> IntArray:
+    """Face of each triangle (m,), from those that gmsh gave, by their corners; -1 where it is not known."""
+    size = int(triangles.max()) + 1
+
+    def code(corners: IntArray) -> IntArray:
+        a, b, c = np.sort(corners, axis=1).T
+        return np.asarray((a * size + b) * size + c)
+
+    known = code(before)
+    order = np.argsort(known, kind="stable")
+    wanted = code(triangles)
+    place = np.searchsorted(known[order], wanted).clip(0, len(order) - 1)
+    found = order[place]
+    return np.where(known[found] == wanted, faces[found], -1)
+
+
+def _corner_normals(mesh: TriangleMesh, of: IntArray, at: IntArray, face: IntArray, normals: FloatArray) -> FloatArray:
+    """Outward normals (m, 3, 3) of the triangles' own faces at their corners; the triangle's where a face has none."""
+    corners = mesh.vertices[mesh.triangles]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    size = len(mesh.vertices)
+    known = face * size + at
+    order = np.argsort(known, kind="stable")
+    wanted = of[:, None] * size + mesh.triangles
+    found = order[np.searchsorted(known[order], wanted).clip(0, len(order) - 1)]
+    n = normals[found] / np.maximum(np.linalg.norm(normals[found], axis=2, keepdims=True), 1e-300)
+    there = (known[found] == wanted) & np.all(np.isfinite(n), axis=2) & (np.linalg.norm(n, axis=2) > 0.5)
+    # a face's orientation is that of its parameters
+    for tag in np.unique(of):
+        mine = of == tag
+        if np.sum((n[mine] * flat[mine, None])[there[mine]]) < 0:
+            n[mine] *= -1
+    there &= np.sum(n * flat[:, None], axis=2) > np.cos(np.radians(FAR_OFF))
+    return np.where(there[..., None], n, flat[:, None])
+
+
+def _creases(mesh: TriangleMesh, of: IntArray, normals: FloatArray) -> NDArray[np.bool_]:
+    """Edges between faces whose normals differ there."""
+    from scatterers.triangles.topology import edges_of
+
+    edges = edges_of(mesh.triangles)
+    order = np.argsort(edges.number, kind="stable").reshape(-1, 2)
+    between = of[order[:, 0] // 3] != of[order[:, 1] // 3]
+    flat = normals.reshape(-1, 3)
+    left, right = order[:, 0], order[:, 1]
+    # the edge runs from corner k to the next in one triangle, the other way in the other
+    after = np.where(left % 3 == 2, left - 2, left + 1), np.where(right % 3 == 2, right - 2, right + 1)
+    turns = [np.linalg.norm(flat[a] - flat[b], axis=1) for a, b in ((left, after[1]), (after[0], right))]
+    return np.asarray(between & (np.minimum(*turns) > 2 * np.sin(np.radians(SHARP) / 2)))
 
 
 def _joined(

@@ -189,16 +189,25 @@ def value_and_gradient(x, y, z, parameters):  # type: ignore[no-untyped-def]
     return f, fx * parameters[6], fy * parameters[7], fz * parameters[8]
 
 
+@njit(**OPTIONS)
+def second_derivatives(x, y, z, parameters):  # type: ignore[no-untyped-def]
+    """F, F_x, F_y, F_z, F_xx, F_yy, F_zz, F_yz, F_xz, F_xy at a point."""
+    px, py, pz = parameters[6], parameters[7], parameters[8]
+    start, stride_x, stride_y, tx, ty, tz = _stencil(x, y, z, parameters)
+    f, fx, fy, fz, xx, yy, zz, yz, xz, xy = _contract_second(parameters, start, stride_x, stride_y, tx, ty, tz)
+    xx, yy, zz, yz, xz, xy = xx * px * px, yy * py * py, zz * pz * pz, yz * py * pz, xz * px * pz, xy * px * py
+    return f, fx * px, fy * py, fz * pz, xx, yy, zz, yz, xz, xy
+
+
 def evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
     """F, grad F and Hessian of a block; the compiled twin of `TensorSpline`."""
-    px, py, pz = parameters[6], parameters[7], parameters[8]
     for i in range(points.shape[1]):
-        start, stride_x, stride_y, tx, ty, tz = _stencil(points[0, i], points[1, i], points[2, i], parameters)
-        f, fx, fy, fz, xx, yy, zz, yz, xz, xy = _contract_second(parameters, start, stride_x, stride_y, tx, ty, tz)
-        values[i] = f
-        gradients[0, i], gradients[1, i], gradients[2, i] = fx * px, fy * py, fz * pz
-        hessians[0, i], hessians[1, i], hessians[2, i] = xx * px * px, yy * py * py, zz * pz * pz
-        hessians[3, i], hessians[4, i], hessians[5, i] = yz * py * pz, xz * px * pz, xy * px * py
+        found = second_derivatives(points[0, i], points[1, i], points[2, i], parameters)
+        values[i] = found[0]
+        for k in range(3):
+            gradients[k, i] = found[1 + k]
+        for k in range(6):
+            hessians[k, i] = found[4 + k]
 
 
 # 216 coefficients into ten sums, axis by axis: what the compiler makes of it takes as long as so many operations

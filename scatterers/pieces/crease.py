@@ -15,8 +15,9 @@ class Crease:
 
     Attributes
     ----------
-    kind : {"edge", "joint", "tip"}
-        The normal jumps; the curvature or a derivative of it jumps, the normal does not; one point, without a normal.
+    kind : {"edge", "joint", "tip", "seam"}
+        The normal jumps; the curvature or a derivative of it jumps, the normal does not; one point, without a normal;
+        nothing jumps, the same smooth surface is known by another F.
     pieces : (int, int)
         On either side; the same twice at a tip, or where a piece meets itself.
     points : (n, 3), L
@@ -32,7 +33,7 @@ class Crease:
     Crease(edge between pieces 0 and 1, 90 degrees, length 2.83 L, closed)
     """
 
-    kind: Literal["edge", "joint", "tip"]
+    kind: Literal["edge", "joint", "tip", "seam"]
     pieces: tuple[int, int]
     points: FloatArray
     angle: float = 0.0

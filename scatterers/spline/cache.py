@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-SCHEMA = 6
+SCHEMA = 7
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
 NAME = re.compile(r"[a-z]+-[0-9a-f]{24}\.npz")
@@ -65,7 +65,9 @@ def load(folder: Path, key: str) -> tuple[dict[str, FloatArray], dict[str, Any]]
 
 
 def _usable(arrays: dict[str, FloatArray]) -> bool:
-    """Whether all arrays are there and of the shape that kernels trust."""
+    """Whether all arrays are there and of the shape that kernels trust; those of pieces are checked when taken."""
+    if "fine-table" in arrays:
+        return all(array.dtype == float for array in arrays.values()) and {"rough", "badness"} <= arrays.keys()
     if not all(arrays[name].dtype == float and arrays[name].ndim == count for name, count in ARRAYS.items()):
         return False
     for name in ("fine", "coarse"):

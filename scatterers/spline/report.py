@@ -57,8 +57,9 @@ class FitReport:
         return cls(**content | {"nodes": tuple(content["nodes"]), "slope": tuple(content["slope"])})
 
     def __str__(self) -> str:
-        kappa = self.normal_curvature_error / self.normal_curvature
-        gauss = self.gaussian_curvature_error / self.gaussian_curvature
+        # a box has no curvature at all
+        kappa = self.normal_curvature_error / (self.normal_curvature or 1.0)
+        gauss = self.gaussian_curvature_error / (self.gaussian_curvature or 1.0)
         return "\n".join(
             [
                 f"fit: {self.points} points, {' x '.join(map(str, self.nodes))} nodes, spacing {self.spacing:.3g} m",

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.triangles.choice import Choice, whole_body
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.form import check_whole
 from scatterers.triangles.threemf import read_3mf
@@ -70,9 +71,12 @@ class _Raw(NamedTuple):
     triangles: IntArray
     stated: str | None
     indexed: bool
+    names: tuple[tuple[str, int], ...] = ()
 
 
-def read_mesh(source: Any, units: str | None = None, *, progress: Callable[[str], None]) -> TriangleMesh:
+def read_mesh(
+    source: Any, units: str | None = None, choice: Choice | None = None, *, progress: Callable[[str], None]
+) -> TriangleMesh:
     """Read, check and repair the mesh of one body.
 
     Parameters
@@ -81,6 +85,8 @@ def read_mesh(source: Any, units: str | None = None, *, progress: Callable[[str]
         STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
+    choice : Choice, optional
+        What of it is the body.
     progress : callable
         Is told each repair in a sentence.
 
@@ -105,8 +111,12 @@ def read_mesh(source: Any, units: str | None = None, *, progress: Callable[[str]
         repairs.append(message)
         progress(message)
 
-    vertices, triangles = cleaned(raw.name, raw.vertices, raw.triangles, note if raw.indexed else _silent, note)
+    choice = choice or Choice()
+    chosen = _named(raw, choice.part)
+    vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else _silent, note)
     _check_size(raw.name, vertices, scale)
+    named = chosen is not raw.triangles
+    vertices, triangles = whole_body(raw.name, vertices, triangles, choice, scale, note, named=named)
     # digits are lost to the offset in any sum of products of coordinates, so it goes first
     offset = 0.5 * (vertices.min(0) + vertices.max(0))
     local = vertices - offset
@@ -120,6 +130,19 @@ def read_mesh(source: Any, units: str | None = None, *, progress: Callable[[str]
         )
         vertices = local
     return TriangleMesh(vertices * scale, triangles, tuple(repairs))
+
+
+def _named(raw: _Raw, part: str | int | None) -> IntArray:
+    """Triangles of the part of that name, all if there is none."""
+    if not isinstance(part, str) or part == "largest" or not raw.names:
+        return raw.triangles
+    begin = 0
+    for name, count in raw.names:
+        if name == part:
+            return raw.triangles[begin : begin + count]
+        begin += count
+    known = ", ".join(name for name, _ in raw.names[:20])
+    raise ValueError(f"{raw.name} has no part {part!r}; it has {known}")
 
 
 def _silent(_: str) -> None:
@@ -151,11 +174,11 @@ def _from_file(source: Any) -> _Raw:
     name, suffix = path.name, path.suffix.lower()
     check_whole(name, suffix, data)
     try:
-        vertices, triangles, stated = _loaded(data, suffix)
+        vertices, triangles, stated, names = _loaded(data, suffix)
     except Exception as error:  # the loaders raise whatever their parsing runs into
         text = str(error) or type(error).__name__
         raise ValueError(f"{name} cannot be read as {suffix[1:].upper()}: {text}; export it again") from None
-    return _Raw(name, vertices, triangles, stated, suffix != ".stl")
+    return _Raw(name, vertices, triangles, stated, suffix != ".stl", names)
 
 
 def mesh_bytes(source: Any) -> tuple[Path, bytes]:
@@ -214,10 +237,10 @@ class _Nothing:
     __getitem__ = get
 
 
-def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None]:
-    """Vertices and triangles of everything in the file, and the unit it states."""
+def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None, tuple[tuple[str, int], ...]]:
+    """Vertices and triangles of everything in the file, the unit it states, and its parts: name, triangles."""
     if suffix == ".3mf":
-        return read_3mf(data, MOST_BYTES, MOST_TRIANGLES)
+        return *read_3mf(data, MOST_BYTES, MOST_TRIANGLES), ()
     import trimesh
 
     with warnings.catch_warnings(), _quiet("trimesh"):
@@ -232,6 +255,7 @@ def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None]
             resolver=_Nothing(),
         )
     vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+    names = []
     stated = {getattr(geometry, "units", None) for geometry in scene.geometry.values()}
     placed = 0
     for node in scene.graph.nodes_geometry:
@@ -251,9 +275,11 @@ def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None]
                 corners = corners if np.linalg.det(matrix[:3, :3]) > 0 else corners[:, ::-1]
             vertices.append(points)
             triangles.append(corners + count)
+            names.append((str(key), len(corners)))
             count += len(points)
     unit = stated.pop() if len(stated) == 1 and suffix == ".glb" else None
-    return np.concatenate(vertices), np.concatenate(triangles), unit or ("m" if suffix == ".glb" else None)
+    unit = unit or ("m" if suffix == ".glb" else None)
+    return np.concatenate(vertices), np.concatenate(triangles), unit, tuple(names)
 
 
 def _check_numbers(raw: _Raw) -> None:
@@ -329,5 +355,6 @@ def _check_crossings(name: str, local: FloatArray, triangles: IntArray, offset: 
         spread = local[triangles[pairs.ravel()]].mean(axis=1)
         raise ValueError(
             f"{name} crosses itself: {count} pairs of its {len(triangles)} triangles, the first near {_where(first)}, "
-            f"within {np.ptp(spread, axis=0).max() * scale:.3g} m of each other; repair it, e.g. by a union"
+            f"within {np.ptp(spread, axis=0).max() * scale:.3g} m of each other; repair it, or give "
+            "union=True if parts of it cross each other"
         )

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
-CLOSE = 1e-6
-"""Distance of vertices on open edges that are merged, in diagonals of the body: single precision and a few digits."""
+CLOSE = (1e-6, 1e-5, 1e-4)
+"""Distance of vertices on open edges that are merged, in diagonals of the body: single precision, and a few digits."""
 FLAT = 1e-9
 """Volume over that of the cube of the diagonal, below which a mesh encloses nothing."""
 
@@ -93,31 +93,41 @@ def _proper(name: str, triangles: IntArray, note: Note) -> IntArray:
 
 
 def _close_gaps(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> tuple[FloatArray, IntArray]:
-    """Merge vertices of open edges that differ by rounding; drop what is no longer used."""
+    """Merge vertices of open edges that differ by rounding, more of it while edges stay open; drop what is not used."""
+    for close in CLOSE:
+        edges = edges_of(triangles)
+        border = np.unique(edges.ends[edges.faces == 1])
+        if not len(border):
+            break
+        vertices, triangles = _merged(name, vertices, triangles, border, close, edges, note)
+    used, corners = np.unique(triangles, return_inverse=True)
+    return vertices[used], corners.reshape(-1, 3).astype(np.int64)
+
+
+def _merged(
+    name: str, vertices: FloatArray, triangles: IntArray, border: IntArray, close: float, edges: Edges, note: Note
+) -> tuple[FloatArray, IntArray]:
+    """Merge vertices of a border that are so close, in diagonals of the body."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    edges = edges_of(triangles)
-    border = np.unique(edges.ends[edges.faces == 1])
-    if len(border):
-        reach = CLOSE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-        # never over a sizeable part of an edge, however fine the mesh
-        length = np.linalg.norm(vertices[edges.ends[:, 0]] - vertices[edges.ends[:, 1]], axis=1)
-        pairs = border[
-            cKDTree(vertices[border]).query_pairs(min(reach, 0.01 * float(length.mean())), output_type="ndarray")
-        ]
-        if len(pairs):
-            n = len(vertices)
-            graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
-            _, label = connected_components(graph, directed=False)
-            _, first = np.unique(label, return_index=True)
-            note(f"{n - len(first)} of {n} vertices of {name} differed from others by rounding; merged")
-            triangles = _proper(name, first[label][triangles], note)
-            if not len(triangles):
-                raise ValueError(f"all triangles of {name} are degenerate; export it again")
-    used, corners = np.unique(triangles, return_inverse=True)
-    return vertices[used], corners.reshape(-1, 3).astype(np.int64)
+    reach = close * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    # never over a sizeable part of an edge, however fine the mesh
+    length = np.linalg.norm(vertices[edges.ends[:, 0]] - vertices[edges.ends[:, 1]], axis=1)
+    reach = min(reach, 0.01 * float(length.mean()))
+    pairs = border[cKDTree(vertices[border]).query_pairs(reach, output_type="ndarray")]
+    if not len(pairs):
+        return vertices, triangles
+    n = len(vertices)
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    _, first = np.unique(label, return_index=True)
+    note(f"{n - len(first)} of {n} vertices of {name} were within {reach:.2g} of its units of others; merged")
+    triangles = _proper(name, first[label][triangles], note)
+    if not len(triangles):
+        raise ValueError(f"all triangles of {name} are degenerate; export it again")
+    return vertices, triangles
 
 
 def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> IntArray:
@@ -148,7 +158,7 @@ def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -
 
 def _check_edges(name: str, vertices: FloatArray, edges: Edges) -> None:
     for wrong, what, remedy in (
-        (edges.faces == 1, "are open", "it has holes or borders: close them"),
+        (edges.faces == 1, "are open", "close them, or give cap= with the size of the largest hole, m"),
         (edges.faces > 2, "have more than two triangles", "sheets meet there: remove inner or double walls"),
     ):
         if bad := int(wrong.sum()):
@@ -173,7 +183,7 @@ def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: I
         hint = f" ({inner} of them within the box of the largest: cavities or inner parts?)" if inner else ""
         raise ValueError(
             f"{name} holds {pieces} separate surfaces{hint}, of {', '.join(map(str, counts[:5]))} "
-            f"{'... ' if pieces > 5 else ''}triangles; give one body at a time, without cavities"
+            f"{'... ' if pieces > 5 else ''}triangles; take one, e.g. part='largest', or all with union=True"
         )
     # corners of one vertex that are joined through edges: the umbrellas
     after = _next(left), _next(right)

@@ -85,7 +85,7 @@ class Meshes:
             self.known.append(mesh.vertices[mesh.triangles])
             assert same(self.known[-1], corners_of(self.suffix, data)), "the two readers differ on the file as it is"
         if self.fitted:
-            sc.Mesh(folder / f"seed-0.{self.suffix}", self._units, allow_rough=True, cache=False)
+            sc.Mesh(folder / f"seed-0.{self.suffix}", self._units, cache=False)
 
     @property
     def _units(self) -> str | None:
@@ -106,7 +106,7 @@ class Meshes:
             mesh, quality = sc.examined_mesh(path, self._units)
             # around a spike the grid of a fit is large, and takes minutes
             if fit and np.ptp(mesh.vertices, axis=0).max() < LARGEST:
-                sc.Mesh(path, self._units, allow_rough=True, cache=False)
+                sc.Mesh(path, self._units, cache=False)
         except ValueError as error:
             return Verdict(REFUSED, str(error))
         if mesh.repairs:
@@ -256,7 +256,7 @@ class CadFiles:
         path = place.with_suffix(".step")
         path.write_bytes(mutated(self.seed, rng, text=True))
         try:
-            body = sc.Cad(path, points=500, allow_rough=True, cache=False)
+            body = sc.Cad(path, points=500, cache=False)
         except ValueError as error:
             return Verdict(REFUSED, str(error))
         except Exception as error:

@@ -142,7 +142,7 @@ class Fits:
 
         (folder / "body.obj").write_bytes(seeds.obj())
         self.source, self.stored = folder / "body.obj", folder / "fits"
-        body = sc.Mesh(self.source, "m", allow_rough=True, cache=self.stored)
+        body = sc.Mesh(self.source, "m", cache=self.stored)
         (held,) = self.stored.glob("*.npz")
         self.whole, self.key = held.read_bytes(), held.stem
         self.points = np.array([[1.3, 0.1, 0.2], [0.0, 0.9, 0.3]])
@@ -167,7 +167,7 @@ class Fits:
             return Verdict(REFUSED) if found is None else Verdict(SILENT, "a changed fit is taken")
         try:
             with np.errstate(all="ignore"):
-                values = sc.Mesh(self.source, "m", allow_rough=True, cache=place).level(self.points)
+                values = sc.Mesh(self.source, "m", cache=place).level(self.points)
         except ValueError as error:
             return Verdict(REFUSED, str(error))
         return Verdict(ACCEPTED, "as fitted" if np.array_equal(values, self.values) else "another, signed anew")

@@ -24,6 +24,7 @@ TEXTS = {
     "two balls": "min((x-.5)**2 + y**2 + z**2 - 1, (x+.5)**2 + y**2 + z**2 - 1)",
     "octahedron": "where(x < 0, -x, x) + where(y < 0, -y, y) + where(z < 0, -z, z) - 1",
     "ogive": "sqrt(x**2 + y**2) - (1 - z**2)/2",
+    "seam": "max(x**2 + y**2 + z**2 - 1 + where(x < 0, 0, x**4), z - 0.5)",
     "pear": "where(z < 0, z**2/2, z**3 - z**2) + x**2 + y**2",
     "crossed": "max(min(x**2 + y**2 - .25, x**2 + z**2 - .25), x**2 + y**2 + z**2 - 1)",
 }
@@ -35,6 +36,7 @@ PIECES = {
     "two balls": 2,
     "octahedron": 8,
     "ogive": 1,
+    "seam": 3,
     "pear": 1,
     "crossed": 3,
 }
@@ -46,6 +48,7 @@ KINDS = {
     "two balls": {"edge": 1},
     "octahedron": {"edge": 12},
     "ogive": {"tip": 2},
+    "seam": {"edge": 2, "seam": 1},
     "pear": {"tip": 1},
     "crossed": {"edge": 6},
 }

@@ -186,10 +186,9 @@ def normals(pieces: Sequence[Level], corners: FloatArray, which: IntArray) -> Fl
 
 
 def creases(pieces: Sequence[Level], clipped: Clipped, spacing: float) -> list[Crease]:
-    """Edges and joints along the cuts of a triangulation with this spacing, L.
+    """Edges, joints and seams along the cuts of a triangulation with this spacing, L.
 
-    Where neither normal nor curvature jumps there is none; what is shorter than the spacing is not resolved: several
-    pieces that meet in a point seem to have curves there.
+    What is shorter than the spacing is not resolved: several pieces that meet in a point seem to have curves there.
     """
     found = []
     for a, b in np.unique(clipped.sides, axis=0).tolist():
@@ -200,9 +199,10 @@ def creases(pieces: Sequence[Level], clipped: Clipped, spacing: float) -> list[C
             na, nb = (_normals(pieces, points, np.full(len(points), k)) for k in (a, b))
             turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
             angle = float(np.nanmax(turn))
-            kind: Literal["edge", "joint"] = "edge" if angle > EDGE else "joint"
-            if kind == "edge" or _bent(pieces[a], pieces[b], points):
-                found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
+            kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
+            if kind == "joint" and not _bent(pieces[a], pieces[b], points):
+                kind = "seam"
+            found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
     return found
 
 

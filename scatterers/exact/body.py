@@ -18,6 +18,8 @@ from scatterers.spline.tensor import SYMMETRIC, evaluated
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+SHARP = ("edge", "tip")
+"""Kinds of creases that no smooth chart covers."""
 
 
 class Levelled:
@@ -165,4 +167,4 @@ class CreasedBody(Levelled, Body):
     @property
     def atlas(self) -> Any:
         """None, unless a subclass has one: asking it for charts raises an error that says why."""
-        return no_charts([crease for crease in self.creases if crease.kind != "joint"])
+        return no_charts([crease for crease in self.creases if crease.kind in SHARP])

@@ -8,7 +8,7 @@ from tolerances import ORDER
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import CreasedSurface
-from scatterers.pieces.profile import Arc, Line
+from scatterers.exact.profile import Arc, Line
 
 EXACT = sc.Ellipsoid(1.0, 1.0, 2.0)
 
@@ -88,6 +88,7 @@ BODIES = {
     "turned round": (lambda: sc.Revolution(BULLET[::-1]), ["tip", "edge", "edge"]),
     "dumbbell": (lambda: sc.Revolution(DUMBBELL), ["edge"] * 5),
     "egg": (lambda: sc.Revolution(np.stack([np.sin(T) + 0.2 * np.cos(T), np.cos(T)], axis=-1)), ["tip", "tip"]),
+    "two lines in one": (lambda: sc.Revolution([(0, 1), (1, 1), (1, 1), (2, 1)]), ["edge", "seam", "edge"]),
     "blunt": (lambda: sc.Revolution(np.stack([np.sin(T), np.cos(T)], axis=-1), corners=[0, 30]), ["tip", "tip"]),
 }
 T = np.linspace(-np.pi / 2, np.pi / 2, 31)

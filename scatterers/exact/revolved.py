@@ -2,7 +2,8 @@
 
 With (u, v, w) = M x, r = sqrt(u^2 + v^2), each segment is a piece F(x) = G(r, w) = 0 of the body; see
 `scatterers.kernels.revolved`. A corner of the profile is a circle about the axis: an edge if the tangent turns there,
-else a joint. Where the profile meets the axis at another than a right angle there is a tip.
+else a joint, or a seam between parts of one line or arc. Where the profile meets the axis at another than a right angle
+there is a tip.
 
 Sources: [C76, sec. 3-3].
 """
@@ -17,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.base.body import positive
+from scatterers.exact.body import SHARP, CreasedBody, NoCharts, Piece
+from scatterers.exact.profile import Segment
+from scatterers.exact.rings import ring_angles, ring_sizes, strip
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
 from scatterers.kernels.spline_constants import HEADER
-from scatterers.pieces.body import CreasedBody, NoCharts, Piece
 from scatterers.pieces.crease import Crease
-from scatterers.pieces.profile import Segment
-from scatterers.pieces.rings import ring_angles, ring_sizes, strip
 
 if TYPE_CHECKING:
     from scatterers.atlas.charts import CubeSphereAtlas
@@ -32,6 +33,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 SMALLEST = 1e-6
 """Turn of the tangent, radians, below which a corner is a joint, and an end on the axis no tip."""
+SAME = 1e-12
+"""Distance, in the body's extent, within which two segments are parts of one."""
 ON_CREASE = 360
 """Points on a circle that is a crease."""
 SIDE = 0.75
@@ -129,9 +132,17 @@ class Revolved(CreasedBody):
             turn = _turn(self._profile[k].tangent(np.ones(1))[0], self._profile[k + 1].tangent(np.zeros(1))[0])
             points = self._ring(w, r, ON_CREASE)
             points = np.concatenate([points, points[:1]])
-            kind: Literal["edge", "joint"] = "edge" if abs(turn) > SMALLEST else "joint"
+            kind: Literal["edge", "joint", "seam"] = "edge" if abs(turn) > SMALLEST else "joint"
+            if kind == "joint" and self._goes_on(k):
+                kind = "seam"
             found.append(Crease(kind, (k, k + 1), points, self._angle(k, points) if kind == "edge" else 0.0))
         return found
+
+    def _goes_on(self, k: int) -> bool:
+        """Whether piece k + 1 has all of piece k, too."""
+        w, r = self._profile[k].point(np.array([0.0, 0.5])).T
+        off = self.pieces[k + 1].level(self._placed(np.stack([r, 0 * r, w], axis=-1)))
+        return bool(np.max(np.abs(off)) < SAME * np.max(np.abs(self.bounds)))
 
     def _angle(self, k: int, points: FloatArray) -> float:
         """Largest angle between the normals of pieces k and k + 1 at points (n, 3)."""
@@ -193,9 +204,9 @@ class Revolved(CreasedBody):
     @cached_property
     def atlas(self) -> "CubeSphereAtlas | NoCharts":
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
-        if any(crease.kind != "joint" for crease in self.creases) or self._axes != (0, 1, 2) or self._stretch != 1:
+        if any(crease.kind in SHARP for crease in self.creases) or self._axes != (0, 1, 2) or self._stretch != 1:
             return NoCharts(super().atlas.reason)
-        from scatterers.pieces.charts import charts
+        from scatterers.exact.charts import charts
 
         return charts(self.bounds, self.tiles, lambda of_map: self._packed(self._profile, of_map))
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.atlas.charts import CubeSphereAtlas
+from scatterers.exact.body import NoCharts
 from scatterers.kernels.compiled import OPTIONS
 from scatterers.kernels.revolved import evaluate, value_and_gradient
-from scatterers.pieces.body import NoCharts
 from scatterers.sphere_map.radial import RadialMap, Spine
 
 FloatArray = NDArray[np.float64]

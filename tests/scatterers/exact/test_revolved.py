@@ -10,7 +10,7 @@ from tolerances import ORDER
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import CreasedSurface, project
-from scatterers.pieces.profile import Arc, Line, upward
+from scatterers.exact.profile import Arc, Line, upward
 
 ALPHA = np.radians(25.0)
 BODIES = {

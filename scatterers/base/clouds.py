@@ -1,0 +1,92 @@
+"""What bodies are fitted to: points and normals of a smooth body, or a mesh with its smooth regions."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.pieces.regions import Regions
+from scatterers.triangles.quality import MeshQuality
+
+FloatArray = NDArray[np.float64]
+DISTRUSTED = 2.0
+"""Edges about a non-smooth point within which nothing is trusted."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """What a body is fitted to.
+
+    Attributes
+    ----------
+    points, normals : (n, 3), L and 1
+        On the body, outward.
+    edge : float
+        Mean distance between neighbouring points of the source, L.
+    spacing : float
+        Of the grid that the points determine, L.
+    noise : float
+        Rms distance of the points from a smooth body, L; 0 if it is less than the error of a fit.
+    non_smooth : (m, 3), L
+        Points of the source where it is not smooth.
+    distance : callable
+        Signed distance from the body, (k, 3) -> (k,); NaN where it is not known.
+    mean_curvature : (n,), 1/L, or None
+        At the points, NaN where it is not known; None for noisy points.
+    quality : MeshQuality
+        Of the source.
+    notes : dict
+        Plain values that are kept beside the fit: ``repairs``, and what else a kind of body has to tell.
+    uncertain : float
+        Difference of the curvatures of two fits, relative to their rms, beyond which the body is refused.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    edge: float
+    spacing: float
+    noise: float
+    non_smooth: FloatArray
+    distance: Callable[[FloatArray], FloatArray]
+    mean_curvature: FloatArray | None
+    quality: MeshQuality
+    notes: dict[str, Any]
+    uncertain: float = np.inf
+
+    @property
+    def reach(self) -> float:
+        """Distance from non-smooth points within which nothing is trusted, L."""
+        return DISTRUSTED * self.edge
+
+    @cached_property
+    def smooth(self) -> NDArray[np.bool_]:
+        """Points that are farther than that from non-smooth ones: (n,)."""
+        from scipy.spatial import cKDTree
+
+        return np.asarray(np.isinf(cKDTree(self.non_smooth).query(self.points, distance_upper_bound=self.reach)[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class PieceCloud:
+    """What a body with edges is fitted to.
+
+    Attributes
+    ----------
+    vertices, triangles : (n, 3), L, and (m, 3)
+    regions : Regions
+    normals : (m, 3, 3), or None
+        Outward at the corners of the triangles, where the source gives them.
+    quality : MeshQuality
+    notes : dict
+        As of a `PointCloud`.
+    """
+
+    vertices: FloatArray
+    triangles: NDArray[np.int64]
+    regions: Regions
+    normals: FloatArray | None
+    quality: MeshQuality
+    notes: dict[str, Any]

@@ -1,0 +1,306 @@
+"""Pieces of a body from its mesh: regions that fold back are parted, and each piece gets its own F.
+
+A region of the mesh folds where two of its points are nearer than a few cells of the grid that is to hold F there and
+their normals oppose each other, as the two sides of a wing whose nose is round: one F in space cannot have both. It is
+parted by the axis nearest to the normals of its triangles. Pieces of one region are fitted to some triangles beyond
+their borders as well, so that both know the seam.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.pieces.crease import Crease
+from scatterers.pieces.curved import curved, divided
+from scatterers.pieces.patch import COARSER, SPACING, Patch, polynomial_patch, spline_patch
+from scatterers.pieces.regions import Regions
+from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
+from scatterers.spline.compared import curvatures
+from scatterers.spline.fitting import SMOOTHING, tangents
+from scatterers.spline.report import FitReport
+from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, osculating_jets
+from scatterers.triangles.quality import BAD
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+FOLD = 3.0
+"""Spacings of the grid within which opposite normals make a fold."""
+RINGS = 4
+"""Triangles beyond a seam that are fitted."""
+GOOD = 0.7
+"""Share of the vertices of a piece whose jets are sound, from which on jets are used."""
+EVEN, MOST_POINTS = 400, 6_000
+"""Fewest points of a piece that is known from few vertices, and the most."""
+SHARE = 500
+"""Triangles cut at a time."""
+ROUGH = 0.05
+"""Misfit, in spacings of the points, beyond which nothing of a piece is trusted."""
+SLOPES = (0.5, 1.6)
+"""|grad F| at the points: beyond, nothing of a piece is trusted either."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPieces:
+    """A body of pieces.
+
+    Attributes
+    ----------
+    fine, coarse : PieceSpace
+    patches : tuple of Patch
+    piece : (m,)
+        Of each triangle of the mesh.
+    normals : (m, 3, 3)
+        Of the pieces at the corners of the triangles.
+    creases : tuple of Crease
+    rough : (p,) bool
+        Pieces that are not trusted.
+    samples, owner : (k, 3), L, and (k,)
+        Points spread over the body, and their pieces.
+    """
+
+    fine: PieceSpace
+    coarse: PieceSpace
+    patches: tuple[Patch, ...]
+    piece: IntArray
+    normals: FloatArray
+    creases: tuple[Crease, ...]
+    rough: BoolArray
+    samples: FloatArray
+    owner: IntArray
+
+    def report(self) -> FitReport:
+        """How well the pieces meet their points, and how their curvatures depend on the grid away from edges."""
+        from scipy.spatial import cKDTree
+
+        found = []
+        edges = [crease.points for crease in self.creases if crease.kind == "edge"]
+        off = cKDTree(np.concatenate(edges)).query(self.samples)[0] if edges else np.full(len(self.samples), np.inf)
+        for k, patch in enumerate(self.patches):
+            points = self.samples[(self.owner == k) & (off > 2 * patch.spacing)]
+            if len(points) and not self.rough[k]:
+                along = tangents(patch.fine.gradient(points))[0]
+                found.append([curvatures(spline, points, along) for spline in (patch.fine, patch.coarse)])
+        fitted = [patch for patch in self.patches if patch.kind == "spline"]
+        spacing = float(np.median([patch.fine.spacing[0] for patch in fitted])) if fitted else 0.0
+        largest = max(
+            (patch.fine.coefficients.shape for patch in fitted),
+            key=lambda shape: float(np.prod(shape)),
+            default=(6, 6, 6),
+        )
+
+        def rms(parts: list[FloatArray]) -> float:
+            values = np.concatenate([np.zeros(1), *parts])
+            return float(np.sqrt(np.mean(values**2)))
+
+        slope = np.concatenate([np.ones(1), *(fine[2] for fine, _ in found)])
+        return FitReport(
+            points=len(self.samples),
+            spacing=spacing,
+            coarser_spacing=COARSER * spacing,
+            nodes=tuple(n - 4 for n in largest),
+            misfit=rms([np.full(1, patch.misfit) for patch in fitted]),
+            turn=rms([patch.turn * np.ones(1) for patch in fitted]),
+            slope=(float(slope.min()), float(slope.max())),
+            normal_curvature=rms([fine[0] for fine, _ in found]),
+            normal_curvature_error=rms([fine[0] - coarse[0] for fine, coarse in found]),
+            gaussian_curvature=rms([fine[1] for fine, _ in found]),
+            gaussian_curvature_error=rms([fine[1] - coarse[1] for fine, coarse in found]),
+            noise=0.0,
+            smoothing=SMOOTHING,
+        )
+
+
+def fitted_pieces(
+    vertices: FloatArray,
+    triangles: IntArray,
+    regions: Regions,
+    progress: Callable[[str], None],
+    normals: FloatArray | None = None,
+) -> FittedPieces:
+    """Pieces of a closed mesh (n, 3), L, and (m, 3) with known regions.
+
+    Parameters
+    ----------
+    normals : (m, 3, 3), optional
+        Outward at the corners of the triangles, where they are known; those of the triangles if not.
+    """
+    size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    piece = _parted(vertices, triangles, regions)
+    count = int(piece.max()) + 1
+    patches, at_corners = [], np.empty((len(triangles), 3, 3))
+    for number in range(count):
+        progress(f"piece {number + 1} of {count}")
+        own = np.flatnonzero(piece == number)
+        patch, corner_normals = _patch(vertices, triangles, _grown(piece, number, regions), own, normals, size)
+        patches.append(patch)
+        at_corners[own] = corner_normals
+    points, owner = _spread(vertices[triangles], at_corners, piece)
+    fine = piece_space([patch.fine for patch in patches], points, owner)
+    coarse = fine.with_splines([patch.coarse for patch in patches])
+    rough = np.array([_rough(patch, points[owner == k]) for k, patch in enumerate(patches)])
+    return FittedPieces(
+        fine, coarse, tuple(patches), piece, at_corners, regions.creases(vertices, piece), rough, points, owner
+    )
+
+
+def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[FloatArray, IntArray]:
+    """Points (k, 3), L, all over the body, closer to each other than a voxel, and their pieces (k,)."""
+    box = np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
+    side = voxel_side(box)
+    points, owner = [], []
+    for start in range(0, len(corners), SHARE):
+        some = slice(start, start + SHARE)
+        origin, place = divided(corners[some], 0.9 * side)
+        x = curved(corners[some][origin], normals[some][origin], place.mean(axis=1))[0]
+        # long triangles are cut into more than is needed
+        code = np.column_stack([np.floor((x - box[0]) / side).astype(np.int64), piece[some][origin]])
+        _, kept = np.unique(code, axis=0, return_index=True)
+        points.append(x[kept])
+        owner.append(piece[some][origin][kept])
+    return np.concatenate(points), np.concatenate(owner)
+
+
+def _parted(vertices: FloatArray, triangles: IntArray, regions: Regions) -> IntArray:
+    """Piece of each triangle: its region, or a part of one that folds."""
+    from scipy.spatial import cKDTree
+
+    corners = vertices[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(area, 1e-300)[:, None]
+    itself = np.zeros(regions.count, dtype=bool)
+    sides = regions.number[regions.turns.sides[regions.crease]]
+    itself[sides[sides[:, 0] == sides[:, 1], 0]] = True
+    piece = np.zeros(len(triangles), dtype=np.int64)
+    count = 0
+    for number in range(regions.count):
+        own = np.flatnonzero(regions.number == number)
+        folds = bool(itself[number])
+        if not folds and len(own) > 1:
+            reach = FOLD * SPACING * _spacing(corners[own])
+            origin, place = divided(corners[own], max(reach, 0.02 * float(np.sqrt(area[own].sum()))))
+            tree = cKDTree(np.einsum("kj,kjc->kc", place.mean(axis=1), corners[own][origin]))
+            pairs = own[origin][tree.query_pairs(reach, output_type="ndarray")]
+            folds = bool(np.any(np.sum(normal[pairs[:, 0]] * normal[pairs[:, 1]], axis=1) < 0))
+        if not folds:
+            piece[own] = count
+            count += 1
+            continue
+        parts = _by_axis(own, normal[own], regions)
+        piece[own] = count + parts
+        count += int(parts.max()) + 1
+    return piece
+
+
+def _by_axis(own: IntArray, normal: FloatArray, regions: Regions) -> IntArray:
+    """Parts (k,) of triangles with these numbers: connected, and with the same axis nearest to their normals."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    axis = np.argmax(np.abs(normal), axis=1)
+    face = 2 * axis + (np.take_along_axis(normal, axis[:, None], 1)[:, 0] < 0)
+    place = np.full(len(regions.number), -1)
+    place[own] = np.arange(len(own))
+    joined = place[regions.joined]
+    joined = joined[np.all(joined >= 0, axis=1)]
+    alike = joined[face[joined[:, 0]] == face[joined[:, 1]]]
+
+    def parts(pairs: IntArray) -> IntArray:
+        graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(own), len(own)))
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+    label = parts(alike)
+    # crumbs along the borders join the largest neighbour
+    for _ in range(3):
+        size = np.bincount(label)
+        crumb = size[label] < max(8, 0.02 * len(own))
+        step = joined[crumb[joined[:, 0]] != crumb[joined[:, 1]]]
+        step = np.where(crumb[step[:, :1]], step, step[:, ::-1])
+        step = step[np.argsort(size[label[step[:, 1]]], kind="stable")]
+        into = dict(zip(label[step[:, 0]].tolist(), label[step[:, 1]].tolist(), strict=True))
+        if not into:
+            break
+        label = np.array([into.get(k, k) for k in label.tolist()])
+    return np.asarray(np.unique(label, return_inverse=True)[1].ravel(), dtype=np.int64)
+
+
+def _grown(piece: IntArray, number: int, regions: Regions) -> IntArray:
+    """Triangles of a piece and those of its region that are next to it."""
+    inside = piece == number
+    for _ in range(RINGS):
+        touching = inside[regions.joined]
+        inside[regions.joined[touching.any(axis=1)].ravel()] = True
+    return np.flatnonzero(inside)
+
+
+def _spacing(corners: FloatArray) -> float:
+    """Distance of the points that know a surface best: the shortest sides of its triangles, L."""
+    return float(np.median(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1)))
+
+
+def _patch(
+    vertices: FloatArray,
+    triangles: IntArray,
+    members: IntArray,
+    own: IntArray,
+    normals: FloatArray | None,
+    size: float,
+) -> tuple[Patch, FloatArray]:
+    """F of a piece from its triangles and those next to it, and the normals at the corners of its own."""
+    used, local = np.unique(triangles[members], return_inverse=True)
+    local = local.reshape(-1, 3)
+    x = vertices[used]
+    if normals is None:
+        n = angle_weighted_normals(x, local)
+    else:
+        n = np.zeros_like(x)
+        np.add.at(n, local.ravel(), normals[members].reshape(-1, 3))
+        n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300)
+    corners = x[local]
+    mine = np.isin(members, own)
+    polynomial = polynomial_patch(x, n, size)
+    if polynomial is not None:
+        gradient = polynomial.fine.gradient(corners[mine].reshape(-1, 3))
+        gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+        return polynomial, gradient.reshape(-1, 3, 3)
+    side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    jets = _sound_jets(x, local, n, normals is not None)
+    even = float(np.percentile(side, 90)) < 4 * float(np.percentile(side, 10))
+    if (jets is not None or normals is not None) and even and len(x) >= EVEN:
+        n = n if jets is None or normals is not None else jets.normals
+        return spline_patch(x, n, float(side.mean()), jets, local), n[local[mine]]
+    # known from few vertices: points between them by curved triangles
+    area = 0.5 * float(
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    )
+    edge = max(min(_spacing(corners), np.sqrt(area / EVEN)), np.sqrt(area / MOST_POINTS))
+    origin, place = divided(corners, 1.5 * edge)
+    points, between = curved(corners[origin], n[local][origin], place.mean(axis=1))
+    # long triangles leave points closer together along their short sides
+    _, kept = np.unique(np.floor(points / edge).astype(np.int64), axis=0, return_index=True)
+    points, between = points[kept], between[kept]
+    return spline_patch(points, between, edge), n[local[mine]]
+
+
+def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray, exact: bool) -> Jets | None:
+    """Jets at the vertices of a piece, if most of them are sound."""
+    if exact or len(x) < 2 * FEWEST:
+        return None
+    jets = osculating_jets(x, triangles)
+    corners = x[triangles]
+    edge = float(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).mean())
+    doubt = edge * np.abs(jets.principal4 - jets.principal).max(axis=1) / 3
+    astray = np.linalg.norm(jets.normals - normals, axis=1) > 0.5
+    sound = jets.fitted & (np.maximum(jets.tilt, doubt) < BAD) & ~astray
+    return jets if np.mean(sound) >= GOOD else None
+
+
+def _rough(patch: Patch, points: FloatArray) -> bool:
+    """Whether F of a patch is no distance at points of its piece, or misses them."""
+    if patch.kind != "spline":
+        return False
+    slope = np.linalg.norm(patch.fine.gradient(points), axis=1)
+    return bool(patch.misfit > ROUGH * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1])

@@ -1,0 +1,145 @@
+"""F of one smooth region of a body: a plane or quadric where its points lie on one, else a fitted spline.
+
+A quadric Q = 0 has q of unit length that makes sum ON^2 Q(x)^2 + |n x grad Q(x)|^2 least over points x and normals n,
+which tell it from other quadrics through the points; it is
+taken if all points lie on it within `EXACT` of the body's size, as those of cylinders, cones and balls of engineering
+do, and counts as exact then. As polynomials of degree 2 both kinds are splines of one cell, which go on as they are far
+beyond the region. Other regions are fitted as whole bodies are (`scatterers.spline.fitting`), from their own points
+only, so that nothing is rounded off at their borders; a coarser fit tells how far they are known.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.spline.fitting import fit, spacing_of
+from scatterers.spline.tensor import TensorSpline, weights
+from scatterers.triangles.jet_points import centroids, signed_distance
+from scatterers.triangles.jets import Jets
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+EXACT = 1e-6
+"""Distance of points from a plane or quadric, in body sizes, within which they lie on it: single precision and some."""
+LEAN = 0.35
+"""Angle between the normals of triangles and a quadric through their corners, radians."""
+ON = 1e4
+"""Weight of points against normals, which those of triangles give roughly."""
+SPACING, NODES = 1.4, 4e5
+"""Grid of a spline in units of the distance of points, and its most nodes."""
+COARSER = 1.35
+CLOSELY, ROUGHLY = 5e-5, 1e-3
+"""Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """F of one region.
+
+    Attributes
+    ----------
+    fine, coarse : TensorSpline
+        The second known less well; the same for planes and quadrics.
+    kind : {"plane", "quadric", "spline"}
+    misfit, turn : float
+        Rms distance of the points from F = 0, L, and rms angle between grad F and the normals there, radians.
+    spacing : float
+        Of the points, L; 0 for planes and quadrics.
+    """
+
+    fine: TensorSpline
+    coarse: TensorSpline
+    kind: str
+    misfit: float
+    turn: float
+    spacing: float
+
+
+def spline_patch(
+    points: FloatArray, normals: FloatArray, spacing: float, jets: Jets | None = None, triangles: IntArray | None = None
+) -> Patch:
+    """F of a region fitted to points (n, 3), L, so far apart, and outward normals (n, 3).
+
+    With jets at the points and triangles (m, 3) between them, to the points that jets give there as well.
+    """
+    distance = mean = None
+    accuracy = ROUGHLY
+    if jets is not None and triangles is not None:
+        more, there = centroids(points, triangles, jets)
+        distance, accuracy = partial(signed_distance, points, jets), CLOSELY
+        mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more), np.nan)])
+        points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
+    grid = max(SPACING * spacing, spacing_of(points, NODES))
+    fine, coarse = (
+        fit(points, normals, h, distance=distance, mean_curvature=mean, accuracy=accuracy)
+        for h in (grid, COARSER * grid)
+    )
+    return Patch(fine.spline, coarse.spline, "spline", fine.misfit, fine.turn, spacing)
+
+
+def polynomial_patch(points: FloatArray, normals: FloatArray, size: float) -> Patch | None:
+    """Plane or quadric through points (n, 3), L, of a body of a size, L, if there is one."""
+    found = polynomial_through(points, normals, EXACT * size)
+    return None if found is None else Patch(found[0], found[0], *found[1:], 0.0, 0.0)
+
+
+def polynomial_through(
+    points: FloatArray, normals: FloatArray, tolerance: float
+) -> tuple[TensorSpline, str, float] | None:
+    """Plane or quadric through points within a tolerance, L, as a spline; its kind and rms distance.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> turn = np.linspace(0, 6, 50)
+    >>> normals = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    >>> _, kind, _ = polynomial_through(normals + np.outer(turn % 1, [0, 0, 1]), normals, 1e-6)
+    >>> kind
+    'quadric'
+    """
+    middle = points.mean(axis=0)
+    half = float(np.max(np.ptp(points, axis=0))) or 1.0
+    x = (points - middle) / half
+    for kind, degree in (("plane", 1), ("quadric", 2)):
+        powers = [(a, b, c) for a in range(3) for b in range(3) for c in range(3) if a + b + c <= degree]
+        value, slope = _monomials(x, powers)
+        if len(x) * 3 < len(powers):
+            continue
+        across = np.cross(slope, normals[:, None])
+        rows = np.concatenate([ON * value, *np.moveaxis(across, -1, 0)])
+        q = np.linalg.svd(rows, full_matrices=False)[2][-1]
+        f, g = value @ q, np.einsum("npk,p->nk", slope, q)
+        steep = np.linalg.norm(g, axis=1)
+        lean = np.sum(g * normals, axis=1) / np.maximum(steep, 1e-300)
+        if np.median(lean) < 0:
+            f, g, lean, q = -f, -g, -lean, -q
+        off = np.abs(f) / np.maximum(steep, 1e-300) * half
+        # a quadric may be a pair of sheets, of which the points take one
+        if np.all(off <= tolerance) and np.all(lean > np.cos(LEAN)):
+            return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
+    return None
+
+
+def _monomials(x: FloatArray, powers: list[tuple[int, int, int]]) -> tuple[FloatArray, FloatArray]:
+    """Monomials (n, p) and their gradients (n, p, 3)."""
+    exponent = np.array(powers)
+    value = np.prod(x[:, None] ** exponent, axis=-1)
+    slope = np.empty((*value.shape, 3))
+    for axis in range(3):
+        lower = exponent.copy()
+        lower[:, axis] = np.maximum(lower[:, axis] - 1, 0)
+        slope[..., axis] = exponent[:, axis] * np.prod(x[:, None] ** lower, axis=-1)
+    return value, slope
+
+
+def _as_spline(q: FloatArray, powers: list[tuple[int, int, int]], middle: FloatArray, half: float) -> TensorSpline:
+    """half sum q_p ((x - middle)/half)^p as a spline of one cell, which reaches from middle - half to middle + half."""
+    # t of the cell is (1 + y)/2, y the variable of the monomials: coefficients of y^m
+    t = np.linspace(0.0, 1.0, 6)
+    rows = np.linalg.solve(weights(t, 0)[..., 0], np.stack([(2 * t - 1) ** m for m in range(3)], axis=1))
+    total = np.zeros((6, 6, 6))
+    for value, (a, b, c) in zip(q, powers, strict=True):
+        total += value * np.einsum("i,j,k->ijk", rows[:, a], rows[:, b], rows[:, c])
+    return TensorSpline(total * half, middle - half, np.full(3, 2 * half))

@@ -1,0 +1,213 @@
+"""Smooth regions of a triangle mesh, and the creases between them.
+
+Triangles that lie in one plane (neighbours turned by less than `FLAT`) make facets. An edge of the mesh is a crease if
+its triangles are turned by more than `SHARP` degrees and thrice the median, or by more than `TURN` and `OFTEN` medians
+where neither facet is turned about as much against another neighbour: there a round surface is no explanation for it.
+Creases stand in chains: sharp edges that stand alone are those of slivers, and of folds of a coarse mesh. Regions are
+what is connected without crossing a crease.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.pieces.crease import Crease
+from scatterers.triangles.topology import edges_of
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+FLAT, TURN, SHARP, ALWAYS = 0.5, 12.0, 40.0, 60.0
+"""Degrees; beyond the last an edge is sharp whatever the others are."""
+OFTEN = 6.0
+ALIKE = 0.4
+"""Turn against another neighbour, relative to that of the edge, from which on a facet is one of a round surface."""
+FEWEST = 6
+"""Edges of a chain, unless all are turned by more than `ALWAYS`, as those of a tetrahedron."""
+SLIVER = 0.02
+"""Area, relative to the median, below which the normal of a triangle is not asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Regions of a closed mesh.
+
+    Attributes
+    ----------
+    number : (m,)
+        Region of each triangle.
+    turns : Turns
+    crease : (e,) bool
+        Which edges are creases.
+    """
+
+    number: IntArray
+    turns: "Turns"
+    crease: BoolArray
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return int(self.number.max()) + 1
+
+    @property
+    def joined(self) -> IntArray:
+        """Pairs of triangles (k, 2) that are neighbours across an edge that is no crease."""
+        return np.asarray(self.turns.sides[~self.crease])
+
+    def creases(self, vertices: FloatArray, piece: IntArray) -> tuple[Crease, ...]:
+        """Edges, and seams between pieces (m,) of triangles of one region, as curves."""
+        sides = piece[self.turns.sides]
+        seam = ~self.crease & (sides[:, 0] != sides[:, 1])
+        edges = _curves(vertices, self.turns, np.flatnonzero(self.crease), piece, "edge")
+        return edges + _curves(vertices, self.turns, np.flatnonzero(seam), piece, "seam")
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """Edges (e, 2) of a closed mesh, their triangles (e, 2), and the turn across them (e,), degrees, < 0 if concave."""
+
+    ends: IntArray
+    sides: IntArray
+    turn: FloatArray
+
+
+def regions_of(vertices: FloatArray, triangles: IntArray, *, sharp: BoolArray | None = None) -> Regions:
+    """Regions of a closed, oriented mesh: (n, 3), L, and (m, 3).
+
+    Parameters
+    ----------
+    sharp : (e,) bool, optional
+        Which edges, in the order of `scatterers.triangles.topology.edges_of`, are creases, where it is known.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> rod = trimesh.creation.cylinder(radius=1.0, height=3.0, sections=48)
+    >>> found = regions_of(rod.vertices, rod.faces)
+    >>> found.count, [crease.closed for crease in found.creases(rod.vertices, found.number)]
+    (3, [True, True])
+    """
+    turns = _turns(vertices, triangles)
+    crease = _chained(turns, _creased(turns, len(triangles)) if sharp is None else sharp, len(vertices))
+    return Regions(_connected(len(triangles), turns.sides[~crease]), turns, crease)
+
+
+def _turns(vertices: FloatArray, triangles: IntArray) -> Turns:
+    edges = edges_of(triangles)
+    # both corners of each edge, that of the triangle that runs forward along it first
+    order = np.lexsort((~edges.forward, edges.number)).reshape(-1, 2)
+    corners = vertices[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    sides = order // 3
+    left, right = normal[sides[:, 0]], normal[sides[:, 1]]
+    across = np.cross(left, right)
+    along = vertices[edges.ends[:, 1]] - vertices[edges.ends[:, 0]]
+    turn = np.degrees(np.arctan2(np.linalg.norm(across, axis=1), np.sum(left * right, axis=1)))
+    # the left triangle runs forward along the edge: at a convex edge left x right points along it
+    turn = np.where(np.sum(across * along, axis=1) >= 0, turn, -turn)
+    thin = np.minimum(area[sides[:, 0]], area[sides[:, 1]]) < SLIVER * np.median(area) * (
+        np.linalg.norm(along, axis=1) / np.sqrt(np.median(area))
+    ).clip(None, 1.0)
+    return Turns(edges.ends, sides, np.where(thin & (np.abs(turn) < ALWAYS), 0.0, turn))
+
+
+def _creased(turns: Turns, count: int) -> BoolArray:
+    """Edges at which no smooth surface goes through the triangles."""
+    size = np.abs(turns.turn)
+    sharp = ((size > SHARP) & (size > 3 * np.median(size))) | (size > ALWAYS)
+    facet = _connected(count, turns.sides[size < FLAT])
+    # pairs of neighbouring facets, with the turn between them where it may be that of a round surface
+    pair = np.sort(facet[turns.sides], axis=1)
+    other = (pair[:, 0] != pair[:, 1]) & ~sharp
+    found, inverse = np.unique(pair[other], axis=0, return_inverse=True)
+    between = np.zeros(len(found))
+    np.maximum.at(between, inverse.ravel(), size[other])
+    # the largest and the second largest turn of each facet, against different neighbours
+    facets = int(facet.max()) + 1
+    first, second, partner = np.zeros(facets), np.zeros(facets), np.full(facets, -1)
+    order = np.argsort(-between)
+    for side in (0, 1):
+        for k in order:
+            mine, theirs, turn = found[k, side], found[k, 1 - side], between[k]
+            if turn > first[mine]:
+                first[mine], second[mine], partner[mine] = turn, first[mine], theirs
+            elif turn > second[mine] and theirs != partner[mine]:
+                second[mine] = turn
+    mine = np.flatnonzero((size > max(TURN, OFTEN * float(np.median(size)))) & ~sharp)
+    ends = facet[turns.sides[mine]]
+    besides = np.where(partner[ends] == ends[:, ::-1], second[ends], first[ends])
+    alone = np.all(besides < ALIKE * size[mine, None], axis=1)
+    sharp[mine[alone]] = True
+    return np.asarray(sharp)
+
+
+def _chained(turns: Turns, crease: BoolArray, count: int) -> BoolArray:
+    """Creases without those of chains of fewer edges than `FEWEST`."""
+    at = np.flatnonzero(crease)
+    if not len(at):
+        return crease
+    label = _connected(count, turns.ends[at])[turns.ends[at, 0]]
+    count_of = np.bincount(label)
+    always = np.bincount(label, np.abs(turns.turn[at]) > ALWAYS) == count_of
+    enough = ((count_of >= FEWEST) | (always & (count_of >= 3)))[label]
+    kept = np.zeros_like(crease)
+    kept[at[enough]] = True
+    return kept
+
+
+def _connected(count: int, pairs: IntArray) -> IntArray:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _curves(
+    vertices: FloatArray, turns: Turns, at: IntArray, piece: IntArray, kind: Literal["edge", "seam"]
+) -> tuple[Crease, ...]:
+    """Edges with numbers ``at`` joined to curves, one for each pair of pieces and stretch between branch points."""
+    pair = np.sort(piece[turns.sides[at]], axis=1)
+    meeting = np.bincount(turns.ends[at].ravel(), minlength=len(vertices))
+    found = []
+    pairs, which = np.unique(pair, axis=0, return_inverse=True)
+    for k, (first, second) in enumerate(pairs.tolist()):
+        mine = at[which.ravel() == k]
+        for chain, edges in _chains(turns.ends[mine], meeting):
+            angle = float(np.radians(np.max(np.abs(turns.turn[mine[edges]])))) if kind == "edge" else 0.0
+            found.append(Crease(kind, (first, second), vertices[chain], angle))
+    return tuple(found)
+
+
+def _chains(ends: IntArray, meeting: IntArray) -> list[tuple[list[int], list[int]]]:
+    """Vertices and edges of the curves that edges (k, 2) make, ended where more than two creases meet."""
+    at: dict[int, list[tuple[int, int]]] = {}
+    for number, (a, b) in enumerate(ends.tolist()):
+        at.setdefault(a, []).append((b, number))
+        at.setdefault(b, []).append((a, number))
+
+    def ending(vertex: int) -> bool:
+        return len(at[vertex]) != 2 or int(meeting[vertex]) != 2
+
+    used: set[int] = set()
+    found = []
+    # open curves first: what is left afterwards are rings
+    for start in [v for v in at if ending(v)] + list(at):
+        for onward, number in at[start]:
+            if number in used:
+                continue
+            chain, edges, here, edge = [start], [], onward, number
+            while True:
+                used.add(edge)
+                edges.append(edge)
+                chain.append(here)
+                after = [step for step in at[here] if step[1] not in used]
+                if here == start or ending(here) or not after:
+                    break
+                here, edge = after[0]
+            found.append((chain, edges))
+    return found

@@ -1,0 +1,272 @@
+"""Which piece bounds a body where: voxels that say how F of the body follows from those of the pieces near them.
+
+Points of all pieces, closer to each other than a voxel, say which pieces bound the body in a voxel and the next ones.
+What two of them make of each other there is read off F of the one at points of the other: F < 0, the body is what both
+have inside, as at a convex edge and between the two sides of a thin part, and F of the body is the larger; F > 0, what
+either has, and it is the smaller; F = 0, they are parts of one smooth surface, and the nearer one stands for both. Of
+three and more the pairs make a tree: if pieces fall into groups that are all joined by "the larger", that comes last,
+and so on within the groups. Voxels far off follow the next ones with points.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.kernels.spline_constants import CENTRE, HEADER
+from scatterers.spline.tensor import TensorSpline, evaluated
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+VOXELS = 200_000
+"""Voxels about a body."""
+FIRST = 9
+"""Parameters before the tables."""
+SAME = 0.03
+"""|F| in voxels at points of another piece, in the mean, below which both are parts of one smooth surface."""
+LARGER, SMALLER = -1, -2
+"""Of the last two values, in a program."""
+MOST_PIECES = 8
+"""Pieces that a voxel tells apart."""
+MARGIN = 3
+"""Voxels about the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class PieceSpace:
+    """F of a body of pieces, in a box of space.
+
+    Attributes
+    ----------
+    splines : sequence of TensorSpline
+        F of each piece.
+    table : (k,)
+        Header, table of voxels and programs, as `scatterers.kernels.pieces` takes them, without the splines.
+    box : (2, 3), L
+    """
+
+    splines: Sequence[TensorSpline]
+    table: FloatArray
+    box: FloatArray
+
+    @property
+    def sources(self) -> Mapping[str, Callable[..., None]]:
+        """Plain Python of the compiled level."""
+        from scatterers.kernels.pieces import evaluate
+
+        return {"level": evaluate}
+
+    def flat(self, of_map: FloatArray) -> FloatArray:
+        """Parameters of the compiled level; there is no sphere map."""
+        return self.parameters
+
+    @cached_property
+    def parameters(self) -> FloatArray:
+        """Parameters of the compiled level."""
+        flat = [spline.flat(np.zeros(HEADER - CENTRE)) for spline in self.splines]
+        table = self.table.copy()
+        table[8] = len(table)
+        places = len(table) + len(flat) + np.cumsum([0, *(len(part) for part in flat[:-1])])
+        return np.concatenate([table, places, *flat])
+
+    def numbers(self, points: FloatArray) -> IntArray:
+        """Pieces whose F is that of the body: (..., 3) -> (...)."""
+        from scatterers.kernels.pieces import numbers
+
+        columns = np.ascontiguousarray(points, dtype=float).reshape(-1, 3)
+        found = np.empty(len(columns), np.int64)
+        numbers(columns, found, self.parameters)
+        return found.reshape(np.shape(points)[:-1])
+
+    def check(self) -> None:
+        """Refuse tables that would lead kernels beyond them.
+
+        Raises
+        ------
+        ValueError
+        """
+        table, count = self.table, len(self.splines)
+        shape = table[4:7]
+        # written so that what is no number fails
+        sound = len(table) > FIRST and bool(np.all(np.isfinite(table))) and table[3] > 0
+        sound = sound and bool(np.all((shape >= 1) & (shape < 1e6))) and FIRST + np.prod(shape) < len(table)
+        if sound:
+            cells = int(np.prod(shape.astype(np.int64)))
+            tail = FIRST + cells
+            places = np.unique(table[FIRST:tail]).astype(np.int64)
+            sound = bool(np.all((places >= tail) & (places < len(table)))) and table[7] == FIRST
+            ends = places + 1 + table[places].clip(0, len(table)).astype(np.int64) if sound else places
+            sound = sound and bool(np.all((table[places] >= 1) & (ends <= len(table))))
+            sound = sound and all(_sound(table[a + 1 : b], count) for a, b in zip(places, ends, strict=True))
+        if not sound or any(min(spline.coefficients.shape) < 6 for spline in self.splines):
+            raise ValueError("the table of the pieces is damaged")
+
+    def with_splines(self, splines: Sequence[TensorSpline]) -> "PieceSpace":
+        """The same choice among other splines, such as coarser fits."""
+        return PieceSpace(splines, self.table, self.box)
+
+
+def _sound(program: FloatArray, count: int) -> bool:
+    """Whether a program takes known pieces only and leaves one value."""
+    if not np.all((program == np.round(program)) & (program >= SMALLER) & (program < count)):
+        return False
+    height = np.cumsum(np.where(program >= 0, 1, -1))
+    return bool(height.min() >= 1 and height.max() <= MOST_PIECES and height[-1] == 1)
+
+
+def voxel_side(box: FloatArray) -> float:
+    """Side of the voxels about a body in its box (2, 3), L."""
+    side = box[1] - box[0]
+    low, high = 0.0, float(side.max())
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        fewer = np.prod(side / middle + 2 * MARGIN) < VOXELS
+        low, high = (low, middle) if fewer else (middle, high)
+    return high
+
+
+def piece_space(splines: Sequence[TensorSpline], points: FloatArray, owner: IntArray) -> PieceSpace:
+    """Choose among splines by points (n, 3), L, of the whole body and the numbers (n,) of the pieces they lie on.
+
+    Points are to be less than a `voxel_side` apart.
+    """
+    from scipy.spatial import cKDTree
+
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
+    side = voxel_side(box)
+    origin = box[0] - MARGIN * side
+    shape = np.ceil((box[1] - box[0]) / side).astype(np.int64) + 2 * MARGIN
+    voxel, piece, at = _near(points, owner, origin, side, shape)
+    occupied, row = np.unique(voxel, return_inverse=True)
+    middles = origin + side * (np.stack(np.unravel_index(occupied, shape), axis=1) + 0.5)
+    nearest = owner[cKDTree(points).query(middles)[1]]
+    pairs = _pairs(row.ravel(), piece, at)
+    signs = _signs(splines, points, pairs, SAME * side)
+    programs: list[tuple[int, ...]] = [(int(number),) for number in nearest]
+    known: dict[tuple[Any, ...], tuple[int, ...]] = {}
+    for where, among in signs.items():
+        key = int(nearest[where]), tuple(sorted(among.items()))
+        if key not in known:
+            known[key] = _program(*key)
+        programs[where] = known[key]
+    # voxels without points follow the next ones that have some
+    every = origin + side * (np.stack(np.unravel_index(np.arange(np.prod(shape)), shape), axis=1) + 0.5)
+    return PieceSpace(
+        splines,
+        _table(origin, side, shape, programs, cKDTree(middles).query(every)[1]),
+        np.stack([origin, origin + shape * side]),
+    )
+
+
+def _near(
+    points: FloatArray, owner: IntArray, origin: FloatArray, side: float, shape: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Voxel, piece and number of a point for each piece with a point in a voxel or next to it; a few points each."""
+    place = np.clip(((points - origin) / side).astype(np.int64), 1, shape - 2)
+    # points of one piece in one voxel are alike
+    code = np.ravel_multi_index(tuple(place.T), tuple(shape)) * (int(owner.max()) + 1) + owner
+    _, first = np.unique(code, return_index=True)
+    shifts = np.stack(np.meshgrid(*3 * [[-1, 0, 1]], indexing="ij"), axis=-1).reshape(-1, 3)
+    around = place[first][:, None] + shifts
+    voxel = np.ravel_multi_index(tuple(np.moveaxis(around, -1, 0)), tuple(shape)).ravel()
+    at = np.repeat(first, len(shifts))
+    return voxel, owner[at], at
+
+
+def _pairs(row: IntArray, piece: IntArray, at: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Rows of voxels, pieces i and j, and a point of j, for all ordered pairs of pieces in a voxel."""
+    order = np.lexsort((piece, row))
+    row, piece, at = row[order], piece[order], at[order]
+    # the pieces of each voxel once, and all of its points
+    new = np.concatenate([[True], (np.diff(row) != 0) | (np.diff(piece) != 0)])
+    rows, pieces = row[new], piece[new]
+    begin = np.searchsorted(rows, row, side="left")
+    count = np.searchsorted(rows, row, side="right") - begin
+    point = np.repeat(np.arange(len(row)), count)
+    first = np.repeat(begin - np.concatenate([[0], np.cumsum(count)[:-1]]), count) + np.arange(len(point))
+    differ = pieces[first] != piece[point]
+    point, first = point[differ], first[differ]
+    return row[point], pieces[first], piece[point], at[point]
+
+
+def _signs(
+    splines: Sequence[TensorSpline],
+    points: FloatArray,
+    pairs: tuple[IntArray, IntArray, IntArray, IntArray],
+    close: float,
+) -> dict[int, dict[tuple[int, int], int]]:
+    """For voxels (row) and pairs of pieces i < j in them: 1 for the larger, -1 for the smaller, 0 for one surface."""
+    row, one, other, at = pairs
+    if not len(row):
+        return {}
+    value = np.empty(len(row))
+    for number in np.unique(one):
+        mine = one == number
+        level, gradient, _ = evaluated(splines[number].compiled, points[at[mine]])
+        value[mine] = level / np.linalg.norm(gradient, axis=1)
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    found, inverse, count = np.unique(
+        np.column_stack([row, low, high]), axis=0, return_inverse=True, return_counts=True
+    )
+    mean = np.bincount(inverse.ravel(), value) / count
+    sign = np.where(np.abs(mean) < close, 0, -np.sign(mean)).astype(int)
+    signs: dict[int, dict[tuple[int, int], int]] = {}
+    for (where, i, j), s in zip(found.tolist(), sign.tolist(), strict=True):
+        signs.setdefault(where, {})[i, j] = s
+    return signs
+
+
+def _program(nearest: int, among: tuple[tuple[tuple[int, int], int], ...]) -> tuple[int, ...]:
+    """F of the body from those of pieces in postfix order: numbers of pieces, `LARGER` and `SMALLER`."""
+    signs = dict(among)
+    pieces = sorted({number for pair in signs for number in pair}, key=lambda number: (number != nearest, number))
+    # of one smooth surface the first stands for all
+    kept: list[int] = []
+    for number in pieces:
+        if all(signs[min(number, k), max(number, k)] for k in kept):
+            kept.append(number)
+    kept = kept[:MOST_PIECES]
+
+    def joined(members: list[int]) -> tuple[int, ...]:
+        if len(members) == 1:
+            return (members[0],)
+        for sign, last in ((-1, LARGER), (1, SMALLER)):
+            # groups that hang together by the other sign come first
+            groups: list[set[int]] = []
+            for number in members:
+                near = [g for g in groups if any(signs[min(number, k), max(number, k)] == sign for k in g)]
+                groups = [g for g in groups if g not in near] + [{number}.union(*near)]
+            if len(groups) > 1:
+                parts = [joined([k for k in members if k in g]) for g in groups]
+                program = parts[0]
+                for part in parts[1:]:
+                    program = (*program, *part, last)
+                return program
+        # no tree: the pairs with the nearest one decide
+        program = (members[0],)
+        for number in members[1:]:
+            sign = signs[min(members[0], number), max(members[0], number)]
+            program = (*program, number, LARGER if sign > 0 else SMALLER)
+        return program
+
+    return joined(kept)
+
+
+def _table(
+    origin: FloatArray, side: float, shape: IntArray, programs: list[tuple[int, ...]], nearest: IntArray
+) -> FloatArray:
+    """Header, table of voxels and their programs, each behind its length; alike ones are kept once."""
+    cells = int(np.prod(shape))
+    known: dict[tuple[int, ...], int] = {}
+    tail: list[float] = []
+    places = np.empty(len(programs))
+    for k, program in enumerate(programs):
+        if program not in known:
+            known[program] = FIRST + cells + len(tail)
+            tail += [len(program), *program]
+        places[k] = known[program]
+    header = [*origin, 1 / side, *shape, FIRST, 0.0]
+    return np.concatenate([np.array(header, dtype=float), places[nearest], np.array(tail, dtype=float)])

@@ -1,0 +1,203 @@
+"""A body of fitted pieces: its level, what creeping asks of creases, and the arrays that it is stored as."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.kernels.compiled import Compiled
+from scatterers.pieces.crease import Crease
+from scatterers.pieces.curved import curved, divided
+from scatterers.pieces.fitting import FittedPieces
+from scatterers.pieces.selection import PieceSpace
+from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+KINDS: tuple[Literal["edge", "joint", "tip", "seam"], ...] = ("edge", "joint", "tip", "seam")
+TRUSTED = 1.0
+"""Distance from an edge from which on a fitted piece is trusted, in distances of its points."""
+STEPS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class SplinePiece:
+    """One smooth piece of a body, which goes on a little beyond its creases.
+
+    Attributes
+    ----------
+    spline : TensorSpline
+    bounds : (2, 3), L
+        Box of the body.
+    """
+
+    spline: TensorSpline
+    bounds: FloatArray
+
+    @property
+    def compiled(self) -> Compiled:
+        """Compiled level evaluator."""
+        return self.spline.compiled
+
+    def level(self, points: FloatArray) -> FloatArray:
+        """F, positive outside: points (..., 3), L, to (...)."""
+        return evaluated(self.compiled, points)[0]
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of F: points (..., 3), L, to (..., 3)."""
+        return evaluated(self.compiled, points)[1]
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of F, 1/L: points (..., 3), L, to (..., 3, 3)."""
+        return evaluated(self.compiled, points)[2][..., SYMMETRIC]
+
+
+@dataclass(frozen=True, eq=False)
+class SplinePieces:
+    """The pieces of a body of one fit.
+
+    Attributes
+    ----------
+    space : PieceSpace
+    creases : tuple of Crease
+    corners, normals : (m, 3, 3), L and 1
+        Triangles of the mesh, outward normals of their pieces.
+    number : (m,)
+        Piece of each triangle.
+    reach : (p,), L
+        Distance from its edges within which a piece is not trusted, inf for one that is not trusted at all.
+    """
+
+    space: PieceSpace
+    creases: tuple[Crease, ...]
+    corners: FloatArray
+    normals: FloatArray
+    number: IntArray
+    reach: FloatArray
+
+    @classmethod
+    def of(cls, fitted: FittedPieces, corners: FloatArray, *, coarse: bool = False) -> "SplinePieces":
+        """Those of a fit, or of its coarser twin."""
+        space = fitted.coarse if coarse else fitted.fine
+        reach = np.array([TRUSTED * patch.spacing for patch in fitted.patches])
+        return cls(space, fitted.creases, corners, fitted.normals, fitted.piece, np.where(fitted.rough, np.inf, reach))
+
+    @cached_property
+    def surfaces(self) -> tuple[SplinePiece, ...]:
+        """The pieces."""
+        box = np.stack([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
+        return tuple(SplinePiece(spline, box) for spline in self.space.splines)
+
+    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
+        """The body as triangles with sides of at most ``edge``, L: corners, normals (m, 3, 3) and pieces (m,)."""
+        origin, place = divided(self.corners, edge)
+        points, _ = curved(self.corners[origin, None], self.normals[origin, None], place)
+        normals = np.empty_like(points)
+        number = self.number[origin]
+        for piece in np.unique(number):
+            mine = number == piece
+            x, step = points[mine], np.zeros(1)
+            for _ in range(STEPS):
+                value, gradient, _ = evaluated(self.space.splines[piece].compiled, x)
+                slope = np.sum(gradient**2, axis=-1)
+                step = np.clip(value / np.sqrt(slope), -edge, edge) / np.sqrt(slope)
+                x = x - step[..., None] * gradient
+            gradient = evaluated(self.space.splines[piece].compiled, x)[1]
+            points[mine], normals[mine] = x, gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+        return points, normals, number
+
+    def non_smooth(self, points: FloatArray) -> BoolArray:
+        """Whether points (..., 3), L, lie where F is not trusted: (...)."""
+        x = np.asarray(points, dtype=float)
+        found = np.isinf(self.reach)[self.space.numbers(x)]
+        tree, reach = self._edges
+        if len(reach) and x.size:
+            finite = np.all(np.isfinite(x), axis=-1)
+            distance, nearest = tree.query(x[finite], distance_upper_bound=float(reach.max()))
+            near = np.isfinite(distance)
+            near[near] = distance[near] < reach[nearest[near]]
+            found[finite] |= near
+        return np.asarray(found)
+
+    @cached_property
+    def _edges(self) -> tuple[Any, FloatArray]:
+        """Tree of points on edges of fitted pieces, and how far from each the pieces are not trusted."""
+        from scipy.spatial import cKDTree
+
+        points, reach = [np.zeros((0, 3))], [np.zeros(0)]
+        for crease in self.creases:
+            sides = self.reach[list(crease.pieces)]
+            own = float(np.max(np.where(np.isfinite(sides), sides, 0.0)))
+            if crease.kind in ("edge", "tip") and own > 0:
+                dense = _dense(crease.points, 0.5 * own)
+                points.append(dense)
+                reach.append(np.full(len(dense), own))
+        return cKDTree(np.concatenate(points)), np.concatenate(reach)
+
+    def arrays(self, name: str) -> dict[str, FloatArray]:
+        """All that `restored` needs, under names that begin with ``name``."""
+        lengths = [len(crease.points) for crease in self.creases]
+        sides = [(KINDS.index(c.kind), *c.pieces, c.angle, n) for c, n in zip(self.creases, lengths, strict=True)]
+        found = {
+            "table": self.space.table,
+            "box": self.space.box,
+            "corners": self.corners,
+            "normals": self.normals,
+            "number": self.number.astype(float),
+            "reach": self.reach,
+            "creases": np.array(sides, dtype=float).reshape(-1, 5),
+            "crease-points": np.concatenate([np.zeros((0, 3)), *(crease.points for crease in self.creases)]),
+        }
+        for k, spline in enumerate(self.space.splines):
+            found[f"coefficients-{k}"] = spline.coefficients
+            found[f"grid-{k}"] = np.stack([spline.origin, spline.spacing])
+        return {f"{name}-{key}": array for key, array in found.items()}
+
+    @classmethod
+    def restored(cls, arrays: Mapping[str, FloatArray], name: str) -> "SplinePieces":
+        """The pieces whose `arrays` these are.
+
+        Raises
+        ------
+        ValueError, KeyError
+            If arrays are missing or do not fit each other.
+        """
+
+        def get(key: str) -> FloatArray:
+            return np.ascontiguousarray(arrays[f"{name}-{key}"], dtype=float)
+
+        reach = get("reach")
+        splines = []
+        for k in range(len(reach)):
+            origin, spacing = get(f"grid-{k}")
+            splines.append(TensorSpline(get(f"coefficients-{k}"), origin, spacing))
+        creases, points, begin = [], get("crease-points"), 0
+        for kind, first, second, angle, count in get("creases").tolist():
+            curve = points[begin : begin + int(count)]
+            begin += int(count)
+            creases.append(Crease(KINDS[int(kind)], (int(first), int(second)), curve, angle))
+        space = PieceSpace(tuple(splines), get("table"), get("box"))
+        number = cast(IntArray, get("number").astype(np.int64))
+        corners, normals = get("corners"), get("normals")
+        space.check()
+        if corners.shape != (len(number), 3, 3) or normals.shape != corners.shape or begin != len(points):
+            raise ValueError("the triangles of the pieces are damaged")
+        if not np.all((number >= 0) & (number < len(reach))) or not np.all(np.isfinite(corners)):
+            raise ValueError("the triangles of the pieces are damaged")
+        if not all(0 <= side < len(reach) for crease in creases for side in crease.pieces):
+            raise ValueError("the creases of the pieces are damaged")
+        return cls(space, tuple(creases), corners, normals, number, reach)
+
+
+def _dense(points: FloatArray, apart: float) -> FloatArray:
+    """Points (n, 3) of a polygon with others between them, so far apart at most."""
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    parts = [
+        a + (b - a) * (np.arange(n) / n)[:, None]
+        for a, b, n in zip(points[:-1], points[1:], np.ceil(length / apart).astype(int).clip(1, 1000), strict=True)
+    ]
+    return np.concatenate([*parts, points[-1:]])
