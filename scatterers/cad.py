@@ -123,16 +123,16 @@ class Cad(FittedBody):
         if found.edges and strict:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
         notes = {"source": path.name, "edges": list(found.edges)}
-        if found.creases.any():
+        if quality.verdict != "smooth" and strict:
+            raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
+        if found.creases.any() or (quality.verdict != "smooth" and found.level.any()):
             # fillets ask for more points than faces
             found = read_cad(path, reading, curved=CURVED, progress=progress)
             mesh, normals = found.mesh, found.corner_normals
-            regions = regions_of(mesh.vertices, mesh.triangles, sharp=found.creases)
+            regions = regions_of(mesh.vertices, mesh.triangles, sharp=found.creases, level=found.level)
             return PieceCloud(
                 mesh.vertices, mesh.triangles, regions, normals, quality, notes | {"repairs": list(mesh.repairs)}
             )
-        if quality.verdict != "smooth" and strict:
-            raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
         non_smooth = np.concatenate([found.mesh.vertices[quality.bad], found.non_smooth])
         return PointCloud(
             found.mesh.vertices,

@@ -46,8 +46,9 @@ class CadPoints:
         Outward; NaN where no face has one.
     corner_normals : (m, 3, 3)
         Outward at the corners of the triangles, each of its own face.
-    creases : (e,) bool
-        Edges, in the order of `scatterers.triangles.topology.edges_of`, at which faces do not join smoothly.
+    creases, level : (e,) bool
+        Edges, in the order of `scatterers.triangles.topology.edges_of`, at which faces do not join smoothly, and at
+        which they do.
     edges : tuple of str
         Where faces do not join smoothly.
     non_smooth : (k, 3), m
@@ -58,6 +59,7 @@ class CadPoints:
     normals: FloatArray
     corner_normals: FloatArray
     creases: NDArray[np.bool_]
+    level: NDArray[np.bool_]
     edges: tuple[str, ...]
     non_smooth: FloatArray
 
@@ -132,7 +134,7 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
         progress(line)
     of = _faces_of(triangles, row[found["triangles"].astype(np.int64)], found["of"].astype(np.int64))
     corners = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
-    return CadPoints(mesh, normals, corners, _creases(mesh, of, corners), edges, mesh.vertices[sharp])
+    return CadPoints(mesh, normals, corners, *_creases(mesh, of, corners), edges, mesh.vertices[sharp])
 
 
 def kind_of(path: Path) -> str:
@@ -263,8 +265,8 @@ def _corner_normals(mesh: TriangleMesh, of: IntArray, at: IntArray, face: IntArr
     return np.where(there[..., None], n, flat[:, None])
 
 
-def _creases(mesh: TriangleMesh, of: IntArray, normals: FloatArray) -> NDArray[np.bool_]:
-    """Edges between faces whose normals differ there."""
+def _creases(mesh: TriangleMesh, of: IntArray, normals: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Edges between faces whose normals differ there, and between others."""
     from scatterers.triangles.topology import edges_of
 
     edges = edges_of(mesh.triangles)
@@ -275,7 +277,8 @@ def _creases(mesh: TriangleMesh, of: IntArray, normals: FloatArray) -> NDArray[n
     # the edge runs from corner k to the next in one triangle, the other way in the other
     after = np.where(left % 3 == 2, left - 2, left + 1), np.where(right % 3 == 2, right - 2, right + 1)
     turns = [np.linalg.norm(flat[a] - flat[b], axis=1) for a, b in ((left, after[1]), (after[0], right))]
-    return np.asarray(between & (np.minimum(*turns) > 2 * np.sin(np.radians(SHARP) / 2)))
+    sharp = between & (np.minimum(*turns) > 2 * np.sin(np.radians(SHARP) / 2))
+    return sharp, between & ~sharp
 
 
 def _joined(

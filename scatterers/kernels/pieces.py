@@ -1,7 +1,8 @@
 """Compiled level of a body of pieces, each a quintic tensor-product B-spline; see `scatterers.pieces.selection`.
 
 Voxels have programs in postfix order: the number of a piece asks for its F, -1 takes the larger of the last two values,
--2 the smaller. Importing this module imports numba.
+-2 the smaller; -3 takes the last one where a.x > b, else the one before, a (3) and b standing behind it. Importing this
+module imports numba.
 
 Parameters: origin of the voxels (3), 1/side, their numbers along the axes (3), where the table of voxels begins, where
 that of the pieces does; the table gives for each voxel the place of its program, which stands behind its length; that
@@ -16,6 +17,7 @@ from scatterers.kernels.tensor import second_derivatives, value_and_gradient
 
 MOST = 8
 """Values that a program holds at a time."""
+LARGER, SMALLER, BESIDES = -1, -2, -3
 
 
 @njit(**OPTIONS)
@@ -39,17 +41,23 @@ def chosen(x, y, z, parameters):  # type: ignore[no-untyped-def]
         return number
     pieces, height = int(parameters[8]), 0
     values, numbers = np.empty(MOST), np.empty(MOST, np.int64)
-    for k in range(entry + 1, entry + 1 + length):
+    k, end = entry + 1, entry + 1 + length
+    while k < end:
         token = int(parameters[k])
+        k += 1
         if token >= 0:
             own = parameters[int(parameters[pieces + token]) :]
             values[height], numbers[height] = value_and_gradient(x, y, z, own)[0], token
             height += 1
+            continue
+        height -= 1
+        if token == BESIDES:
+            last = parameters[k] * x + parameters[k + 1] * y + parameters[k + 2] * z > parameters[k + 3]
+            k += 4
         else:
-            height -= 1
-            larger = values[height] > values[height - 1]
-            if larger == (token == -1):
-                values[height - 1], numbers[height - 1] = values[height], numbers[height]
+            last = (values[height] > values[height - 1]) == (token == LARGER)
+        if last:
+            values[height - 1], numbers[height - 1] = values[height], numbers[height]
     return numbers[0]
 
 

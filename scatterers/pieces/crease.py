@@ -1,7 +1,6 @@
 """Where smooth pieces of a body meet or end."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,7 @@ class Crease:
     Crease(edge between pieces 0 and 1, 90 degrees, length 2.83 L, closed)
     """
 
-    kind: Literal["edge", "joint", "tip", "seam"]
+    kind: str
     pieces: tuple[int, int]
     points: FloatArray
     angle: float = 0.0

@@ -7,7 +7,7 @@ their borders as well, so that both know the seam.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,10 @@ GOOD = 0.7
 """Share of the vertices of a piece whose jets are sound, from which on jets are used."""
 EVEN, MOST_POINTS = 400, 6_000
 """Fewest points of a piece that is known from few vertices, and the most."""
+MISSED = 1e-4
+"""Distance in body sizes between a point and the level there, beyond which the level is not trusted about it."""
+JUMP = 0.1
+"""Jump of the curvature across a joint, relative to the larger, below which it is none."""
 SHARE = 500
 """Triangles cut at a time."""
 ROUGH = 0.05
@@ -59,6 +63,8 @@ class FittedPieces:
         Pieces that are not trusted.
     samples, owner : (k, 3), L, and (k,)
         Points spread over the body, and their pieces.
+    astray : (j, 3), L
+        Those at which another piece stands for the body, that is not there: features are too fine for the voxels.
     """
 
     fine: PieceSpace
@@ -70,6 +76,7 @@ class FittedPieces:
     rough: BoolArray
     samples: FloatArray
     owner: IntArray
+    astray: FloatArray
 
     def report(self) -> FitReport:
         """How well the pieces meet their points, and how their curvatures depend on the grid away from edges."""
@@ -138,12 +145,40 @@ def fitted_pieces(
         patches.append(patch)
         at_corners[own] = corner_normals
     points, owner = _spread(vertices[triangles], at_corners, piece)
-    fine = piece_space([patch.fine for patch in patches], points, owner)
+    creases = tuple(_judged(crease, patches) for crease in regions.creases(vertices, piece))
+    fine = piece_space([patch.fine for patch in patches], points, owner, creases)
     coarse = fine.with_splines([patch.coarse for patch in patches])
+    astray = _astray(fine, patches, points, owner, size)
     rough = np.array([_rough(patch, points[owner == k]) for k, patch in enumerate(patches)])
-    return FittedPieces(
-        fine, coarse, tuple(patches), piece, at_corners, regions.creases(vertices, piece), rough, points, owner
-    )
+    return FittedPieces(fine, coarse, tuple(patches), piece, at_corners, creases, rough, points, owner, astray)
+
+
+def _astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: IntArray, size: float) -> FloatArray:
+    """Points (k, 3) that the level of the body misses by more than `MISSED` of its size."""
+    number = space.numbers(points)
+    wrong = np.flatnonzero(number != owner)
+    missed = np.zeros(len(wrong))
+    for k in np.unique(number[wrong]):
+        mine = number[wrong] == k
+        value, gradient = patches[k].fine.value_and_gradient(points[wrong[mine]])
+        missed[mine] = np.abs(value) / np.linalg.norm(gradient, axis=1)
+    return np.asarray(points[wrong[missed > MISSED * size]])
+
+
+def _judged(crease: Crease, patches: list[Patch]) -> Crease:
+    """A joint across which the curvature does not jump either is a seam."""
+    if crease.kind != "joint":
+        return crease
+    x = 0.5 * (crease.points[1:] + crease.points[:-1])
+    along = np.diff(crease.points, axis=0)
+    bends = []
+    for number in crease.pieces:
+        spline = patches[number].fine
+        across = np.cross(spline.gradient(x), along)
+        # across first, then along
+        bends.append(curvatures(spline, x, across)[0][: len(x)])
+    jump = float(np.median(np.abs(bends[0] - bends[1])))
+    return replace(crease, kind="seam") if jump <= JUMP * float(np.median(np.max(np.abs(bends), axis=0))) else crease
 
 
 def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[FloatArray, IntArray]:

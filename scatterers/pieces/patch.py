@@ -3,7 +3,8 @@
 A quadric Q = 0 has q of unit length that makes sum ON^2 Q(x)^2 + |n x grad Q(x)|^2 least over points x and normals n,
 which tell it from other quadrics through the points; it is
 taken if all points lie on it within `EXACT` of the body's size, as those of cylinders, cones and balls of engineering
-do, and counts as exact then. As polynomials of degree 2 both kinds are splines of one cell, which go on as they are far
+do, or if what is left, e over a length l, changes curvatures by 8 e/l^2 < `CLOSE` of the largest, as of cylinders that a
+program wrote as splines. As polynomials of degree 2 both kinds are splines of one cell, which go on as they are far
 beyond the region. Other regions are fitted as whole bodies are (`scatterers.spline.fitting`), from their own points
 only, so that nothing is rounded off at their borders; a coarser fit tells how far they are known.
 """
@@ -23,13 +24,16 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 EXACT = 1e-6
 """Distance of points from a plane or quadric, in body sizes, within which they lie on it: single precision and some."""
+CLOSE = 2e-4
 LEAN = 0.35
 """Angle between the normals of triangles and a quadric through their corners, radians."""
 ON = 1e4
 """Weight of points against normals, which those of triangles give roughly."""
-SPACING, NODES = 1.4, 4e5
-"""Grid of a spline in units of the distance of points, and its most nodes."""
+SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
+"""Grid of a spline in units of the distance of points, of those with others between them, and its most nodes."""
 COARSER = 1.35
+STEPS = 300
+"""Of a fit: the borders of a piece take long, and gain little."""
 CLOSELY, ROUGHLY = 5e-5, 1e-3
 """Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
 
@@ -65,15 +69,16 @@ def spline_patch(
     With jets at the points and triangles (m, 3) between them, to the points that jets give there as well.
     """
     distance = mean = None
-    accuracy = ROUGHLY
+    accuracy, cells = ROUGHLY, SPACING
     if jets is not None and triangles is not None:
         more, there = centroids(points, triangles, jets)
-        distance, accuracy = partial(signed_distance, points, jets), CLOSELY
+        distance = partial(signed_distance, points, jets)
+        accuracy, cells = CLOSELY, BETWEEN
         mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more), np.nan)])
         points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
-    grid = max(SPACING * spacing, spacing_of(points, NODES))
+    grid = max(cells * spacing, spacing_of(points, NODES))
     fine, coarse = (
-        fit(points, normals, h, distance=distance, mean_curvature=mean, accuracy=accuracy)
+        fit(points, normals, h, distance=distance, mean_curvature=mean, accuracy=accuracy, iterations=STEPS)
         for h in (grid, COARSER * grid)
     )
     return Patch(fine.spline, coarse.spline, "spline", fine.misfit, fine.turn, spacing)
@@ -117,9 +122,16 @@ def polynomial_through(
             f, g, lean, q = -f, -g, -lean, -q
         off = np.abs(f) / np.maximum(steep, 1e-300) * half
         # a quadric may be a pair of sheets, of which the points take one
-        if np.all(off <= tolerance) and np.all(lean > np.cos(LEAN)):
+        curved = CLOSE * _bend(q, powers, steep) * half / 8 if kind == "quadric" else 0.0
+        if np.all(off <= max(tolerance, curved)) and np.all(lean > np.cos(LEAN)):
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
     return None
+
+
+def _bend(q: FloatArray, powers: list[tuple[int, int, int]], steep: FloatArray) -> float:
+    """Median size of the second derivatives of Q over |grad Q|, in the variables of the monomials."""
+    second = np.array([[2.0 if 2 in p else 1.0] for p in powers]) * (np.sum(powers, axis=1) == 2)[:, None]
+    return float(np.linalg.norm(q[:, None] * second) / np.median(steep))
 
 
 def _monomials(x: FloatArray, powers: list[tuple[int, int, int]]) -> tuple[FloatArray, FloatArray]:

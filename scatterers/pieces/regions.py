@@ -8,7 +8,6 @@ what is connected without crossing a crease.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,12 +39,15 @@ class Regions:
         Region of each triangle.
     turns : Turns
     crease : (e,) bool
-        Which edges are creases.
+        Which edges bound regions.
+    level : (e,) bool
+        Which of those have one normal on both sides, as where a fillet begins.
     """
 
     number: IntArray
     turns: "Turns"
     crease: BoolArray
+    level: BoolArray
 
     @property
     def count(self) -> int:
@@ -58,11 +60,13 @@ class Regions:
         return np.asarray(self.turns.sides[~self.crease])
 
     def creases(self, vertices: FloatArray, piece: IntArray) -> tuple[Crease, ...]:
-        """Edges, and seams between pieces (m,) of triangles of one region, as curves."""
+        """Edges, joints, and seams between pieces (m,) of triangles of one region, as curves."""
         sides = piece[self.turns.sides]
         seam = ~self.crease & (sides[:, 0] != sides[:, 1])
-        edges = _curves(vertices, self.turns, np.flatnonzero(self.crease), piece, "edge")
-        return edges + _curves(vertices, self.turns, np.flatnonzero(seam), piece, "seam")
+        found: tuple[Crease, ...] = ()
+        for kind, which in (("edge", self.crease & ~self.level), ("joint", self.level), ("seam", seam)):
+            found += _curves(vertices, self.turns, np.flatnonzero(which), piece, kind)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +78,21 @@ class Turns:
     turn: FloatArray
 
 
-def regions_of(vertices: FloatArray, triangles: IntArray, *, sharp: BoolArray | None = None) -> Regions:
+def regions_of(
+    vertices: FloatArray,
+    triangles: IntArray,
+    *,
+    sharp: BoolArray | None = None,
+    level: BoolArray | None = None,
+) -> Regions:
     """Regions of a closed, oriented mesh: (n, 3), L, and (m, 3).
 
     Parameters
     ----------
     sharp : (e,) bool, optional
         Which edges, in the order of `scatterers.triangles.topology.edges_of`, are creases, where it is known.
+    level : (e,) bool, optional
+        Which other edges bound regions without a jump of the normal.
 
     Examples
     --------
@@ -92,7 +104,9 @@ def regions_of(vertices: FloatArray, triangles: IntArray, *, sharp: BoolArray | 
     """
     turns = _turns(vertices, triangles)
     crease = _chained(turns, _creased(turns, len(triangles)) if sharp is None else sharp, len(vertices))
-    return Regions(_connected(len(triangles), turns.sides[~crease]), turns, crease)
+    level = np.zeros_like(crease) if level is None else level & ~crease
+    bounds = crease | level
+    return Regions(_connected(len(triangles), turns.sides[~bounds]), turns, bounds, level)
 
 
 def _turns(vertices: FloatArray, triangles: IntArray) -> Turns:
@@ -167,9 +181,7 @@ def _connected(count: int, pairs: IntArray) -> IntArray:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _curves(
-    vertices: FloatArray, turns: Turns, at: IntArray, piece: IntArray, kind: Literal["edge", "seam"]
-) -> tuple[Crease, ...]:
+def _curves(vertices: FloatArray, turns: Turns, at: IntArray, piece: IntArray, kind: str) -> tuple[Crease, ...]:
     """Edges with numbers ``at`` joined to curves, one for each pair of pieces and stretch between branch points."""
     pair = np.sort(piece[turns.sides[at]], axis=1)
     meeting = np.bincount(turns.ends[at].ravel(), minlength=len(vertices))

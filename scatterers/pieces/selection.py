@@ -3,7 +3,8 @@
 Points of all pieces, closer to each other than a voxel, say which pieces bound the body in a voxel and the next ones.
 What two of them make of each other there is read off F of the one at points of the other: F < 0, the body is what both
 have inside, as at a convex edge and between the two sides of a thin part, and F of the body is the larger; F > 0, what
-either has, and it is the smaller; F = 0, they are parts of one smooth surface, and the nearer one stands for both. Of
+either has, and it is the smaller; F = 0, they are parts of one smooth surface, parted by the plane through their crease
+there, and where they have none the nearer one stands for both. Of
 three and more the pairs make a tree: if pieces fall into groups that are all joined by "the larger", that comes last,
 and so on within the groups. Voxels far off follow the next ones with points.
 """
@@ -17,20 +18,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.spline_constants import CENTRE, HEADER
+from scatterers.pieces.crease import Crease
 from scatterers.spline.tensor import TensorSpline, evaluated
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-VOXELS = 200_000
+Program = tuple[float, ...]
+VOXELS = 500_000
 """Voxels about a body."""
 FIRST = 9
 """Parameters before the tables."""
 SAME = 0.03
 """|F| in voxels at points of another piece, in the mean, below which both are parts of one smooth surface."""
-LARGER, SMALLER = -1, -2
-"""Of the last two values, in a program."""
+LARGER, SMALLER, BESIDES = -1, -2, -3
+"""Of the last two values, in a program; the last names a plane."""
 MOST_PIECES = 8
 """Pieces that a voxel tells apart."""
+LONGEST = 6
+"""Smooth neighbours in a voxel that are told apart."""
 MARGIN = 3
 """Voxels about the body."""
 
@@ -111,10 +116,16 @@ class PieceSpace:
 
 def _sound(program: FloatArray, count: int) -> bool:
     """Whether a program takes known pieces only and leaves one value."""
-    if not np.all((program == np.round(program)) & (program >= SMALLER) & (program < count)):
-        return False
-    height = np.cumsum(np.where(program >= 0, 1, -1))
-    return bool(height.min() >= 1 and height.max() <= MOST_PIECES and height[-1] == 1)
+    height, k = 0, 0
+    while k < len(program):
+        token = program[k]
+        if token != round(token) or not BESIDES <= token < count:
+            return False
+        height += 1 if token >= 0 else -1
+        k += 5 if token == BESIDES else 1
+        if not 1 <= height <= MOST_PIECES:
+            return False
+    return height == 1 and k == len(program)
 
 
 def voxel_side(box: FloatArray) -> float:
@@ -128,10 +139,12 @@ def voxel_side(box: FloatArray) -> float:
     return high
 
 
-def piece_space(splines: Sequence[TensorSpline], points: FloatArray, owner: IntArray) -> PieceSpace:
+def piece_space(
+    splines: Sequence[TensorSpline], points: FloatArray, owner: IntArray, creases: Sequence[Crease] = ()
+) -> PieceSpace:
     """Choose among splines by points (n, 3), L, of the whole body and the numbers (n,) of the pieces they lie on.
 
-    Points are to be less than a `voxel_side` apart.
+    Points are to be less than a `voxel_side` apart. Of creases the smooth ones matter: joints and seams.
     """
     from scipy.spatial import cKDTree
 
@@ -145,10 +158,12 @@ def piece_space(splines: Sequence[TensorSpline], points: FloatArray, owner: IntA
     nearest = owner[cKDTree(points).query(middles)[1]]
     pairs = _pairs(row.ravel(), piece, at)
     signs = _signs(splines, points, pairs, SAME * side)
-    programs: list[tuple[int, ...]] = [(int(number),) for number in nearest]
-    known: dict[tuple[Any, ...], tuple[int, ...]] = {}
+    programs: list[Program] = [(int(number),) for number in nearest]
+    known: dict[tuple[Any, ...], Program] = {}
+    planes = _Planes(splines, creases)
     for where, among in signs.items():
-        key = int(nearest[where]), tuple(sorted(among.items()))
+        beside = planes.near(middles[where], [pair for pair, sign in among.items() if not sign], 3 * side)
+        key = int(nearest[where]), tuple(sorted(among.items())), tuple(sorted(beside.items()))
         if key not in known:
             known[key] = _program(*key)
         programs[where] = known[key]
@@ -219,20 +234,73 @@ def _signs(
     return signs
 
 
-def _program(nearest: int, among: tuple[tuple[tuple[int, int], int], ...]) -> tuple[int, ...]:
-    """F of the body from those of pieces in postfix order: numbers of pieces, `LARGER` and `SMALLER`."""
-    signs = dict(among)
-    pieces = sorted({number for pair in signs for number in pair}, key=lambda number: (number != nearest, number))
-    # of one smooth surface the first stands for all
-    kept: list[int] = []
-    for number in pieces:
-        if all(signs[min(number, k), max(number, k)] for k in kept):
-            kept.append(number)
-    kept = kept[:MOST_PIECES]
+class _Planes:
+    """Planes across the body through joints and seams, by which the two pieces of one smooth surface are told apart."""
 
-    def joined(members: list[int]) -> tuple[int, ...]:
+    def __init__(self, splines: Sequence[TensorSpline], creases: Sequence[Crease]) -> None:
+        from scipy.spatial import cKDTree
+
+        self._of: dict[tuple[int, int], tuple[Any, FloatArray, FloatArray]] = {}
+        for pair in {crease.pieces for crease in creases if crease.kind in ("joint", "seam")}:
+            curves = [c for c in creases if c.pieces == pair and c.kind in ("joint", "seam")]
+            x = np.concatenate([0.5 * (c.points[1:] + c.points[:-1]) for c in curves])
+            along = np.concatenate([np.diff(c.points, axis=0) for c in curves])
+            first, second = (splines[number].gradient(x) for number in pair)
+            across = np.cross(first / np.linalg.norm(first, axis=1, keepdims=True) + second, along)
+            across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+            self._of[min(pair), max(pair)] = cKDTree(x), x, across
+
+    def near(
+        self, point: FloatArray, pairs: list[tuple[int, int]], reach: float
+    ) -> dict[tuple[int, int], tuple[float, ...]]:
+        """a (3) and b of the plane a.x = b nearest to a point, for each pair that has one."""
+        found = {}
+        for pair in pairs:
+            if pair in self._of:
+                tree, x, across = self._of[pair]
+                distance, k = tree.query(point)
+                if distance < reach:
+                    found[pair] = (*across[k].tolist(), float(across[k] @ x[k]))
+        return found
+
+
+def _program(
+    nearest: int,
+    among: tuple[tuple[tuple[int, int], int], ...],
+    beside: tuple[tuple[tuple[int, int], tuple[float, ...]], ...],
+) -> Program:
+    """F of the body from those of pieces in postfix order: numbers of pieces, `LARGER`, `SMALLER`, `BESIDES`."""
+    signs, planes = dict(among), dict(beside)
+    pieces = sorted({number for pair in signs for number in pair}, key=lambda number: (number != nearest, number))
+    # of one smooth surface the first stands for all, but beyond the planes that part them
+    kept: list[int] = []
+    leaves: dict[int, Program] = {}
+    chained: set[int] = set()
+    for number in pieces:
+        if number in chained:
+            continue
+        same = [k for k in pieces if k != number and not signs[min(number, k), max(number, k)]]
+        if any(k in kept for k in same):
+            continue
+        if len(kept) >= MOST_PIECES // 2:
+            break
+        kept.append(number)
+        leaves[number] = (number,)
+        # along a chain of smooth neighbours, each beyond the plane through its joint with the one before
+        ends = [number]
+        while ends and len(chained) < LONGEST:
+            k = ends.pop()
+            for other in pieces:
+                plane = planes.get((min(k, other), max(k, other)))
+                if plane is not None and other not in chained and other not in kept:
+                    turn = 1.0 if k < other else -1.0
+                    leaves[number] = (*leaves[number], other, BESIDES, *(turn * value for value in plane))
+                    chained.add(other)
+                    ends.append(other)
+
+    def joined(members: list[int]) -> Program:
         if len(members) == 1:
-            return (members[0],)
+            return leaves[members[0]]
         for sign, last in ((-1, LARGER), (1, SMALLER)):
             # groups that hang together by the other sign come first
             groups: list[set[int]] = []
@@ -246,21 +314,19 @@ def _program(nearest: int, among: tuple[tuple[tuple[int, int], int], ...]) -> tu
                     program = (*program, *part, last)
                 return program
         # no tree: the pairs with the nearest one decide
-        program = (members[0],)
+        program = leaves[members[0]]
         for number in members[1:]:
             sign = signs[min(members[0], number), max(members[0], number)]
-            program = (*program, number, LARGER if sign > 0 else SMALLER)
+            program = (*program, *leaves[number], LARGER if sign > 0 else SMALLER)
         return program
 
     return joined(kept)
 
 
-def _table(
-    origin: FloatArray, side: float, shape: IntArray, programs: list[tuple[int, ...]], nearest: IntArray
-) -> FloatArray:
+def _table(origin: FloatArray, side: float, shape: IntArray, programs: list[Program], nearest: IntArray) -> FloatArray:
     """Header, table of voxels and their programs, each behind its length; alike ones are kept once."""
     cells = int(np.prod(shape))
-    known: dict[tuple[int, ...], int] = {}
+    known: dict[Program, int] = {}
     tail: list[float] = []
     places = np.empty(len(programs))
     for k, program in enumerate(programs):

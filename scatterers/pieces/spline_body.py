@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
-KINDS: tuple[Literal["edge", "joint", "tip", "seam"], ...] = ("edge", "joint", "tip", "seam")
+KINDS = ("edge", "joint", "tip", "seam")
 TRUSTED = 1.0
 """Distance from an edge from which on a fitted piece is trusted, in distances of its points."""
 STEPS = 3
@@ -70,6 +70,8 @@ class SplinePieces:
         Piece of each triangle.
     reach : (p,), L
         Distance from its edges within which a piece is not trusted, inf for one that is not trusted at all.
+    astray : (j, 3), L
+        Points about which the level is not trusted, within a voxel.
     """
 
     space: PieceSpace
@@ -78,13 +80,15 @@ class SplinePieces:
     normals: FloatArray
     number: IntArray
     reach: FloatArray
+    astray: FloatArray
 
     @classmethod
     def of(cls, fitted: FittedPieces, corners: FloatArray, *, coarse: bool = False) -> "SplinePieces":
         """Those of a fit, or of its coarser twin."""
         space = fitted.coarse if coarse else fitted.fine
         reach = np.array([TRUSTED * patch.spacing for patch in fitted.patches])
-        return cls(space, fitted.creases, corners, fitted.normals, fitted.piece, np.where(fitted.rough, np.inf, reach))
+        reach = np.where(fitted.rough, np.inf, reach)
+        return cls(space, fitted.creases, corners, fitted.normals, fitted.piece, reach, fitted.astray)
 
     @cached_property
     def surfaces(self) -> tuple[SplinePiece, ...]:
@@ -128,7 +132,7 @@ class SplinePieces:
         """Tree of points on edges of fitted pieces, and how far from each the pieces are not trusted."""
         from scipy.spatial import cKDTree
 
-        points, reach = [np.zeros((0, 3))], [np.zeros(0)]
+        points, reach = [self.astray], [np.full(len(self.astray), 1 / self.space.table[3])]
         for crease in self.creases:
             sides = self.reach[list(crease.pieces)]
             own = float(np.max(np.where(np.isfinite(sides), sides, 0.0)))
@@ -149,6 +153,7 @@ class SplinePieces:
             "normals": self.normals,
             "number": self.number.astype(float),
             "reach": self.reach,
+            "astray": self.astray,
             "creases": np.array(sides, dtype=float).reshape(-1, 5),
             "crease-points": np.concatenate([np.zeros((0, 3)), *(crease.points for crease in self.creases)]),
         }
@@ -190,7 +195,7 @@ class SplinePieces:
             raise ValueError("the triangles of the pieces are damaged")
         if not all(0 <= side < len(reach) for crease in creases for side in crease.pieces):
             raise ValueError("the creases of the pieces are damaged")
-        return cls(space, tuple(creases), corners, normals, number, reach)
+        return cls(space, tuple(creases), corners, normals, number, reach, get("astray").reshape(-1, 3))
 
 
 def _dense(points: FloatArray, apart: float) -> FloatArray:

@@ -87,6 +87,7 @@ def fit(
     smoothing: float = SMOOTHING,
     normal_weight: float = 1.0,
     accuracy: float = 5e-5,
+    iterations: int = ITERATIONS,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fitted:
     """Fit F to points (n, 3) of a closed body, L, and outward unit normals (n, 3) there.
@@ -108,6 +109,8 @@ def fit(
         Weight of grad f = n; less where points are noisy, and normals that come of them more so.
     accuracy : float
         Change of the curvatures over `CHECKED` iterations, relative to their rms, at which the solver stops.
+    iterations : int
+        Most steps of the solver.
     progress : callable
         Told what is being done.
 
@@ -124,7 +127,7 @@ def fit(
     p, rz = z.copy(), float(np.vdot(r, z))
     before, change, done = watch.curvatures(c), np.inf, 0
     best, kept = watch.off(before), c.copy()
-    while done < ITERATIONS and rz > 0:
+    while done < iterations and rz > 0:
         q = equations.residual(p, targets=False)
         step = -rz / float(np.vdot(p, q))
         c += step * p
