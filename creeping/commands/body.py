@@ -75,7 +75,7 @@ def parse_body(
     try:
         if of_file:
             kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
-            shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=progress)
+            shape = kind(text, units, strict=not allow_rough, cache=cache, speed=speed, progress=progress)
             return _with_charts(shape, progress)
         if name in BODIES:
             return _with_charts(_named(name, rest, speed), None)

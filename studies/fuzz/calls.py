@@ -280,7 +280,7 @@ def _calls_of_bodies(made: dict[str, Any]) -> dict[str, Call]:
     nodes = np.linspace(-1.4, 1.4, 12)
     samples = nodes[:, None, None] ** 2 + nodes[:, None] ** 2 + nodes**2 - 1
     box = [[-1.4] * 3, [1.4] * 3]
-    options: dict[str, Any] = {"allow_rough": False, "speed": None}
+    options: dict[str, Any] = {"strict": False, "speed": None}
     files = {"units": "m", **options, "cache": False, "progress": None}
     found: dict[str, Call] = {
         "sc.Sphere": (sc.Sphere, {"radius": 1.0, "speed": None}),
