@@ -1,31 +1,46 @@
 """Body F(x, y, z) = 0 from an expression: differentiated by sympy, compiled, and examined before use.
 
 The body is looked for on grids (`scatterers.expression.search`): F < 0 in one connected region inside the box, F > 0 in
-one around it. Then places are looked for where it is not smooth (`scatterers.expression.singularities`).
+one around it. Then places are looked for where it is not smooth: tips (`scatterers.expression.singularities`), and
+curves along which max, min and where change their choice and the normal or the curvature jumps.
 """
 
 import hashlib
 import reprlib
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.body import numbers
+from scatterers.base.body import numbers, positive
 from scatterers.base.level_body import LevelBody
+from scatterers.exact.body import SHARP, Piece, no_charts
+from scatterers.exact.clipped import clip, creases, normals
+from scatterers.exact.marching import march
 from scatterers.expression.search import FINE, SIZES, examine, found_box, samples_of, tightened
-from scatterers.expression.singularities import refuse_edges, refuse_kinks, singular_points
+from scatterers.expression.singularities import (
+    distinct,
+    is_tip,
+    kinks,
+    polished,
+    refuse_edges,
+    refuse_kinks,
+    singular_points,
+)
 from scatterers.expression.space import ExpressionSpace
+from scatterers.expression.switches import Switches
+from scatterers.kernels.compiled import Compiled
+from scatterers.pieces.crease import Crease
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.samples import Samples
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 MOST_TIPS = 8
-BUMP = 2.4
-"""Reach of a non-smooth place in widths of the bump, exp(-r^4), that rounds a tip off: beyond, below rounding."""
-TIP = 0.025
-"""Distance from a singular point within which the body counts as non-smooth, in diagonals of its box."""
+PER_EDGE = 1.5
+"""Cells of the grid to an edge of tiles: sides are 1.15 edges at most."""
 
 
 class Implicit(LevelBody):
@@ -35,15 +50,16 @@ class Implicit(LevelBody):
     ----------
     expression : str
         Numbers, x, y, z, pi, + - * / **, parentheses, sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and
-        where(x < 0, a, b) of pieces that join smoothly; negative inside the body, positive outside.
+        max(a, b, ...), min(a, b, ...) and where(x < 0, a, b); negative inside the body, positive outside.
     bounds : (2, 3) array_like, optional
         Box that contains the body and nothing else, L; found if not given, for bodies that a cube about the origin with
         half width 2^-8 to 2^12 resolves.
     centre : (3,) array_like, optional
         Point that sees the whole body from within, L; only star-shaped bodies have one.
-    allow_rough : bool
-        Take a body with tips, points where grad F = 0. They are rounded off within a fortieth of the box's diagonal;
-        `non_smooth` says where, and rays that come there end.
+    strict : bool
+        Refuse bodies with edges and tips. A body that has them, or joints, is one of smooth pieces: it has the members
+        ``pieces``, ``creases``, ``piece`` and ``tiles``, and charts only if it has neither edges nor tips. Pieces
+        smaller than a cell of the grid on which the body is looked for, a 64th of its box, may be missed.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
@@ -51,7 +67,7 @@ class Implicit(LevelBody):
     ------
     ValueError
         If the expression contains anything else, or F = 0 is empty, open, unbounded, not finite, not connected, has a
-        cavity, a point where grad F = 0, an edge, or unbounded curvature.
+        cavity, crosses itself, or has unbounded curvature other than at tips; or is refused as strict.
 
     Examples
     --------
@@ -61,6 +77,8 @@ class Implicit(LevelBody):
     array([1., 0., 0.])
     >>> body.star_shaped
     True
+    >>> sc.Implicit("max(x**2 + y**2 + z**2 - 1, z - 0.6)").creases
+    [Crease(edge between pieces 0 and 1, 53.1 degrees, length 5.03 L, closed)]
     """
 
     def __init__(
@@ -69,11 +87,11 @@ class Implicit(LevelBody):
         bounds: ArrayLike | None = None,
         *,
         centre: ArrayLike | None = None,
-        allow_rough: bool = False,
+        strict: bool = False,
         speed: Any = None,
     ) -> None:
-        if not isinstance(allow_rough, bool):
-            raise ValueError(f"allow_rough = {allow_rough!r} is neither True nor False")
+        if not isinstance(strict, bool):
+            raise ValueError(f"strict = {strict!r} is neither True nor False")
         everywhere = ExpressionSpace(expression, np.array([[-SIZES[-1]] * 3, [SIZES[-1]] * 3]))
         self.expression = expression
         self.speed = speed
@@ -88,17 +106,77 @@ class Implicit(LevelBody):
             examine(expression, samples, True)
         given = None if centre is None else _point(centre)
         self._shape(expression, samples, given)
-        found = self._singular(samples)
-        if len(found) and not allow_rough:
+        tips = self._tips(samples, strict)
+        along = self._found_creases(samples, strict)
+        ends = [int(self._numbers(tip[None])[0]) for tip in tips]
+        self._creases = [*(Crease("tip", (k, k), tip[None]) for tip, k in zip(tips, ends, strict=True)), *along]
+        if any(crease.kind != "seam" for crease in self._creases):
+            # only a body of pieces has the members of one: by them it is told from a smooth body
+            self.__class__ = CreasedImplicit
+
+    def _tips(self, samples: Samples, strict: bool) -> FloatArray:
+        points, spacing, size = samples.crossings(), float(samples.spacing.max()), self._diagonal
+        flat = singular_points(self.compiled, points, size)
+        if len(flat) > MOST_TIPS:
             raise ValueError(
-                f"F = 0 is not smooth: grad F = 0 at {len(found)} of its points, first {tuple(found[0].tolist())}; "
-                "a tip, an edge or a crossing there has no creeping rays: "
-                "round it off, or allow non-smooth places, where rays end"
+                f"F = 0 is not smooth: grad F = 0 at {len(flat)} of its points, first {tuple(flat[0].tolist())}, more "
+                f"than the {MOST_TIPS} tips of a body; an edge, or F that does not change sign linearly: write it "
+                "otherwise"
             )
-        if len(found):
-            self._round(found, samples, given)
-        refuse_edges(self.compiled, samples.crossings(), float(samples.spacing.max()))
-        refuse_kinks(self.compiled, samples.crossings(), float(samples.spacing.max()), self._diagonal)
+        if crossed := [place for place in flat if not is_tip(self.compiled, place, size)]:
+            raise ValueError(
+                f"F = 0 is not smooth: grad F = 0 at {len(flat)} of its points, and at "
+                f"{tuple(crossed[0].tolist())} there is a cusp or a crossing of parts, no tip: round it off in F"
+            )
+        sharp, bends = kinks(self.compiled, points, spacing, size)
+        apart = distinct(sharp, bends, size)
+        if len(apart) <= MOST_TIPS:
+            apart = np.array([polished(self.compiled, place, size) for place in apart]).reshape(-1, 3)
+        tips = len(apart) <= MOST_TIPS and all(is_tip(self.compiled, place, size) for place in apart)
+        if not tips:
+            refuse_kinks(sharp, bends)
+        found = distinct(np.concatenate([flat, apart]), np.arange(len(flat) + len(apart), 0.0, -1.0), size)
+        if strict and len(found):
+            raise ValueError(
+                f"F = 0 is not smooth: it has {len(found)} tips, first {tuple(found[0].round(9).tolist())}; leave "
+                "strict out to take them, or round them off in F"
+            )
+        return found
+
+    def _found_creases(self, samples: Samples, strict: bool) -> list[Crease]:
+        spacing = float(samples.spacing.max())
+        self._switches = Switches(self.expression)
+        if not self._switches.any:
+            refuse_edges(self.compiled, samples.crossings(), spacing)
+            return []
+        # points on the body: next to it, other choices may be made
+        points, triangles = march(self.level, self._bounds, spacing)
+        self._switches.met(points)
+        if len(self._pieces) == 1:
+            return []
+        found = creases(self._pieces, clip(self, self._pieces, self._numbers, points, triangles), spacing)
+        edges = [crease for crease in found if crease.kind == "edge"]
+        if strict and edges:
+            sharpest = max(edges, key=lambda crease: crease.angle)
+            raise ValueError(
+                f"F = 0 is not smooth: its normal jumps by up to {np.degrees(sharpest.angle):.2g} degrees near "
+                f"{tuple(sharpest.points[0].round(6).tolist())}, along {len(edges)} edges; leave strict out to take "
+                "them, or round them off in F"
+            )
+        return found
+
+    @cached_property
+    def _pieces(self) -> list[Piece]:
+        count = len(self._switches.pieces)
+        if count < 2:
+            return [Piece(self.compiled, self._bounds)]
+        compiled = [Compiled(self._switches.functions(k).block, "level", np.zeros(1)) for k in range(count)]
+        return [Piece(one, self._bounds) for one in compiled]
+
+    def _numbers(self, points: FloatArray) -> IntArray:
+        flat = np.asarray(points, dtype=float).reshape(-1, 3)
+        found = self._switches.numbers(flat) if len(self._pieces) > 1 else np.zeros(len(flat), dtype=np.int64)
+        return found.reshape(np.shape(points)[:-1])
 
     def _shape(self, expression: str, samples: Samples, centre: FloatArray | None) -> None:
         space = ExpressionSpace(expression, np.stack([samples.origin, samples.far_corner]))
@@ -107,34 +185,9 @@ class Implicit(LevelBody):
             raise ValueError(failure)
         self._place(space, samples, sphere_map)
 
-    def _round(self, tips: FloatArray, samples: Samples, centre: FloatArray | None) -> None:
-        """Add a bump to F at each tip, so that a smooth cap, within the non-smooth place, stands for it."""
-        if len(tips) > MOST_TIPS:
-            raise ValueError(
-                f"F = 0 is not smooth: grad F = 0 at {len(tips)} of its points, more than the {MOST_TIPS} tips that "
-                "are rounded off; an edge, or F that does not change sign linearly: write it otherwise"
-            )
-        self._non_smooth, self._reach = tips, TIP * self._diagonal
-        width, expression = self._reach / BUMP, self.expression
-        sphere = np.random.default_rng(0).normal(size=(2000, 3))
-        sphere *= 0.5 * width / np.linalg.norm(sphere, axis=1, keepdims=True)
-        for tip in tips:
-            depth = -float(np.min(self.level(tip + sphere)))
-            squares = "+".join(f"({name}-({value!r}))**2" for name, value in zip("xyz", tip.tolist(), strict=True))
-            expression += f"+({depth!r})*exp(-(({squares})/{width**2!r})**2)"
-        self._shape(expression, samples, centre)
-        if len(left := self._singular(samples)):
-            raise ValueError(
-                f"F = 0 is not smooth at {len(tips)} points, and not with them rounded either (at "
-                f"{tuple(left[0].tolist())}): an edge or a crossing of parts; round it off in F"
-            )
-
     @property
     def _diagonal(self) -> float:
         return float(np.linalg.norm(self._bounds[1] - self._bounds[0]))
-
-    def _singular(self, samples: Samples) -> FloatArray:
-        return singular_points(self.compiled, samples.crossings(), self._diagonal)
 
     def __repr__(self) -> str:
         return f"Implicit({self.expression!r}, speed={self.speed!r})"
@@ -148,6 +201,56 @@ class Implicit(LevelBody):
 
     def _identity(self) -> str:
         return self._named
+
+
+class CreasedImplicit(Implicit):
+    """Body of an expression with creases; `Implicit` makes it of its own accord."""
+
+    @property
+    def pieces(self) -> Sequence[Piece]:
+        """Smooth surfaces that bound the body."""
+        return self._pieces
+
+    @property
+    def creases(self) -> Sequence[Crease]:
+        """Where pieces meet or end."""
+        return self._creases
+
+    def piece(self, points: FloatArray) -> IntArray:
+        """Number of the piece that the expression chooses: points (..., 3), L, near the body, to (...).
+
+        On the body it is the nearest; off it, near an edge, as near as the sizes of grad F on both sides are equal.
+        """
+        return self._numbers(points)
+
+    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
+        """The body as triangles with sides of about ``edge``, L, at most.
+
+        Returns
+        -------
+        corners, normals : (m, 3, 3), L and 1
+            Counter-clockwise seen from outside; on the piece of the triangle, its normals there.
+        pieces : (m,)
+            No triangle lies on two. Slivers that fold back are left out.
+
+        Raises
+        ------
+        ValueError
+            If ``edge`` is not a positive finite number, or so small that the grid is too large.
+        """
+        positive(edge=edge)
+        points, triangles = march(self.level, self._bounds, edge / PER_EDGE)
+        clipped = clip(self, self._pieces, self._numbers, points, triangles)
+        corners, directions = clipped.corners, normals(self._pieces, clipped.corners, clipped.pieces)
+        outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        kept = np.all(np.sum(outward[:, None] * directions, axis=-1) > 0, axis=1)
+        return corners[kept], directions[kept], clipped.pieces[kept]
+
+    @cached_property
+    def atlas(self) -> Any:
+        """Charts of a body without edges and tips; asking others for charts raises an error."""
+        sharp = [crease for crease in self._creases if crease.kind in SHARP]
+        return no_charts(sharp) if sharp else super().atlas
 
 
 def _box(bounds: ArrayLike) -> FloatArray:

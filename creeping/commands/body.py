@@ -13,6 +13,13 @@ BODIES = {
     "ellipsoid": "Ellipsoid",
     "torus": "Torus",
     "twisted-ellipsoid": "TwistedEllipsoid",
+    "cylinder": "Cylinder",
+    "capsule": "Capsule",
+    "cone": "Cone",
+    "cone-sphere": "ConeSphere",
+    "ogive": "Ogive",
+    "double-ogive": "DoubleOgive",
+    "almond": "Almond",
 }
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -59,7 +66,7 @@ def parse_body(
         raise InvalidInputError(f"--units belongs to a file; {text!r} is none")
     name, _, rest = text.partition(":")
     if name in BODIES and allow_rough:
-        raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is smooth")
+        raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is taken as it is")
     if not (of_file or name in BODIES or _like_expression(text)):
         raise InvalidInputError(
             f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
@@ -68,13 +75,13 @@ def parse_body(
     try:
         if of_file:
             kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
-            shape = kind(text, units, allow_rough=allow_rough, cache=cache, speed=speed, progress=progress)
+            shape = kind(text, units, strict=not allow_rough, cache=cache, speed=speed, progress=progress)
             return _with_charts(shape, progress)
         if name in BODIES:
-            return _named(name, rest, speed)
+            return _with_charts(_named(name, rest, speed), None)
         if progress:
             progress("examining the expression")
-        return _with_charts(scatterers.Implicit(text, allow_rough=allow_rough, speed=speed), progress)
+        return _with_charts(scatterers.Implicit(text, strict=not allow_rough, speed=speed), progress)
     except InvalidInputError:
         raise
     except (TypeError, ValueError) as error:
@@ -100,7 +107,7 @@ def _with_charts(shape: Any, progress: Progress | None) -> Any:
     """Body whose charts are made: every flow needs them, and of thin or sharp parts there may be none."""
     if progress:
         progress("charts")
-    _ = shape.atlas
+    _ = shape.atlas.charts
     return shape
 
 

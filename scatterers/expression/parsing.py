@@ -2,7 +2,7 @@
 
 The text is walked as a syntax tree and each allowed node is rebuilt as a sympy object, so nothing of the
 text is ever executed; only code that sympy prints from that tree is. where(a < b, c, d) is c where a < b, else d;
-its derivatives are those of the pieces, so pieces must join smoothly.
+max(a, b, ...) and min(a, b, ...) choose one, too. Derivatives are those of the piece that is chosen.
 """
 
 import ast
@@ -12,6 +12,8 @@ import re
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
+
+from scatterers.expression.chosen import chosen, numeric_chosen
 
 FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
 MAX_LENGTH = 2000
@@ -78,7 +80,7 @@ def parse(text: str) -> Any:
     names = {name: sympy.Symbol(name, real=True) for name in "xyz"} | {"pi": sympy.pi}
 
     def refuse(what: str) -> ValueError:
-        allowed = f"numbers, x, y, z, pi, + - * / **, {', '.join(FUNCTIONS)} and where(x < 0, a, b)"
+        allowed = f"numbers, x, y, z, pi, + - * / **, {', '.join(FUNCTIONS)}, max, min and where(x < 0, a, b)"
         return ValueError(f"expression {shown(text)} contains {what}; allowed are {allowed}")
 
     def require_moderate(value: Any) -> None:
@@ -124,6 +126,13 @@ def parse(text: str) -> Any:
                 given = build(argument, depth + 1)
                 require_moderate(given)
                 return getattr(sympy, name)(given)
+            case ast.Call(func=ast.Name(id="max" | "min" as name), args=[_, _, *_] as given, keywords=[]):
+                parts = [build(part, depth + 1) for part in given]
+                for part in parts:
+                    require_moderate(part)
+                if all(part.is_number for part in parts):
+                    return sympy.Max(*parts) if name == "max" else sympy.Min(*parts)
+                return chosen()(*(part if name == "max" else -part for part in parts), *parts)
             case ast.Call(
                 func=ast.Name(id="where"),
                 args=[ast.Compare(left=left, ops=[op], comparators=[right]), yes, no],
@@ -174,10 +183,21 @@ def _shared(parts: Any) -> Any:
 
 @lru_cache(maxsize=64)
 def _differentiated(text: str) -> Differentiated:
+    return derivatives(parse(text), text)
+
+
+@lru_cache(maxsize=256)
+def derivatives(expression: Any, text: str) -> Differentiated:
+    """Functions made from a sympy expression; errors name the text.
+
+    Raises
+    ------
+    ValueError
+        If there is an absolute value in it.
+    """
     import sympy
     from sympy.printing.pycode import PythonCodePrinter
 
-    expression = parse(text)
     x, y, z = (sympy.Symbol(name, real=True) for name in "xyz")
     gradient = [expression.diff(v) for v in (x, y, z)]
     pairs = [(x, x), (y, y), (z, z), (y, z), (x, z), (x, y)]
@@ -211,7 +231,8 @@ def _differentiated(text: str) -> Differentiated:
     space["block"].operations = operations
 
     def numeric(parts: list[Any]) -> Callable[..., Any]:
-        function: Callable[..., Any] = sympy.lambdify((x, y, z), parts, "numpy", cse=_shared)
+        known = [{"Chosen": numeric_chosen}, "numpy"]
+        function: Callable[..., Any] = sympy.lambdify((x, y, z), parts, known, cse=_shared)
         return function
 
     return Differentiated(numeric([expression]), numeric(gradient), numeric(hessian), space["block"], space["first"])

@@ -1,4 +1,8 @@
-"""Places of F = 0 that are not smooth: where grad F = 0, where the normal jumps, where the curvature has no bound."""
+"""Places of F = 0 that are not smooth: where grad F = 0, where the normal jumps, where the curvature has no bound.
+
+Such a place is a tip if close by it looks like one end of a cone: on a small sphere about it F < 0 in one region, and
+F > 0 in one, and their shares are those on a smaller one.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +20,12 @@ CLOSE, EDGE = 1e-6, 1e-3
 """Cells between two points, and the turn of the normal, radians, from one to the other that makes an edge."""
 CLOSER = 60
 """Steps of the search for kinks, each 0.7 times as wide as the last: it ends 1e-10 cells from where it leads."""
+NEWTON, ROUND = 12, 1e-6
+"""Steps to a tip, and the radius of a sphere about it, in diagonals of the box."""
+ALIKE = 1e-4
+"""Diagonals of the box within which two places are one."""
+AROUND, NEARBY = 4000, (2e-3, 2e-4)
+"""Points of a small sphere about a place, and its radii in diagonals of the box."""
 SHARPEST = 1e8
 """Curvature, in 1/diagonals of the box, beyond which a place is a kink; a disc of thickness 1e-3 radii has 3e6."""
 
@@ -102,8 +112,8 @@ def _onto(compiled: Compiled, points: FloatArray, reach: float, steps: int) -> F
     return points
 
 
-def refuse_kinks(compiled: Compiled, points: FloatArray, spacing: float, size: float) -> None:
-    """ValueError if the curvature grows without bound towards a place where grad F itself need not vanish.
+def kinks(compiled: Compiled, points: FloatArray, spacing: float, size: float) -> tuple[FloatArray, FloatArray]:
+    """Places (m, 3) towards which the curvature grows without bound, grad F need not vanish there, and curvatures (m,).
 
     From where it is largest, points go to the most curved of some places about them, ever closer by.
     """
@@ -120,11 +130,68 @@ def refuse_kinks(compiled: Compiled, points: FloatArray, spacing: float, size: f
         at = np.where(up[:, None], tried[rows, best], at)
         most = np.where(up, bend[rows, best], most)
         reach *= 0.7
-    if bad := int(np.sum(most * size > SHARPEST)):
+    bad = most * size > SHARPEST
+    return at[bad], most[bad]
+
+
+def refuse_kinks(places: FloatArray, bends: FloatArray) -> None:
+    """ValueError if there is one of `kinks`."""
+    if len(places):
         raise ValueError(
-            f"F = 0 is not smooth: its curvature has no bound near {tuple(at[np.argmax(most)].round(6).tolist())} "
-            f"({bad} of {len(at)} searches); a tip, an edge or a pole of F there: round it off in F"
+            f"F = 0 is not smooth: its curvature has no bound near {tuple(places[np.argmax(bends)].round(6).tolist())} "
+            f"({len(places)} searches); an edge or a pole of F there: round it off in F"
         )
+
+
+def distinct(places: FloatArray, bends: FloatArray, size: float) -> FloatArray:
+    """One of the places (m, 3), L, from each group, that with the largest bend (m,)."""
+    left, found = np.argsort(-bends), []
+    while len(left):
+        found.append(places[left[0]])
+        left = left[np.linalg.norm(places[left] - found[-1], axis=1) > ALIKE * size]
+    return np.array(found).reshape(-1, 3)
+
+
+def polished(compiled: Compiled, place: FloatArray, size: float) -> FloatArray:
+    """Tip (3,), L, of a cone near a place: along the mean of grad F about it, its axis, to F = 0."""
+    directions = np.random.default_rng(0).normal(size=(AROUND, 3))
+    directions = np.concatenate([directions, -directions])
+    directions *= ROUND * size / np.linalg.norm(directions, axis=1, keepdims=True)
+    for _ in range(NEWTON):
+        axis = evaluated(compiled, place + directions)[1].mean(axis=0)
+        square = float(axis @ axis)
+        if not square > 0:
+            break
+        place = place - float(evaluated(compiled, place)[0]) / square * axis
+    return place
+
+
+def is_tip(compiled: Compiled, place: FloatArray, size: float) -> bool:
+    """Whether the body ends at a place (3,), L, like a cone at its tip, or has a dent like one."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    # equal areas along a spiral
+    k = np.arange(AROUND) + 0.5
+    height, phi = 1 - 2 * k / AROUND, np.pi * (1 + np.sqrt(5.0)) * k
+    ring = np.sqrt(1 - height**2)
+    sphere = np.stack([ring * np.cos(phi), ring * np.sin(phi), height], axis=-1)
+    near = cKDTree(sphere).query(sphere, k=8)[1][:, 1:]
+    shares = []
+    for radius in NEARBY:
+        inside = evaluated(compiled, place + radius * size * sphere)[0] < 0
+        shares.append(float(np.mean(inside)))
+        for part in (inside, ~inside):
+            rows = np.repeat(np.flatnonzero(part), near.shape[1])
+            columns = near[part].ravel()
+            kept = part[columns]
+            graph = coo_matrix((np.ones(kept.sum()), (rows[kept], columns[kept])), shape=(AROUND, AROUND))
+            labels = connected_components(graph, directed=False)[1]
+            if len(np.unique(labels[part])) != 1:
+                return False
+    # of a cusp the share falls with the radius
+    return min(shares) > 0.7 * max(shares)
 
 
 def _bend(compiled: Compiled, points: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:

@@ -15,8 +15,8 @@ class Crease:
     Attributes
     ----------
     kind : {"edge", "joint", "tip", "seam"}
-        The normal jumps; the curvature jumps and the normal does not; one point, without a normal; nothing jumps, the
-        same smooth surface is known by another F.
+        The normal jumps; the curvature or a derivative of it jumps, the normal does not; one point, without a normal;
+        nothing jumps, the same smooth surface is known by another F.
     pieces : (int, int)
         On either side; the same twice at a tip, or where a piece meets itself.
     points : (n, 3), L

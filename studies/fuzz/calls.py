@@ -280,13 +280,28 @@ def _calls_of_bodies(made: dict[str, Any]) -> dict[str, Call]:
     nodes = np.linspace(-1.4, 1.4, 12)
     samples = nodes[:, None, None] ** 2 + nodes[:, None] ** 2 + nodes**2 - 1
     box = [[-1.4] * 3, [1.4] * 3]
-    options: dict[str, Any] = {"allow_rough": False, "speed": None}
+    options: dict[str, Any] = {"strict": False, "speed": None}
     files = {"units": "m", **options, "cache": False, "progress": None}
     found: dict[str, Call] = {
         "sc.Sphere": (sc.Sphere, {"radius": 1.0, "speed": None}),
         "sc.Ellipsoid": (sc.Ellipsoid, {"a": 1.0, "b": 0.8, "c": 0.6, "speed": None}),
         "sc.Torus": (sc.Torus, {"R": 1.0, "r": 0.4, "speed": None}),
         "sc.TwistedEllipsoid": (sc.TwistedEllipsoid, {"a": 0.5, "b": 0.5, "c": 1.0, "d": 0.2, "speed": None}),
+        "sc.Cylinder": (sc.Cylinder, {"radius": 1.0, "length": 2.0, "speed": None}),
+        "sc.Capsule": (sc.Capsule, {"radius": 1.0, "length": 4.0, "speed": None}),
+        "sc.Cone": (sc.Cone, {"radius": 1.0, "length": 2.0, "top": 0.5, "speed": None}),
+        "sc.ConeSphere": (sc.ConeSphere, {"radius": 1.0, "length": 4.0, "speed": None}),
+        "sc.Ogive": (sc.Ogive, {"radius": 1.0, "length": 5.0, "speed": None}),
+        "sc.DoubleOgive": (
+            sc.DoubleOgive,
+            {"radius": 1.0, "lower": 2.5, "upper": 5.0, "lower_angle": 0.8, "upper_angle": None, "speed": None},
+        ),
+        "sc.Almond": (sc.Almond, {"length": 1.0, "speed": None}),
+        "sc.Revolution": (
+            sc.Revolution,
+            {"profile": [(0.0, 0.0), (0.5, 1.0), (1.5, 1.0), (2.0, 0.0)], "corners": [1, 2], "speed": None},
+        ),
+        "sc.Cylinder.tiles": (sc.Cylinder(1.0, 2.0).tiles, {"edge": 0.5}),
         "sc.ExpressionSpeed": (sc.ExpressionSpeed, {"expression": "1 + x/4"}),
         "sc.Implicit": (
             sc.Implicit,
@@ -294,7 +309,7 @@ def _calls_of_bodies(made: dict[str, Any]) -> dict[str, Call]:
                 "expression": ball,
                 "bounds": [[-2] * 3, [2] * 3],
                 "centre": (0, 0, 0),
-                "allow_rough": False,
+                "strict": False,
                 "speed": None,
             },
         ),

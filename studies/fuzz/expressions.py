@@ -14,7 +14,23 @@ from numpy.random import Generator
 from studies.fuzz.attack import ACCEPTED, REFUSED, SILENT, Verdict
 from studies.fuzz.mutation import mutated
 
-FUNCTIONS = ("sin", "cos", "exp", "log", "sqrt", "tanh", "abs", "where", "gamma", "eval", "open", "factorial", "Matrix")
+FUNCTIONS = (
+    "sin",
+    "cos",
+    "exp",
+    "log",
+    "sqrt",
+    "tanh",
+    "abs",
+    "where",
+    "max",
+    "min",
+    "gamma",
+    "eval",
+    "open",
+    "factorial",
+    "Matrix",
+)
 NUMBERS = ("1", "2", "0.5", "3e-2", "1e300", "1e-300", "9**9", "64", "1/3", "0", "1j", "1_0", "0x1f", "10**10")
 NAMES = ("x", "y", "z", "x", "y", "z", "pi", "E", "I", "oo", "w", "self", "__builtins__", "os", "\ufb01", "\u0445")
 HARM = (
@@ -42,6 +58,8 @@ BODIES = (
     "(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.9**4",
     "exp(x**2 + y**2 + z**2) - 3",
     "where(x < 0, x**2, 2*x**2) + y**2 + z**2 - 1",
+    "max(x**2 + y**2 + z**2 - 1, z - 0.5, min(x, y) - 0.4)",
+    "sqrt(x**2 + y**2) - (1 - z**2)/2",
 )
 SPECS = ("sphere", "sphere:radius=2", "ellipsoid:a=1.2,b=0.8,c=0.8", "torus:R=1,r=0.5", "twisted-ellipsoid", "hull.stl")
 

@@ -197,7 +197,7 @@ def test_bodies_refuse_as_well():
     with pytest.raises(ValueError, match="are not numbers"):
         sc.Implicit("x**2 + y**2 + z**2 - 1", range(10**12))
     with pytest.raises(ValueError, match="neither True nor False"):
-        sc.Implicit("x**2 + y**2 + z**2 - 1", allow_rough=1j)
+        sc.Implicit("x**2 + y**2 + z**2 - 1", strict=1j)
     with pytest.raises(ValueError, match=r"whole numbers from .* to 1000"):
         sc.Gridded.sampled(BODY, 2**31)
     with pytest.raises(ValueError, match="no name of a file"):

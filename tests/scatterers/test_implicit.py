@@ -250,31 +250,6 @@ def test_bounds_leave_another_body_out():
     assert cr.check_surface(body).area == pytest.approx(4 * np.pi, rel=1e-2)
 
 
-PEAR = "where(z < 0, z**2/2, z**3 - z**2) + x**2 + y**2"
-"""A cone about the z axis at the origin, rounded off at z = 1."""
-
-
-def test_tips_are_rounded_off_on_request_only():
-    with pytest.raises(ValueError, match=r"grad F = 0 at 1 of its points, first \(0.0, 0.0, 0.0\); a tip"):
-        Implicit(PEAR)
-    body = Implicit(PEAR, allow_rough=True)
-    assert cr.check_surface(body).ok
-    reach = 0.025 * np.linalg.norm(body.bounds[1] - body.bounds[0])
-    z = np.linspace(0, 0.3, 400)
-    axis = np.stack([0 * z, 0 * z, z], axis=-1)
-    np.testing.assert_array_equal(body.non_smooth(axis), z < reach)
-    cone = np.stack([z * np.sqrt(1 - z), 0 * z, z], axis=-1)
-    kept = np.linalg.norm(cone, axis=-1) > reach
-    np.testing.assert_allclose(body.level(cone[kept]), 0, atol=1e-13)
-    assert np.all(body.level(cone[z < 0.2 * reach]) > 0)
-
-
-@pytest.mark.parametrize("name", ["ellipsoid", "torus"])
-def test_smooth_bodies_have_no_non_smooth_places(name):
-    body = Implicit(TEXTS[name], allow_rough=True)
-    assert not np.any(body.non_smooth(points_of(name)))
-
-
 @pytest.mark.parametrize(
     "text",
     [

@@ -1,0 +1,244 @@
+"""A closed triangulation cut where the piece changes, and the creases along the cuts.
+
+On a side between pieces a and b the cut is the point nearest to the middle with F_a = F_b = 0, by Newton's steps of
+least length where the normals differ,
+
+    x <- x - J^T (J J^T)^-1 (F_a, F_b),   J = (grad F_a, grad F_b),
+
+and by halving on the body where they do not. A triangle on three pieces is cut from the point that is on all of them.
+
+Sources: [C76, sec. 2-2].
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.pieces.crease import Crease
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+NEWTON = 20
+HALVINGS = 45
+SHALLOW = 1e-3
+"""Angle between normals, radians, below which both levels together do not tell the place."""
+EDGE, JUMP = 1e-5, 1e-6
+"""Angle of the normals, radians, that makes an edge, and change of the curvatures, relative, that makes a joint."""
+THIN = 0.5
+"""Points of a crease closer than this, in the triangulation's spacing, are left out."""
+
+
+class Level(Protocol):
+    """F with its derivatives."""
+
+    def level(self, points: FloatArray) -> FloatArray:
+        """F: points (..., 3), L, to (...)."""
+        ...
+
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Gradient of F: points (..., 3), L, to (..., 3)."""
+        ...
+
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Hessian of F: points (..., 3), L, to (..., 3, 3)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Clipped:
+    """Triangles each on one piece, and the cuts between them.
+
+    Attributes
+    ----------
+    corners : (m, 3, 3), L
+        Counter-clockwise from outside.
+    pieces : (m,)
+    cuts : (k, 2, 3), L
+        Segments of creases.
+    nodes : (k, 2)
+        Numbers of their ends: the same where cuts meet.
+    sides : (k, 2)
+        Pieces on either side, in order.
+    """
+
+    corners: FloatArray
+    pieces: IntArray
+    cuts: FloatArray
+    nodes: IntArray
+    sides: IntArray
+
+
+def clip(
+    body: Level,
+    pieces: Sequence[Level],
+    numbers: Callable[[FloatArray], IntArray],
+    points: FloatArray,
+    triangles: IntArray,
+) -> Clipped:
+    """Triangles (m, 3) with corners among points (n, 3), L, on the body, cut where the number of the piece changes."""
+    of_point = numbers(points)
+    kinds = of_point[triangles]
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
+    mixed = np.any(kinds != kinds[:, :1], axis=1)
+    pairs, which = np.unique(sides[mixed].reshape(-1, 2), axis=0, return_inverse=True)
+    # of the sides between two pieces; the others stay unused
+    between = _on_both(body, pieces, numbers, *(points[end] for end in pairs.T), *(of_point[end] for end in pairs.T))
+    which = which.reshape(-1, 3)
+    x, k = points[triangles[mixed]], kinds[mixed]
+    cut = between[which]
+    corners, numbered = [points[triangles[~mixed]]], [kinds[~mixed, 0]]
+    cuts, nodes, apart = [], [], []
+    for odd in range(3):
+        i, j, h = odd, (odd + 1) % 3, (odd + 2) % 3
+        two = (k[:, j] == k[:, h]) & (k[:, i] != k[:, j])
+        # cuts of the sides i-j and h-i
+        after, before = cut[two, i], cut[two, h]
+        corners += [
+            np.stack([x[two, i], after, before], axis=1),
+            np.stack([after, x[two, j], x[two, h]], axis=1),
+            np.stack([after, x[two, h], before], axis=1),
+        ]
+        numbered += [k[two, i], k[two, j], k[two, j]]
+        cuts.append(np.stack([after, before], axis=1))
+        nodes.append(np.stack([which[two, i], which[two, h]], axis=-1))
+        apart.append(np.stack([k[two, i], k[two, j]], axis=-1))
+    three = np.flatnonzero((k[:, 0] != k[:, 1]) & (k[:, 1] != k[:, 2]) & (k[:, 2] != k[:, 0]))
+    middle = _on_all(pieces, x[three].mean(axis=1), k[three])
+    for i in range(3):
+        after, before = cut[three, i], cut[three, (i + 2) % 3]
+        corners += [np.stack([x[three, i], after, middle], axis=1), np.stack([x[three, i], middle, before], axis=1)]
+        numbered += [k[three, i], k[three, i]]
+        cuts.append(np.stack([after, middle], axis=1))
+        nodes.append(np.stack([which[three, i], len(pairs) + three], axis=-1))
+        apart.append(np.stack([k[three, i], k[three, (i + 1) % 3]], axis=-1))
+    return Clipped(
+        np.concatenate(corners),
+        np.concatenate(numbered),
+        np.concatenate(cuts),
+        np.concatenate(nodes).astype(np.int64),
+        np.sort(np.concatenate(apart), axis=-1).astype(np.int64),
+    )
+
+
+def _on_both(
+    body: Level,
+    pieces: Sequence[Level],
+    numbers: Callable[[FloatArray], IntArray],
+    a: FloatArray,
+    b: FloatArray,
+    ka: IntArray,
+    kb: IntArray,
+) -> FloatArray:
+    """Points (n, 3) between a and b where the piece changes."""
+    middle = 0.5 * (a + b)
+    na, nb = (_normals(pieces, middle, k) for k in (ka, kb))
+    steep = np.linalg.norm(np.cross(na, nb), axis=-1) > SHALLOW
+    found = middle.copy()
+    found[steep] = _on_all(pieces, middle[steep], np.stack([ka, kb], axis=-1)[steep])
+    # where the surfaces do not meet within a cell, and where they touch; the sides of an acute edge cut it short
+    far = np.linalg.norm(found - middle, axis=-1) > np.max(np.linalg.norm(b - a, axis=-1), initial=0.0)
+    halved = (~steep | far) & (ka != kb)
+    low, high, first = a[halved], b[halved], ka[halved]
+    for _ in range(HALVINGS):
+        at = 0.5 * (low + high)
+        for _ in range(3):
+            at = at - _step(body.level(at), body.gradient(at))
+        same = (numbers(at) == first)[:, None]
+        low, high = np.where(same, at, low), np.where(same, high, at)
+    found[halved] = 0.5 * (low + high)
+    return found
+
+
+def _step(value: FloatArray, gradient: FloatArray) -> FloatArray:
+    with np.errstate(all="ignore"):
+        return np.asarray(np.nan_to_num((value / np.sum(gradient**2, axis=-1))[..., None] * gradient))
+
+
+def _on_all(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> FloatArray:
+    """Points (n, 3) moved to where the levels of their pieces (n, k) are all 0."""
+    points = points.copy()
+    for numbers in np.unique(which, axis=0):
+        mine = np.all(which == numbers, axis=1)
+        x = points[mine]
+        for _ in range(NEWTON):
+            value = np.stack([pieces[k].level(x) for k in numbers], axis=-1)
+            slope = np.stack([pieces[k].gradient(x) for k in numbers], axis=-2)
+            x = x - (np.linalg.pinv(np.nan_to_num(slope)) @ np.nan_to_num(value)[..., None])[..., 0]
+        points[mine] = x
+    return points
+
+
+def _normals(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> FloatArray:
+    found = np.zeros(points.shape)
+    for k in np.unique(which):
+        gradient = pieces[k].gradient(points[which == k])
+        with np.errstate(all="ignore"):
+            found[which == k] = gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+    return found
+
+
+def normals(pieces: Sequence[Level], corners: FloatArray, which: IntArray) -> FloatArray:
+    """Unit normals (m, 3, 3) of pieces (m,) at the corners (m, 3, 3), L, of their triangles."""
+    return _normals(pieces, corners.reshape(-1, 3), np.repeat(which, 3)).reshape(corners.shape)
+
+
+def creases(pieces: Sequence[Level], clipped: Clipped, spacing: float) -> list[Crease]:
+    """Edges, joints and seams along the cuts of a triangulation with this spacing, L.
+
+    What is shorter than the spacing is not resolved: several pieces that meet in a point seem to have curves there.
+    """
+    found = []
+    for a, b in np.unique(clipped.sides, axis=0).tolist():
+        mine = np.all(clipped.sides == (a, b), axis=1)
+        for points in _chains(clipped.cuts[mine], clipped.nodes[mine], THIN * spacing):
+            if np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)) < spacing:
+                continue
+            na, nb = (_normals(pieces, points, np.full(len(points), k)) for k in (a, b))
+            turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
+            angle = float(np.nanmax(turn))
+            kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
+            if kind == "joint" and not _bent(pieces[a], pieces[b], points):
+                kind = "seam"
+            found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
+    return found
+
+
+def _bent(one: Level, other: Level, points: FloatArray) -> bool:
+    """Whether the curvatures of two pieces differ somewhere along a curve."""
+    of_each = []
+    for piece in (one, other):
+        gradient = piece.gradient(points)
+        slope = np.linalg.norm(gradient, axis=-1)[:, None, None]
+        n = gradient[:, :, None] / slope
+        flat = np.eye(3) - n * n.swapaxes(1, 2)
+        of_each.append(flat @ piece.hessian(points) @ flat / slope)
+    largest = max(float(np.max(np.abs(shape))) for shape in of_each)
+    return bool(np.max(np.abs(of_each[0] - of_each[1])) > JUMP * largest)
+
+
+def _chains(cuts: FloatArray, nodes: IntArray, apart: float) -> list[FloatArray]:
+    """Curves (n, 3), L, of segments that share their ends, points ``apart``, L; closed ones end where they begin."""
+    places: dict[int, FloatArray] = {}
+    near: dict[int, list[int]] = {}
+    for (p, q), (a, b) in zip(cuts, nodes.tolist(), strict=True):
+        places[a], places[b] = p, q
+        near.setdefault(a, []).append(b)
+        near.setdefault(b, []).append(a)
+    found = []
+    # open curves from their ends first
+    for start in sorted(near, key=lambda node: len(near[node]) == 2):
+        while near[start]:
+            chain = [start]
+            while near[chain[-1]]:
+                following = near[chain[-1]].pop()
+                near[following].remove(chain[-1])
+                chain.append(following)
+            kept = [places[chain[0]]]
+            for node in chain[1:-1]:
+                if np.linalg.norm(places[node] - kept[-1]) > apart:
+                    kept.append(places[node])
+            found.append(np.stack([*kept, places[chain[-1]]]))
+    return found

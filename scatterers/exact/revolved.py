@@ -1,0 +1,239 @@
+"""Bodies of revolution, and their affine images, from the segments of a profile.
+
+With (u, v, w) = M x, r = sqrt(u^2 + v^2), each segment is a piece F(x) = G(r, w) = 0 of the body; see
+`scatterers.kernels.revolved`. A corner of the profile is a circle about the axis: an edge if the tangent turns there,
+else a joint, or a seam between parts of one line or arc. Where the profile meets the axis at another than a right angle
+there is a tip.
+
+Sources: [C76, sec. 3-3].
+"""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.base.body import positive
+from scatterers.exact.body import SHARP, CreasedBody, NoCharts, Piece
+from scatterers.exact.profile import Segment
+from scatterers.exact.rings import ring_angles, ring_sizes, strip
+from scatterers.kernels.compiled import Compiled
+from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
+from scatterers.kernels.spline_constants import HEADER
+from scatterers.pieces.crease import Crease
+
+if TYPE_CHECKING:
+    from scatterers.atlas.charts import CubeSphereAtlas
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+SMALLEST = 1e-6
+"""Turn of the tangent, radians, below which a corner is a joint, and an end on the axis no tip."""
+SAME = 1e-12
+"""Distance, in the body's extent, within which two segments are parts of one."""
+ON_CREASE = 360
+"""Points on a circle that is a crease."""
+SIDE = 0.75
+"""Steps along and across the profile in edges of tiles: the third side is then 1.06 edges at most."""
+MOST_TILES = 1e7
+DENSE = 513
+"""Points of a segment by which its length is measured."""
+
+
+class Revolved(CreasedBody):
+    """Base of bodies with a profile; a subclass gives ``_profile``, and where it is placed."""
+
+    # the axes of space that are u, v and w, and v over that coordinate
+    _axes: tuple[int, int, int] = (0, 1, 2)
+    _stretch: float = 1.0
+
+    @cached_property
+    def _profile(self) -> Sequence[Segment]:
+        """Segments from the lower to the upper end of the axis."""
+        raise NotImplementedError
+
+    @cached_property
+    def pieces(self) -> Sequence[Piece]:
+        """Smooth surfaces that bound the body, one after the other from below."""
+        return [
+            Piece(Compiled(evaluate, "level", self._packed([s], whole=False)), self._box([s])) for s in self._profile
+        ]
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Box (2, 3) that contains the body, L."""
+        return self._box(self._profile)
+
+    def _box(self, segments: Sequence[Segment]) -> FloatArray:
+        outline = np.concatenate([segment.point(segment.extremes) for segment in segments])
+        (low, _), (high, r) = outline.min(0), outline.max(0)
+        return self._placed(np.array([[-r, -r, low], [r, r, high]]))
+
+    def _placed(self, local: FloatArray) -> FloatArray:
+        """Points (..., 3), L, of (u, v, w)."""
+        iu, iv, iw = self._axes
+        x = np.empty(np.shape(local))
+        x[..., iu], x[..., iv], x[..., iw] = local[..., 0], local[..., 1] / self._stretch, local[..., 2]
+        return x
+
+    def _packed(
+        self, segments: Sequence[Segment], of_map: FloatArray | None = None, *, whole: bool = True
+    ) -> FloatArray:
+        """Parameters of the compiled functions."""
+        rows, shapes = [], []
+        kept = [(segment, *segment.shapes()) for segment in segments]
+        # one conic alone needs no search
+        turns = [s.turns if kind == SPLINE or len(kept) > 1 else s.turns[[0, -1]] for s, kind, _ in kept]
+        at = ROWS + WIDTH * sum(len(u) - 1 for u in turns)
+        for piece, ((segment, kind, parts), u) in enumerate(zip(kept, turns, strict=True)):
+            ends = np.column_stack([segment.point(u), segment.tangent(u)])
+            before = np.zeros(2) if piece == 0 else segments[piece - 1].tangent(np.ones(1))[0]
+            after = np.zeros(2) if piece == len(segments) - 1 else segments[piece + 1].tangent(np.zeros(1))[0]
+            corner = before[0] * ends[0, 3] - before[1] * ends[0, 2]
+            # on both sides of a joint the same normal divides the plane
+            ends[0, 2:] = _shared(ends[0, 2:], before)
+            ends[-1, 2:] = _shared(ends[-1, 2:], after)
+            for k, (start, end) in enumerate(pairwise(ends)):
+                where = at + (sum(map(len, parts[:k])) if kind == SPLINE else 0)
+                turned = -math.copysign(1.0, corner) if k == 0 else 1.0
+                rows.append([*start, *end, piece, kind, where, turned])
+            at += sum(map(len, parts))
+            shapes += parts
+        place = [*self._axes, self._stretch, float(whole), len(rows)]
+        header = np.concatenate([np.full(HEADER, 0.0) if of_map is None else of_map, place])
+        return np.concatenate([header, np.ravel(rows), *shapes])
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled level evaluator."""
+        return Compiled(evaluate, "level", self._packed(self._profile))
+
+    @cached_property
+    def _compiled_numbers(self) -> Compiled:
+        return Compiled(numbers, "level", self.compiled.parameters)
+
+    @cached_property
+    def creases(self) -> Sequence[Crease]:
+        """Circles along which pieces meet, and tips."""
+        found = []
+        last = len(self._profile) - 1
+        for number, (end, u) in enumerate(((0, 0.0), (last, 1.0))):
+            segment = self._profile[end]
+            along = segment.tangent(np.array([u]))[0]
+            if abs(along[0]) > SMALLEST:
+                w = (segment.start, segment.end)[number][0]
+                found.append(Crease("tip", (end, end), self._placed(np.array([[0.0, 0.0, w]]))))
+        for k in range(last):
+            w, r = self._profile[k].end
+            turn = _turn(self._profile[k].tangent(np.ones(1))[0], self._profile[k + 1].tangent(np.zeros(1))[0])
+            points = self._ring(w, r, ON_CREASE)
+            points = np.concatenate([points, points[:1]])
+            kind: Literal["edge", "joint", "seam"] = "edge" if abs(turn) > SMALLEST else "joint"
+            if kind == "joint" and self._goes_on(k):
+                kind = "seam"
+            found.append(Crease(kind, (k, k + 1), points, self._angle(k, points) if kind == "edge" else 0.0))
+        return found
+
+    def _goes_on(self, k: int) -> bool:
+        """Whether piece k + 1 has all of piece k, too."""
+        w, r = self._profile[k].point(np.array([0.0, 0.5])).T
+        off = self.pieces[k + 1].level(self._placed(np.stack([r, 0 * r, w], axis=-1)))
+        return bool(np.max(np.abs(off)) < SAME * np.max(np.abs(self.bounds)))
+
+    def _angle(self, k: int, points: FloatArray) -> float:
+        """Largest angle between the normals of pieces k and k + 1 at points (n, 3)."""
+        a, b = (piece.gradient(points) for piece in self.pieces[k : k + 2])
+        across = np.linalg.norm(np.cross(a, b), axis=-1)
+        return float(np.max(np.arctan2(across, np.sum(a * b, axis=-1))))
+
+    def _ring(self, w: float, r: float, n: int) -> FloatArray:
+        phi = ring_angles(n, self._stretch)
+        return self._placed(np.stack([r * np.cos(phi), r * np.sin(phi), np.full(n, w)], axis=-1))
+
+    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
+        """The body as triangles with sides of about ``edge``, L, at most, in rings about the axis.
+
+        Returns
+        -------
+        corners, normals : (m, 3, 3), L and 1
+            Counter-clockwise seen from outside; on the piece of the triangle, its normals there. At a tip the normal is
+            that towards the middle of the triangle.
+        pieces : (m,)
+            No triangle lies on two.
+
+        Raises
+        ------
+        ValueError
+            If ``edge`` is not a positive finite number, or asks for too many tiles.
+        """
+        positive(edge=edge)
+        long, wide = np.ptp(self.bounds, axis=0).sum() / edge, max(np.ptp(self.bounds, axis=0)) / edge
+        if long * wide > MOST_TILES:
+            raise ValueError(
+                f"edge = {edge!r} asks for some {long * wide:.1g} tiles, more than {MOST_TILES:.0g}; give more"
+            )
+        corners, normals, pieces = [], [], []
+        for number, segment in enumerate(self._profile):
+            u = _steps(segment, SIDE * edge)
+            (w, r), (tw, tr) = segment.point(u).T, segment.tangent(u).T
+            sizes = ring_sizes(r, SIDE * edge, self._stretch)
+            for k in range(len(u) - 1):
+                ring, of_ring = strip(int(sizes[k]), int(sizes[k + 1]))
+                angles = [ring_angles(int(n), self._stretch) for n in sizes[k : k + 2]]
+                phi = np.where(ring == 0, angles[0][of_ring % sizes[k]], angles[1][of_ring % sizes[k + 1]])
+                at = k + ring
+                x = np.stack([r[at] * np.cos(phi), r[at] * np.sin(phi), w[at]], axis=-1)
+                corners.append(self._placed(x))
+                # the apex of a fan has no angle of its own
+                phi = _towards(phi, sizes[at])
+                n = np.stack([tw[at] * np.cos(phi), tw[at] * np.sin(phi), -tr[at]], axis=-1)
+                normals.append(self._normal(n))
+                pieces.append(np.full(len(x), number, dtype=np.int64))
+        return np.concatenate(corners), np.concatenate(normals), np.concatenate(pieces)
+
+    def _normal(self, local: FloatArray) -> FloatArray:
+        iu, iv, iw = self._axes
+        n = np.empty(local.shape)
+        n[..., iu], n[..., iv], n[..., iw] = local[..., 0], local[..., 1] * self._stretch, local[..., 2]
+        return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
+
+    @cached_property
+    def atlas(self) -> "CubeSphereAtlas | NoCharts":
+        """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
+        if any(crease.kind in SHARP for crease in self.creases) or self._axes != (0, 1, 2) or self._stretch != 1:
+            return NoCharts(super().atlas.reason)
+        from scatterers.exact.charts import charts
+
+        return charts(self.bounds, self.tiles, lambda of_map: self._packed(self._profile, of_map))
+
+
+def _shared(tangent: FloatArray, other: FloatArray) -> FloatArray:
+    """Mean of two unit tangents if they agree, the first if they do not."""
+    if not np.any(other) or abs(_turn(tangent, other)) > SMALLEST:
+        return tangent
+    mean = tangent + other
+    return np.asarray(mean / np.linalg.norm(mean))
+
+
+def _turn(before: FloatArray, after: FloatArray) -> float:
+    return math.atan2(before[0] * after[1] - before[1] * after[0], before @ after)
+
+
+def _steps(segment: Segment, step: float) -> FloatArray:
+    """Values of u at equal steps of the length, of at most ``step``, L."""
+    u = np.linspace(0, 1, DENSE)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(segment.point(u), axis=0), axis=1))])
+    count = max(1, math.ceil(length[-1] / step))
+    return np.interp(np.linspace(0, length[-1], count + 1), length, u)
+
+
+def _towards(phi: FloatArray, sizes: IntArray) -> FloatArray:
+    """Angles (m, 3) of corners, of an apex the angle of the middle of the other two."""
+    apex = sizes == 1
+    other = np.where(apex, 0.0, 1.0)
+    middle = np.arctan2(np.sum(other * np.sin(phi), axis=-1), np.sum(other * np.cos(phi), axis=-1))
+    return np.where(apex, middle[:, None], phi)

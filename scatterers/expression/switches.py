@@ -1,0 +1,114 @@
+"""Pieces of an expression: what is left of it once every max, min and where has chosen."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scatterers.expression.chosen import chosen, numeric_chosen
+from scatterers.expression.parsing import Differentiated, derivatives, parse
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+MOST_PIECES = 64
+
+
+class Switches:
+    """The choices in an expression, and its pieces as they are met.
+
+    Parameters
+    ----------
+    text : str
+
+    Examples
+    --------
+    >>> cut = Switches("max(x**2 + y**2 + z**2 - 1, z - 0.5)")
+    >>> cut.met(np.array([[0, 0, -1.0], [0, 0, 0.5], [0, 1, 0]]))
+    >>> cut.numbers(np.array([[0, 0.1, 0.5], [1, 0, 0]])), len(cut.pieces)
+    (array([1, 0]), 2)
+    """
+
+    def __init__(self, text: str) -> None:
+        import sympy
+
+        self._text, self._expression = text, parse(text)
+        self._switches = sorted(
+            self._expression.atoms(sympy.Piecewise) | self._expression.atoms(chosen()), key=sympy.default_sort_key
+        )
+        self.pieces: list[Any] = []
+        # number of the piece by the choices made
+        self._known: dict[tuple[int, ...], int] = {}
+
+    @property
+    def any(self) -> bool:
+        """Whether the expression has choices."""
+        return bool(self._switches)
+
+    @cached_property
+    def _choices(self) -> Callable[..., Any]:
+        """Function of x, y, z to the number of the choice of each switch."""
+        import sympy
+
+        found = []
+        for switch in self._switches:
+            if isinstance(switch, sympy.Piecewise):
+                pairs = [(sympy.Integer(k), condition) for k, (_, condition) in enumerate(switch.args)]
+                found.append(sympy.Piecewise(*pairs))
+            else:
+                found.append(chosen()(*switch.keys, *map(sympy.Integer, range(len(switch.keys)))))
+        names = [sympy.Symbol(name, real=True) for name in "xyz"]
+        function: Callable[..., Any] = sympy.lambdify(names, found, [{"Chosen": numeric_chosen}, "numpy"])
+        return function
+
+    def choices(self, points: FloatArray) -> IntArray:
+        """Choice of each switch: points (n, 3), L, to (n, k)."""
+        with np.errstate(all="ignore"):
+            found = [np.broadcast_to(part, len(points)) for part in self._choices(*points.T)]
+        return np.stack(found, axis=-1).astype(np.int64) if found else np.zeros((len(points), 0), dtype=np.int64)
+
+    def met(self, points: FloatArray) -> None:
+        """Take up the pieces at points (n, 3), L.
+
+        Raises
+        ------
+        ValueError
+            If there are too many.
+        """
+        for row in np.unique(self.choices(points), axis=0).tolist():
+            made = tuple(row)
+            if made in self._known:
+                continue
+            left = self._resolved(self._expression, dict(zip(self._switches, made, strict=True)))
+            # a choice within what is not chosen makes no piece
+            if left not in self.pieces:
+                self.pieces.append(left)
+            self._known[made] = self.pieces.index(left)
+            if len(self.pieces) > MOST_PIECES:
+                raise ValueError(f"the body has more than {MOST_PIECES} pieces; give one of fewer")
+
+    def _resolved(self, expression: Any, made: dict[Any, int]) -> Any:
+        if expression in made:
+            switch, k = expression, made[expression]
+            branch = switch.values[k] if isinstance(switch, chosen()) else switch.args[k][0]
+            return self._resolved(branch, made)
+        if not any(expression.has(switch) for switch in made):
+            return expression
+        return expression.func(*(self._resolved(part, made) for part in expression.args))
+
+    def functions(self, number: int) -> Differentiated:
+        """Functions of a piece."""
+        return derivatives(self.pieces[number], self._text)
+
+    def numbers(self, points: FloatArray) -> IntArray:
+        """Numbers of the pieces at points (n, 3), L; where the choices are new, of the piece with the least |F|."""
+        rows, where = np.unique(self.choices(points), axis=0, return_inverse=True)
+        numbers = np.array([self._known.get(tuple(row), -1) for row in rows.tolist()], dtype=np.int64)
+        found = numbers[where.reshape(-1)]
+        if np.any(new := found < 0):
+            x = points[new].T
+            with np.errstate(all="ignore"):
+                values = [np.broadcast_to(self.functions(k).value(*x)[0], x.shape[1]) for k in range(len(self.pieces))]
+            found[new] = np.argmin(np.abs(np.nan_to_num(np.stack(values), nan=np.inf)), axis=0)
+        return found

@@ -1,0 +1,153 @@
+"""Ogives: arcs that meet the axis in tips, turned about it.
+
+An arc from radius a at z = 0 to the tip at z = l, along z there at z = 0, has the profile [WWSS93]
+
+    r = a (sqrt(1 - (z/l)^2 sin^2 alpha) - cos alpha)/(1 - cos alpha),
+
+part of an ellipse about (0, -a cos alpha/(1 - cos alpha)), and of a circle of radius (l^2 + a^2)/2 a where
+
+    tan(alpha/2) = a/l;
+
+alpha is then the half angle at the tip. The ogive of the EMCC has a = 1 in, l = 5 in (alpha = 22.62 degrees); its
+double ogive has l = 2.5 in below with alpha = 46.4 degrees, an arc of an ellipse (43.6 degrees would make a circle),
+and l = 5 in above.
+
+Sources: [WWSS93].
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from scatterers.base.body import finite, positive
+from scatterers.exact.profile import Arc, Segment
+from scatterers.exact.revolved import Revolved
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Ogive(Revolved):
+    """Circular arc turned about its chord on the z axis: two tips; its middle is the origin.
+
+    Parameters
+    ----------
+    radius : float
+        The largest, at z = 0, L.
+    length : float
+        From tip to tip, L; more than twice the radius.
+    speed : str or object with ``value`` and ``gradient``, optional
+        Speed c(x) of the weighted flow.
+
+    Raises
+    ------
+    ValueError
+        If a length is not a positive finite number, the ogive is too short, or the speed is not usable.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> target = sc.Ogive(radius=0.0254, length=0.254)                     # of the EMCC, m
+    >>> [crease.kind for crease in target.creases], round(target.half_angle, 6)
+    (['tip', 'tip'], 0.394791)
+    """
+
+    radius: float
+    length: float
+    speed: Any = None
+
+    def __post_init__(self) -> None:
+        positive(radius=self.radius, length=self.length)
+        if self.length <= 2 * self.radius:
+            raise ValueError(f"length = {self.length!r} is not more than twice the radius {self.radius!r}")
+        self._set_speed()
+
+    @property
+    def half_angle(self) -> float:
+        """Angle alpha between the axis and the profile at a tip, radians."""
+        return 2 * math.atan2(self.radius, 0.5 * self.length)
+
+    @cached_property
+    def _profile(self) -> Sequence[Segment]:
+        half = 0.5 * self.length
+        centre, axes = _ellipse(self.radius, half, None)
+        return [Arc((-half, 0.0), (half, 0.0), centre, axes)]
+
+
+@dataclass(frozen=True)
+class DoubleOgive(Revolved):
+    """Halves of two ogives that meet at their largest radius, in the plane z = 0: two tips and a joint.
+
+    The tangent is along z on both sides of the joint; the curvature jumps there.
+
+    Parameters
+    ----------
+    radius : float
+        The largest, at z = 0, L.
+    lower, upper : float
+        Lengths below and above z = 0, L; more than the radius.
+    lower_angle, upper_angle : float, optional
+        Angles alpha of the published formula, radians, below pi/2; those of circles if not given.
+    speed : str or object with ``value`` and ``gradient``, optional
+        Speed c(x) of the weighted flow.
+
+    Raises
+    ------
+    ValueError
+        If a length is not a positive finite number, a half is too short, an angle is not between 0 and pi/2, or the
+        speed is not usable.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import scatterers as sc
+    >>> inch = 0.0254
+    >>> target = sc.DoubleOgive(inch, 2.5 * inch, 5 * inch, lower_angle=np.radians(46.4))  # of the EMCC, m
+    >>> [crease.kind for crease in target.creases]
+    ['tip', 'tip', 'joint']
+    """
+
+    radius: float
+    lower: float
+    upper: float
+    lower_angle: float | None = None
+    upper_angle: float | None = None
+    speed: Any = None
+
+    def __post_init__(self) -> None:
+        positive(radius=self.radius, lower=self.lower, upper=self.upper)
+        for name in ("lower", "upper"):
+            if getattr(self, name) <= self.radius:
+                raise ValueError(f"{name} = {getattr(self, name)!r} is not more than the radius {self.radius!r}")
+            angle = getattr(self, f"{name}_angle")
+            if angle is not None:
+                finite(**{f"{name}_angle": angle})
+                if not 0 < angle < math.pi / 2:
+                    raise ValueError(f"{name}_angle = {angle!r} is not between 0 and pi/2; angles are radians")
+        self._set_speed()
+
+    def _shape_texts(self) -> list[str]:
+        values = [self.radius, self.lower, self.upper, self.lower_angle, self.upper_angle]
+        return [str(value if value is None else float(value).hex()) for value in values]
+
+    @cached_property
+    def _profile(self) -> Sequence[Segment]:
+        below, above = (
+            _ellipse(self.radius, length, angle)
+            for length, angle in ((self.lower, self.lower_angle), (self.upper, self.upper_angle))
+        )
+        widest = 0.0, self.radius
+        return [Arc((-self.lower, 0.0), widest, *below), Arc(widest, (self.upper, 0.0), *above)]
+
+
+def _ellipse(radius: float, length: float, angle: float | None) -> tuple[Pair, Pair]:
+    """Centre and semi-axes (z, radius), L, of the arc."""
+    if angle is None:
+        # a little more exact than by the angle of the circle
+        circle = 0.5 * (length * (length / radius) + radius)
+        return (0.0, radius - circle), (circle, circle)
+    # 1 - cos alpha without cancellation
+    across = radius / (2 * math.sin(0.5 * angle) ** 2)
+    return (0.0, radius - across), (length / math.sin(angle), across)
