@@ -1,8 +1,7 @@
 """Shadow lines of bodies with creases: the curves of each piece, finished, and where they go on beyond their ends.
 
-Each curve is that of a smooth F_i (`creeping.shadow.piece_curves`), in panels exact to rounding. Its states are those
-of `creeping.shadow.status`; whether the wave comes to a point is asked of the whole body, at points of the curve and, by
-bisection, where two neighbours differ. At joints the curves of two pieces meet: there one goes on as the other.
+Each curve is that of a smooth F_i (`creeping.shadow.piece_curves`), in panels exact to rounding. Whether the wave comes
+to a point is asked of the whole body, at points of the curve and, by bisection, where two neighbours differ. At joints the curves of two pieces meet: there one goes on as the other.
 
 Sources: Derivations, R6 and R10.
 """
@@ -187,7 +186,7 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
         arc_index[rows], spacing[rows], closed[rows] = number, long[number] / max(count, 1), arc.closed
         state[rows] = curve.state_at(place)
         first += count
-    columns = (points, arclength, curve_index, arc_index, spacing, closed, state)
+    columns: tuple[Any, ...] = (points, arclength, curve_index, arc_index, spacing, closed, state)
     return LaunchPoints(direction[None], *(column[None] for column in columns))
 
 

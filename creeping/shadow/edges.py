@@ -23,8 +23,6 @@ PROBE = 1e-4
 """Distance from an edge, in body sizes, at which F tells a convex one from a concave one."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _GAUSS, _WEIGHTS = 0.5 * (_NODES + 1), 0.5 * _WEIGHTS
-    0.5 * (rule + shift) for rule, shift in zip(np.polynomial.legendre.leggauss(5), (1, 0), strict=True)
-)
 
 
 class EdgePart(NamedTuple):

@@ -200,16 +200,13 @@ def _creased_line(body: Surface, direction: FloatArray, n_points: int) -> Shadow
         raise InvalidInputError(f"{brief(body)} has creases and a speed; give a body with one or the other")
     curves, on_edges, at_tips, edge_on = creased_curves(body, direction, n_points)
     parts = [curve.line_nodes() for curve in curves]
-    columns = (
-        np.concatenate([getattr(part, name) for part in parts], axis=1) if parts else np.zeros((3, 0))
-        for name in ("points", "tangents")
-    )
     nodes = LineNodes(
-        *columns,
-        np.concatenate([np.zeros(0), *(part.curvature for part in parts)]),
-        np.cumsum([0, *(len(part.curvature) for part in parts)]).astype(np.int64),
-        np.concatenate([np.zeros(0), *(part.spacing for part in parts)]),
-        max((part.error for part in parts), default=0.0),
+        points=np.concatenate([np.zeros((3, 0)), *(part.points for part in parts)], axis=1),
+        tangents=np.concatenate([np.zeros((3, 0)), *(part.tangents for part in parts)], axis=1),
+        curvature=np.concatenate([np.zeros(0), *(part.curvature for part in parts)]),
+        starts=np.cumsum([0, *(len(part.curvature) for part in parts)]).astype(np.int64),
+        spacing=np.concatenate([np.zeros(0), *(part.spacing for part in parts)]),
+        error=max((part.error for part in parts), default=0.0),
     )
     return ShadowLine(body, direction, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
 

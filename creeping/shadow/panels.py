@@ -186,7 +186,8 @@ def fit_panels(
             )
         todo = halves
     done.sort(key=lambda panel: panel[0])
-    return PanelCurve(body, direction, *(np.array([panel[k] for panel in done]) for k in (1, 2, 3)), closed)
+    shapes = (np.array([panel[k] for panel in done]) for k in (1, 2, 3))
+    return PanelCurve(body, direction, *shapes, closed=closed)
 
 
 def _between(low: float, high: float) -> float:

@@ -120,7 +120,8 @@ class _Walk:
             x = onto_line(self.piece, self.direction, points, reach=0.5 * edge, iterations=12)
         x = x[np.all(np.isfinite(x), axis=1) & (np.linalg.norm(x - points, axis=1) < edge)]
         x = x[self._solved(x)]
-        return x[self.inside(x) & ~(self._to_tip(x) <= REACH * self.size)]
+        kept: FloatArray = x[self.inside(x) & ~(self._to_tip(x) <= REACH * self.size)]
+        return kept
 
     def _solved(self, x: FloatArray) -> BoolArray:
         if not len(x):
@@ -131,7 +132,7 @@ class _Walk:
 
     def inside(self, x: FloatArray) -> BoolArray:
         """Whether points of the line are of this piece (n,)."""
-        return piece_ahead(self.body, x, self.direction) == self.number
+        return np.asarray(piece_ahead(self.body, x, self.direction) == self.number)
 
     def _to_tip(self, x: FloatArray) -> FloatArray:
         if not len(self.tips):
