@@ -10,7 +10,7 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
     """What the summary file holds."""
     import numpy as np
 
-    from creeping.rays.fan import RayStatus
+    from creeping.rays.status import RayStatus
 
     summary: dict[str, Any] = {
         "body": body,

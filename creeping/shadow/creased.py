@@ -1,7 +1,8 @@
 """Shadow lines of bodies with creases: the curves of each piece, finished, and where they go on beyond their ends.
 
 Each curve is that of a smooth F_i (`creeping.shadow.piece_curves`), in panels exact to rounding. Whether the wave comes
-to a point is asked of the whole body, at points of the curve and, by bisection, where two neighbours differ. At joints the curves of two pieces meet: there one goes on as the other.
+to a point is asked of the whole body, at points of the curve and, by bisection, where two neighbours differ. At joints
+the curves of two pieces meet: there one goes on as the other.
 
 Sources: Derivations, R6 and R10.
 """

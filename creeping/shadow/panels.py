@@ -186,8 +186,8 @@ def fit_panels(
             )
         todo = halves
     done.sort(key=lambda panel: panel[0])
-    shapes = (np.array([panel[k] for panel in done]) for k in (1, 2, 3))
-    return PanelCurve(body, direction, *shapes, closed=closed)
+    first, shape, speed = (np.array([panel[k] for panel in done]) for k in (1, 2, 3))
+    return PanelCurve(body, direction, first, shape, speed, closed)
 
 
 def _between(low: float, high: float) -> float:
