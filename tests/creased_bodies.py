@@ -243,3 +243,15 @@ class TwoBalls(Pieced):
 
     def piece(self, x):
         return np.where(x[..., 2] < 0, 0, 1)
+
+
+class SplitBall(Pieced):
+    """Unit ball of two halves: a joint at z = 0 across which nothing changes."""
+
+    def __init__(self):
+        box = [[-1, -1, -1], [1, 1, 1]]
+        profile = [(0, Arc(0, 1.0, 0.0, np.pi / 2)), (1, Arc(0, 1.0, np.pi / 2, np.pi))]
+        super().__init__([Ball(), Ball()], [Line("joint", (0, 1), ring(1.0, 0.0))], box, profile)
+
+    def piece(self, x):
+        return np.where(x[..., 2] < 0, 0, 1)

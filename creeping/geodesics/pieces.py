@@ -179,8 +179,8 @@ class _Walk:
             states = np.concatenate([first[:, None], found], axis=1)
             left = self._left(number, states, own)
             after = stops[None] > begin[:, None]
-            for k, ray in enumerate(mine):
-                out[ray, after[k]] = states[k, after[k]]
+            for row, ray in enumerate(mine):
+                out[ray, after[row]] = states[row, after[row]]
             gone = np.flatnonzero(np.isfinite(left[0]))
             if len(gone) and crossed < CROSSINGS:
                 parts = begin[gone], states[gone], own[gone], [v[gone] for v in left]
