@@ -5,8 +5,8 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import positive_number, real_array, shown
-from creeping.geometry.directions import unit_directions
 from creeping.geometry.creased import checked_smooth
+from creeping.geometry.directions import unit_directions
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 

@@ -117,6 +117,7 @@ def surface_field(
     k = checked(wavenumber, order)
     if points is None:
         return _along_rays(fan, k, boundary, kind, order)
+    checked_plain(fan.body, smooth="the field at points of the body")
     y = as_points(points)
     shape = y.shape[:-1]
     total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)

@@ -60,6 +60,8 @@ class LitTiles(NamedTuple):
         Larger principal curvature.
     pieces : (t,)
         Number of the piece of each.
+    scale : float, L
+        Size of the body.
     """
 
     direction: FloatArray
@@ -68,11 +70,13 @@ class LitTiles(NamedTuple):
     cosine: FloatArray
     curvature: FloatArray
     pieces: IntArray
+    scale: float
 
     def on(self, pieces: tuple[int, ...]) -> "LitTiles":
         """Those of some pieces."""
         mine = np.isin(self.pieces, pieces)
-        return LitTiles(self.direction, *(getattr(self, name)[mine] for name in self._fields[1:]))
+        rows = self.corners[mine], self.normals[mine], self.cosine[mine], self.curvature[mine], self.pieces[mine]
+        return LitTiles(self.direction, *rows, self.scale)
 
 
 def side_of_tiles(body: Any, wavenumber: float) -> float:
@@ -118,7 +122,7 @@ def lit_tiles(body: Any, direction: FloatArray, wavenumber: float) -> LitTiles:
     lit, middles = lit[free], middles[free]
     some = Tiles(tiles.corners[lit], tiles.normals[lit], tiles.pieces[lit])
     curvature = _curvatures(body, some, middles)
-    return LitTiles(direction, some.corners, n[lit], -n[lit] @ direction, curvature, some.pieces)
+    return LitTiles(direction, some.corners, n[lit], -n[lit] @ direction, curvature, some.pieces, size(body))
 
 
 def phase_sums(corners: FloatArray, vectors: FloatArray, wavenumber: float, weights: FloatArray) -> ComplexArray:
@@ -197,7 +201,7 @@ def optics_field(
             fields.append(0.5j * k / np.pi * np.einsum("moc,mci->moi", sent, V))
         return OpticsField(fields[0], np.max(np.abs(fields[1]), axis=(1, 2)))
     R = plane_reflection(tiles.cosine, boundary[0])
-    flat, cosine = tiles.curvature * np.max(np.ptp(tiles.corners, axis=(0, 1)), initial=0.0) < FLAT, tiles.cosine
+    flat, cosine = tiles.curvature < FLAT / tiles.scale, tiles.cosine
     mirror, shadow = np.where(flat, 1 + R, 0.0)[:, None] * n, -((1 - R) * cosine)[:, None]
     bent = -(np.where(flat, 0.0, 1 + R) * cosine)[:, None]
     weights = np.concatenate([mirror, shadow, bent], axis=1)

@@ -15,6 +15,7 @@ from creeping.field.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, P, X, whole_lanes
+from creeping.geometry.creased import checked_smooth
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch, ray_arrays
 from creeping.rays.reach import early_length
@@ -57,6 +58,8 @@ class Sweeper:
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
+        if request.quantity != "rays":
+            checked_smooth(flow.body, "a sweep of fields", "call creeping.far_field for each incidence, or sweep rays")
         self._tracer = None if request.quantity == "rays" else RayTracer(flow.body, request.length)
         self._early = 0.0
         if request.quantity != "rays":
