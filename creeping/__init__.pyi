@@ -37,10 +37,10 @@ from .phaseflow.phase_map import PhaseMap as PhaseMap
 from .phaseflow.tuning.flow_choice import choose_flow as choose_flow
 from .phaseflow.tuning.request import build_phase_map as build_phase_map
 from .rays.fan import RayFan as RayFan
-from .rays.fan import RayStatus as RayStatus
 from .rays.fan import launch as launch
 from .rays.isophase import IsoPhaseCurve as IsoPhaseCurve
 from .rays.isophase import iso_phase_curves as iso_phase_curves
+from .rays.status import RayStatus as RayStatus
 from .rays.uncertain_body import BodyUncertainty as BodyUncertainty
 from .rays.uncertain_body import body_uncertainty as body_uncertainty
 from .shadow.line import ShadowLine as ShadowLine

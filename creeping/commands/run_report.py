@@ -10,7 +10,8 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
     """What the summary file holds."""
     import numpy as np
 
-    from creeping.rays.fan import RayStatus
+    from creeping.geometry.creased import is_creased
+    from creeping.rays.status import RayStatus
 
     summary: dict[str, Any] = {
         "body": body,
@@ -40,6 +41,8 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
             "max": carrier.error.max,
             "samples": carrier.error.samples,
         }
+    if is_creased(fan.body):
+        summary["losses"] = fan.losses()._asdict()
     summary |= _of_the_body(fan)
     return summary
 
@@ -125,6 +128,12 @@ def readable(summary: dict[str, Any], output: Path) -> str:
         rows.append("direct integration of order 8")
     statuses = ", ".join(f"{n} {name}" for name, n in summary["ray_status"].items() if n)
     rows.append(f"rays: {summary['rays']} of length {summary['length']:g} ({statuses or 'none launched'})")
+    if "losses" in summary:
+        line, ended, outline = (100 * summary["losses"][name] for name in ("line", "rays", "outline"))
+        rows.append(
+            f"on edges and tips: {line:.3g} % of the line, {outline:.3g} % of the outline; "
+            f"{ended:.3g} % of the rays, by what is left of their waves, end there"
+        )
     error = summary["error_of_rays"]
     rows.append(
         f"error at their ends, against independent integration at 1e-12: rms {error['rms']:.1e}, max {error['max']:.1e}"

@@ -19,6 +19,7 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import UNRESOLVED, checked, checked_method, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.creased_far import creased_far_field
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.extrapolated import measured_level
@@ -27,6 +28,7 @@ from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.geometry.arguments import one_of
+from creeping.geometry.creased import is_creased
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 
@@ -54,7 +56,8 @@ def far_field(
         Second-order creeping waves, or the leading order, which is by rays.
     method : {"auto", "currents", "rays"}
         The currents of the whole body, or isolated rays. "auto" takes currents unless they cost more than some ten
-        seconds or the order is 1.
+        seconds or the order is 1. A body with edges, joints or tips has isolated rays and physical optics, whatever
+        the method (`creeping.field.creased_far`): "rays+optics" in the result.
 
     Returns
     -------
@@ -85,6 +88,9 @@ def far_field(
     k = checked(wavenumber, order)
     checked_method(method, order)
     r = observers_of(observation)
+    if is_creased(fan.body):
+        far = creased_far_field(fan, r, k, boundary, order)
+        return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
     if method == "currents" or cheap:

@@ -16,6 +16,7 @@ from creeping.field.ray_ends import RayEnds
 from creeping.field.reflected_fold import fold_error
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import WITH_JACOBI
+from creeping.geometry.creased import is_creased
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import normal, project, size
@@ -70,7 +71,7 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
         tracer = RayTracer(fan.body, fan.length)
         # not the fan itself: this is kept as long as the fan lives
         line, make = fan.line, _forward_parts(fan)
-        attached = np.array([shares_of(line)["attached"]])
+        attached = np.array([(line.fractions if is_creased(line.body) else shares_of(line))["attached"]])
         geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, lambda _: (line, make()))
         _KEPT[fan] = kept = (key, geometry)
     return kept[1]

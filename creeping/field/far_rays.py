@@ -33,6 +33,7 @@ from creeping.field.polarisation import dyads, wave_frame
 from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude, reflected_error
 from creeping.field.shed_wave import scales, shed_wave, smoothstep
 from creeping.rays.quantities import RayPoints
+from creeping.rays.specular import SpecularPoints
 
 FORWARD = (0.55, 0.85)
 """m̄ θ between which the forward lobe gives way."""
@@ -59,7 +60,7 @@ MERGED = (0.38, 0.52)
 def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int) -> FarField:
     """Far field of a geometry, one row for each observer of each incidence."""
     kinds = scalar_boundaries(boundary)
-    parts = _Parts(geometry, kinds, k, order)
+    parts = Parts(geometry, kinds, k, order)
     for number, kind in enumerate(kinds):
         parts.add(number, kind)
     return FarField(
@@ -124,7 +125,7 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
         return np.asarray(1j * np.maximum(first * last, 0.0) / (wavenumber * rays.spreading_rate))
 
 
-class _Parts:
+class Parts:
     """Weighted parts of the far field, summed contribution by contribution, and the squares of what each may be off."""
 
     def __init__(self, geometry: FarGeometry, kinds: tuple[Boundary, ...], wavenumber: float, order: int) -> None:
@@ -201,9 +202,12 @@ class _Parts:
         self._add_whole(self.creeping, *sums)
 
     def _add_reflected(self, number: int, kind: Boundary) -> None:
+        s = self.geometry.specular
+        self._add_specular(number, kind, s, (1 - self.in_forward)[s.observer])
+
+    def _add_specular(self, number: int, kind: Boundary, s: SpecularPoints, share: FloatArray) -> None:
+        """Add specular points (n,), each by a share (n,)."""
         g, k = self.geometry, self.wavenumber
-        s = g.specular
-        share = (1 - self.in_forward)[s.observer]
         incident = self.incident[s.observer]
         wave = reflected_amplitude(s, g.directions, incident, k, kind, self.order)
         if self.vector:

@@ -99,7 +99,7 @@ def near_field(
     ((2,), 0.04, ['rays', 'currents'])
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body)
+    checked_plain(fan.body, smooth="the near field")
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     checked_method(method, order)

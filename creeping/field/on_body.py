@@ -44,8 +44,9 @@ from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
 from creeping.geometry.unit import unit_of
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_on
+from creeping.rays.status import RayStatus
 from creeping.rays.tracer import ray_points
 
 SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
@@ -116,6 +117,7 @@ def surface_field(
     k = checked(wavenumber, order)
     if points is None:
         return _along_rays(fan, k, boundary, kind, order)
+    checked_plain(fan.body, smooth="the field at points of the body")
     y = as_points(points)
     shape = y.shape[:-1]
     total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)

@@ -26,9 +26,10 @@ from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.far_geometry import fan_strips
 from creeping.field.point_result import FieldStatus
 from creeping.field.shed_wave import fock_parameter, scales, transverse_ratios
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
+from creeping.rays.status import RayStatus
 from creeping.rays.strips import Strip
 
 CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25}

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.rays.fan import RayFan, RayStatus
+from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
+from creeping.rays.status import ENDED, RayStatus
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import STATUSES
 
@@ -78,7 +79,7 @@ class Polylines:
         arrays = {name: getattr(fan, name) for name in (*RAY_ARRAYS, "caustic_index")} | {"travel_time": times}
         status, detachment = np.asarray(fan.status)[:, None], np.asarray(fan.detachment)[:, None]
         # these come on the way, other trouble is there from the start
-        met = np.isin(status, (RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+        met = np.isin(status, ENDED)
         arrays["ray_status"] = np.where(met & (times <= detachment), RayStatus.OK, status)
         numbers = {"ray": range(len(status)), "status": fan.status, "curve_index": fan.curve_index}
         self._add("ray", fan.points, False, arrays, **numbers)

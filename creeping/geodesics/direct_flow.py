@@ -7,8 +7,10 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_points
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
+from creeping.geodesics.pieces import with_ends
 from creeping.geodesics.states import checked_states, pack, unpack
 from creeping.geometry.arguments import checked_body, number_between, one_of, positive_number
+from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import Surface
 
 
@@ -51,7 +53,7 @@ class DirectFlow(Shown):
     error: ErrorEstimate | None = None
 
     def __post_init__(self) -> None:
-        checked_body(self.body)
+        checked_body(self.body, charts=not is_creased(self.body))
         object.__setattr__(self, "rtol", number_between(self.rtol, "rtol", 1e-14, 1e-2))
         object.__setattr__(self, "horizon", positive_number(self.horizon, "horizon"))
         if self.step is not None:
@@ -95,8 +97,13 @@ class DirectFlow(Shown):
         return unpack(self.transport(pack(x, p), values), x.shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6, 10 or 12) to ascending times (m,), L: (n, m, the same); see `PhaseMap.transport`."""
+        """Advance states (n, 6, 10 or 12) to ascending times (m,), L: (n, m, the same); see `PhaseMap.transport`.
+
+        On a body with creases 14 components tell the ends of rays (`creeping.geodesics.pieces`).
+        """
         states, times = checked_states(states), as_times(times)[0]
+        if is_creased(self.body):
+            return with_ends(self.body, states, times, rtol=self.rtol, step=self.step)
         if states.shape[1] > 10:
             return with_attenuation(self.body, states, times, rtol=self.rtol, step=self.step)
         return trace_states(self.body, states, times, rtol=self.rtol if self.step is None else 0.0, step=self.step)

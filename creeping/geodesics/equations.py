@@ -19,14 +19,20 @@ Sources: [YC06b], [C76], [G05]; Derivations, R1 to R4.
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.geometry.creased import is_creased, pieces_of
 from creeping.geometry.curvature import principal_curvature_bound, second_form
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, size
 
 
 def points_of_charts(body: Surface) -> FloatArray:
-    """Points all over a body (n, 3), L."""
+    """Points all over a body (n, 3), L; of one with creases, or a piece of one, not on them."""
+    if is_creased(body):
+        return np.concatenate([piece.samples for piece in pieces_of(body)])
+    samples: FloatArray | None = getattr(body, "samples", None)
+    if samples is not None:
+        return samples
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     return np.concatenate([chart.point(uv) for chart in body.atlas.charts])
 
@@ -35,7 +41,7 @@ def natural_horizon(body: Surface) -> float:
     """Power of two next to the time a ray takes over the smallest radius of curvature."""
 
     def found() -> float:
-        fastest = float(np.max(speed_values(body, points_of_charts(body))))
+        fastest = float(np.max(speed_values(body, points_of_charts(body)), initial=0.0)) or 1.0
         return float(2.0 ** np.round(np.log2(1 / (sharpest_curvature(body) * fastest))))
 
     return kept(body, "natural horizon", found)
@@ -43,7 +49,14 @@ def natural_horizon(body: Surface) -> float:
 
 def sharpest_curvature(body: Surface) -> float:
     """Largest |kappa_1| or |kappa_2| over points all over a body, 1/L."""
-    return kept(body, "sharpest curvature", lambda: principal_curvature_bound(body, points_of_charts(body)))
+
+    def found() -> float:
+        points = points_of_charts(body)
+        sharpest = principal_curvature_bound(body, points) if len(points) else 0.0
+        # flat pieces alone set no scale of their own
+        return max(sharpest, 1 / size(body)) if is_creased(body) or hasattr(body, "samples") else sharpest
+
+    return kept(body, "sharpest curvature", found)
 
 
 def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -17,6 +17,7 @@ from creeping.errors import IntegrationError, InvalidInputError
 from creeping.geodesics.bundle import bundle_points
 from creeping.geodesics.states import pack, unpack
 from creeping.geometry.arguments import checked_body, number_between, real_array
+from creeping.geometry.creased import checked_smooth
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import CHUNK, in_threads, pause
@@ -146,6 +147,7 @@ def trace(
     """
     rtol = number_between(rtol, "rtol", 1e-14, 1e-2)
     values, scalar = as_times(times)
+    checked_smooth(body, "creeping.trace", "take creeping.DirectFlow(body).flow instead")
     checked_body(body)
     x, p = bundle_points(body, points, directions)
     return unpack(trace_states(body, pack(x, p), values, rtol=rtol), x.shape, scalar)

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.errors import SurfaceError
 from creeping.geometry.arguments import checked_body
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.creased import is_creased, pieces_of, tiles_of
+from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import triangulate
 
 
@@ -34,7 +35,7 @@ class SurfaceReport:
     ----------
     checks : tuple of Check
     genus : int
-        Handles of the body.
+        Handles of the body; -1 of a body with creases, whose triangles need not fit.
     area : float
         L^2, of a triangulation: a few digits.
     """
@@ -82,6 +83,8 @@ def check_surface(body: Surface) -> SurfaceReport:
     >>> report.ok, report.genus
     (True, 1)
     """
+    if is_creased(body):
+        return _creased_report(body)
     checked_body(body)
     mesh = triangulate(body.level, body.gradient, body.bounds)
     points = mesh.vertices
@@ -97,6 +100,35 @@ def check_surface(body: Surface) -> SurfaceReport:
         genus=components - mesh.euler_characteristic // 2,
         area=float(doubled_area.sum() / 2),
     )
+
+
+def _creased_report(body: Any) -> SurfaceReport:
+    """Checks of a body with creases: each piece where it bounds the body, and its triangles all together."""
+    checked_body(body, charts=False)
+    tiles, pieces = tiles_of(body, 0.05), pieces_of(body)
+    middles, n = tiles.corners.mean(axis=1), tiles.normals.mean(axis=1)
+    a, b, c = np.moveaxis(tiles.corners, 1, 0)
+    areas = 0.5 * np.cross(b - a, c - a)
+    area = float(np.sum(np.linalg.norm(areas, axis=1)))
+    checks = [
+        Check("sum of area times normal, as a share of the area", float(np.linalg.norm(areas.sum(axis=0))) / area, 1e-2,
+              "close the tiles"),
+        Check("share of tiles turned inside out", float(np.mean(np.sum(areas * n, axis=1) < 0)), 0, "turn the tiles"),
+    ]  # fmt: skip
+    step, out = 1e-4 * size(body), 0.0
+    for number, piece in enumerate(pieces):
+        x = piece.samples
+        if not len(x):
+            continue
+        m = normal(piece, x)
+        out = max(out, float(np.mean((body.level(x + step * m) < 0) | (body.level(x - step * m) > 0))))
+        mine = tiles.pieces == number
+        off = float(np.max(np.abs(np.sum((middles[mine, None] - tiles.corners[mine]) * n[mine, None], axis=-1))))
+        checks.append(Check(f"piece {number}: tiles off their normals' planes, in body sizes", off / size(body), 0.05,
+                            "mend tiles()"))  # fmt: skip
+        checks += [Check(f"piece {number}: {c.name}", c.worst, c.limit, c.remedy) for c in _derivative_checks(piece, x)]
+    checks.append(Check("share of points where F has the wrong sign outside or inside", out, 0.01, "mend level()"))
+    return SurfaceReport(checks=tuple(checks), genus=-1, area=area)
 
 
 def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:

@@ -10,7 +10,10 @@ import ctypes
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+
+# numba tells the type of a callback only once this is imported, which it does itself after a first failure
 from numba import types
+from numba.experimental import function_type as _function_type  # noqa: F401
 
 from creeping._typing import Any, FloatArray
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from creeping.phaseflow.phase_map import PhaseMap
     from creeping.rays.fan import RayFan
     from creeping.rays.isophase import IsoPhaseCurve
-    from creeping.shadow.line import ShadowCurve, ShadowLine
+    from creeping.shadow.curve import ShadowCurve
+    from creeping.shadow.line import ShadowLine
 
 Facts = Iterable[tuple[str, str]]
 MOST = 6

@@ -13,7 +13,8 @@ from creeping.plotting.parameter_plane import draw_curves, frame, is_torus, page
 from creeping.plotting.pictures import add_legend, axes_or_new, drawn_page
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
-from creeping.shadow.line import ShadowCurve, ShadowLine
+from creeping.shadow.curve import ShadowCurve
+from creeping.shadow.line import ShadowLine
 
 KINDS = ("parameters", "3d")
 

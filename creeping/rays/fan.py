@@ -12,7 +12,7 @@ Sources: Derivations, R3 and R4.
 """
 
 from dataclasses import dataclass, replace
-from enum import IntEnum
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -23,53 +23,30 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
-from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, P, X, pack
+from creeping.geodesics.pieces import Passages, passages, trace_pieces
+from creeping.geodesics.states import ATTENUATION, P, X, known_steps, pack, whole_lanes
 from creeping.geometry.arguments import flag, one_of, real_number, whole_number
+from creeping.geometry.creased import is_creased
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
-from creeping.rays.nonsmooth import non_smooth_from
+from creeping.rays.ends import ends_of
+from creeping.rays.losses import Losses, losses_of
 from creeping.rays.reach import AUTO, IN_RANGE, ray_length
 from creeping.rays.spreading import spread, zeros_passed
 from creeping.rays.starts import Starts
+from creeping.rays.status import LAUNCHED, LINE_STATUS, RayStatus
 from creeping.rays.transport import Flow, carried, checked_flow
 from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
 from creeping.shadow.line import ShadowLine, checked_launch_from
-from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED
+from creeping.shadow.status import NO_RAY
 from creeping.storage.memory import within_budget
 
 MAX_RAYS = 200_000
 """Rays beyond which refinement stops."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
-
-
-class RayStatus(IntEnum):
-    """What became of a ray.
-
-    Examples
-    --------
-    >>> import creeping as cr
-    >>> cr.RayStatus.OK.name, int(cr.RayStatus.OK)
-    ('OK', 0)
-    """
-
-    OK = 0
-    DETACHED = 1
-    """kappa_n fell to 0 at ``RayFan.detachment``; the field ends there."""
-    OCCLUDED = 2
-    """Launched on request from a point that the incident wave does not reach."""
-    CONCAVE = 3
-    """Launched on request from a point where kappa_n(d) <= 0: no creeping ray."""
-    STALLED = 4
-    """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
-    NON_SMOOTH = 5
-    """Came at ``RayFan.detachment`` to where the body is not smooth enough, by its own word; the field ends there."""
-
-
-LINE_STATUS = {ATTACHED: RayStatus.OK, OCCLUDED: RayStatus.OCCLUDED, CONCAVE: RayStatus.CONCAVE}
-"""Status of a ray that starts well, by the state of the line at its launch point."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -96,7 +73,8 @@ class RayFan(DrawnOnBody):
     status : (rays,)
         Codes of `RayStatus`.
     detachment : (rays,), L
-        Travel time at which kappa_n first falls to 0 or the ray comes to a non-smooth region, inf if neither happens.
+        Travel time at which kappa_n first falls to 0 or the ray comes to a non-smooth region, an edge or a tip, inf
+        if none of these happens. A ray that has come to an edge or a tip stays there.
     curve_index, arc_index : (rays,)
         Curve of the shadow line, and arc: rays of one arc are neighbours; with ``launch_from="all"`` an arc is a curve.
     arclength, spacing : (rays,), L
@@ -159,7 +137,13 @@ class RayFan(DrawnOnBody):
     @property
     def launched(self) -> BoolArray:
         """Whether the wave launched each ray, wherever it ended (rays,)."""
-        return np.isin(self.status, (RayStatus.OK, RayStatus.DETACHED, RayStatus.NON_SMOOTH))
+        return np.isin(self.status, LAUNCHED)
+
+    @cached_property
+    def crossings(self) -> Passages:
+        """Where rays go on across joints of a body with creases: ray, travel time and crease, each (n,)."""
+        starts = pack(self.points[:, 0], self.directions[:, 0])
+        return passages(self.body, starts, self.length, rtol=getattr(self.flow, "rtol", 1e-10))
 
     @property
     def least_radius(self) -> float:
@@ -173,6 +157,10 @@ class RayFan(DrawnOnBody):
         k = IN_RANGE * float(np.median(curvature[:, 0]))
         largest = float(np.max(curvature, initial=0.0, where=np.cbrt(k / 2) * self.attenuation[self.launched] < 1))
         return 1 / largest if largest > 0 else float("nan")
+
+    def losses(self, wavenumber: float | None = None) -> Losses:
+        """Shares that edges and tips take of the line, the rays and the outline; of ``wavenumber``, as for `launch`."""
+        return losses_of(self, wavenumber)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
@@ -257,12 +245,15 @@ def launch(
     measured, length = flag(measured, "measured"), ray_length(line, length, wavenumber=wavenumber)
     steps = n_steps or enough_steps(body, length)
     count = n_rays or sum(len(curve.points) for curve in line.curves)
-    within_budget(24.0 * WHOLE * count * steps, f"{steps} steps of {count} rays", "ask for fewer, or shorter ones")
+    lanes = whole_lanes(body)
+    within_budget(24.0 * lanes * count * steps, f"{steps} steps of {count} rays", "ask for fewer, or shorter ones")
     times = np.linspace(0.0, length, steps + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
     while np.isfinite(gap):
-        arc, position = parting_positions(states[..., X], starts.arcs, starts.arc, starts.position, gap)
+        arc, position = parting_positions(
+            states[..., X], starts.arcs, starts.arc, starts.position, gap, known_steps(states, times)
+        )
         if not len(arc) or len(starts.arc) + len(arc) > MAX_RAYS:
             break
         more = Starts.at(line, starts.arcs, arc, position)
@@ -291,8 +282,8 @@ def enough_steps(body: Surface, length: float) -> int:
 def _carry(flow: Flow, line: ShadowLine, starts: Starts, times: FloatArray) -> FloatArray:
     """States with all that is carried along: (rays, steps, 12)."""
     if not len(starts.arc):
-        return np.empty((0, len(times), WHOLE))
-    return np.asarray(carried(flow, starts.launch_points(line), times, components=WHOLE)[0])
+        return np.empty((0, len(times), whole_lanes(flow.body)))
+    return np.asarray(carried(flow, starts.launch_points(line), times, components=whole_lanes(flow.body))[0])
 
 
 class RayArrays(NamedTuple):
@@ -312,7 +303,7 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
     body : Surface
     launch : LaunchPoints
         Of n incidences.
-    states : (n, rays, steps, 12)
+    states : (n, rays, steps, 12 or 14)
         At the times, not to be read where there is no ray.
     times : (steps,)
     """
@@ -324,18 +315,8 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
     directions = launch.directions[there[0]]
     tangents = None if speed_of(body) is None else line_tangents(body, points, directions)
     J, rate, stalled = spread(body, points, tangents, directions, path)
-    # a flow writes where a ray detaches beside every state
-    detachment = path[:, -1, DETACHMENT]
-    status = np.array([LINE_STATUS[k] for k in sorted(LINE_STATUS)])[launch.state[there].astype(int)]
-    # a ray that never was a creeping ray keeps the reason
-    status[(status == RayStatus.OK) & np.isfinite(detachment)] = RayStatus.DETACHED
-    non_smooth = np.full(len(points), np.inf)
-    if hasattr(body, "non_smooth"):
-        begun = np.concatenate([points[:, None], path[..., X]], axis=1) if times[0] > 0 else path[..., X]
-        non_smooth = non_smooth_from(body, begun, np.concatenate([[0.0], times]) if times[0] > 0 else times)
-    status[((status == RayStatus.OK) | (status == RayStatus.DETACHED)) & (non_smooth < detachment)] = (
-        RayStatus.NON_SMOOTH
-    )
+    begun = np.array([LINE_STATUS[k] for k in sorted(LINE_STATUS)])[launch.state[there].astype(int)]
+    status, first = ends_of(body, points, path, times, begun)
     status[stalled] = RayStatus.STALLED
 
     def placed(values: Any, fill: float) -> Any:
@@ -346,19 +327,18 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
         out[there] = values
         return out
 
-    first = np.minimum(detachment, non_smooth)
     return RayArrays(placed(J, np.nan), placed(rate, np.nan), placed(status, NO_RAY), placed(first, np.nan))
 
 
 def fan_of(flow: Flow, line: ShadowLine, launch: LaunchPoints, states: FloatArray, times: FloatArray) -> RayFan:
-    """Fan of one incidence whose rays have been carried: states (rays, steps, 12), the first time 0."""
+    """Fan of one incidence whose rays have been carried: states (rays, steps, 12 or 14), the first time 0."""
     body = line.body
     rays = ray_arrays(body, launch, states[None], times)
     points, directions = states[..., X].copy(), states[..., P].copy()
     arc = launch.arc_index[0].astype(np.int64)
     # of a weighted body the kernel gives c^(3/2) times it
     curvature = (
-        curvature_values(body, states.reshape(-1, WHOLE)).reshape(states.shape[:2])
+        curvature_values(body, states.reshape(-1, states.shape[-1])).reshape(states.shape[:2])
         if speed_of(body) is None
         else normal_curvature(body, points, directions)
     )
@@ -395,6 +375,7 @@ def end_error(fan: RayFan) -> ErrorEstimate:
     # a thousandth of what is to be measured
     rms = np.nan if fan.flow.error is None else fan.flow.error.rms
     rtol = float(np.clip(1e-3 * rms, 1e-12, 1e-9)) if np.isfinite(rms) and rms > 0 else 1e-12
-    exact = trace_states(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
+    trace = trace_states if not is_creased(fan.body) else lambda *rays, rtol: trace_pieces(*rays, rtol=rtol).states
+    exact = trace(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
     error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
     return ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))

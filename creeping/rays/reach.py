@@ -18,7 +18,7 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import points_of_charts
-from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, pack
+from creeping.geodesics.states import ATTENUATION, DETACHMENT, END, WHOLE, pack, whole_lanes
 from creeping.geometry.arguments import positive_number, shown
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.speed import speed_of, speed_values
@@ -155,7 +155,7 @@ def decayed_lengths(
     curvature = np.full(there.shape, np.nan)
     curvature[there] = curvature_values(body, starts)
     times: FloatArray = np.linspace(0.0, most, SAMPLES + 1)
-    states = carried(DirectFlow(body, rtol=RTOL), launch, times, components=WHOLE)
+    states = carried(DirectFlow(body, rtol=RTOL), launch, times, components=whole_lanes(body))
     k = None if wavenumber is None else _positive("wavenumber", wavenumber)
     found = np.full(len(there), most)
     for row in np.flatnonzero(there.any(axis=1)):
@@ -163,8 +163,11 @@ def decayed_lengths(
         lowest = IN_RANGE * typical if k is None else k
         wanted = DECAY / (np.cbrt(lowest / 2) * decay)
         ends = [np.interp(wanted, ray[:, ATTENUATION], times, right=most) for ray in rays]
-        # a wave ends where its ray detaches
-        found[row] = np.quantile(np.minimum(ends, rays[:, -1, DETACHMENT]), 1 - spared)
+        # a wave ends where its ray detaches, or comes to an edge or a tip
+        last = rays[:, -1, DETACHMENT]
+        if rays.shape[-1] > WHOLE:
+            last = np.minimum(last, rays[:, -1, END])
+        found[row] = np.quantile(np.minimum(ends, last), 1 - spared)
     grain = GRAIN * size(body)
     return np.asarray(np.minimum(np.ceil(found / grain - 1e-6) * grain, most))
 

@@ -21,7 +21,9 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M21, P, X, pack
+from creeping.geometry.creased import is_creased
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, size
@@ -130,12 +132,12 @@ class RayTracer:
         """
         last = int(np.ceil(latest / step)) + GUARD + 1
         forward: FloatArray = step * np.arange(last + 1, dtype=np.float64)
-        ahead = trace_states(self.body, pack(starts, directions, jacobi=True), forward, rtol=0.0, step=step)
+        ahead = self._traced(pack(starts, directions, jacobi=True), forward, step)
         if not before:
             # never read, but polynomials of the first steps pass there
             return np.concatenate([np.repeat(ahead[:, :1, :8], GUARD, axis=1), ahead[..., :8]], axis=1)
         some = forward[: GUARD + 1]
-        back = trace_states(self.body, pack(starts, -directions, jacobi=True), some, rtol=0.0, step=step)
+        back = self._traced(pack(starts, -directions, jacobi=True), some, step)
         states = np.empty((len(starts), last + 1 + GUARD, 8))
         states[:, GUARD:] = ahead[..., :8]
         behind = back[:, GUARD:0:-1]
@@ -221,15 +223,25 @@ class RayTracer:
         directions, starts, tangents = directions[owner], starts[owner], tangents[owner]
         first[:, 0] = np.sum(starts * directions, axis=1)
         first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
-        if whole and hasattr(self.body, "non_smooth") and n:
-            alive &= times < self._non_smooth(directions, starts, times)
+        if whole and n and (hasattr(self.body, "non_smooth") or is_creased(self.body)):
+            alive &= times < self._ends(directions, starts, times)
         return SingleRays(directions, starts, tangents, RayPoints(lanes, first, times, alive, scale), risen)
 
-    def _non_smooth(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
-        """Times (n,) at which rays come to where the body is not smooth enough, inf where they do not before theirs."""
+    def _traced(self, states: FloatArray, times: FloatArray, step: float) -> FloatArray:
+        """Rays by equal steps; beyond an edge or tip as if their piece went on, for the polynomials' sake."""
+        if is_creased(self.body):
+            return trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=(GUARD + 2) * step).states
+        return trace_states(self.body, states, times, rtol=0.0, step=step)
+
+    def _ends(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
+        """Times (n,) at which rays come to an edge, a tip or to what is not smooth enough, inf if not by theirs."""
         forward = self.step * np.arange(int(np.ceil(np.max(times) / self.step)) + 1, dtype=float)
-        states = trace_states(self.body, pack(starts, directions), forward, rtol=0.0, step=self.step)
-        return non_smooth_from(self.body, states[..., X], forward)
+        if not is_creased(self.body):
+            states = trace_states(self.body, pack(starts, directions), forward, rtol=0.0, step=self.step)
+            return non_smooth_from(self.body, states[..., X], forward)
+        every, owner = np.unique(np.concatenate([starts, directions], axis=1), axis=0, return_inverse=True)
+        found = trace_pieces(self.body, every, forward, rtol=0.0, step=self.step)
+        return np.minimum(found.end, non_smooth_from(self.body, found.states[..., X], forward))[owner]
 
     def towards(
         self, directions: FloatArray, observers: FloatArray, near: FloatArray, times: FloatArray, cell: FloatArray

@@ -13,6 +13,7 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geodesics.states import pack
 from creeping.geometry.arguments import checked_body, shown
+from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK
 from creeping.shadow.attachment import LaunchPoints
@@ -53,7 +54,7 @@ def checked_flow(flow: Flow) -> None:
         raise InvalidInputError(
             f"flow = {shown(flow)} is no flow; make one by creeping.build_phase_map, DirectFlow or choose_flow"
         )
-    checked_body(flow.body)
+    checked_body(flow.body, charts=not is_creased(flow.body))
 
 
 def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: int) -> FloatArray:

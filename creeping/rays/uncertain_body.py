@@ -15,8 +15,9 @@ from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.states import pack
 from creeping.geometry.arguments import one_of, whole_number
 from creeping.geometry.surface import project
-from creeping.rays.fan import RayFan, RayStatus, launch
+from creeping.rays.fan import RayFan, launch
 from creeping.rays.spreading import spread
+from creeping.rays.status import RayStatus
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.line import shadow_line
 from creeping.storage.memory import within_budget

@@ -91,11 +91,17 @@ def evenly_chosen(there: BoolArray, most: int) -> BoolArray:
 
 
 def parting_positions(
-    points: FloatArray, arcs: list[Arc], arc: IntArray, arclength: FloatArray, gap: float
+    points: FloatArray,
+    arcs: list[Arc],
+    arc: IntArray,
+    arclength: FloatArray,
+    gap: float,
+    known: IntArray | None = None,
 ) -> tuple[IntArray, FloatArray]:
     """Positions half-way between neighbours that come to part by more than ``gap``: (m,), (m,).
 
-    ``points`` (rays, steps, 3) are in the order of the positions: by arc, then by arclength.
+    ``points`` (rays, steps, 3) are in the order of the positions: by arc, then by arclength. ``known`` (rays,) are the
+    steps before each ray ends; what comes after says nothing.
     """
     new_arc, new_arclength = [], []
     for k, one in enumerate(arcs):
@@ -107,7 +113,11 @@ def parting_positions(
         after[-1] += one.end - one.start
         if not one.closed:
             mine, following, after = mine[:-1], following[:-1], after[:-1]
-        apart = np.max(np.linalg.norm(points[following] - points[mine], axis=-1), axis=-1)
+        distance = np.linalg.norm(points[following] - points[mine], axis=-1)
+        if known is not None:
+            common = np.minimum(known[following], known[mine])
+            distance[np.arange(distance.shape[1]) >= common[:, None]] = 0.0
+        apart = np.max(distance, axis=-1)
         # below a spacing of rounding size more rays would tell nothing
         wide = (apart > gap) & (after - arclength[mine] > 1e-9 * (one.end - one.start))
         new_arc.append(np.full(int(wide.sum()), k, dtype=np.int64))

@@ -1,4 +1,4 @@
-"""The shadow line of an incidence: the closed curves n.d = 0 on the body, and what part of them launches rays.
+"""The shadow line of an incidence: the curves n.d = 0 on the body, and what part of them launches rays.
 
 Sources: Derivations, R6.
 
@@ -12,118 +12,26 @@ the last bit; next to a singular direction, where that cannot be certain, its to
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from creeping._presenting import DrawnOnBody, brief
-from creeping._typing import Any, ArrayLike, FloatArray, IntArray
+from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import checked_body, whole_number
+from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import unit_direction
+from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, normal
 from creeping.shadow.attachment import Arc, LaunchPoints
+from creeping.shadow.creased import creased_curves, launched_from
+from creeping.shadow.curve import ShadowCurve, counted, interpolated, spelled
+from creeping.shadow.edges import EdgePart
 from creeping.shadow.following import followed
 from creeping.shadow.nodes import Finished, LineNodes, finished, line_nodes, polished
-from creeping.shadow.panels import PanelCurve, fit_panels
-from creeping.shadow.status import CONCAVE, NEAR_SINGULAR, STATUSES
+from creeping.shadow.panels import PanelCurve
+from creeping.shadow.status import NEAR_SINGULAR, STATUSES
 from creeping.storage.memory import within_budget
-
-HALF = 6
-"""Nodes on either side that a polynomial along a curve goes through."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ShadowCurve(DrawnOnBody):
-    """One closed curve of the shadow line, at points equally spaced by arclength.
-
-    Attributes
-    ----------
-    body, direction : Surface, (3,)
-    points : (n, 3), L
-        The last is one spacing before the first.
-    normals, tangents : (n, 3)
-        n and T; seen from outside, the lit side is on the left of T.
-    arclength : (n,), L
-        From 0, growing along T.
-    length : float, L
-    error : float
-        Estimated relative error of the length, and so of places along the curve.
-    status : (n,) of str
-        "attached", "occluded" (the incident ray is stopped before) or "concave" (kappa_n(d) <= 0).
-    curvature : (n,), 1/L
-        kappa_n(d).
-    arcs : tuple of (start, end, status)
-        Arclengths at which the status changes; the end passes the length where an arc wraps.
-    nodes : (k, 3), L
-        Equally spaced points that the curve was found by.
-    """
-
-    body: Surface
-    direction: FloatArray
-    points: FloatArray
-    normals: FloatArray
-    tangents: FloatArray
-    arclength: FloatArray
-    length: float
-    error: float
-    status: np.ndarray[Any, np.dtype[np.str_]]
-    curvature: FloatArray
-    arcs: tuple[tuple[float, float, str], ...]
-    nodes: FloatArray
-
-    @property
-    def fractions(self) -> dict[str, float]:
-        """Share of the length with each status, from the arcs."""
-        shares = dict.fromkeys(STATUSES, 0.0)
-        for start, end, status in self.arcs:
-            shares[status] += (end - start) / self.length
-        return shares
-
-    @cached_property
-    def panels(self) -> PanelCurve:
-        """The curve in panels that are exact to rounding, fitted when first asked for."""
-        spacing = np.full(len(self.nodes), self.length / len(self.nodes))
-        return fit_panels(self.body, self.direction, self.nodes, spacing)
-
-    def line_nodes(self) -> LineNodes:
-        """The curve as the nodes of a line of its own."""
-        x, tangents, curvature = polished(self.body, self.direction, self.nodes)
-        spacing = np.array([self.length / len(x)])
-        columns = np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T)
-        return LineNodes(*columns, curvature, np.array([0, len(x)]), spacing, self.error)
-
-    def state_at(self, arclength: FloatArray) -> IntArray:
-        """Codes of the status at arclengths modulo the length: (m,)."""
-        # rounding may leave a place between two arcs: then it is of neither side, and concave launches nothing
-        codes = np.full(len(arclength), CONCAVE)
-        for start, end, status in self.arcs:
-            codes[np.mod(arclength - start, self.length) < end - start] = STATUSES.index(status)
-        return codes
-
-    def at(self, arclength: ArrayLike) -> FloatArray:
-        """Points of the curve at any arclength modulo the length: (m,) -> (m, 3), L.
-
-        On the line to rounding, along it as exact as the length.
-        """
-        s = np.asarray(arclength, dtype=float)
-        if s.ndim > 1 or not np.all(np.isfinite(s)):
-            raise InvalidInputError(
-                f"arclength of shape {s.shape} is not one finite number or a row of them; give (m,)"
-            )
-        if "panels" in vars(self):
-            return self.panels.at(s.ravel()).reshape(*s.shape, 3)
-        points = interpolated(self.nodes, s.ravel() / self.length * len(self.nodes))
-        return polished(self.body, self.direction, points)[0].reshape(*s.shape, 3)
-
-    def __repr__(self) -> str:
-        n_dot_d = np.abs(self.normals @ self.direction)
-        return (
-            f"ShadowCurve({len(self.points)} points, length {self.length:.10g} L)\n"
-            f"  {_spelled(self.fractions)}; {_count(len(self.arcs), 'arc')}\n"
-            f"  |n.d| at most {np.max(n_dot_d):.1e}; "
-            f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/L"
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,6 +50,12 @@ class ShadowLine(DrawnOnBody):
         order, the angle from d to the next direction whose shadow line crosses itself.
     nodes : LineNodes
         What the line was found by.
+    on_edges : tuple of EdgePart
+        Of a body with creases: where the line goes on along edges, which launch no creeping rays.
+    at_tips : float, L
+        Length next to tips that launches none.
+    edge_on : tuple of int
+        Pieces all over which n.d = 0: they have no line of their own, and count as dark.
 
     Examples
     --------
@@ -157,11 +71,20 @@ class ShadowLine(DrawnOnBody):
     curves: tuple[ShadowCurve, ...]
     singular_distance: float
     nodes: LineNodes
+    on_edges: tuple[EdgePart, ...] = ()
+    at_tips: float = 0.0
+    edge_on: tuple[int, ...] = ()
 
     @property
     def length(self) -> float:
-        """Length of all curves, L."""
+        """Length of all curves, L; parts on edges and next to tips apart."""
         return self.nodes.length
+
+    @property
+    def edge_share(self) -> float:
+        """Share of the line, its parts on edges and next to tips among it, that they are; 0 of a smooth body."""
+        lost = sum(part.length for part in self.on_edges) + self.at_tips
+        return lost / (self.length + lost) if lost else 0.0
 
     @property
     def fractions(self) -> dict[str, float]:
@@ -175,9 +98,9 @@ class ShadowLine(DrawnOnBody):
         """Arcs that launch rays: the attached ones, or with "all" each whole curve."""
         checked_launch_from(launch_from)
         if launch_from == "all":
-            return [Arc(number, 0.0, curve.length, True) for number, curve in enumerate(self.curves)]
+            return [Arc(number, 0.0, curve.length, curve.closed) for number, curve in enumerate(self.curves)]
         return [
-            Arc(number, start, end, len(curve.arcs) == 1)
+            Arc(number, start, end, curve.closed and len(curve.arcs) == 1)
             for number, curve in enumerate(self.curves)
             for start, end, status in curve.arcs
             if status == "attached"
@@ -188,6 +111,8 @@ class ShadowLine(DrawnOnBody):
         checked_launch_from(launch_from)
         n_rays = whole_number(n_rays, "n_rays", 0)
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
+        if is_creased(self.body):
+            return launched_from(self.curves, self.arcs(launch_from), self.direction, n_rays)
         found = finished(self.body, self.direction, self.nodes, n_rays, every=launch_from == "all")
         return LaunchPoints.unpacked(self.direction[None], found.launched[None], found.places[None])
 
@@ -195,10 +120,11 @@ class ShadowLine(DrawnOnBody):
         worst = max((float(np.max(np.abs(curve.normals @ self.direction))) for curve in self.curves), default=0.0)
         direction = ", ".join(f"{d:.4g}" for d in self.direction)
         points = sum(len(curve.points) for curve in self.curves)
+        on_edges = f"; {self.edge_share:.4g} of it on edges and tips" if self.edge_share else ""
         return (
-            f"ShadowLine({_count(len(self.curves), 'curve')}, {points} points, length {self.length:.10g} L, "
+            f"ShadowLine({counted(len(self.curves), 'curve')}, {points} points, length {self.length:.10g} L, "
             f"direction ({direction}))\n"
-            f"  {_spelled(self.fractions)}; on {brief(self.body)}\n"
+            f"  {spelled(self.fractions)}{on_edges}; on {brief(self.body)}\n"
             f"  |n.d| at most {worst:.1e}; singular distance {self.singular_distance:.3g}"
         )
 
@@ -251,6 +177,8 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     d = unit_direction(direction)
     n_points = whole_number(n_points, "n_points", 16)
     within_budget(150.0 * n_points, f"{n_points} points of the shadow line", "ask for fewer")
+    if is_creased(body):
+        return _creased_line(body, d, n_points)
     nodes, code, distance = line_nodes(body, d)
     panels: tuple[PanelCurve, ...] = ()
     if nodes is None or code == NEAR_SINGULAR:
@@ -267,25 +195,20 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     return ShadowLine(body, d, tuple(curves), distance, nodes)
 
 
-def interpolated(nodes: FloatArray, places: FloatArray) -> FloatArray:
-    """Points of a closed curve at numbers of nodes with fractions, by polynomials: (k, 3), (m,) -> (m, 3)."""
-    first = np.floor(places).astype(np.int64)
-    offsets = np.arange(1 - HALF, HALF + 1)
-    u = (places - first)[:, None] - offsets
-    before, after = np.ones_like(u), np.ones_like(u)
-    before[:, 1:] = np.cumprod(u[:, :-1], axis=1)
-    after[:, :-1] = np.cumprod(u[:, :0:-1], axis=1)[:, ::-1]
-    scale = np.array([np.prod([j - i for i in offsets if i != j], dtype=float) for j in offsets])
-    weights = before * after / scale
-    return np.asarray(np.einsum("mj,mjc->mc", weights, nodes[(first[:, None] + offsets) % len(nodes)]))
-
-
-def _spelled(fractions: dict[str, float]) -> str:
-    return ", ".join(f"{share:.4g} {status}" for status, share in fractions.items() if share) or "nothing"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"
+def _creased_line(body: Surface, direction: FloatArray, n_points: int) -> ShadowLine:
+    if speed_of(body) is not None:
+        raise InvalidInputError(f"{brief(body)} has creases and a speed; give a body with one or the other")
+    curves, on_edges, at_tips, edge_on = creased_curves(body, direction, n_points)
+    parts = [curve.line_nodes() for curve in curves]
+    nodes = LineNodes(
+        points=np.concatenate([np.zeros((3, 0)), *(part.points for part in parts)], axis=1),
+        tangents=np.concatenate([np.zeros((3, 0)), *(part.tangents for part in parts)], axis=1),
+        curvature=np.concatenate([np.zeros(0), *(part.curvature for part in parts)]),
+        starts=np.cumsum([0, *(len(part.curvature) for part in parts)]).astype(np.int64),
+        spacing=np.concatenate([np.zeros(0), *(part.spacing for part in parts)]),
+        error=max((part.error for part in parts), default=0.0),
+    )
+    return ShadowLine(body, direction, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
 
 
 def _curve(

@@ -10,14 +10,17 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
+from creeping.geometry.creased import is_creased
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 from creeping.shadow.attachment import LaunchPoints
+from creeping.shadow.creased import launched_from
 from creeping.shadow.following import followed
+from creeping.shadow.line import shadow_line
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, finished, judged, prepared
-from creeping.shadow.status import FOLLOWED, NO_RAY, SINGULAR
+from creeping.shadow.status import FOLLOWED, NO_RAY, OK, SINGULAR
 
 LEAST = 8
 """Fewest incidences worth a thread."""
@@ -78,6 +81,8 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     """
     from creeping.shadow.kernels.trace import LAUNCHED, SUMMARY, trace_lines
 
+    if is_creased(body):
+        return _one_by_one(body, np.asarray(directions, dtype=float), n_rays, every)
     directions = np.ascontiguousarray(directions, dtype=float)
     n = len(directions)
     meshes, box, v = prepared(body), box_of(body), critical_distances(body, directions)
@@ -108,6 +113,27 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     curves, length, error, attached, occluded, concave = summary.T
     launch = LaunchPoints.unpacked(directions, launched, places)
     return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, v, launch)
+
+
+def _one_by_one(body: Surface, directions: FloatArray, n_rays: int, every: bool) -> ShadowLines:
+    """Lines of a body with creases, each by itself."""
+    n = len(directions)
+    numbers, status = np.full((n, 6), np.nan), np.full(n, SINGULAR, np.int8)
+    columns: dict[str, list[Any]] = {one.name: [] for one in fields(LaunchPoints)}
+    for row, direction in enumerate(directions):
+        try:
+            line = shadow_line(body, direction, n_points=16)
+            shares = line.fractions.values()
+            numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
+            launch = line.launch_points(n_rays, "all" if every else "attached")
+        except SingularIncidenceError:
+            launch = launched_from((), [], direction, n_rays)
+        for name, values in columns.items():
+            values.append(getattr(launch, name)[0])
+    launched = LaunchPoints(**{name: np.array(values) for name, values in columns.items()})
+    curves, length, error, attached, occluded, concave = numbers.T
+    near = np.full(n, np.inf)
+    return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, near, launched)
 
 
 def _follow(

@@ -1,4 +1,4 @@
-"""A smooth closed curve {F = 0, grad F.d = 0} in panels, exact at every arclength.
+"""A smooth curve {F = 0, grad F.d = 0}, closed or open, in panels, exact at every arclength.
 
 On the panel from a to b with chord c = b - a, the curve is a graph over the chord, u in [-1, 1]:
 
@@ -74,7 +74,7 @@ def _limited(step: FloatArray, reach: FloatArray | float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PanelCurve:
-    """Closed curve in panels.
+    """Curve in panels.
 
     Attributes
     ----------
@@ -85,6 +85,7 @@ class PanelCurve:
         Legendre coefficients of x(u).
     speed : (p, ORDER), L
         Legendre coefficients of ds/du.
+    closed : bool
     """
 
     body: Surface
@@ -92,6 +93,7 @@ class PanelCurve:
     nodes: FloatArray
     shape: FloatArray
     speed: FloatArray
+    closed: bool = True
 
     @property
     def breaks(self) -> FloatArray:
@@ -105,9 +107,10 @@ class PanelCurve:
         return float(self.breaks[-1])
 
     def at(self, arclength: FloatArray) -> FloatArray:
-        """Points at any arclength, modulo the length: (m,) -> (m, 3), L."""
+        """Points at any arclength: (m,) -> (m, 3), L; modulo the length, of an open curve no further than its ends."""
         breaks = self.breaks
-        s = np.mod(np.asarray(arclength, dtype=float), breaks[-1])
+        s = np.asarray(arclength, dtype=float)
+        s = np.mod(s, breaks[-1]) if self.closed else np.clip(s, 0.0, breaks[-1])
         panel = np.clip(np.searchsorted(breaks, s, side="right") - 1, 0, len(self.nodes) - 1)
         offset = s - breaks[panel]
         integral = legendre.legint(self.speed, lbnd=-1, axis=1)[panel]
@@ -123,8 +126,10 @@ class PanelCurve:
         return onto_line(self.body, self.direction, points, reach=1e-6 * size(self.body), iterations=2)
 
 
-def fit_panels(body: Surface, direction: FloatArray, nodes: FloatArray, spacing: FloatArray) -> PanelCurve:
-    """Panels of the closed curve through ordered nodes.
+def fit_panels(
+    body: Surface, direction: FloatArray, nodes: FloatArray, spacing: FloatArray, *, closed: bool = True
+) -> PanelCurve:
+    """Panels of the curve through ordered nodes.
 
     Parameters
     ----------
@@ -133,6 +138,8 @@ def fit_panels(body: Surface, direction: FloatArray, nodes: FloatArray, spacing:
         Points of the curve, running along T, up to swaps of neighbours closer than ``spacing``.
     spacing : (k,), L
         Size of the mesh at the nodes.
+    closed : bool
+        Whether the curve goes on from the last node to the first; else these are its ends.
 
     Returns
     -------
@@ -143,14 +150,16 @@ def fit_panels(body: Surface, direction: FloatArray, nodes: FloatArray, spacing:
     SingularIncidenceError
         If a panel cannot be made exact: the curve turns within rounding of a crossing.
     """
-    nodes = _forward_nodes(body, direction, nodes, spacing)
+    if closed:
+        nodes = _forward_nodes(body, direction, nodes, spacing)
     _, tangents = newton_step(body, direction, nodes)
     count = len(nodes)
-    chords = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)
+    last = count if closed else count - 1
+    chords = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)[:last]
     tolerance = LENGTH_TOLERANCE * max(float(chords.sum()), 0.1 * size(body))
-    keys = _first_breaks(tangents)
+    keys = _first_breaks(tangents, last)
     # a panel end is its place in the ring of nodes; halving takes a node of the ring while there is one between
-    known = {float(k): (nodes[k % count], tangents[k % count]) for k in range(count + 1)}
+    known = {float(k): (nodes[k % count], tangents[k % count]) for k in range(last + 1)}
     todo = [(float(a), float(b)) for a, b in pairwise(keys)]
     done: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
     while todo:
@@ -177,7 +186,8 @@ def fit_panels(body: Surface, direction: FloatArray, nodes: FloatArray, spacing:
             )
         todo = halves
     done.sort(key=lambda panel: panel[0])
-    return PanelCurve(body, direction, *(np.array([panel[k] for panel in done]) for k in (1, 2, 3)))
+    first, shape, speed = (np.array([panel[k] for panel in done]) for k in (1, 2, 3))
+    return PanelCurve(body, direction, first, shape, speed, closed)
 
 
 def _between(low: float, high: float) -> float:
@@ -198,14 +208,13 @@ def _forward_nodes(body: Surface, direction: FloatArray, nodes: FloatArray, spac
     return nodes[kept]
 
 
-def _first_breaks(tangents: FloatArray) -> list[int]:
-    """Ring numbers, 0 to k, at which panels start: 0.6 rad of turning apart, eight panels if there are nodes."""
-    count = len(tangents)
-    cosine = np.clip(np.sum(tangents * np.roll(tangents, -1, axis=0), axis=1), -1, 1)
+def _first_breaks(tangents: FloatArray, last: int) -> list[int]:
+    """Ring numbers, 0 to ``last``, at which panels start: 0.6 rad of turning apart, eight panels if there are nodes."""
+    cosine = np.clip(np.sum(tangents * np.roll(tangents, -1, axis=0), axis=1), -1, 1)[:last]
     turned = np.concatenate([[0.0], np.cumsum(np.arccos(cosine))])
-    panels = int(np.clip(np.ceil(turned[-1] / 0.6), min(8, count), count))
+    panels = int(np.clip(np.ceil(turned[-1] / 0.6), min(8, last), last))
     keys = np.searchsorted(turned, np.linspace(0, turned[-1], panels + 1)[1:-1])
-    return [0, *np.unique(np.clip(keys, 1, count - 1)).tolist(), count]
+    return [0, *np.unique(np.clip(keys, 1, last - 1)).tolist(), last]
 
 
 def _fit(

@@ -14,7 +14,8 @@ from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.states import ATTENUATION, WHOLE, P, X
+from creeping.geodesics.states import ATTENUATION, P, X, whole_lanes
+from creeping.geometry.creased import checked_smooth
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch, ray_arrays
 from creeping.rays.reach import early_length
@@ -57,6 +58,8 @@ class Sweeper:
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
+        if request.quantity != "rays":
+            checked_smooth(flow.body, "a sweep of fields", "call creeping.far_field for each incidence, or sweep rays")
         self._tracer = None if request.quantity == "rays" else RayTracer(flow.body, request.length)
         self._early = 0.0
         if request.quantity != "rays":
@@ -161,7 +164,7 @@ def fill_rays(flow: Flow, lines: ShadowLines, times: FloatArray, out: dict[str, 
     launch = lines.launch
     for name, values in zip(CURVED, launch_validity(flow.body, launch), strict=True):
         out[name][:] = values
-    states, there = carried(flow, launch, times, components=WHOLE), launch.there
+    states, there = carried(flow, launch, times, components=whole_lanes(flow.body)), launch.there
     rays = ray_arrays(flow.body, launch, states, times)
     out["ray_status"][:], out["detachment"][:] = rays.status, rays.detachment
     out["curve_index"][:], out["arclength"][:] = launch.curve_index, launch.arclength

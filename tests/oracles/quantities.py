@@ -6,8 +6,8 @@ from scipy.interpolate import make_interp_spline
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal, size
-from creeping.rays.fan import RayStatus
 from creeping.rays.quantities import GAUSS, GUARD, LANES, SHARPEST, START_LANES, RayPoints
+from creeping.rays.status import RayStatus
 from creeping.rays.tracer import TURN
 from creeping.shadow.attachment import line_tangents
 

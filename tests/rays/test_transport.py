@@ -6,7 +6,7 @@ from oracles.plain_sweep import PlainSweeper
 
 import creeping as cr
 import scatterers as sc
-from creeping.rays.fan import RayStatus
+from creeping.rays.status import RayStatus
 from creeping.shadow.status import FAILED, NO_RAY, OK, SINGULAR
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper

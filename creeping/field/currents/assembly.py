@@ -51,7 +51,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
     (True, True)
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body)
+    checked_plain(fan.body, smooth="the method of currents")
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, 2)
     # a conductor's rays are as long as its wave that decays less

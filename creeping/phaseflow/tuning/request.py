@@ -19,6 +19,7 @@ from creeping.geometry.arguments import (
     shown,
     whole_number,
 )
+from creeping.geometry.creased import checked_smooth
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import (
     Plan,
@@ -115,6 +116,7 @@ def build_phase_map(
     >>> pm.horizon, pm.error.rms < 1e-9
     (0.5, True)
     """
+    checked_smooth(body, "a phase map", "carry the rays by creeping.DirectFlow, or leave the choice to choose_flow")
     checked_body(body)
     report = reporter(progress)
     if tolerance is None and grid is None:

@@ -1,0 +1,238 @@
+"""The far field of a body with edges, joints and tips: creeping rays on its pieces, physical optics, and what is lost.
+
+    f = (1 - w) f_rays + Σ over smooth parts of [u f_optics + (1 - u) f_specular]
+
+with w of the forward lobe as in `creeping.field.far_rays`. A smooth part is what hangs together by joints; u is 1, but
+w where the part has specular points and all stand clear of its creases (`creeping.rays.piece_specular`). f_optics
+(`creeping.field.optics`) holds facets, specular points next to edges, and the forward lobe. The error adds in squares,
+besides what is beyond the second order of each ray and specular point,
+
+    edges      C/(2π) |∫ e^{ik(d - r).x} dl|        lit or part of the outline, and their parts, C of order 1
+    line       1/(2π) |∫ min[κ/(k (1 - d.r)²), (kρ)^(1/3)] e^{ik(d - r).x} dl|, of a conductor 1/(1 - d.r) more
+    ends       1/(2π) |Σ 2 e^(-ξ Im τ) |J|^(1/2) h e^{ik(d.x0 + s - r.x)}|       rays that end at edges and tips
+    tips       1/(4k) each lit one
+    optics     its next order, κ/(k cos³θᵢ) of each tile
+
+An incremental length of edge radiates about C/(2π) beside what physical optics has of it; the current of physical
+optics starts with a kink at the line, whose end-point contribution is the first under ``line``; the second is the wave
+of the penumbra, ahead. Between the faces of a concave edge the wave is reflected more than once: that is left out, and
+so is everything shed by an edge and scattered again.
+
+Sources: [LK59], [KLS56]; Derivations, F3 and F13.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.far_geometry import FarGeometry, far_geometry, merging
+from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
+from creeping.field.far_result import FarField
+from creeping.field.optics import lit_tiles, optics_field
+from creeping.field.shed_wave import smoothstep
+from creeping.geometry.creased import pieces_of, tiles_of
+from creeping.geometry.surface import size
+from creeping.rays.fan import RayFan
+from creeping.rays.piece_specular import joined, smooth_parts, some, specular_on_pieces, stand_clear
+from creeping.rays.specular import SpecularPoints
+from creeping.rays.status import AT_CREASES
+from creeping.shadow.edges import convex, unit_normals
+from creeping.shadow.occlusion import occluded
+
+WEDGE = 1.0
+"""C: what a wedge scatters beside physical optics, times 2π, is of this size but next to its shadow boundaries."""
+PARTS_OF_EDGE = 16
+"""Parts of an edge whose waves are added in squares too: stationary points of its phase stand apart."""
+MATTERS = 0.25
+"""Share of the field from which what is left out makes a direction unresolved."""
+STEEP = 1e-9
+"""1 - d.r below which the end-point contribution has no bound of its own."""
+OUTWARD = 1e-4
+"""Distance from an edge, in body sizes, at which it is asked whether the wave comes to it."""
+
+
+def creased_far_field(fan: RayFan, r: FloatArray, k: float, boundary: BoundaryLike, order: int) -> FarField:
+    """Far field of a fan in unit directions r (m, 3), by rays and physical optics."""
+    kinds = scalar_boundaries(boundary)
+    parts = CreasedParts(fan, far_geometry(fan, r), kinds, k, order)
+    for number, kind in enumerate(kinds):
+        parts.add(number, kind)
+    return FarField(
+        directions=r.copy(),
+        creeping=parts.creeping,
+        reflected=parts.reflected,
+        forward=parts.forward,
+        method=np.full(len(r), "rays+optics", dtype="<U16"),
+        unresolved=parts.unresolved(),
+        error=parts.error(),
+        error_by="order",
+        wavenumber=k,
+        boundary=boundary_name(boundary),
+        order=order,
+    )
+
+
+class CreasedParts(Parts):
+    """Parts of the field of one incidence, and what each may be off."""
+
+    def __init__(
+        self, fan: RayFan, geometry: FarGeometry, kinds: tuple[Boundary, ...], wavenumber: float, order: int
+    ) -> None:
+        self.fan, self.geometry, self.wavenumber, self.order = fan, geometry, wavenumber, order
+        self.incident, self.vector = geometry.direction, len(kinds) == 2
+        self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
+        r, m, body = geometry.directions, len(geometry.directions), fan.body
+        self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
+        self.doubt, self.failing_size = self._zeros().real, np.zeros(m)
+        theta = geometry.angle
+        self.in_forward = 1 - smoothstep(geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta, *FORWARD)
+        ends = [geometry.ends.lost(r, geometry.incidence, wavenumber, kind) for kind in kinds]
+        typical = np.sqrt(tiles_of(body, 0.1).areas.sum() / (8 * np.pi))
+        edges, facing = _edges(fan, r, wavenumber)
+        # hidden ground, and faces that see each other, have waves that are nowhere in particular
+        self.dark = np.hypot(geometry.unserved * typical, facing * typical)
+        ended = np.max([_ended(fan, r, wavenumber, kind) for kind in kinds], axis=0)
+        lost = [edges, ended, _tips(fan, wavenumber) * np.ones(m), (1 - self.in_forward) * np.max(ends, axis=0)]
+        self.specular = []
+        tiles = lit_tiles(body, fan.line.direction, wavenumber)
+        for part in smooth_parts(body):
+            clear, points = _clear_points(body, part, fan.line.direction, r, wavenumber)
+            share = np.where(clear, self.in_forward, 1.0)
+            if points is not None:
+                self.specular.append((points, (1 - share)[points.observer]))
+            optics = optics_field(tiles.on(part), r, wavenumber, kinds, self.in_forward)
+            self.reflected += share.reshape(-1, *(1,) * (self.creeping.ndim - 1)) * optics.values
+            lost += [share * optics.next_order, share * _line(fan, part, r, wavenumber, self.vector)]
+        self.left_out = np.sqrt(np.sum(np.square(lost), axis=0))
+
+    def add(self, number: int, kind: Boundary) -> None:
+        """Add the creeping rays and the specular points of one scalar problem."""
+        g, shed = self.geometry, self.geometry.shed
+        share = (1 - self.in_forward)[shed.observer]
+        waves = []
+        for order in (1, 2):
+            wave = isolated_rays(g, self.wavenumber, kind, order)
+            waves.append(np.where(share > 0, share * np.where(share > 0, wave, 0.0), 0.0))
+        merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
+        first, second = waves
+        wave = second if self.order == 2 else first
+        off = beyond(np.abs(second - first), wave, self.order, self.unsure)
+        normals = shed.rays.first_normal, g.shed_normals
+        self._add_apart(self.creeping, number, shed.observer, wave, off, *normals, merged)
+        for points, by in self.specular:
+            self._add_specular(number, kind, points, by)
+
+    def unresolved(self) -> BoolArray:
+        """Directions in which what is left out matters (m,)."""
+        total = np.abs(self.creeping + self.reflected)
+        largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
+        lost = np.hypot(np.hypot(self.left_out, self.failing_size), self.dark)
+        return np.asarray(~(lost <= MATTERS * largest))
+
+    def error(self) -> FloatArray:
+        """Size of all that is left out or beyond an order, L."""
+        lost = np.hypot(np.hypot(self.left_out, self.failing_size), self.dark)
+        error = np.hypot(lost.reshape(-1, *(1,) * (self.creeping.ndim - 1)), np.sqrt(self.doubt))
+        return np.asarray(np.where(np.isfinite(error), error, np.nan))
+
+
+def _clear_points(
+    body: Any, part: tuple[int, ...], direction: FloatArray, observers: FloatArray, k: float
+) -> tuple[BoolArray, SpecularPoints | None]:
+    """Whether specular points alone serve for a smooth part of the body in each direction (m,), and those that do."""
+    found = specular_on_pieces(body, part, direction, observers)
+    number, clear = np.zeros(len(observers), dtype=int), np.zeros(len(observers), dtype=int)
+    for points in found:
+        np.add.at(number, points.observer, 1)
+        np.add.at(clear, points.observer[stand_clear(body, points, k)], 1)
+    serve = (number > 0) & (number == clear)
+    kept = [some(points, serve[points.observer]) for points in found]
+    kept = [points for points in kept if len(points.points)]
+    return serve, joined(kept) if kept else None
+
+
+def _edges(fan: RayFan, observers: FloatArray, k: float) -> tuple[FloatArray, float]:
+    """Waves of lit edges and of edges on the outline (m,), L, and the share of concave lit ones in the outline."""
+    body: Any = fan.body
+    d, pieces = fan.line.direction, pieces_of(body)
+    whole, parts, facing = np.zeros(len(observers), dtype=complex), np.zeros(len(observers)), 0.0
+    for crease in body.creases:
+        if crease.kind != "edge":
+            continue
+        x = _refined(np.asarray(crease.points, dtype=float), k)
+        n = [unit_normals(pieces[number], x) for number in crease.pieces]
+        outward = n[0] + n[1]
+        outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-12)
+        lit = np.minimum(n[0] @ d, n[1] @ d) < 0
+        lit &= ~occluded(body, x + OUTWARD * size(body) * outward, d)
+        chords = np.linalg.norm(np.diff(x, axis=0), axis=1)
+        middles, shining = 0.5 * (x[1:] + x[:-1]), (lit[1:] | lit[:-1])
+        waves = np.exp(1j * k * (middles @ (d - observers).T)) * (chords * shining)[:, None]
+        whole += waves.sum(axis=0)
+        cuts = np.unique(np.linspace(0, len(waves), PARTS_OF_EDGE + 1).astype(int))[:-1]
+        parts += np.sum(np.abs(np.add.reduceat(waves, cuts, axis=0)) ** 2, axis=0)
+        concave = ~(convex(body, x, *n)[1:]) & shining & (np.maximum(n[0] @ d, n[1] @ d) < 0)[1:]
+        facing += float(np.sum(chords[concave]))
+    outline = fan.line.length + sum(part.length for part in fan.line.on_edges)
+    return WEDGE / (2 * np.pi) * np.hypot(np.abs(whole), np.sqrt(parts)), min(facing / outline if outline else 0.0, 1.0)
+
+
+def _refined(x: FloatArray, k: float) -> FloatArray:
+    """A polyline with chords of at most 1/k."""
+    out = [x[:1]]
+    for a, b in pairwise(x):
+        count = max(1, int(np.ceil(k * np.linalg.norm(b - a))))
+        out.append(a + (np.arange(1, count + 1) / count)[:, None] * (b - a))
+    return np.concatenate(out)
+
+
+def _line(fan: RayFan, part: tuple[int, ...], observers: FloatArray, k: float, jumps: bool) -> FloatArray:
+    """What physical optics has wrong next to the line on a smooth part of the body (m,), L."""
+    d, out = fan.line.direction, np.zeros(len(observers), dtype=complex)
+    steep = np.maximum(1 - observers @ d, STEEP)
+    for curve in fan.line.curves:
+        for start, end, status in curve.arcs:
+            if status != "attached" or curve.piece not in part:
+                continue
+            count = max(64, int(np.ceil(2 * k * (end - start))))
+            s = start + (end - start) * (np.arange(count) + 0.5) / count
+            x = curve.at(s)
+            kappa = np.maximum(np.interp(np.mod(s, curve.length), curve.arclength, curve.curvature), 0.0)[:, None]
+            with np.errstate(divide="ignore"):
+                end_point = kappa / (k * steep**2) + (1 / steep if jumps else 0.0)
+                size_of = np.minimum(end_point, np.cbrt(k / kappa))
+            across = np.linalg.norm(np.cross(x - np.roll(x, 1, axis=0), d), axis=1)
+            across[0] = across[1] if len(across) > 1 else 0.0
+            out += np.sum(size_of * across[:, None] * np.exp(1j * k * (x @ (d - observers).T)), axis=0)
+    return np.abs(out) / (2 * np.pi)
+
+
+def _ended(fan: RayFan, observers: FloatArray, k: float, kind: Boundary) -> FloatArray:
+    """What rays that end at edges and tips would give there (m,), L."""
+    ended = np.isin(fan.status, AT_CREASES)
+    if not np.any(ended):
+        return np.zeros(len(observers))
+    first = np.maximum(fan.curvature[ended, 0], 1e-300)
+    decay = np.min(np.atleast_2d(modes_of(kind, fock_scale(k, first)).tau.imag), axis=-1)
+    left = 2 * np.exp(-np.cbrt(k / 2) * fan.attenuation[ended, -1] * np.maximum(decay, 0.0))
+    wave = left * np.sqrt(np.abs(fan.spreading[ended, -1])) * fan.spacing[ended]
+    path = fan.eikonal[ended, 0] + fan.detachment[ended]
+    phase = k * (path[:, None] - fan.points[ended, -1] @ observers.T)
+    together = np.abs(np.sum(wave[:, None] * np.exp(1j * phase), axis=0))
+    return np.asarray(np.hypot(together, np.sqrt(np.sum(wave**2))) / (2 * np.pi))
+
+
+def _tips(fan: RayFan, k: float) -> float:
+    """Waves of the tips that the wave comes to, L."""
+    body: Any = fan.body
+    tips = np.array([np.ravel(c.points)[:3] for c in body.creases if c.kind == "tip"]).reshape(-1, 3)
+    if not len(tips):
+        return 0.0
+    centre = np.mean(np.asarray(body.bounds, dtype=float), axis=0)
+    out = tips - centre
+    out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
+    seen = ~occluded(body, tips + OUTWARD * size(body) * out, fan.line.direction)
+    return float(np.sqrt(np.sum(seen)) / (4 * k))

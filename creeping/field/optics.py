@@ -1,0 +1,214 @@
+"""Physical optics of the lit tiles of a body: what its facets and curved pieces reflect, and the shadow they cast.
+
+    f = -(ik/4π) ∫ [(1 + R) n.r + (1 - R) n.d] e^{ik(d - r).x} dS     over lit ground, R of a plane at its cos θᵢ = -n.d
+    f = (ik/2π) [V - (V.r) r],  V = ∫ n e^{ik(d - r).x} dS x (d x E)   of a conductor
+
+On curved ground n.r is replaced by (2w - 1) n.d, w = 1 in the forward lobe and 0 elsewhere: they agree at specular
+points and ahead, and n.d has no jump at the shadow line, where the current of a hard body does not stop.
+
+Each tile is a flat triangle, over which the phase is linear: with phases u and v of two corners relative to the third,
+
+    ∫ e^{iφ} dS = 2A e^{iφ0} (g(u) - g(v))/(i(u - v)),    g(x) = (e^{ix} - 1)/(ix).
+
+The same integral serves a specular point, a flat facet as a whole, the rim of a facet and the forward lobe. Its error
+on curved ground is of the next order, κ/(k cos³θᵢ) of each tile's contribution.
+
+Sources: [KLS56]; Derivations, F13.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
+from creeping.field.boundary import Boundary
+from creeping.field.polarisation import spherical_frame
+from creeping.field.reflected import plane_reflection
+from creeping.geometry.creased import Tiles, pieces_of, tiles_of
+from creeping.geometry.surface import size
+from creeping.shadow.occlusion import occluded
+from creeping.storage.memory import within_budget
+
+SAG = 0.1
+"""k h² κ of a tile: its phase then errs by a hundredth of a radian on average, in backscatter."""
+LONGEST, SHORTEST = 0.1, 2e-3
+"""Longest and shortest sides of tiles, in body sizes."""
+USUAL = 0.95
+"""Share of the area whose curvature the sides go by: next to a tip it is without bound."""
+OUTWARD = 1e-6
+"""Distance from the body, in its sizes, at which a tile is asked whether the wave comes to it."""
+BLOCK = 2_000_000
+"""Directions times tiles at once."""
+FLAT = 1e-6
+"""Curvature, in inverse sizes, below which a tile is flat."""
+NEAR = 0.2
+"""Difference of phases below which the integral is its series."""
+
+
+class LitTiles(NamedTuple):
+    """Lit triangles of an incidence.
+
+    Attributes
+    ----------
+    direction : (3,)
+    corners : (t, 3, 3), L
+    normals : (t, 3)
+        Of the body, at their middles.
+    cosine : (t,)
+        cos θᵢ > 0.
+    curvature : (t,), 1/L
+        Larger principal curvature.
+    pieces : (t,)
+        Number of the piece of each.
+    scale : float, L
+        Size of the body.
+    """
+
+    direction: FloatArray
+    corners: FloatArray
+    normals: FloatArray
+    cosine: FloatArray
+    curvature: FloatArray
+    pieces: IntArray
+    scale: float
+
+    def on(self, pieces: tuple[int, ...]) -> "LitTiles":
+        """Those of some pieces."""
+        mine = np.isin(self.pieces, pieces)
+        rows = self.corners[mine], self.normals[mine], self.cosine[mine], self.curvature[mine], self.pieces[mine]
+        return LitTiles(self.direction, *rows, self.scale)
+
+
+def side_of_tiles(body: Any, wavenumber: float) -> float:
+    """Share of the body's size that tiles may have as sides; one of few, so that frequencies share them."""
+    coarse = tiles_of(body, LONGEST)
+    bound = _curvatures(body, coarse, coarse.corners.mean(axis=1))
+    order = np.argsort(bound)
+    covered = np.cumsum(coarse.areas[order])
+    usual = float(bound[order][min(np.searchsorted(covered, USUAL * covered[-1]), len(order) - 1)])
+    side = np.sqrt(SAG / (wavenumber * max(usual, 1e-3 / size(body)))) / size(body)
+    return float(np.clip(2 ** (np.floor(2 * np.log2(side)) / 2), SHORTEST, LONGEST))
+
+
+def _curvatures(body: Any, tiles: Tiles, middles: FloatArray) -> FloatArray:
+    out = np.zeros(len(middles))
+    for number, piece in enumerate(pieces_of(body)):
+        mine = np.flatnonzero(tiles.pieces == number)
+        out[mine] = _bound(piece, middles[mine])
+    return out
+
+
+def _bound(piece: Any, x: FloatArray) -> FloatArray:
+    """Norm of the shape operator at points (n,), 1/L: its larger principal curvature, up to a factor √2."""
+    if not len(x):
+        return np.zeros(0)
+    gradient = piece.gradient(x)
+    g = np.linalg.norm(gradient, axis=1)
+    n = gradient / g[:, None]
+    P = np.eye(3) - n[:, :, None] * n[:, None, :]
+    return np.asarray(np.linalg.norm(P @ piece.hessian(x) @ P, axis=(1, 2)) / g)
+
+
+def lit_tiles(body: Any, direction: FloatArray, wavenumber: float) -> LitTiles:
+    """The tiles that the wave comes to."""
+    share = side_of_tiles(body, wavenumber)
+    tiles = tiles_of(body, share)
+    within_budget(1000.0 * len(tiles.corners), f"{len(tiles.corners)} tiles of the body", "lower the wavenumber")
+    n = tiles.normals.mean(axis=1)
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    lit = np.flatnonzero(n @ direction < 0)
+    middles = tiles.corners[lit].mean(axis=1)
+    free = ~occluded(body, middles + (OUTWARD + share**2) * size(body) * n[lit], direction)
+    lit, middles = lit[free], middles[free]
+    some = Tiles(tiles.corners[lit], tiles.normals[lit], tiles.pieces[lit])
+    curvature = _curvatures(body, some, middles)
+    return LitTiles(direction, some.corners, n[lit], -n[lit] @ direction, curvature, some.pieces, size(body))
+
+
+def phase_sums(corners: FloatArray, vectors: FloatArray, wavenumber: float, weights: FloatArray) -> ComplexArray:
+    """Sums over triangles (t, 3, 3) of weights (t, w) times ∫ e^{ik q.x} dS, for vectors q (m, 3): (m, w).
+
+    Examples
+    --------
+    >>> square = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=float)
+    >>> found = phase_sums(square, np.array([[2.0, 0, 0]]), 3.0, np.ones((2, 1)))[0, 0]
+    >>> bool(abs(found - (np.exp(6j) - 1) / 6j) < 1e-14)
+    True
+    """
+    out = np.zeros((len(vectors), weights.shape[1]), dtype=complex)
+    a, b, c = np.moveaxis(corners, 1, 0)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    block = max(1, BLOCK // max(len(corners), 1))
+    for first in range(0, len(vectors), block):
+        some = slice(first, first + block)
+        phases = wavenumber * np.einsum("tkc,mc->kmt", corners, vectors[some])
+        out[some] = _simplex(phases) @ (doubled[:, None] * weights)
+    return out
+
+
+def _simplex(phases: FloatArray) -> ComplexArray:
+    """Integral of e^{iφ} over the unit simplex from phases at its corners (3, ...): (...)."""
+    # the corner opposite to the side with the largest difference: only where all are small do differences cancel
+    gaps = np.abs(phases - np.roll(phases, -1, axis=0))
+    opposite = (np.argmax(gaps, axis=0) + 2) % 3
+    base, one, two = (np.take_along_axis(phases, (opposite[None] + k) % 3, axis=0)[0] for k in range(3))
+    u, v = one - base, two - base
+    near = np.abs(u - v) < NEAR
+    apart = np.where(near, 1.0, u - v)
+    found = (_ramp(u) - _ramp(v)) / (1j * apart)
+    x, y = np.where(near, u, 0.0), np.where(near, v, 0.0)
+    total, power = np.zeros(found.shape, dtype=complex), np.ones(found.shape)
+    factor: complex = 0.5
+    for order in range(1, 9):
+        total += factor * power
+        # complete homogeneous polynomials of u and v over (order + 2)!
+        power = power * x + y**order
+        factor *= 1j / (order + 2)
+    return np.asarray(np.exp(1j * base) * np.where(near, total, found))
+
+
+def _ramp(x: FloatArray) -> ComplexArray:
+    """g(x), exact at 0."""
+    return np.asarray(np.exp(0.5j * x) * np.sinc(x / (2 * np.pi)))
+
+
+class OpticsField(NamedTuple):
+    """What lit tiles give: the field (m,) or (m, 2, 2), L, and the size of its next order (m,), L."""
+
+    values: ComplexArray
+    next_order: FloatArray
+
+
+def optics_field(
+    tiles: LitTiles, observers: FloatArray, wavenumber: float, boundary: tuple[Boundary, ...], in_forward: FloatArray
+) -> OpticsField:
+    """Field of lit tiles in directions r (m, 3): of a scalar boundary, or of a conductor's two.
+
+    ``in_forward`` (m,) is w, 1 in the forward lobe and 0 outside it.
+    """
+    k, n, d = wavenumber, tiles.normals, tiles.direction
+    vectors = d - observers
+    # near grazing the next order stops growing where the transition region begins
+    least = np.cbrt(2 * tiles.curvature / k)
+    later = np.minimum(tiles.curvature / (k * np.maximum(tiles.cosine, np.maximum(least, 1e-12)) ** 3), 1.0)
+    if len(boundary) == 2:
+        sums = phase_sums(tiles.corners, vectors, k, np.concatenate([n, later[:, None] * n], axis=1))
+        received = spherical_frame(d[None])[0]
+        sent = spherical_frame(observers)
+        fields = []
+        for N in (sums[:, :3], sums[:, 3:]):
+            V = np.stack([np.cross(N, np.cross(d, E)) for E in received], axis=-1)
+            fields.append(0.5j * k / np.pi * np.einsum("moc,mci->moi", sent, V))
+        return OpticsField(fields[0], np.max(np.abs(fields[1]), axis=(1, 2)))
+    R = plane_reflection(tiles.cosine, boundary[0])
+    flat, cosine = tiles.curvature < FLAT / tiles.scale, tiles.cosine
+    mirror, shadow = np.where(flat, 1 + R, 0.0)[:, None] * n, -((1 - R) * cosine)[:, None]
+    bent = -(np.where(flat, 0.0, 1 + R) * cosine)[:, None]
+    weights = np.concatenate([mirror, shadow, bent], axis=1)
+    sums = phase_sums(tiles.corners, vectors, k, np.concatenate([weights, later[:, None] * weights], axis=1))
+    turned = 2 * in_forward - 1
+    values, next_ = (
+        -0.25j * k / np.pi * (np.sum(part[:, :3] * observers, axis=1) + part[:, 3] + turned * part[:, 4])
+        for part in (sums[:, :5], sums[:, 5:])
+    )
+    return OpticsField(np.asarray(values), np.abs(next_))

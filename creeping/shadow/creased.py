@@ -1,0 +1,206 @@
+"""Shadow lines of bodies with creases: the curves of each piece, finished, and where they go on beyond their ends.
+
+Each curve is that of a smooth F_i (`creeping.shadow.piece_curves`), in panels exact to rounding. Whether the wave comes
+to a point is asked of the whole body, at points of the curve and, by bisection, where two neighbours differ. At joints
+the curves of two pieces meet: there one goes on as the other.
+
+Sources: Derivations, R6 and R10.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.geometry.creased import pieces_of, tiles_of
+from creeping.geometry.surface import size
+from creeping.shadow.attachment import Arc, LaunchPoints
+from creeping.shadow.curve import ShadowCurve
+from creeping.shadow.edges import EdgePart, parts_on_edges, unit_normals
+from creeping.shadow.occlusion import occluded
+from creeping.shadow.panels import PanelCurve, fit_panels, newton_step
+from creeping.shadow.piece_curves import PieceCurve, curves_on, edge_on
+from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES
+
+TILE = 0.05
+"""Longest sides of the triangles whose corners seed the curves, in body sizes."""
+LOOKED_AT = 193
+"""Points of a curve whose states are asked for."""
+OUTWARD = 1e-9
+"""Distance from the body, in its sizes, at which that is asked: along a straight generator F is 0 up to rounding."""
+SHORTEST = 1e-9
+"""Length, in body sizes, of a curve below which there is none."""
+MEET = 1e-7
+"""Distance of the ends of two curves, in body sizes, up to which they meet."""
+EXACT = 1e-12
+"""Relative error of a length: panels are exact to rounding."""
+
+Found = tuple[tuple[ShadowCurve, ...], tuple[EdgePart, ...], float, tuple[int, ...]]
+
+
+def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
+    """Curves of the line of a unit direction, the longest first.
+
+    Returns
+    -------
+    curves : tuple of ShadowCurve
+    on_edges : tuple of EdgePart
+    at_tips : float, L
+        Length between curves and the tips they come to.
+    edge_on : tuple of int
+        Pieces all over which n.d = 0.
+
+    Raises
+    ------
+    SingularIncidenceError
+        If a curve cannot be followed.
+    """
+    pieces, tiles = pieces_of(body), tiles_of(body, TILE)
+    level = tuple(k for k in range(len(pieces)) if edge_on(tiles, k, direction))
+    curves, gaps = [], 0.0
+    for number in range(len(pieces)):
+        if number in level:
+            continue
+        for found in curves_on(body, pieces, number, direction, tiles):
+            curve = _finished(body, pieces[number], number, direction, found, n_points)
+            if curve.length > SHORTEST * size(body):
+                curves.append(curve)
+                gaps += sum(found.gaps)
+    curves.sort(key=lambda curve: -curve.length)
+    return _joined(body, curves), parts_on_edges(body, pieces, direction), gaps, level
+
+
+def _finished(
+    body: Any, piece: Any, number: int, direction: FloatArray, found: PieceCurve, n_points: int
+) -> ShadowCurve:
+    chords = np.linalg.norm(np.roll(found.nodes, -1, axis=0) - found.nodes, axis=1)
+    panels = fit_panels(piece, direction, found.nodes, chords, closed=found.closed)
+    arclength = np.linspace(0.0, panels.length, n_points, endpoint=not found.closed)
+    points = panels.at(arclength)
+    _, tangents = newton_step(piece, direction, points)
+    arcs = _arcs(body, piece, direction, panels)
+    curve = ShadowCurve(
+        body=body,
+        direction=direction,
+        points=points,
+        normals=unit_normals(piece, points),
+        tangents=tangents,
+        arclength=arclength,
+        length=panels.length,
+        error=EXACT,
+        status=np.full(n_points, STATUSES[ATTACHED]),
+        curvature=_bent(piece, direction, points),
+        arcs=arcs,
+        nodes=points,
+        closed=found.closed,
+        piece=number,
+        creases=found.creases,
+    )
+    vars(curve)["panels"] = panels
+    curve.status[:] = np.array(STATUSES)[curve.state_at(arclength)]
+    return curve
+
+
+def _bent(piece: Any, direction: FloatArray, points: FloatArray) -> FloatArray:
+    """kappa_n(d) at points (n,), 1/L."""
+    bent = np.einsum("nij,i,j->n", piece.hessian(points), direction, direction)
+    return np.asarray(bent / np.linalg.norm(piece.gradient(points), axis=1))
+
+
+def _states(body: Any, piece: Any, direction: FloatArray, points: FloatArray) -> IntArray:
+    """Codes of points of a curve (n,)."""
+    convex = _bent(piece, direction, points) > 0
+    hidden = occluded(body, points + OUTWARD * size(body) * unit_normals(piece, points), direction)
+    return np.where(convex, np.where(hidden, OCCLUDED, ATTACHED), CONCAVE)
+
+
+def _arcs(body: Any, piece: Any, direction: FloatArray, panels: PanelCurve) -> tuple[tuple[float, float, str], ...]:
+    """Arclengths between which the state is the same, and its name; the last may come round."""
+    length = panels.length
+    s = (np.arange(LOOKED_AT) + 0.5) * length / LOOKED_AT
+    codes = _states(body, piece, direction, panels.at(s))
+    if panels.closed:
+        s, codes = np.append(s, s[0] + length), np.append(codes, codes[0])
+    at = np.flatnonzero(codes[1:] != codes[:-1])
+    low, high, before = s[at], s[at + 1], codes[at]
+    while len(at) and np.max(high - low) > 1e-13 * length:
+        middle = 0.5 * (low + high)
+        same = _states(body, piece, direction, panels.at(middle)) == before
+        if np.array_equal(np.where(same, middle, low), low) and np.array_equal(np.where(same, high, middle), high):
+            break
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    ends = 0.5 * (low + high)
+    if not len(ends):
+        return ((0.0, length, STATUSES[codes[0]]),)
+    after = codes[at + 1]
+    if panels.closed:
+        starts, stops = ends, np.append(ends[1:], ends[0] + length)
+    else:
+        starts, stops = np.append(0.0, ends), np.append(ends, length)
+        after = np.append(codes[0], after)
+    starts, stops = starts - length * (starts >= length), stops - length * (starts >= length)
+    order = np.argsort(starts)
+    return tuple((float(starts[k]), float(stops[k]), STATUSES[after[k]]) for k in order)
+
+
+def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
+    """The curves with those that go on from their ends at joints."""
+    ends = [(number, side) for number, curve in enumerate(curves) if not curve.closed for side in (0, 1)]
+    goes_on = {end: -1 for end in ends}
+    for number, side in ends:
+        curve = curves[number]
+        crease = curve.creases[side]
+        if crease < 0 or body.creases[crease].kind != "joint":
+            continue
+        x = curve.points[-side]
+        others = [other for other in ends if other[0] != number and other[1] != side]
+        gaps = [float(np.linalg.norm(curves[k].points[-side_] - x)) for k, side_ in others]
+        if gaps and min(gaps) < MEET * size(body):
+            goes_on[number, side] = others[int(np.argmin(gaps))][0]
+    out = []
+    for number, curve in enumerate(curves):
+        if curve.closed:
+            out.append(curve)
+            continue
+        one = replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1]))
+        vars(one)["panels"] = curve.panels
+        out.append(one)
+    return tuple(out)
+
+
+def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: FloatArray, n_rays: int) -> LaunchPoints:
+    """So many launch points on arcs, shared among them by length, one at least on each, evenly spaced: n is 1.
+
+    Half a spacing from the ends of an arc, where kappa_n, the illumination or the piece ends.
+    """
+    points, arclength = np.full((n_rays, 3), np.nan), np.full(n_rays, np.nan)
+    curve_index = np.full(n_rays, NO_RAY, np.int16)
+    arc_index, spacing, closed, state = (np.full(n_rays, np.nan) for _ in range(4))
+    long = np.array([arc.end - arc.start for arc in arcs])
+    first = 0
+    for number, count in enumerate(_shared(long, n_rays)):
+        arc, rows = arcs[number], slice(first, first + count)
+        curve = curves[arc.curve]
+        place = arc.start + long[number] * (np.arange(count) + (0.0 if arc.closed else 0.5)) / max(count, 1)
+        place = np.mod(place, curve.length)
+        points[rows], arclength[rows], curve_index[rows] = curve.at(place), place, arc.curve
+        arc_index[rows], spacing[rows], closed[rows] = number, long[number] / max(count, 1), arc.closed
+        state[rows] = curve.state_at(place)
+        first += count
+    columns: tuple[Any, ...] = (points, arclength, curve_index, arc_index, spacing, closed, state)
+    return LaunchPoints(direction[None], *(column[None] for column in columns))
+
+
+def _shared(long: FloatArray, wanted: int) -> list[int]:
+    """Whole numbers in proportion to lengths, at least one each while there are any, ``wanted`` in all."""
+    if not len(long) or not wanted:
+        return [0] * len(long)
+    if wanted <= len(long):
+        return [1] * wanted + [0] * (len(long) - wanted)
+    exact = wanted * long / long.sum()
+    counts = np.maximum(exact.astype(np.int64), 1)
+    while counts.sum() < wanted:
+        counts[np.argmax(exact - counts)] += 1
+    while counts.sum() > wanted:
+        counts[np.argmax(np.where(counts > 1, counts - exact, -np.inf))] -= 1
+    return [int(count) for count in counts]

@@ -1,0 +1,155 @@
+"""One curve of a shadow line: its points, what of it launches rays, and any place of it.
+
+Sources: Derivations, R6.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from creeping._presenting import DrawnOnBody
+from creeping._typing import Any, ArrayLike, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.geometry.surface import Surface
+from creeping.shadow.nodes import LineNodes, polished
+from creeping.shadow.panels import PanelCurve, fit_panels
+from creeping.shadow.status import CONCAVE, STATUSES
+
+HALF = 6
+"""Nodes on either side that a polynomial along a curve goes through."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShadowCurve(DrawnOnBody):
+    """One curve of the shadow line, at points equally spaced by arclength; a closed one unless the body has creases.
+
+    Attributes
+    ----------
+    body, direction : Surface, (3,)
+    points : (n, 3), L
+        The last is one spacing before the first; of an open curve the first and the last are its ends.
+    normals, tangents : (n, 3)
+        n and T; seen from outside, the lit side is on the left of T.
+    arclength : (n,), L
+        From 0, growing along T.
+    length : float, L
+    error : float
+        Estimated relative error of the length, and so of places along the curve.
+    status : (n,) of str
+        "attached", "occluded" (the incident ray is stopped before) or "concave" (kappa_n(d) <= 0).
+    curvature : (n,), 1/L
+        kappa_n(d).
+    arcs : tuple of (start, end, status)
+        Arclengths at which the status changes; the end passes the length where an arc wraps.
+    nodes : (k, 3), L
+        Equally spaced points that the curve was found by.
+    closed : bool
+    piece : int
+        Number of the piece that it lies on, of a body with creases; else -1.
+    creases : tuple of int
+        Of an open curve, the creases at its start and at its end.
+    goes_on : tuple of int
+        Of an open curve, the curves that go on from its start and from its end beyond a joint, by their numbers in
+        the line; -1 where none does.
+    """
+
+    body: Surface
+    direction: FloatArray
+    points: FloatArray
+    normals: FloatArray
+    tangents: FloatArray
+    arclength: FloatArray
+    length: float
+    error: float
+    status: np.ndarray[Any, np.dtype[np.str_]]
+    curvature: FloatArray
+    arcs: tuple[tuple[float, float, str], ...]
+    nodes: FloatArray
+    closed: bool = True
+    piece: int = -1
+    creases: tuple[int, int] = (-1, -1)
+    goes_on: tuple[int, int] = (-1, -1)
+
+    @property
+    def fractions(self) -> dict[str, float]:
+        """Share of the length with each status, from the arcs."""
+        shares = dict.fromkeys(STATUSES, 0.0)
+        for start, end, status in self.arcs:
+            shares[status] += (end - start) / self.length
+        return shares
+
+    @cached_property
+    def panels(self) -> PanelCurve:
+        """The curve in panels that are exact to rounding, fitted when first asked for."""
+        spacing = np.full(len(self.nodes), self.length / len(self.nodes))
+        return fit_panels(self.body, self.direction, self.nodes, spacing)
+
+    def line_nodes(self) -> LineNodes:
+        """The curve as the nodes of a line of its own."""
+        if self.piece >= 0:
+            x, tangents, curvature = self.nodes, self.tangents, self.curvature
+        else:
+            x, tangents, curvature = polished(self.body, self.direction, self.nodes)
+        spacing = np.array([self.length / len(x)])
+        columns = np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T)
+        return LineNodes(*columns, curvature, np.array([0, len(x)]), spacing, self.error)
+
+    def state_at(self, arclength: FloatArray) -> IntArray:
+        """Codes of the status at arclengths modulo the length, of an open curve no further than its ends: (m,)."""
+        # rounding may leave a place between two arcs: then it is of neither side, and concave launches nothing
+        codes = np.full(len(arclength), CONCAVE)
+        s = arclength if self.closed else np.clip(arclength, 0.0, np.nextafter(self.length, 0.0))
+        for start, end, status in self.arcs:
+            codes[np.mod(s - start, self.length) < end - start] = STATUSES.index(status)
+        return codes
+
+    def at(self, arclength: ArrayLike) -> FloatArray:
+        """Points of the curve at any arclength modulo the length: (m,) -> (m, 3), L.
+
+        Of an open curve no further than its ends. On the line to rounding, along it as exact as the length.
+        """
+        s = np.asarray(arclength, dtype=float)
+        if s.ndim > 1 or not np.all(np.isfinite(s)):
+            raise InvalidInputError(
+                f"arclength of shape {s.shape} is not one finite number or a row of them; give (m,)"
+            )
+        if "panels" in vars(self):
+            return self.panels.at(s.ravel()).reshape(*s.shape, 3)
+        points = interpolated(self.nodes, s.ravel() / self.length * len(self.nodes))
+        return polished(self.body, self.direction, points)[0].reshape(*s.shape, 3)
+
+    def __repr__(self) -> str:
+        n_dot_d = np.abs(self.normals @ self.direction)
+        return (
+            f"ShadowCurve({len(self.points)} points, length {self.length:.10g} L)\n"
+            f"  {spelled(self.fractions)}; {counted(len(self.arcs), 'arc')}\n"
+            f"  |n.d| at most {np.max(n_dot_d):.1e}; "
+            f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/L"
+        )
+
+
+def interpolated(nodes: FloatArray, places: FloatArray) -> FloatArray:
+    """Points of a closed curve at numbers of nodes with fractions, by polynomials: (k, 3), (m,) -> (m, 3)."""
+    first = np.floor(places).astype(np.int64)
+    offsets = np.arange(1 - HALF, HALF + 1)
+    u = (places - first)[:, None] - offsets
+    before, after = np.ones_like(u), np.ones_like(u)
+    before[:, 1:] = np.cumprod(u[:, :-1], axis=1)
+    after[:, :-1] = np.cumprod(u[:, :0:-1], axis=1)[:, ::-1]
+    scale = np.array([np.prod([j - i for i in offsets if i != j], dtype=float) for j in offsets])
+    weights = before * after / scale
+    return np.asarray(np.einsum("mj,mjc->mc", weights, nodes[(first[:, None] + offsets) % len(nodes)]))
+
+
+def spelled(fractions: dict[str, float]) -> str:
+    """Shares in words."""
+    return ", ".join(f"{share:.4g} {status}" for status, share in fractions.items() if share) or "nothing"
+
+
+def counted(number: int, noun: str) -> str:
+    """So many of something."""
+    return f"{number} {noun}{'s' * (number != 1)}"

@@ -1,0 +1,236 @@
+"""Curves of the shadow line on one smooth piece of a body: from seeds along T to the creases, or round to the start.
+
+    F_i(x) = 0,   grad F_i(x).d = 0,   T = grad F_i x Hd / |.|
+
+Seeds are sign changes of n.d along the sides of the piece's triangles, and corners where it is 0. F_i is smooth a
+little beyond its creases, so a step may pass one; the curve then ends where `piece_ahead` changes, by bisection. A
+point on a crease is of the piece on which its ray would start. At a tip F_i has no derivatives: a curve ends REACH
+before it.
+
+Sources: Derivations, R6 and R7.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray
+from creeping.errors import SingularIncidenceError
+from creeping.geometry.creased import Tiles, nearest_crease, piece_ahead, tips_of
+from creeping.geometry.surface import size
+from creeping.shadow.panels import newton_step, onto_line
+
+STEP, LEAST_STEP = 0.04, 1e-6
+"""Longest and shortest step along a curve, in body sizes."""
+TURN = 0.25
+"""Largest angle between tangents a step apart, radians."""
+REACH = 1e-3
+"""Distance from a tip, in body sizes, within which nothing is followed: curvatures go like its inverse there."""
+ALIKE = 0.1
+"""Distance from a curve, in its steps, up to which a seed lies on it: chords leave it by a third of that."""
+EDGE_ON = 1e-7
+"""|n.d| on a whole piece up to which it lies edge-on and has no line of its own."""
+MOST = 20_000
+"""Nodes of a curve at most."""
+CLOSE = 1e-11
+"""Residual, in body sizes, of a point of the line."""
+
+
+class PieceCurve(NamedTuple):
+    """A curve on one piece.
+
+    Attributes
+    ----------
+    nodes : (k, 3), L
+        Along T; of an open curve the ends are among them.
+    closed : bool
+    creases : tuple of int
+        At which the curve starts and ends; -1 for both of a closed one.
+    gaps : tuple of float, L
+        From either end to its tip, 0 at other creases.
+    """
+
+    nodes: FloatArray
+    closed: bool
+    creases: tuple[int, int]
+    gaps: tuple[float, float]
+
+
+def curves_on(body: Any, pieces: tuple[Any, ...], number: int, direction: FloatArray, tiles: Tiles) -> list[PieceCurve]:
+    """All curves of the line of a unit direction on the piece of a number.
+
+    Raises
+    ------
+    SingularIncidenceError
+        If one cannot be followed: it turns too sharply, or crosses itself.
+    """
+    walk = _Walk(body, pieces[number], number, direction)
+    found: list[PieceCurve] = []
+    left = walk.seeds(tiles)
+    while len(left):
+        curve = walk.whole(left[0])
+        rest = left[1:]
+        if curve is not None:
+            found.append(curve)
+            rest = rest[~_on_curve(rest, curve)]
+        left = rest
+    return found
+
+
+def edge_on(tiles: Tiles, number: int, direction: FloatArray) -> bool:
+    """Whether n.d = 0 all over a piece."""
+    normals = tiles.normals[tiles.pieces == number]
+    return bool(np.max(np.abs(normals @ direction), initial=0.0) < EDGE_ON)
+
+
+def _on_curve(points: FloatArray, curve: PieceCurve) -> BoolArray:
+    nodes = np.concatenate([curve.nodes, curve.nodes[:1]]) if curve.closed else curve.nodes
+    along = np.diff(nodes, axis=0)
+    long = np.linalg.norm(along, axis=1)
+    out = np.zeros(len(points), dtype=bool)
+    for k, x in enumerate(points):
+        away = x - nodes[:-1]
+        share = np.clip(np.sum(away * along, axis=1) / np.maximum(long, 1e-300) ** 2, 0.0, 1.0)
+        gap = np.linalg.norm(away - share[:, None] * along, axis=1)
+        out[k] = bool(np.any(gap <= ALIKE * np.maximum(long, 1e-2 * np.max(long))))
+    return out
+
+
+class _Walk:
+    """Steps along the line on one piece."""
+
+    def __init__(self, body: Any, piece: Any, number: int, direction: FloatArray) -> None:
+        self.body, self.piece, self.number, self.direction = body, piece, number, direction
+        self.size = size(body)
+        self.tip_numbers, self.tips = tips_of(body)
+
+    def seeds(self, tiles: Tiles) -> FloatArray:
+        """Points of the line on the piece, at least one on each curve that a triangle's side crosses."""
+        mine = tiles.pieces == self.number
+        corners, s = tiles.corners[mine], tiles.normals[mine] @ self.direction
+        after, ahead = np.roll(corners, -1, axis=1), np.roll(s, -1, axis=1)
+        mixed = (s > 0) != (ahead > 0)
+        share = s[mixed] / (s[mixed] - ahead[mixed])
+        points = corners[mixed] + share[:, None] * (after[mixed] - corners[mixed])
+        points = np.concatenate([points, corners[np.abs(s) < EDGE_ON]])
+        if not len(points):
+            return points
+        edge = float(np.max(np.linalg.norm(after - corners, axis=-1)))
+        with np.errstate(all="ignore"):
+            x = onto_line(self.piece, self.direction, points, reach=0.5 * edge, iterations=12)
+        x = x[np.all(np.isfinite(x), axis=1) & (np.linalg.norm(x - points, axis=1) < edge)]
+        x = x[self._solved(x)]
+        kept: FloatArray = x[self.inside(x) & ~(self._to_tip(x) <= REACH * self.size)]
+        return kept
+
+    def _solved(self, x: FloatArray) -> BoolArray:
+        if not len(x):
+            return np.zeros(0, dtype=bool)
+        with np.errstate(all="ignore"):
+            step, _ = newton_step(self.piece, self.direction, x)
+        return np.asarray(np.linalg.norm(step, axis=1) < CLOSE * self.size)
+
+    def inside(self, x: FloatArray) -> BoolArray:
+        """Whether points of the line are of this piece (n,)."""
+        return np.asarray(piece_ahead(self.body, x, self.direction) == self.number)
+
+    def _to_tip(self, x: FloatArray) -> FloatArray:
+        if not len(self.tips):
+            return np.full(len(x), np.inf)
+        return np.asarray(np.min(np.linalg.norm(x[:, None] - self.tips, axis=2), axis=1))
+
+    def whole(self, seed: FloatArray) -> PieceCurve | None:
+        """The curve through a seed; None where the seed has no tangent or the curve no length."""
+        T = self._tangent(seed)
+        if not np.all(np.isfinite(T)):
+            return None
+        ahead, closed, last, far = self._followed(seed, T, 1.0)
+        if closed:
+            return PieceCurve(ahead, True, (-1, -1), (0.0, 0.0))
+        back, _, first, near = self._followed(seed, T, -1.0)
+        nodes = np.concatenate([back[:0:-1], ahead])
+        nodes = nodes[np.concatenate([[True], np.linalg.norm(np.diff(nodes, axis=0), axis=1) > 1e-13 * self.size])]
+        if len(nodes) < 2:
+            return None
+        # next to an end, a node closer to it than a share of the step before would make a panel of rounding size
+        for inner, step in ((1, 1), (-2, -1)):
+            if len(nodes) > 3:
+                end = np.linalg.norm(nodes[inner] - nodes[inner - step])
+                if end < 0.05 * np.linalg.norm(nodes[inner + step] - nodes[inner]):
+                    nodes = np.delete(nodes, inner, axis=0)
+        return PieceCurve(nodes, False, (first, last), (near, far))
+
+    def _tangent(self, x: FloatArray) -> FloatArray:
+        with np.errstate(all="ignore"):
+            return np.asarray(newton_step(self.piece, self.direction, x[None])[1][0])
+
+    def _corrected(self, guess: FloatArray, reach: float) -> FloatArray:
+        with np.errstate(all="ignore"):
+            return onto_line(self.piece, self.direction, guess, reach=reach, iterations=6)
+
+    def _followed(self, start: FloatArray, T0: FloatArray, sign: float) -> tuple[FloatArray, bool, int, float]:
+        """Nodes from the start along sign T, whether they come round, the crease they end at, and the gap to it."""
+        nodes, T, h = [start], T0, STEP * self.size
+        while len(nodes) < MOST:
+            x = nodes[-1]
+            tip = float(self._to_tip(x[None])[0])
+            if tip <= REACH * self.size:
+                return np.array(nodes), False, *self._end(x, tip)
+            h = min(h, STEP * self.size, max(0.5 * tip, 0.5 * REACH * self.size))
+            y = self._corrected((x + sign * h * T)[None], 0.3 * h)[0]
+            V = self._tangent(y)
+            off = np.linalg.norm(y - x - sign * h * T)
+            if not (off < 0.3 * h and T @ V > np.cos(TURN) and self._solved(y[None])[0]):
+                h *= 0.5
+                if h < LEAST_STEP * self.size:
+                    raise SingularIncidenceError(
+                        f"the shadow line cannot be followed on piece {self.number} near {np.round(x, 6).tolist()}; "
+                        "perturb the direction by say 1e-3",
+                        points=x[None],
+                        distance=0.0,
+                    )
+                continue
+            chord = y - x
+            home = float((start - x) @ chord) / float(chord @ chord)
+            miss = np.linalg.norm(start - x - home * chord)
+            if len(nodes) > 2 and 0 < home <= 1 and miss < ALIKE * h and T0 @ V > 0.8:
+                return np.array(nodes), True, -1, 0.0
+            shares = np.array([0.25, 0.5, 0.75, 1.0])
+            out = ~self.inside(self._corrected(x + shares[:, None] * chord, 0.3 * h))
+            if out.any():
+                k = int(np.argmax(out))
+                end = self._bisected(x, chord, shares[k - 1] if k else 0.0, shares[k])
+                return np.array([*nodes, end]), False, *self._end(end, 0.0)
+            nodes.append(y)
+            T, h = V, 1.5 * h
+        raise SingularIncidenceError(
+            f"the shadow line on piece {self.number} does not end after {MOST} steps; "
+            "perturb the direction by say 1e-3",
+            points=start[None],
+            distance=0.0,
+        )
+
+    def _bisected(self, x: FloatArray, chord: FloatArray, low: float, high: float) -> FloatArray:
+        """Last point of the piece between shares of a chord of the curve."""
+        long = float(np.linalg.norm(chord))
+        best = x
+        while (high - low) * long > 1e-14 * self.size and high - low > 1e-15:
+            middle = 0.5 * (low + high)
+            y = self._corrected((x + middle * chord)[None], 0.3 * long)
+            if self.inside(y)[0]:
+                low, best = middle, y[0]
+            else:
+                high = middle
+        return best
+
+    def _end(self, x: FloatArray, gap: float) -> tuple[int, float]:
+        """The crease at which a curve ends, and what is left to it if that is a tip."""
+        if gap > 0:
+            return int(self.tip_numbers[np.argmin(np.linalg.norm(self.tips - x, axis=1))]), gap
+        beyond = x + 1e-7 * self.size * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+        others = np.unique(np.asarray(self.body.piece(beyond)))
+        pairs = np.array([[self.number, other] for other in others if other != self.number])
+        if not len(pairs):
+            return int(nearest_crease(self.body, x[None])[0][0]), 0.0
+        found, distance = nearest_crease(self.body, np.repeat(x[None], len(pairs), axis=0), pairs)
+        return int(found[np.argmin(distance)]), 0.0
