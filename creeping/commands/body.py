@@ -3,6 +3,7 @@
 import inspect
 import re
 from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,22 +33,49 @@ Body = Annotated[
         "or an expression F(x, y, z), negative inside, e.g. 'x**2 + y**4 + z**2 - 1'."
     ),
 ]
-Units = Annotated[
-    str | None,
-    Parameter(help="Unit of a file's numbers: m, mm, cm, um, in, ft or km; lengths are metres from there on."),
-]
-AllowRough = Annotated[
-    bool, Parameter(negative="", help="Take a body with tips or other non-smooth places: rays end there.")
-]
+FILE_OPTIONS = ("units", "strict", "part", "cap", "union")
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class FileOptions:
+    """What of a file or expression is the body, and how it is taken."""
+
+    units: Annotated[
+        str | None,
+        Parameter(help="Unit of a file's numbers: m, mm, cm, um, in, ft or km; lengths are metres from there on."),
+    ] = None
+    strict: Annotated[
+        bool, Parameter(negative="", help="Refuse edges, tips and coarse meshes; else rays end at them.")
+    ] = False
+    part: Annotated[str | None, Parameter(help="Which part of a file: largest, a number from 1, or a name.")] = None
+    cap: Annotated[float | None, Parameter(help="Close holes of a file up to this size, m.")] = None
+    union: Annotated[
+        bool, Parameter(negative="", help="Take the outer surface of all parts of a file, which may cross.")
+    ] = False
+    subdivide: Annotated[
+        str | None, Parameter(help="Loop's subdivision of a coarse smooth mesh: auto, or 1, 2 or 3 times.")
+    ] = None
+    sew: Annotated[float | None, Parameter(help="Sew faces of a CAD file that are so far apart at most, m.")] = None
+
+    def given(self) -> dict[str, Any]:
+        """Options that are not the defaults, as the bodies take them."""
+        found = {field.name: getattr(self, field.name) for field in fields(self)}
+        for name in ("part", "subdivide"):
+            if isinstance(found[name], str) and found[name].isdigit():
+                found[name] = int(found[name])
+        return {name: value for name, value in found.items() if value not in (None, False)}
+
+
+AS_IT_IS = FileOptions()
 
 
 def parse_body(
     text: str,
     speed: str | None = None,
     *,
-    units: str | None = None,
-    allow_rough: bool = False,
+    options: FileOptions = AS_IT_IS,
     cache: bool = True,
     progress: Progress | None = None,
 ) -> Any:
@@ -62,11 +90,12 @@ def parse_body(
     from creeping.errors import InvalidInputError
 
     suffix, of_file = Path(text).suffix.lower(), is_file(text)
-    if units is not None and not of_file:
-        raise InvalidInputError(f"--units belongs to a file; {text!r} is none")
     name, _, rest = text.partition(":")
-    if name in BODIES and allow_rough:
-        raise InvalidInputError(f"--allow-rough belongs to a file or an expression; {name} is taken as it is")
+    given = options.given()
+    belong = _belonging(suffix, of_file, name in BODIES)
+    if alien := [option for option in given if option not in belong]:
+        what = f"{name} takes none" if not belong else f"{text!r} takes --{', --'.join(belong)}"
+        raise InvalidInputError(f"--{alien[0]} does not belong to this body: {what}")
     if not (of_file or name in BODIES or _like_expression(text)):
         raise InvalidInputError(
             f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
@@ -75,21 +104,27 @@ def parse_body(
     try:
         if of_file:
             kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
-            shape = kind(text, units, strict=not allow_rough, cache=cache, speed=speed, progress=progress)
-            return _with_charts(shape, progress)
+            return _with_charts(kind(text, **given, cache=cache, speed=speed, progress=progress), progress)
         if name in BODIES:
             return _with_charts(_named(name, rest, speed), None)
         if progress:
             progress("examining the expression")
-        return _with_charts(scatterers.Implicit(text, strict=not allow_rough, speed=speed), progress)
+        return _with_charts(scatterers.Implicit(text, **given, speed=speed), progress)
     except InvalidInputError:
         raise
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{text if len(text) < 60 else text[:57] + '...'}: {error}") from error
     except ModuleNotFoundError as error:
-        if error.name == "gmsh":
-            raise InvalidInputError(f"a CAD file: {error}") from error
+        if error.name in ("gmsh", "manifold3d"):
+            raise InvalidInputError(f"this file: {error}") from error
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
+
+
+def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:
+    """Options that a kind of body has."""
+    if of_file:
+        return FILE_OPTIONS + (("subdivide",) if suffix in MESHES else ("sew",))
+    return () if named else ("strict",)
 
 
 def is_file(text: str) -> bool:
@@ -104,7 +139,9 @@ def title_of(text: str) -> str:
 
 
 def _with_charts(shape: Any, progress: Progress | None) -> Any:
-    """Body whose charts are made: every flow needs them, and of thin or sharp parts there may be none."""
+    """Body whose charts are made: flows need them, and of thin parts there may be none; bodies of pieces have none."""
+    if len(getattr(shape, "creases", ())):
+        return shape
     if progress:
         progress("charts")
     _ = shape.atlas.charts

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping.commands.body import MESHES, AllowRough, Body, SpeedOption, Units, parse_body
+from creeping.commands.body import AS_IT_IS, MESHES, Body, FileOptions, SpeedOption, parse_body
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 Wavenumber = Annotated[
@@ -25,8 +25,7 @@ def check(
     body: Body,
     *,
     speed: SpeedOption = None,
-    units: Units = None,
-    allow_rough: AllowRough = False,
+    file: FileOptions = AS_IT_IS,
     wavenumber: Wavenumber = None,
     frequency: Frequency = None,
     wavelength: Wavelength = None,
@@ -57,14 +56,14 @@ def check(
         output = None
     shape, refusal = None, None
     try:
-        shape = parse_body(body, speed, units=units, allow_rough=allow_rough)
+        shape = parse_body(body, speed, options=file)
     except InvalidInputError as error:
         if suffix not in MESHES:
             raise
         refusal = error
     if (refusal is not None and suffix in MESHES) or output is not None:
         # what is known of a mesh that can be read is worth more than the refusal alone
-        _mesh(body, units, wavenumber, output, answer, texts)
+        _mesh(body, file, wavenumber, output, answer, texts)
     if shape is None:
         ok, answer["refused"] = False, str(refusal)
         texts.append(f"refused: {refusal}")
@@ -117,7 +116,7 @@ def _range(shape: Any, wavenumber: float, answer: dict[str, Any], texts: list[st
 
 def _mesh(
     body: str,
-    units: str | None,
+    file: FileOptions,
     wavenumber: float | None,
     output: Path | None,
     answer: dict[str, Any],
@@ -128,7 +127,7 @@ def _mesh(
     from scatterers import examined_mesh
 
     try:
-        mesh, quality = examined_mesh(body, units)
+        mesh, quality = examined_mesh(body, **{k: v for k, v in file.given().items() if k != "strict"})
     except ValueError as error:
         raise InvalidInputError(f"{body}: {error}") from error
     answer |= {"quality": quality.to_json(), "repairs": list(mesh.repairs)}

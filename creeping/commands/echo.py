@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from creeping.commands.body import AllowRough, Body, Units, parse_body
+from creeping.commands.body import AS_IT_IS, Body, FileOptions, parse_body
 
 _angles = Group("Angles")
 _output = Group("Output")
@@ -71,8 +71,7 @@ def rcs(
     align: Align = 0.0,
     output: Folder = None,
     method: Method = "auto",
-    units: Units = None,
-    allow_rough: AllowRough = False,
+    file: FileOptions = AS_IT_IS,
     cache: Cache = True,
     pictures: Pictures = True,
     formats: Formats = "csv",
@@ -82,7 +81,7 @@ def rcs(
     asked: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": None}
     asked |= {"polarisation": polarisation, "boundary": "pec"}
     asked |= {"monostatic": monostatic, "bistatic": bistatic, "incidence": incidence}
-    made: dict[str, Any] = {"units": units, "allow_rough": allow_rough, "cache": cache}
+    made: dict[str, Any] = {"options": file, "cache": cache}
     written: dict[str, Any] = {"pictures": pictures, "formats": formats}
     measured = (compare, column, align)
     return _echo("rcs", body, asked, made, method, measured, output or Path("rcs"), written, as_json=json_)
@@ -103,8 +102,7 @@ def ts(
     align: Align = 0.0,
     output: Folder = None,
     method: Method = "auto",
-    units: Units = None,
-    allow_rough: AllowRough = False,
+    file: FileOptions = AS_IT_IS,
     cache: Cache = True,
     pictures: Pictures = True,
     formats: Formats = "csv",
@@ -118,7 +116,7 @@ def ts(
     asked: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": sound_speed}
     asked |= {"polarisation": None, "boundary": boundary}
     asked |= {"monostatic": monostatic, "bistatic": bistatic, "incidence": incidence}
-    made: dict[str, Any] = {"units": units, "allow_rough": allow_rough, "cache": cache}
+    made: dict[str, Any] = {"options": file, "cache": cache}
     written: dict[str, Any] = {"pictures": pictures, "formats": formats}
     measured = (compare, column, align)
     return _echo("ts", body, asked, made, method, measured, output or Path("ts"), written, as_json=json_)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from creeping.commands.body import AllowRough, Body, SpeedOption, Units, is_file, parse_body, title_of
+from creeping.commands.body import AS_IT_IS, Body, FileOptions, SpeedOption, is_file, parse_body, title_of
 
 _field = Group("Field")
 _page = Group("Page")
@@ -40,8 +40,7 @@ def explore(
     browser: Annotated[bool, Parameter(group=_page, help="Open the page in a browser.")] = True,
     tolerance: Annotated[float, Parameter(help="Error at the ends of the rays.")] = 1e-5,
     speed: SpeedOption = None,
-    units: Units = None,
-    allow_rough: AllowRough = False,
+    file: FileOptions = AS_IT_IS,
     cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
 ) -> int:
     """Turn the incidence by hand, and watch shadow line, rays, iso-phase curves and field follow."""
@@ -60,7 +59,7 @@ def explore(
         import viser  # noqa: F401
     except ImportError as error:
         raise CreepingError(f"the page needs viser ({error}); pip install 'creeping[web]'") from error
-    shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
+    shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
     extent = size(shape)
     wavenumber, metres = _wave(wavenumber, frequency, sound_speed, body)
     theta, phi = angles(unit_direction(direction))

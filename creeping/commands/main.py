@@ -19,7 +19,7 @@ from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import AllowRough, Body, SpeedOption, Units, parse_body, title_of
+from creeping.commands.body import AS_IT_IS, Body, FileOptions, SpeedOption, parse_body, title_of
 from creeping.commands.compiling import told_of_compilation
 
 app = App(
@@ -95,8 +95,7 @@ def run(
         Parameter(help="Phase map or direct integration; auto takes what is faster, its preparation included."),
     ] = "auto",
     speed: SpeedOption = None,
-    units: Units = None,
-    allow_rough: AllowRough = False,
+    file: FileOptions = AS_IT_IS,
     wavenumber: Annotated[float | None, Parameter(group=_field, help="k, 1/L: adds the field to the results.")] = None,
     frequency: Annotated[
         str | None, Parameter(group=_field, help='Instead of k, e.g. "10GHz": lengths are metres then.')
@@ -146,7 +145,7 @@ def run(
     wave |= {"polarisation": polarisation, "weighted": speed is not None}
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with _Progress(quiet=json_) as progress, told_of_compilation(progress):
-        shape = parse_body(body, speed, units=units, allow_rough=allow_rough, cache=cache, progress=progress)
+        shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
         if job:
             job = job.fitted(shape)
         progress("shadow line")

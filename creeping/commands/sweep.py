@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from creeping.commands.body import CAD, MESHES, parse_body
+from creeping.commands.body import CAD, MESHES, FileOptions, parse_body
 
 PARTIAL, ALL_FAILED = 4, 3
 """Exit codes: of a sweep that --resume would go on with, for what is missing or failed; of one without results."""
@@ -120,7 +120,9 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
     is_file = Path(read.body).suffix.lower() in MESHES + CAD
     text = str(read.folder / read.body) if is_file else read.body
     progress("body")
-    body = parse_body(text, read.speed, units=read.units, allow_rough=read.allow_rough, cache=cache, progress=progress)
+    body = parse_body(
+        text, read.speed, options=FileOptions(units=read.units, **read.file), cache=cache, progress=progress
+    )
     request = read.request_for(body)
     progress("flow")
     if resume and folder.exists():

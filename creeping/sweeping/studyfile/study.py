@@ -52,7 +52,12 @@ STUDY = {
     "body": Key("text", "", required=True),
     "units": Key("text"),
     "speed": Key("text"),
-    "allow_rough": Key("flag", False),
+    "strict": Key("flag", False),
+    "part": Key("text"),
+    "cap": Key("positive"),
+    "union": Key("flag", False),
+    "subdivide": Key("text"),
+    "sew": Key("positive"),
     "quantity": Key("text", "monostatic", choices=QUANTITIES),
     "boundary": Key("texts"),
     "wavenumbers_per_length": Key("wavenumbers", ()),
@@ -80,7 +85,7 @@ class Study:
     ----------
     name : str
     body : str
-        As on the command line; with ``units``, ``speed`` and ``allow_rough``.
+        As on the command line; with ``units``, ``speed`` and, in ``file``, the other options of a file.
     request : SweepRequest
         Its ``length`` as ``length_in`` says, and 1 if that is "auto".
     length_in : {"L", "body sizes", "auto"}
@@ -100,7 +105,7 @@ class Study:
     body: str
     units: str | None
     speed: str | None
-    allow_rough: bool
+    file: dict[str, Any]
     request: SweepRequest
     length_in: Literal["L", "body sizes", "auto"]
     incidences: FloatArray
@@ -115,7 +120,7 @@ class Study:
     @property
     def asked(self) -> dict[str, Any]:
         """What led to body and flow, as text and numbers."""
-        named = ("body", "units", "speed", "allow_rough", "flow", "tolerance")
+        named = ("body", "units", "speed", "file", "flow", "tolerance")
         return {name: getattr(self, name) for name in named}
 
     @property
@@ -206,11 +211,13 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
     if mistakes or request is None:
         count = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
         raise InvalidInputError(f"{name} has {count}:\n  " + "\n  ".join(mistakes), mistakes=mistakes)
-    kept = {key: main[key] for key in ("name", "body", "units", "speed", "allow_rough")}
+    kept = {key: main[key] for key in ("name", "body", "units", "speed")}
+    file = {key: main[key] for key in ("strict", "part", "cap", "union", "subdivide", "sew")}
     incidences = sets["incidences"]
     assert incidences is not None
     return Study(
         **kept,
+        file=file,
         request=request,
         length_in=_length_in(main),
         incidences=incidences,
