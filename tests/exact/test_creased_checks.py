@@ -58,3 +58,14 @@ def test_summary_tells_what_is_lost():
     assert summary["losses"] == fan.losses()._asdict() and summary["ray_status"]["EDGE"] > 0
     summary |= {"drawn_by": None, "files": [], "seconds": 0.0}
     assert "on edges and tips: " in readable(summary, Path("out"))
+
+
+def test_iso_phase_curves_end_with_their_rays():
+    body = cut_sphere()
+    line = cr.shadow_line(body, (1, 0, 0.2))
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-10), line, n_rays=64, length=3.0, max_gap=np.inf)
+    (curve,) = cr.iso_phase_curves(fan, [2.2])[:1]
+    assert np.all(fan.detachment[curve.rays] >= 2.2)
+    # on the ball and across the rays: great circles
+    exact = fan.points[curve.rays, 0] * np.cos(2.2) + line.direction * np.sin(2.2)
+    np.testing.assert_allclose(curve.points, exact, atol=1e-7)
