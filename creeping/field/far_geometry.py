@@ -15,7 +15,7 @@ from creeping.field.arguments import observers_of
 from creeping.field.ray_ends import RayEnds
 from creeping.field.reflected_fold import fold_error
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.states import WITH_JACOBI
+from creeping.geodesics.states import END, WITH_END, WITH_JACOBI
 from creeping.geometry.creased import is_creased
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
@@ -192,7 +192,11 @@ class FarGeometry:
         launch, (n, many) = self.launch, self.observers.shape[:2]
         rays = launch.arc_index.shape[1]
         times = coarse_times(self.flow, self.tracer.length)
-        states = np.ascontiguousarray(carried(self.flow, launch, times, components=WITH_JACOBI))
+        lanes = WITH_END if is_creased(self.body) else WITH_JACOBI
+        states = carried(self.flow, launch, times, components=lanes)
+        # a ray that has come to an edge or tip stays there: what the search sees beyond is nothing
+        self._end = states[:, :, -1, END] if lanes == WITH_END else None
+        states = np.ascontiguousarray(states[..., :WITH_JACOBI])
         self._chi, self._roots = np.zeros((n, many)), np.ones(n)
         back = np.ascontiguousarray((self.angle > np.pi / 2).reshape(n, many))
         # a ray crosses about once in every half turn; at worst each sample is a cell and a crossing
@@ -246,8 +250,12 @@ class FarGeometry:
         near = (1 - across) * launch.points[which, ray] + across * launch.points[which, after]
         fine = np.append(self._fine.ravel(), self.tracer.length)
         long = fine[sample + 1] - fine[sample]
-        cell = np.stack([launch.spacing[which, ray], long], axis=1)
         begin = fine[sample] + along * long
+        if self._end is not None:
+            some = begin <= np.fmax(self._end[which, ray], self._end[which, after]) + long
+            row, ray, which, across = row[some], ray[some], which[some], across[some]
+            near, begin, long = near[some], begin[some], long[some]
+        cell = np.stack([launch.spacing[which, ray], long], axis=1)
         one, found, moved = self.tracer.towards(self.direction[row], self.directions[row], near, begin, cell)
         row, ray, cell, across = row[found], ray[found], cell[found], across[found, 0]
         which = which[found]

@@ -25,6 +25,7 @@ from creeping.field.boundary import Boundary
 from creeping.field.polarisation import spherical_frame
 from creeping.field.reflected import plane_reflection
 from creeping.geometry.creased import Tiles, pieces_of, tiles_of
+from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.surface import size
 from creeping.shadow.occlusion import occluded
 from creeping.storage.memory import within_budget
@@ -94,19 +95,8 @@ def _curvatures(body: Any, tiles: Tiles, middles: FloatArray) -> FloatArray:
     out = np.zeros(len(middles))
     for number, piece in enumerate(pieces_of(body)):
         mine = np.flatnonzero(tiles.pieces == number)
-        out[mine] = _bound(piece, middles[mine])
+        out[mine] = curvature_norms(piece, middles[mine])
     return out
-
-
-def _bound(piece: Any, x: FloatArray) -> FloatArray:
-    """Norm of the shape operator at points (n,), 1/L: its larger principal curvature, up to a factor √2."""
-    if not len(x):
-        return np.zeros(0)
-    gradient = piece.gradient(x)
-    g = np.linalg.norm(gradient, axis=1)
-    n = gradient / g[:, None]
-    P = np.eye(3) - n[:, :, None] * n[:, None, :]
-    return np.asarray(np.linalg.norm(P @ piece.hessian(x) @ P, axis=(1, 2)) / g)
 
 
 def lit_tiles(body: Any, direction: FloatArray, wavenumber: float) -> LitTiles:

@@ -20,10 +20,13 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.geometry.creased import is_creased, pieces_of
-from creeping.geometry.curvature import principal_curvature_bound, second_form
+from creeping.geometry.curvature import curvature_norms, principal_curvature_bound, second_form
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, size
+
+USUAL = 0.98
+"""Share of the points of a body with creases that a scale of it goes by."""
 
 
 def points_of_charts(body: Surface) -> FloatArray:
@@ -48,13 +51,18 @@ def natural_horizon(body: Surface) -> float:
 
 
 def sharpest_curvature(body: Surface) -> float:
-    """Largest |kappa_1| or |kappa_2| over points all over a body, 1/L."""
+    """Largest |kappa_1| or |kappa_2| over points all over a body, 1/L; with creases, of USUAL of the points.
+
+    Next to a tip curvatures have no bound.
+    """
 
     def found() -> float:
         points = points_of_charts(body)
-        sharpest = principal_curvature_bound(body, points) if len(points) else 0.0
+        if not (is_creased(body) or hasattr(body, "samples")):
+            return principal_curvature_bound(body, points)
+        norms = curvature_norms(body, points)
         # flat pieces alone set no scale of their own
-        return max(sharpest, 1 / size(body)) if is_creased(body) or hasattr(body, "samples") else sharpest
+        return max(float(np.quantile(norms, USUAL)) if len(norms) else 0.0, 1 / size(body))
 
     return kept(body, "sharpest curvature", found)
 

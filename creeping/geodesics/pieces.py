@@ -9,8 +9,6 @@ stays where it is.
 Sources: Derivations, R1 and R3.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
@@ -19,6 +17,7 @@ from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.chords import cubic_at, cubics, nearest_on, windows
 from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.piece_trace import Passages, PieceTrace
 from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X
 from creeping.geometry.creased import is_creased, nearest_crease, piece_ahead, pieces_of, tips_of
 from creeping.geometry.surface import size
@@ -35,36 +34,10 @@ TOGETHER = 32
 """Rays traced in one call to times of their own."""
 CROSSINGS = 64
 """Creases that a ray may cross within a window; a ray along a joint would cross it at every step."""
+NEXT = 0.02
+"""Distance from a tip, in body sizes, at which a ray goes on in short steps."""
 SHORT, SHORTEST = 0.01, 1e-7
 """Longest and shortest step, in body sizes, of a ray that has no states through a window."""
-
-
-class Passages(NamedTuple):
-    """Where rays went on across joints: ray number, travel time and number of the crease, each (n,)."""
-
-    ray: IntArray
-    travel_time: FloatArray
-    crease: IntArray
-
-
-class PieceTrace(NamedTuple):
-    """Rays of a body with creases.
-
-    Attributes
-    ----------
-    states : (n, m, lanes)
-        At the times.
-    end : (n,)
-        Travel time at which each ended, inf if it did not.
-    crease : (n,) of int
-        At which; -1 if it did not end.
-    passages : Passages
-    """
-
-    states: FloatArray
-    end: FloatArray
-    crease: IntArray
-    passages: Passages
 
 
 def passages(body: Any, states: FloatArray, length: float, *, rtol: float) -> Passages:
@@ -92,6 +65,7 @@ def trace_pieces(
     rtol: float,
     step: float | None = None,
     beyond: float = 0.0,
+    strict: bool = True,
 ) -> PieceTrace:
     """Trace states (n, 6, 10 or 12) to the ascending times (m,).
 
@@ -104,13 +78,15 @@ def trace_pieces(
         As for `DirectFlow`.
     beyond : float, L
         How far a ray that has ended goes on, on its last piece as if it had no end, while that can be.
+    strict : bool
+        Whether a ray that cannot go on, far from any edge or tip, is an error; else it ends there without a crease.
 
     Raises
     ------
     IntegrationError
         If a ray does not reach its end, and no crease is near.
     """
-    walk = _Walk(body, states, rtol, step)
+    walk = _Walk(body, states, rtol, step, strict)
     times = np.asarray(times, dtype=float)
     out = np.empty((len(states), len(times), states.shape[1]))
     for stops, wanted in windows(times, WINDOW * walk.size):
@@ -128,7 +104,8 @@ def trace_pieces(
 class _Walk:
     """Rays as they go: their states, pieces and ends."""
 
-    def __init__(self, body: Any, states: FloatArray, rtol: float, step: float | None) -> None:
+    def __init__(self, body: Any, states: FloatArray, rtol: float, step: float | None, strict: bool) -> None:
+        self.strict = strict
         self.body, self.pieces, self.size = body, pieces_of(body), size(body)
         self.rtol, self.step = rtol, step
         self.states = np.array(states, dtype=float)
@@ -160,10 +137,7 @@ class _Walk:
 
     def _through(self, rows: IntArray, start: FloatArray, stops: FloatArray, out: FloatArray, crossed: int) -> None:
         """Advance rays, each from its own start within the window, filling what comes after into ``out``."""
-        reach = stops[-1] - start + REACH * self.size
-        for k in np.flatnonzero(
-            np.any(np.linalg.norm(self.states[rows, None, X] - self.tips, axis=2) < reach[:, None], axis=1)
-        ):
+        for k in np.flatnonzero(self._near_tips(rows, stops[-1] - start)):
             place = int(np.searchsorted(stops, start[k], side="right")) - 1
             self._march(int(self.on[rows[k]]), int(rows[k]), float(start[k]), place, stops, out, crossed)
             start[k] = np.inf
@@ -191,6 +165,13 @@ class _Walk:
                     last = int(np.argmax(lost)) - 1
                     self.states[one] = out[one, last]
                     self._march(number, one, float(stops[last]), last, stops, out, crossed)
+
+    def _near_tips(self, rows: IntArray, long: FloatArray) -> BoolArray:
+        """Whether rays may come next to a tip within a time (n,), as far as their tangents tell."""
+        away, p = self.tips - self.states[rows, None, X], self.states[rows, P]
+        along = np.clip(np.einsum("ntk,nk->nt", away, p), 0.0, long[:, None])
+        gap = np.linalg.norm(away - along[..., None] * p[:, None], axis=2)
+        return np.asarray(np.any(gap < NEXT * self.size, axis=1))
 
     def _later(self, found: FloatArray, rows: IntArray, begin: FloatArray | float) -> FloatArray:
         """States (n, k, lanes) with times of detachment from the launch on; they come as from where a trace began."""
@@ -233,6 +214,9 @@ class _Walk:
         """End a ray where its piece does, at the nearest edge or tip."""
         crease, distance = nearest_crease(self.body, state[None, X], kinds=("edge", "tip"))
         if not distance[0] < WINDOW * self.size:
+            if not self.strict:
+                self.end[ray] = now
+                return
             raise IntegrationError(
                 f"ray {ray} left the finite numbers at travel time {now:.3g}, far from any edge or tip; "
                 "check the body's pieces",
@@ -327,7 +311,7 @@ class _Walk:
         base, since = states[n, interval], own[n, interval]
         far = states[n, np.minimum(interval + 1, states.shape[1] - 1)]
         long = own[n, np.minimum(interval + 1, own.shape[1] - 1)] - since
-        low, high = self._bisected(number, base, far, long, low - since, high - since, tip)
+        low, high = self._bisected(number, base, far, long, low - since, high - since, tip, 0.01 * TIGHT)
         tight = np.minimum(TIGHT * self.size, 0.5 * long)
         for _ in range(4):
             near = np.stack([np.maximum(low - tight, 0.0), np.minimum(high + tight, long)], axis=1)
@@ -337,9 +321,8 @@ class _Walk:
             if good.all():
                 break
             tight = np.where(good, tight, np.minimum(30 * tight, long))
-        u, v = self._bisected(
-            number, found[:, 0], found[:, 1], near[:, 1] - near[:, 0], np.zeros(len(n)), near[:, 1] - near[:, 0], tip
-        )
+        short = near[:, 1] - near[:, 0]
+        u, v = self._bisected(number, found[:, 0], found[:, 1], short, 0 * short, short, tip, 1e-15)
         at = near[:, 0] + 0.5 * (u + v)
         state = self._to_own(number, base, at[:, None])[:, 0]
         moment = begin + since + at
@@ -383,11 +366,12 @@ class _Walk:
         low: FloatArray,
         high: FloatArray,
         tip: IntArray,
+        close: float,
     ) -> tuple[FloatArray, FloatArray]:
-        """Bracket of the time at which the cubics from a to b (n, lanes) leave the piece."""
+        """Bracket, ``close`` sizes wide, of the time at which the cubics from a to b (n, lanes) leave the piece."""
         for _ in range(50):
             middle = 0.5 * (low + high)
-            if np.all(high - low <= 1e-15 * self.size):
+            if np.all(high - low <= close * self.size):
                 break
             share = np.divide(middle, long, out=np.zeros_like(middle), where=long > 0)
             points = cubic_at(a, b, long, share)

@@ -60,3 +60,14 @@ def principal_curvature_bound(body: Surface, points: FloatArray) -> float:
     tangential = np.eye(3) - n[..., :, None] * n[..., None, :]
     shape = tangential @ h @ tangential / norm[..., None, None]
     return float(np.max(np.abs(np.linalg.eigvalsh(shape))))
+
+
+def curvature_norms(body: Surface, x: FloatArray) -> FloatArray:
+    """Norm of the shape operator at points (n, 3): the larger principal curvature up to a factor √2, (n,), 1/L."""
+    if not len(x):
+        return np.zeros(0)
+    gradient = body.gradient(x)
+    g = np.linalg.norm(gradient, axis=1)
+    n = gradient / g[:, None]
+    P = np.eye(3) - n[:, :, None] * n[:, None, :]
+    return np.asarray(np.linalg.norm(P @ body.hessian(x) @ P, axis=(1, 2)) / g)

@@ -19,10 +19,12 @@ from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import vector_field
 from creeping.geometry.arguments import flag, one_of, real_array
+from creeping.geometry.creased import is_creased
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import project
 from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
+from creeping.rays.status import AT_CREASES
 
 MOST_LEVELS = 100_000
 """Levels of one call."""
@@ -133,7 +135,7 @@ def iso_phase_curves(
         return []
     hermite = _Hermite(fan)
     offset = fan.eikonal[:, 0] - fan.travel_time[0] if of == "eikonal" else np.zeros(len(fan.points))
-    last = np.full(len(fan.points), fan.length)
+    last = _whole_steps(fan)
     if not beyond_detachment:
         last = np.minimum(last, fan.detachment)
     pieces = []
@@ -149,6 +151,19 @@ def iso_phase_curves(
     ends = np.cumsum([len(run) for _, run, _, _ in pieces])[:-1]
     parts = zip(pieces, np.split(points, ends), np.split(parameters, ends), strict=True)
     return [IsoPhaseCurve(level, of, x, closed, angles, run) for (level, run, _, closed), x, angles in parts]
+
+
+def _whole_steps(fan: RayFan) -> FloatArray:
+    """Travel time up to which the steps of each ray are whole (rays,): one that has come to an edge stays there."""
+    moving = np.any(np.diff(fan.points, axis=1) != 0, axis=2) if is_creased(fan.body) else np.ones((0, 0), dtype=bool)
+    out = np.full(len(fan.points), fan.length)
+    for ray in np.flatnonzero(~moving[:, -1]) if moving.size else ():
+        out[ray] = fan.travel_time[max(int(np.sum(moving[ray])) - 1, 0)]
+    if moving.size:
+        # in the last step
+        late = moving[:, -1] & np.isin(fan.status, AT_CREASES) & (fan.detachment < fan.length)
+        out[late] = fan.travel_time[-2]
+    return out
 
 
 def _runs(fan: RayFan, met: IntArray) -> Iterable[tuple[IntArray, bool]]:

@@ -159,7 +159,8 @@ def decayed_lengths(
     k = None if wavenumber is None else _positive("wavenumber", wavenumber)
     found = np.full(len(there), most)
     for row in np.flatnonzero(there.any(axis=1)):
-        rays, typical = states[row, there[row]], float(np.median(curvature[row, there[row]]))
+        # on a crease the curvature may be that of a flat piece
+        rays, typical = states[row, there[row]], float(np.median(curvature[row, there[row]])) or 1 / size(body)
         lowest = IN_RANGE * typical if k is None else k
         wanted = DECAY / (np.cbrt(lowest / 2) * decay)
         ends = [np.interp(wanted, ray[:, ATTENUATION], times, right=most) for ray in rays]

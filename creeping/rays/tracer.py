@@ -23,7 +23,7 @@ from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M21, P, X, pack
-from creeping.geometry.creased import is_creased
+from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, size
@@ -116,11 +116,16 @@ class RayTracer:
     def onto_line(self, points: FloatArray, directions: FloatArray, steps: int = 4) -> tuple[FloatArray, FloatArray]:
         """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""
         reach = 0.1 * size(self.body)
-        tangents = np.zeros_like(points)
-        for _ in range(steps):
-            step, tangents = newton_step(self.body, directions, points)
-            long = np.linalg.norm(step, axis=1, keepdims=True)
-            points = points + step * np.minimum(1.0, reach / np.maximum(long, 1e-300))
+        points, tangents = points.copy(), np.zeros_like(points)
+        # on a body with creases, each on the piece that it is next to
+        on = piece_ahead(self.body, points, directions) if is_creased(self.body) else np.zeros(len(points), dtype=int)
+        bodies: Sequence[Any] = pieces_of(self.body) if is_creased(self.body) else (self.body,)
+        for number in np.unique(on):
+            mine = on == number
+            for _ in range(steps):
+                step, tangents[mine] = newton_step(bodies[number], directions[mine], points[mine])
+                long = np.linalg.norm(step, axis=1, keepdims=True)
+                points[mine] += step * np.minimum(1.0, reach / np.maximum(long, 1e-300))
         return points, tangents
 
     def _states(
@@ -230,7 +235,8 @@ class RayTracer:
     def _traced(self, states: FloatArray, times: FloatArray, step: float) -> FloatArray:
         """Rays by equal steps; beyond an edge or tip as if their piece went on, for the polynomials' sake."""
         if is_creased(self.body):
-            return trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=(GUARD + 2) * step).states
+            long = (GUARD + 2) * step
+            return trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=long, strict=False).states
         return trace_states(self.body, states, times, rtol=0.0, step=step)
 
     def _ends(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
@@ -240,7 +246,7 @@ class RayTracer:
             states = trace_states(self.body, pack(starts, directions), forward, rtol=0.0, step=self.step)
             return non_smooth_from(self.body, states[..., X], forward)
         every, owner = np.unique(np.concatenate([starts, directions], axis=1), axis=0, return_inverse=True)
-        found = trace_pieces(self.body, every, forward, rtol=0.0, step=self.step)
+        found = trace_pieces(self.body, every, forward, rtol=0.0, step=self.step, strict=False)
         return np.minimum(found.end, non_smooth_from(self.body, found.states[..., X], forward))[owner]
 
     def towards(

@@ -1,0 +1,71 @@
+"""Checks, sweeps of rays and summaries of bodies with creases."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from creased_bodies import Capsule, TwoBalls, cone, cut_sphere, cylinder
+
+import creeping as cr
+from creeping.commands.run_report import readable, summary_of
+from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
+from creeping.geometry.surface import fingerprint
+from creeping.rays.piece_specular import smooth_parts
+
+BODIES = {"cut": cut_sphere(), "cylinder": cylinder(), "cone": cone(), "capsule": Capsule(), "two": TwoBalls()}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_good_bodies_pass_their_check(name):
+    report = cr.check_surface(BODIES[name])
+    assert report.ok, report
+    assert is_creased(BODIES[name]) and len(fingerprint(BODIES[name])) > 20
+
+
+def test_a_wrong_piece_is_found():
+    body = cut_sphere()
+    body.pieces[0].hessian = lambda x: np.zeros((*x.shape, 3))
+    report = cr.check_surface(body)
+    assert not report.ok and any("piece 0: Hessian" in check.name and not check.ok for check in report.checks)
+
+
+def test_parts_and_creases():
+    assert smooth_parts(Capsule()) == ((0, 1, 2),) and smooth_parts(cylinder()) == ((0,), (1,), (2,))
+    found, distance = nearest_crease(cylinder(), np.array([[0.6, 0, 1.0], [0, 0.5, -0.9]]))
+    assert found.tolist() == [0, 1]
+    np.testing.assert_allclose(distance, 0.1, atol=1e-4)
+    assert [len(piece.samples) > 10 for piece in pieces_of(cone())] == [True, True]
+
+
+def test_sweep_of_rays_is_that_of_each_fan():
+    body, d = cut_sphere(), np.array([[1.0, 0, 0.2], [0, 0, 1.0]])
+    flow = cr.DirectFlow(body, rtol=1e-9)
+    found = cr.sweep_directions(flow, d, quantity="rays", n_rays=8, length=3.0)
+    assert np.all(found["incidence_status"] == 0)
+    for row in range(2):
+        line = cr.shadow_line(body, d[row])
+        fan = cr.launch(flow, line, n_rays=8, length=3.0, max_gap=np.inf)
+        assert float(found["line_length"][row]) == pytest.approx(line.length, rel=1e-12)
+        np.testing.assert_array_equal(found["ray_status"][row], fan.status)
+        np.testing.assert_allclose(found["detachment"][row], fan.detachment, atol=1e-9)
+
+
+def test_summary_tells_what_is_lost():
+    body = cut_sphere()
+    line, flow = cr.shadow_line(body, (1, 0, 0.2)), cr.DirectFlow(body, rtol=1e-8)
+    fan = cr.launch(flow, line, n_rays=16, length=3.0, max_gap=np.inf)
+    summary = summary_of("cut", None, line, flow, fan, [])
+    assert summary["losses"] == fan.losses()._asdict() and summary["ray_status"]["EDGE"] > 0
+    summary |= {"drawn_by": None, "files": [], "seconds": 0.0}
+    assert "on edges and tips: " in readable(summary, Path("out"))
+
+
+def test_iso_phase_curves_end_with_their_rays():
+    body = cut_sphere()
+    line = cr.shadow_line(body, (1, 0, 0.2))
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-10), line, n_rays=64, length=3.0, max_gap=np.inf)
+    (curve,) = cr.iso_phase_curves(fan, [2.2])[:1]
+    assert np.all(fan.detachment[curve.rays] >= 2.2)
+    # on the ball and across the rays: great circles
+    exact = fan.points[curve.rays, 0] * np.cos(2.2) + line.direction * np.sin(2.2)
+    np.testing.assert_allclose(curve.points, exact, atol=1e-7)
