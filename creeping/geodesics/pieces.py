@@ -19,7 +19,7 @@ from creeping.geodesics.chords import cubic_at, cubics, nearest_on, windows
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.piece_trace import Passages, PieceTrace
 from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X
-from creeping.geometry.creased import is_creased, nearest_crease, piece_ahead, pieces_of, tips_of
+from creeping.geometry.creased import SMOOTH, is_creased, nearest_crease, piece_ahead, pieces_of, tips_of
 from creeping.geometry.surface import size
 
 WINDOW = 0.1
@@ -333,7 +333,7 @@ class _Walk:
         kinds = np.array([one.kind for one in self.body.creases])[crease]
         if self.lanes == WHOLE:
             state[:, DETACHMENT] += np.where(np.isinf(base[:, DETACHMENT]), begin + since, 0.0)
-        on = kinds == "joint"
+        on = np.isin(kinds, SMOOTH)
         ended = np.flatnonzero(~on)
         for k in ended:
             ray = rows[k]
@@ -341,7 +341,9 @@ class _Walk:
             out[ray, stops > moment[k]] = state[k]
         joint = np.flatnonzero(on)
         for k in joint:
-            self.passed.append((int(rows[k]), float(moment[k]), int(crease[k])))
+            # a seam is an event of how the body is known, not of the ray
+            if kinds[k] == "joint":
+                self.passed.append((int(rows[k]), float(moment[k]), int(crease[k])))
             x, p = project_bundle(self.pieces[other[k]], state[k, X], state[k, P])
             state[k, X], state[k, P] = x, p
         self.on[rows[joint]] = other[joint]

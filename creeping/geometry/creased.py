@@ -19,7 +19,9 @@ SAMPLE = 0.1
 """Longest sides of the triangles that samples of a body come from, in its sizes."""
 AHEAD = 1e-12
 """δ, in body sizes: some digits above rounding."""
-KINDS = ("edge", "joint", "tip")
+KINDS = ("edge", "joint", "tip", "seam")
+SMOOTH = ("joint", "seam")
+"""Creases across which the normal does not jump: rays and lines go on there."""
 
 
 class Piece:

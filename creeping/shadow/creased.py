@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.creased import pieces_of, tiles_of
+from creeping.geometry.creased import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.curve import ShadowCurve
@@ -150,7 +150,7 @@ def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
     for number, side in ends:
         curve = curves[number]
         crease = curve.creases[side]
-        if crease < 0 or body.creases[crease].kind != "joint":
+        if crease < 0 or body.creases[crease].kind not in SMOOTH:
             continue
         x = curve.points[-side]
         others = [other for other in ends if other[0] != number and other[1] != side]
