@@ -46,7 +46,7 @@ def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
     curves : tuple of ShadowCurve
     on_edges : tuple of EdgePart
     at_tips : float, L
-        Length between curves and the tips they come to.
+        Length between curves and the tips they come to, and of what cannot be followed.
     edge_on : tuple of int
         Pieces all over which n.d = 0.
 
@@ -61,7 +61,9 @@ def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
     for number in range(len(pieces)):
         if number in level:
             continue
-        for found in curves_on(body, pieces, number, direction, tiles):
+        on_piece, missing = curves_on(body, pieces, number, direction, tiles)
+        gaps += missing
+        for found in on_piece:
             curve = _finished(body, pieces[number], number, direction, found, n_points)
             if curve.length > SHORTEST * size(body):
                 curves.append(curve)
