@@ -236,7 +236,7 @@ class RayTracer:
         """Rays by equal steps; beyond an edge or tip as if their piece went on, for the polynomials' sake."""
         if is_creased(self.body):
             long = (GUARD + 2) * step
-            return trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=long, strict=False).states
+            return trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=long).states
         return trace_states(self.body, states, times, rtol=0.0, step=step)
 
     def _ends(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
@@ -246,7 +246,7 @@ class RayTracer:
             states = trace_states(self.body, pack(starts, directions), forward, rtol=0.0, step=self.step)
             return non_smooth_from(self.body, states[..., X], forward)
         every, owner = np.unique(np.concatenate([starts, directions], axis=1), axis=0, return_inverse=True)
-        found = trace_pieces(self.body, every, forward, rtol=0.0, step=self.step, strict=False)
+        found = trace_pieces(self.body, every, forward, rtol=0.0, step=self.step)
         return np.minimum(found.end, non_smooth_from(self.body, found.states[..., X], forward))[owner]
 
     def towards(

@@ -6,7 +6,8 @@ from creased_bodies import Capsule, TwoBalls, cone, cut_sphere, cylinder
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.geodesics.pieces import REACH, trace_pieces
+from creeping.geodesics.piece_exits import REACH
+from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import ATTENUATION, M11, M12, M21, M22, P, X, pack
 from creeping.geometry.surface import size
 

@@ -23,7 +23,7 @@ _sum_2, _sum_4, _sum_6, _sum_8, _sum_10 = (combination(n) for n in (2, 4, 6, 8, 
 
 
 @njit(**options)
-def _add_stages(terms, weights, index, k, y, z):
+def add_stages(terms, weights, index, k, y, z):
     """Set z = y + sum over ``terms`` of weights[r] k[index[r]]; terms are even, each variant takes time to compile."""
     if terms == 2:
         _sum_2(weights, index, k, y, z)
@@ -265,14 +265,14 @@ def integrate(
                     for r in range(terms[row]):
                         scaled[row, r] = trial * weights[row, r]
                 for s in range(1, stages + 1):
-                    _add_stages(terms[s], scaled[s], index[s], k, y, z)
+                    add_stages(terms[s], scaled[s], index[s], k, y, z)
                     right_hand_side(level, level_par, speed, speed_par, weighted, z, k[s], geometry, weight)
                 used += 1
                 error = 0.0
                 if rtol > 0.0:
                     for e in range(2):
                         row = stages + 1 + e
-                        _add_stages(terms[row], weights[row], index[row], k, zero, estimates[e])
+                        add_stages(terms[row], weights[row], index[row], k, zero, estimates[e])
                     error = _error_norm(estimates, sums, y, z, scale, rtol, trial)
                 if used > limit or (trial < 1e-12 * step and trial < left):
                     good = False

@@ -1,0 +1,269 @@
+"""Rays of a body of pieces as they go: together from stop to stop on their pieces, one by one where they leave them.
+
+All rays on one piece are traced through a window of stops in one call. Where one of them has left its piece, the time
+is found again between exact states, TIGHT around it, so that it is exact to rounding; from there it goes by itself to
+the next stop, and so do rays next to a tip, in steps that do not reach through it.
+
+What a ray does is bounded: after CROSSINGS it stays on its piece up to the end of the window, and after ROUNDS, or
+where no step however short is left to it, it ends as data, at the nearest edge or tip, without a crease if none is near.
+
+Sources: Derivations, R1 and R3.
+"""
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.errors import IntegrationError
+from creeping.geodesics.attenuation import with_attenuation
+from creeping.geodesics.bundle import project_bundle
+from creeping.geodesics.chords import cubic_at
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.own_times import trace_own
+from creeping.geodesics.piece_exits import REACH, Exits, PieceExits
+from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X
+from creeping.geometry.creased import SMOOTH, nearest_crease, piece_ahead, pieces_of
+from creeping.geometry.surface import size
+
+WINDOW = 0.1
+"""Longest time, in body sizes, that a ray is traced beyond a crease before that is noticed."""
+TIGHT = 1e-5
+"""Half the time, in body sizes, between exact states around a crossing; the cubic there errs by its fourth power."""
+CROSSINGS = 64
+"""Creases that a ray may cross within a window; a ray along a joint would cross it at every step."""
+NEXT = 0.02
+"""Distance from a tip, in body sizes, at which a ray goes on in short steps."""
+SHORTEST = 1e-7
+"""Shortest step, in body sizes, of a ray that has no states through a window."""
+ROUNDS = 400
+"""Rounds of a window: next to a tip a ray goes half of REACH in each, and a step is halved 20 times."""
+OWN = 1e-12
+"""Relative tolerance of what rays do by themselves, where they go by equal steps else."""
+
+
+class Walk:
+    """Rays (n, lanes) on their pieces: their states, ends and the joints they have passed."""
+
+    def __init__(self, body: Any, states: FloatArray, rtol: float, step: float | None) -> None:
+        self.body, self.pieces, self.size = body, pieces_of(body), size(body)
+        self.rtol, self.step = rtol, step
+        self.exits = PieceExits(body)
+        self.states = np.array(states, dtype=float)
+        self.lanes, n = states.shape[1], len(states)
+        self.on = piece_ahead(body, states[:, X], states[:, P])
+        self.end = np.full(n, np.inf)
+        self.crease = np.full(n, -1, dtype=np.int64)
+        self.stuck = np.zeros(n, dtype=bool)
+        self.passed: list[tuple[IntArray, FloatArray, IntArray]] = []
+        # within a window: time, last stop, longest step and crossings of each ray
+        self.now, self.place = np.zeros(n), np.zeros(n, dtype=np.int64)
+        self.longest, self.crossed = np.zeros(n), np.zeros(n, dtype=np.int64)
+
+    def window(self, stops: FloatArray, beyond: float) -> FloatArray:
+        """Advance all rays from the first of the stops (k,) to the last: (n, k, lanes)."""
+        out = np.repeat(self.states[:, None], len(stops), axis=1)
+        if len(stops) == 1:
+            return out
+        loose = np.flatnonzero((self.end <= stops[0]) & (self.end + beyond > stops[0]) & ~self.stuck)
+        self.now[:], self.place[:], self.longest[:], self.crossed[:] = stops[0], 0, np.inf, 0
+        for _ in range(ROUNDS):
+            rows = np.flatnonzero(np.isinf(self.end) & (self.place < len(stops) - 1))
+            if not len(rows):
+                break
+            self._round(rows, stops, out)
+        else:
+            self._stop(rows, stops, out)
+        if beyond > 0 and len(loose):
+            self._beyond(loose, stops, out)
+        self.states = out[:, -1].copy()
+        return out
+
+    def _round(self, rows: IntArray, stops: FloatArray, out: FloatArray) -> None:
+        """Take each ray on by one step of its own, or all the way to the last stop with the others."""
+        alone = (self.now[rows] > stops[self.place[rows]]) | np.isfinite(self.longest[rows])
+        alone |= self.exits.near_tips(self.states[rows], stops[-1] - self.now[rows], NEXT * self.size)
+        groups = np.stack([self.on[rows], np.where(alone, -1, self.place[rows])], axis=1)
+        for number, place in np.unique(groups, axis=0):
+            mine = rows[(groups[:, 0] == number) & (groups[:, 1] == place)]
+            if place < 0:
+                self._alone(int(number), mine, stops, out)
+            else:
+                self._together(int(number), mine, int(place), stops, out)
+
+    def _together(self, number: int, mine: IntArray, place: int, stops: FloatArray, out: FloatArray) -> None:
+        own = stops[place:] - stops[place]
+        found = self._later(self._safely(number, self.states[mine], own[1:]), mine, stops[place])
+        path = np.concatenate([self.states[mine, None], found], axis=1)
+        exits = self._exits(number, mine, path, np.broadcast_to(own, (len(mine), len(own))))
+        known = np.cumprod(np.all(np.isfinite(path[..., :BARE]), axis=2), axis=1).sum(axis=1) - 1
+        last = np.where(exits.gone, np.minimum(exits.interval, known), known)
+        reached = np.arange(1, len(own)) <= last[:, None]
+        ray, stop = np.nonzero(reached)
+        out[mine[ray], place + 1 + stop] = found[ray, stop]
+        n = np.arange(len(mine))
+        self.states[mine], self.place[mine], self.now[mine] = path[n, last], place + last, stops[place + last]
+        lost = (last < len(own) - 1) & ~exits.gone
+        self.longest[mine[lost]] = self.size
+        gone = np.flatnonzero(exits.gone)
+        if len(gone):
+            k = exits.interval[gone]
+            far, begin = path[gone, np.minimum(k + 1, path.shape[1] - 1)], own[k]
+            self._cross(number, mine[gone], far, own[k + 1] - begin, exits[gone].since(begin), stops, out)
+
+    def _alone(self, number: int, mine: IntArray, stops: FloatArray, out: FloatArray) -> None:
+        """Go on with each ray to its next stop, if a step that does not reach through a tip does.
+
+        There, and far beyond an edge, a piece need not have any geodesics.
+        """
+        following, tip = stops[self.place[mine] + 1], self.exits.to_tips(self.states[mine])
+        short = np.minimum(np.maximum(0.5 * tip, 0.5 * REACH * self.size), self.longest[mine])
+        step = np.minimum(short, following - self.now[mine])
+        found = self._later(self._own(number, self.states[mine], step), mine, self.now[mine])
+        bad = ~np.all(np.isfinite(found[:, :BARE]), axis=1)
+        self.longest[mine[bad]] = 0.5 * step[bad]
+        none = bad & (0.5 * step < SHORTEST * self.size)
+        if none.any():
+            self._stop(mine[none], stops, out)
+        good = np.flatnonzero(~bad)
+        mine, found, step = mine[good], found[good], step[good]
+        path = np.stack([self.states[mine], found], axis=1)
+        exits = self._exits(number, mine, path, np.stack([np.zeros(len(mine)), step], axis=1))
+        on = np.flatnonzero(~exits.gone)
+        rays, gone = mine[on], np.flatnonzero(exits.gone)
+        self.states[rays] = found[on]
+        self.now[rays] += step[on]
+        arrived = self.now[rays] >= stops[self.place[rays] + 1] - 1e-14 * self.size
+        at = rays[arrived]
+        self.place[at] += 1
+        self.now[at] = stops[self.place[at]]
+        out[at, self.place[at]] = self.states[at]
+        if len(gone):
+            self._cross(number, mine[gone], found[gone], step[gone], exits[gone], stops, out)
+
+    def _exits(self, number: int, mine: IntArray, path: FloatArray, own: FloatArray) -> Exits:
+        exits = self.exits.of(number, path, own)
+        return exits._replace(gone=exits.gone & (self.crossed[mine] < CROSSINGS))
+
+    def _cross(
+        self,
+        number: int,
+        rows: IntArray,
+        far: FloatArray,
+        long: FloatArray,
+        exits: Exits,
+        stops: FloatArray,
+        out: FloatArray,
+    ) -> None:
+        """Find where rays leave a piece on their way from their states to those ``far``, and end them or send them on."""
+        base, tip = self.states[rows], exits.tip
+        tight = np.minimum(TIGHT * self.size, 0.5 * long)
+        low, high = self._bisected(number, base, far, long, exits.low, exits.high, tip, 0.01 * TIGHT)
+        for _ in range(4):
+            first, last = np.maximum(low - tight, 0.0), np.minimum(high + tight, long)
+            before = self._own(number, base, first)
+            after = self._own(number, before, last - first)
+            inside = ~self.exits.outside(number, before[:, X], tip) | (first == 0)
+            good = inside & self.exits.outside(number, after[:, X], tip)
+            if good.all():
+                break
+            tight = np.where(good, tight, np.minimum(30 * tight, long))
+        short = last - first
+        u, v = self._bisected(number, before, after, short, 0 * short, short, tip, 1e-15)
+        at = 0.5 * (u + v)
+        state = self._later(self._own(number, before, at), rows, self.now[rows] + first)
+        lost = ~np.all(np.isfinite(state[:, :BARE]), axis=1)
+        state[lost] = base[lost]
+        moment = self.now[rows] + np.where(lost, 0.0, first + at)
+        other = np.where(tip >= 0, number, np.asarray(self.body.piece(np.where(lost[:, None], far, after)[:, X])))
+        crease, _ = nearest_crease(self.body, state[:, X], np.stack([np.full(len(rows), number), other], axis=1))
+        crease = np.where(tip >= 0, tip, crease)
+        kinds = np.array([one.kind for one in self.body.creases])[crease]
+        self.states[rows], self.now[rows] = state, moment
+        self.crossed[rows] += 1
+        on = np.isin(kinds, SMOOTH)
+        self._ended(rows[~on], crease[~on], stops, out)
+        rows, other, crease, moment = rows[on], other[on], crease[on], moment[on]
+        if not len(rows):
+            return
+        # a seam is an event of how the body is known, not of the ray
+        jumps = kinds[on] == "joint"
+        self.passed.append((rows[jumps], moment[jumps], crease[jumps]))
+        for following in np.unique(other):
+            mine = rows[other == following]
+            x, p = project_bundle(self.pieces[following], self.states[mine, X], self.states[mine, P])
+            self.states[mine, X], self.states[mine, P] = x, p
+        self.on[rows] = other
+
+    def _stop(self, rows: IntArray, stops: FloatArray, out: FloatArray) -> None:
+        """End rays that cannot go on, at the nearest edge or tip."""
+        crease, distance = nearest_crease(self.body, self.states[rows, X], kinds=("edge", "tip"))
+        self._ended(rows, np.where(distance < WINDOW * self.size, crease, -1), stops, out)
+
+    def _ended(self, rows: IntArray, crease: IntArray, stops: FloatArray, out: FloatArray) -> None:
+        self.end[rows], self.crease[rows] = self.now[rows], crease
+        ray, stop = np.nonzero(stops > self.now[rows, None])
+        out[rows[ray], stop] = self.states[rows[ray]]
+
+    def _beyond(self, loose: IntArray, stops: FloatArray, out: FloatArray) -> None:
+        """Take rays that have ended on as if their pieces had no ends, while that can be."""
+        for number in np.unique(self.on[loose]):
+            mine = loose[self.on[loose] == number]
+            first = self.states[mine]
+            found = self._later(self._safely(number, first, stops[1:] - stops[0]), mine, stops[0])
+            good = np.all(np.isfinite(found), axis=(1, 2)) if self.lanes < WHOLE else np.isfinite(found[:, -1, 0])
+            self.stuck[mine[~good]] = True
+            out[mine[good], 1:] = found[good]
+
+    def _bisected(
+        self,
+        number: int,
+        a: FloatArray,
+        b: FloatArray,
+        long: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        tip: IntArray,
+        close: float,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Bracket, ``close`` sizes wide, of the time at which the cubics from a to b (n, lanes) leave the piece."""
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            if np.all(high - low <= close * self.size):
+                break
+            share = np.divide(middle, long, out=np.zeros_like(middle), where=long > 0)
+            out = self.exits.outside(number, cubic_at(a, b, long, share), tip)
+            low, high = np.where(out, low, middle), np.where(out, middle, high)
+        return low, high
+
+    def _later(self, found: FloatArray, rows: IntArray, begin: FloatArray | float) -> FloatArray:
+        """States (n, ..., lanes) with times of detachment from the launch on; they come as from where a trace began."""
+        if self.lanes == WHOLE:
+            new = np.where(np.isinf(self.states[rows, DETACHMENT]), begin, 0.0)
+            found[..., DETACHMENT] += new.reshape(-1, *(1,) * (found.ndim - 2))
+        return found
+
+    def _own(self, number: int, states: FloatArray, times: FloatArray) -> FloatArray:
+        rtol = self.rtol if self.step is None else OWN
+        return trace_own(self.pieces[number], states, times, rtol=rtol)
+
+    def _safely(self, number: int, states: FloatArray, times: FloatArray) -> FloatArray:
+        """Trace rays on a piece, (n, k, lanes); what reaches no end is NaN."""
+        try:
+            return self._traced(number, states, times)
+        except IntegrationError as error:
+            # a block of rays fails as a whole
+            out = np.full((len(states), len(times), self.lanes), np.nan)
+            sound = np.setdiff1d(np.arange(len(states)), vars(error)["failed"])
+        if len(sound):
+            try:
+                out[sound] = self._traced(number, states[sound], times)
+            except IntegrationError:
+                pass
+        return out
+
+    def _traced(self, number: int, states: FloatArray, times: FloatArray) -> FloatArray:
+        piece = self.pieces[number]
+        with np.errstate(all="ignore"):
+            if self.lanes == WHOLE:
+                return with_attenuation(piece, states, times, rtol=self.rtol, step=self.step)
+            rtol = self.rtol if self.step is None else 0.0
+            return trace_states(piece, states, times, rtol=rtol, step=self.step)
