@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
+from creeping.errors import SingularIncidenceError
 from creeping.geometry.creased import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.shadow.attachment import Arc, LaunchPoints
@@ -64,7 +65,12 @@ def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
         on_piece, missing = curves_on(body, pieces, number, direction, tiles)
         gaps += missing
         for found in on_piece:
-            curve = _finished(body, pieces[number], number, direction, found, n_points)
+            try:
+                curve = _finished(body, pieces[number], number, direction, found, n_points)
+            except SingularIncidenceError:
+                # it turns within rounding of a crossing somewhere: all of it is lost
+                gaps += float(np.sum(np.linalg.norm(np.diff(found.nodes, axis=0), axis=1)))
+                continue
             if curve.length > SHORTEST * size(body):
                 curves.append(curve)
                 gaps += sum(found.gaps)
