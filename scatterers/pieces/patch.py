@@ -7,6 +7,8 @@ curvatures by 8 e/l^2 < `CLOSE` of the largest, as of cylinders that a program w
 degree 2 both kinds are splines of one cell, which go on as they are far beyond the region. Other regions are fitted as
 whole bodies are (`scatterers.spline.fitting`), from their own points only, so that nothing is rounded off at their
 borders; a coarser fit tells how far they are known.
+
+Sources: Derivations, B13.
 """
 
 from dataclasses import dataclass

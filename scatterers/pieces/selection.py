@@ -7,6 +7,8 @@ either has, and it is the smaller; F = 0, they are parts of one smooth surface, 
 there, and where they have none the nearer one stands for both. Of
 three and more the pairs make a tree: if pieces fall into groups that are all joined by "the larger", that comes last,
 and so on within the groups. Voxels far off follow the next ones with points.
+
+Sources: Derivations, B13.
 """
 
 from collections.abc import Callable, Mapping, Sequence
