@@ -25,6 +25,8 @@ TURN = 0.25
 """Largest angle between tangents a step apart, radians."""
 REACH = 1e-3
 """Distance from a tip, in body sizes, within which nothing is followed: curvatures go like its inverse there."""
+ASTRAY = 1.5
+"""Distance from the tiles of a piece, in their longest side, beyond which F = 0 is another sheet, as fits may have."""
 ALIKE = 0.1
 """Distance from a curve, in its steps, up to which a seed lies on it: chords leave it by a third of that."""
 EDGE_ON = 1e-7
@@ -63,7 +65,7 @@ def curves_on(
     Where a curve turns too sharply to be followed, or crosses itself, it ends: what is missing then is what the tiles
     have of n.d = 0 on the piece beyond the length of its curves.
     """
-    walk = _Walk(body, pieces[number], number, direction)
+    walk = _Walk(body, pieces[number], number, direction, tiles)
     found: list[PieceCurve] = []
     left = walk.seeds(tiles)
     while len(left):
@@ -114,11 +116,17 @@ def _on_curve(points: FloatArray, curve: PieceCurve) -> BoolArray:
 class _Walk:
     """Steps along the line on one piece."""
 
-    def __init__(self, body: Any, piece: Any, number: int, direction: FloatArray) -> None:
+    def __init__(self, body: Any, piece: Any, number: int, direction: FloatArray, tiles: Tiles) -> None:
+        from scipy.spatial import cKDTree
+
         self.body, self.piece, self.number, self.direction = body, piece, number, direction
         self.size = size(body)
         self.tip_numbers, self.tips = tips_of(body)
         self.broken = False
+        corners = tiles.corners[tiles.pieces == number]
+        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)
+        self._tree = cKDTree(corners.mean(axis=1) if len(corners) else np.full((1, 3), np.inf))
+        self._reach = ASTRAY * float(np.max(sides, initial=0.0))
 
     def seeds(self, tiles: Tiles) -> FloatArray:
         """Points of the line on the piece, at least one on each curve that a triangle's side crosses."""
@@ -147,8 +155,9 @@ class _Walk:
         return np.asarray(np.linalg.norm(step, axis=1) < CLOSE * self.size)
 
     def inside(self, x: FloatArray) -> BoolArray:
-        """Whether points of the line are of this piece (n,)."""
-        return np.asarray(piece_ahead(self.body, x, self.direction) == self.number)
+        """Whether points of the line are of this piece (n,), and not of a sheet of its F far from the body."""
+        near = np.isfinite(self._tree.query(x, distance_upper_bound=self._reach)[0])
+        return np.asarray(near & (piece_ahead(self.body, x, self.direction) == self.number))
 
     def _to_tip(self, x: FloatArray) -> FloatArray:
         if not len(self.tips):

@@ -42,6 +42,8 @@ SHARE = 500
 """Triangles cut at a time."""
 ROUGH = 0.05
 """Misfit, in spacings of the points, beyond which nothing of a piece is trusted."""
+FAR_OFF = 0.5
+"""Largest distance of its points from F = 0, in their spacings, that a piece may have."""
 SLOPES = (0.5, 1.6)
 """|grad F| at the points: beyond, nothing of a piece is trusted either."""
 
@@ -337,5 +339,8 @@ def _rough(patch: Patch, points: FloatArray) -> bool:
     """Whether F of a patch is no distance at points of its piece, or misses them."""
     if patch.kind != "spline":
         return False
-    slope = np.linalg.norm(patch.fine.gradient(points), axis=1)
-    return bool(patch.misfit > ROUGH * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1])
+    value, gradient = patch.fine.value_and_gradient(points)
+    slope = np.linalg.norm(gradient, axis=1)
+    if patch.misfit > ROUGH * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1]:
+        return True
+    return bool(np.max(np.abs(value) / slope) > FAR_OFF * patch.spacing)

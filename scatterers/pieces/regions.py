@@ -25,7 +25,7 @@ ALIKE = 0.4
 """Turn against another neighbour, relative to that of the edge, from which on a facet is one of a round surface."""
 FEWEST = 6
 """Edges of a chain, unless all are turned by more than `ALWAYS`, as those of a tetrahedron."""
-SLIVER = 0.02
+SLIVER = 1e-3
 """Area, relative to the median, below which the normal of a triangle is not asked."""
 
 

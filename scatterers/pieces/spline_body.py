@@ -21,7 +21,8 @@ BoolArray = NDArray[np.bool_]
 KINDS = ("edge", "joint", "tip", "seam")
 TRUSTED = 1.0
 """Distance from an edge from which on a fitted piece is trusted, in distances of its points."""
-STEPS = 3
+STEPS, MOVED = 3, 0.1
+"""Newton steps that bring tiles onto their piece, and the longest, in their sides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ class SplinePieces:
             for _ in range(STEPS):
                 value, gradient, _ = evaluated(self.space.splines[piece].compiled, x)
                 slope = np.sum(gradient**2, axis=-1)
-                step = np.clip(value / np.sqrt(slope), -edge, edge) / np.sqrt(slope)
+                step = np.clip(value / np.sqrt(slope), -MOVED * edge, MOVED * edge) / np.sqrt(slope)
                 x = x - step[..., None] * gradient
             gradient = evaluated(self.space.splines[piece].compiled, x)[1]
             points[mine], normals[mine] = x, gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
