@@ -41,8 +41,8 @@ CLOSE = 1e-6
 ACCEPTED = 1e-4
 """Residual of what was found, on exact rays: its phase errs by half the square of it, in radii of curvature."""
 ROUNDS = 10
-TOGETHER = 192
-"""Rays traced in one call."""
+TOGETHER, TOGETHER_ON_PIECES = 192, 2048
+"""Rays traced in one call, and on a body with creases, where a call has more to do beside them."""
 LONG = 2
 """Steps of a search, in steps of what it finds: points err less than derivatives of curvature do."""
 NEARLY = 2e-4
@@ -200,12 +200,13 @@ class RayTracer:
         rank = np.empty(rays, dtype=np.int64)
         rank[order] = np.arange(rays)
         place = np.argsort(rank[owner], kind="stable")
-        ends = np.searchsorted(rank[owner][place], np.arange(0, rays + TOGETHER, TOGETHER))
+        together = TOGETHER_ON_PIECES if is_creased(self.body) else TOGETHER
+        ends = np.searchsorted(rank[owner][place], np.arange(0, rays + together, together))
         with evaluators(self.body) as parts:
             evaluator = parts[:2]
-            for k in range(0, rays, TOGETHER):
-                mine = order[k : k + TOGETHER]
-                rows = place[ends[k // TOGETHER] : ends[k // TOGETHER + 1]]
+            for k in range(0, rays, together):
+                mine = order[k : k + together]
+                rows = place[ends[k // together] : ends[k // together + 1]]
                 if not len(rows):
                     continue
                 now, which = times[rows], rank[owner[rows]] - k
