@@ -34,6 +34,8 @@ SAG = 0.1
 """k h² κ of a tile: its phase then errs by a hundredth of a radian on average, in backscatter."""
 LONGEST, SHORTEST = 0.1, 2e-3
 """Longest and shortest sides of tiles, in body sizes."""
+SLIVERS = 16.0
+"""Tiles, in units of what squares of their side would be, from which on they are taken for slivers."""
 USUAL = 0.95
 """Share of the area whose curvature the sides go by: next to a tip it is without bound."""
 OUTWARD = 1e-6
@@ -108,11 +110,26 @@ def lit_tiles(body: Any, direction: FloatArray, wavenumber: float) -> LitTiles:
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     lit = np.flatnonzero(n @ direction < 0)
     middles = tiles.corners[lit].mean(axis=1)
-    free = ~occluded(body, middles + (OUTWARD + share**2) * size(body) * n[lit], direction)
+    asked, of = _representatives(tiles, lit, middles, share * size(body))
+    above = middles[asked] + (OUTWARD + share**2) * size(body) * n[lit][asked]
+    free = ~occluded(body, above, direction)[of]
     lit, middles = lit[free], middles[free]
     some = Tiles(tiles.corners[lit], tiles.normals[lit], tiles.pieces[lit])
     curvature = _curvatures(body, some, middles)
     return LitTiles(direction, some.corners, n[lit], -n[lit] @ direction, curvature, some.pieces, size(body))
+
+
+def _representatives(tiles: Tiles, lit: IntArray, middles: FloatArray, side: float) -> tuple[IntArray, IntArray]:
+    """Numbers of the lit tiles that are asked for all, and which of them stands for each.
+
+    Each for itself, unless slivers of a long mesh make many more tiles than their sides would: then one a cube.
+    """
+    each = np.arange(len(lit))
+    if len(tiles.areas) < SLIVERS * float(tiles.areas.sum()) / side**2:
+        return each, each
+    cell = np.column_stack([tiles.pieces[lit], np.floor(middles / side).astype(np.int64)])
+    _, first, of = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+    return first, of.ravel()
 
 
 def phase_sums(corners: FloatArray, vectors: FloatArray, wavenumber: float, weights: FloatArray) -> ComplexArray:

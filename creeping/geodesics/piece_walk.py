@@ -12,7 +12,7 @@ Sources: Derivations, R1 and R3.
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import IntegrationError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import project_bundle
@@ -21,7 +21,7 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.piece_exits import REACH, Exits, PieceExits
 from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X
-from creeping.geometry.creased import nearest_crease, piece_ahead, pieces_of
+from creeping.geometry.creased import SMOOTH, nearest_crease, piece_ahead, pieces_of
 from creeping.geometry.surface import size
 
 WINDOW = 0.1
@@ -181,12 +181,14 @@ class Walk:
         kinds = np.array([one.kind for one in self.body.creases])[crease]
         self.states[rows], self.now[rows] = state, moment
         self.crossed[rows] += 1
-        on = kinds == "joint"
+        on = np.isin(kinds, SMOOTH)
         self._ended(rows[~on], crease[~on], stops, out)
-        rows, other, crease = rows[on], other[on], crease[on]
+        rows, other, crease, moment = rows[on], other[on], crease[on], moment[on]
         if not len(rows):
             return
-        self.passed.append((rows, moment[on], crease))
+        # a seam is an event of how the body is known, not of the ray
+        jumps = kinds[on] == "joint"
+        self.passed.append((rows[jumps], moment[jumps], crease[jumps]))
         for following in np.unique(other):
             mine = rows[other == following]
             x, p = project_bundle(self.pieces[following], self.states[mine, X], self.states[mine, P])

@@ -19,7 +19,9 @@ SAMPLE = 0.1
 """Longest sides of the triangles that samples of a body come from, in its sizes."""
 AHEAD = 1e-12
 """δ, in body sizes: some digits above rounding."""
-KINDS = ("edge", "joint", "tip")
+KINDS = ("edge", "joint", "tip", "seam")
+SMOOTH = ("joint", "seam")
+"""Creases across which the normal does not jump: rays and lines go on there."""
 
 
 class Piece:
@@ -127,40 +129,60 @@ def nearest_crease(
 
     Of creases between ``pieces`` (n, 2), in either order, where there are such.
     """
+    segments = kept(body, "crease segments", lambda: _Segments.of(body))
+    wanted = np.isin(segments.kinds, [KINDS.index(kind) for kind in kinds])
     best, nearest = np.full(len(points), -1), np.full(len(points), np.inf)
-    fits = np.zeros(len(points), dtype=bool)
-    for number, crease in enumerate(body.creases):
-        if crease.kind not in kinds:
-            continue
-        distance = distance_to_polyline(points, np.asarray(crease.points, dtype=float))
-        between = np.ones(len(points), dtype=bool)
-        if pieces is not None:
-            between = np.all(np.sort(pieces, axis=1) == np.sort(crease.pieces), axis=1)
-        closer = (between & ~fits) | ((between == fits) & (distance < nearest))
-        best[closer], nearest[closer] = number, distance[closer]
-        fits |= between
+    left = np.ones(len(points), dtype=bool)
+    if pieces is not None:
+        sides = np.sort(pieces, axis=1)
+        for pair in np.unique(sides, axis=0):
+            mine = wanted & np.all(segments.sides == pair, axis=1)
+            rows = np.flatnonzero(np.all(sides == pair, axis=1))
+            if mine.any():
+                best[rows], nearest[rows] = segments.nearest(points[rows], np.flatnonzero(mine))
+                left[rows] = False
+    rows = np.flatnonzero(left)
+    if len(rows) and wanted.any():
+        best[rows], nearest[rows] = segments.nearest(points[rows], np.flatnonzero(wanted))
     return best, nearest
 
 
-def distance_to_polyline(points: FloatArray, line: FloatArray) -> FloatArray:
-    """Distance of points (n, 3) from a polyline (m, 3), or from its one point: (n,), L.
+class _Segments(NamedTuple):
+    """Segments of all creases, a tip as one of no length: ends (n, 3), crease, pieces in order (n, 2), and kind."""
 
-    Examples
-    --------
-    >>> distance_to_polyline(np.array([[0.5, 1.0, 0.0]]), np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])).tolist()
-    [0.5]
-    """
-    if len(line) == 1:
-        return np.asarray(np.linalg.norm(points - line[0], axis=1))
-    found = np.empty(len(points))
-    along = np.diff(line, axis=0)
-    square = np.maximum(np.sum(along**2, axis=1), 1e-300)
-    block = max(1, 2_000_000 // len(along))
-    for first in range(0, len(points), block):
-        away = points[first : first + block, None] - line[:-1]
-        share = np.clip(np.sum(away * along, axis=2) / square, 0.0, 1.0)
-        found[first : first + block] = np.min(np.linalg.norm(away - share[..., None] * along, axis=2), axis=1)
-    return found
+    starts: FloatArray
+    ends: FloatArray
+    creases: IntArray
+    sides: IntArray
+    kinds: IntArray
+
+    @classmethod
+    def of(cls, body: Any) -> "_Segments":
+        starts, ends, numbers = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+        for number, crease in enumerate(body.creases):
+            x = np.asarray(crease.points, dtype=float).reshape(-1, 3)
+            starts.append(x[:-1] if len(x) > 1 else x)
+            ends.append(x[1:] if len(x) > 1 else x)
+            numbers.append(np.full(len(starts[-1]), number))
+        creases = np.concatenate(numbers)
+        sides = np.array([sorted(crease.pieces) for crease in body.creases])[creases]
+        kinds = np.array([KINDS.index(crease.kind) for crease in body.creases])[creases]
+        return cls(np.concatenate(starts), np.concatenate(ends), creases, sides, kinds)
+
+    def nearest(self, points: FloatArray, among: IntArray) -> tuple[IntArray, FloatArray]:
+        """Crease of the nearest of some segments to each point (n, 3), and its distance, L."""
+        crease, distance = np.empty(len(points), np.int64), np.empty(len(points))
+        a, along = self.starts[among], self.ends[among] - self.starts[among]
+        square = np.maximum(np.sum(along**2, axis=1), 1e-300)
+        block = max(1, 1_000_000 // len(among))
+        for first in range(0, len(points), block):
+            away = points[first : first + block, None] - a
+            share = np.clip(np.sum(away * along, axis=2) / square, 0.0, 1.0)
+            gap = np.linalg.norm(away - share[..., None] * along, axis=2)
+            least = np.argmin(gap, axis=1)
+            crease[first : first + block] = self.creases[among[least]]
+            distance[first : first + block] = gap[np.arange(len(least)), least]
+        return crease, distance
 
 
 def tips_of(body: Any) -> tuple[IntArray, FloatArray]:

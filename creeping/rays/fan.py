@@ -44,8 +44,8 @@ from creeping.shadow.line import ShadowLine, checked_launch_from
 from creeping.shadow.status import NO_RAY
 from creeping.storage.memory import within_budget
 
-MAX_RAYS = 200_000
-"""Rays beyond which refinement stops."""
+MAX_RAYS, GROWTH, FEW_RAYS = 200_000, 32, 4096
+"""Rays beyond which refinement stops, also in units of those asked for, unless they are few."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
 
@@ -136,6 +136,18 @@ class RayFan(DrawnOnBody):
         return {s.name: int(np.sum(self.status == s)) for s in RayStatus if np.any(self.status == s)}
 
     @property
+    def largest_gap(self) -> float:
+        """Largest distance of neighbours on their way, L; 0 with fewer than two rays on every arc."""
+        widest = 0.0
+        for arc, closed in enumerate(self.closed_arcs):
+            rays = self.points[self.arc_index == arc]
+            if len(rays) > 1:
+                following = np.roll(rays, -1, axis=0)[: None if closed else -1]
+                apart = np.linalg.norm(following - rays[: len(following)], axis=-1)
+                widest = max(widest, float(np.nanmax(apart, initial=0.0)))
+        return widest
+
+    @property
     def launched(self) -> BoolArray:
         """Whether the wave launched each ray, wherever it ended (rays,)."""
         return np.isin(self.status, LAUNCHED)
@@ -207,7 +219,8 @@ def launch(
     launch_from : {"attached", "all"}
         "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
-        Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none.
+        Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none. Where
+        rays part without end, past many caustics, it stops at 32 times as many; `RayFan.largest_gap` tells.
     measured : bool
         Whether the error at the end is measured.
 
@@ -251,11 +264,12 @@ def launch(
     times = np.linspace(0.0, length, steps + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
+    most = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS))
     while np.isfinite(gap):
         arc, position = parting_positions(
             states[..., X], starts.arcs, starts.arc, starts.position, gap, known_steps(states, times)
         )
-        if not len(arc) or len(starts.arc) + len(arc) > MAX_RAYS:
+        if not len(arc) or len(starts.arc) + len(arc) > most:
             break
         more = Starts.at(line, starts.arcs, arc, position)
         states = np.concatenate([states, _carry(flow, line, more, times)])

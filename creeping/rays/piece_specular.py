@@ -12,7 +12,7 @@ from dataclasses import fields
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.creased import nearest_crease, pieces_of, tiles_of
+from creeping.geometry.creased import SMOOTH, nearest_crease, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.geometry.triangulation import Triangulation
 from creeping.rays.specular import SpecularPoints, specular_points
@@ -29,10 +29,10 @@ FLAT = 1e-4
 
 
 def smooth_parts(body: Any) -> tuple[tuple[int, ...], ...]:
-    """Numbers of the pieces that hang together by joints, part by part."""
+    """Numbers of the pieces that hang together by joints and seams, part by part."""
     part = list(range(len(body.pieces)))
     for crease in body.creases:
-        if crease.kind == "joint":
+        if crease.kind in SMOOTH:
             one, other = (part[k] for k in crease.pieces)
             part = [one if number == other else number for number in part]
     return tuple(tuple(k for k, number in enumerate(part) if number == one) for one in sorted(set(part)))

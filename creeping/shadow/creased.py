@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.creased import pieces_of, tiles_of
+from creeping.errors import SingularIncidenceError
+from creeping.geometry.creased import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.curve import ShadowCurve
@@ -46,7 +47,7 @@ def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
     curves : tuple of ShadowCurve
     on_edges : tuple of EdgePart
     at_tips : float, L
-        Length between curves and the tips they come to.
+        Length between curves and the tips they come to, and of what cannot be followed.
     edge_on : tuple of int
         Pieces all over which n.d = 0.
 
@@ -61,8 +62,15 @@ def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
     for number in range(len(pieces)):
         if number in level:
             continue
-        for found in curves_on(body, pieces, number, direction, tiles):
-            curve = _finished(body, pieces[number], number, direction, found, n_points)
+        on_piece, missing = curves_on(body, pieces, number, direction, tiles)
+        gaps += missing
+        for found in on_piece:
+            try:
+                curve = _finished(body, pieces[number], number, direction, found, n_points)
+            except SingularIncidenceError:
+                # it turns within rounding of a crossing somewhere: all of it is lost
+                gaps += float(np.sum(np.linalg.norm(np.diff(found.nodes, axis=0), axis=1)))
+                continue
             if curve.length > SHORTEST * size(body):
                 curves.append(curve)
                 gaps += sum(found.gaps)
@@ -150,7 +158,7 @@ def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
     for number, side in ends:
         curve = curves[number]
         crease = curve.creases[side]
-        if crease < 0 or body.creases[crease].kind != "joint":
+        if crease < 0 or body.creases[crease].kind not in SMOOTH:
             continue
         x = curve.points[-side]
         others = [other for other in ends if other[0] != number and other[1] != side]

@@ -53,7 +53,7 @@ class ShadowLine(DrawnOnBody):
     on_edges : tuple of EdgePart
         Of a body with creases: where the line goes on along edges, which launch no creeping rays.
     at_tips : float, L
-        Length next to tips that launches none.
+        Length next to tips, and where the line turns too sharply to be followed, that launches none.
     edge_on : tuple of int
         Pieces all over which n.d = 0: they have no line of their own, and count as dark.
 

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.errors import SingularIncidenceError
 from creeping.geometry.creased import Tiles, nearest_crease, piece_ahead, tips_of
 from creeping.geometry.surface import size
 from creeping.shadow.panels import newton_step, onto_line
@@ -56,13 +55,13 @@ class PieceCurve(NamedTuple):
     gaps: tuple[float, float]
 
 
-def curves_on(body: Any, pieces: tuple[Any, ...], number: int, direction: FloatArray, tiles: Tiles) -> list[PieceCurve]:
-    """All curves of the line of a unit direction on the piece of a number.
+def curves_on(
+    body: Any, pieces: tuple[Any, ...], number: int, direction: FloatArray, tiles: Tiles
+) -> tuple[list[PieceCurve], float]:
+    """All curves of the line of a unit direction on the piece of a number, and the length that is missing, L.
 
-    Raises
-    ------
-    SingularIncidenceError
-        If one cannot be followed: it turns too sharply, or crosses itself.
+    Where a curve turns too sharply to be followed, or crosses itself, it ends: what is missing then is what the tiles
+    have of n.d = 0 on the piece beyond the length of its curves.
     """
     walk = _Walk(body, pieces[number], number, direction)
     found: list[PieceCurve] = []
@@ -74,7 +73,23 @@ def curves_on(body: Any, pieces: tuple[Any, ...], number: int, direction: FloatA
             found.append(curve)
             rest = rest[~_on_curve(rest, curve)]
         left = rest
-    return found
+    if not walk.broken:
+        return found, 0.0
+    known = sum(float(np.sum(np.linalg.norm(np.diff(curve.nodes, axis=0), axis=1))) for curve in found)
+    return found, max(contour_length(tiles, number, direction) - known, 0.0)
+
+
+def contour_length(tiles: Tiles, number: int, direction: FloatArray) -> float:
+    """Length of n.d = 0 on the tiles of a piece, n.d taken as linear on each, L."""
+    mine = tiles.pieces == number
+    corners, s = tiles.corners[mine], tiles.normals[mine] @ direction
+    after, ahead = np.roll(corners, -1, axis=1), np.roll(s, -1, axis=1)
+    crossed = (s > 0) != (ahead > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        points = corners + (s / (s - ahead))[..., None] * (after - corners)
+    # two sides of a triangle are crossed, or none
+    pairs = points[crossed].reshape(-1, 2, 3)
+    return float(np.sum(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
 
 
 def edge_on(tiles: Tiles, number: int, direction: FloatArray) -> bool:
@@ -103,6 +118,7 @@ class _Walk:
         self.body, self.piece, self.number, self.direction = body, piece, number, direction
         self.size = size(body)
         self.tip_numbers, self.tips = tips_of(body)
+        self.broken = False
 
     def seeds(self, tiles: Tiles) -> FloatArray:
         """Points of the line on the piece, at least one on each curve that a triangle's side crosses."""
@@ -183,12 +199,8 @@ class _Walk:
             if not (off < 0.3 * h and T @ V > np.cos(TURN) and self._solved(y[None])[0]):
                 h *= 0.5
                 if h < LEAST_STEP * self.size:
-                    raise SingularIncidenceError(
-                        f"the shadow line cannot be followed on piece {self.number} near {np.round(x, 6).tolist()}; "
-                        "perturb the direction by say 1e-3",
-                        points=x[None],
-                        distance=0.0,
-                    )
+                    self.broken = True
+                    return np.array(nodes), False, -1, 0.0
                 continue
             chord = y - x
             home = float((start - x) @ chord) / float(chord @ chord)
@@ -203,12 +215,8 @@ class _Walk:
                 return np.array([*nodes, end]), False, *self._end(end, 0.0)
             nodes.append(y)
             T, h = V, 1.5 * h
-        raise SingularIncidenceError(
-            f"the shadow line on piece {self.number} does not end after {MOST} steps; "
-            "perturb the direction by say 1e-3",
-            points=start[None],
-            distance=0.0,
-        )
+        self.broken = True
+        return np.array(nodes), False, -1, 0.0
 
     def _bisected(self, x: FloatArray, chord: FloatArray, low: float, high: float) -> FloatArray:
         """Last point of the piece between shares of a chord of the curve."""

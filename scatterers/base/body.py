@@ -2,14 +2,17 @@
 
 import math
 import sys
-from collections.abc import Sized
+from collections.abc import Sequence, Sized
 from dataclasses import fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scatterers.speed import as_speed
+
+if TYPE_CHECKING:
+    from scatterers.pieces.crease import Crease
 
 MOST_NUMBERS = 10**9
 
@@ -49,7 +52,15 @@ def numbers(values: ArrayLike) -> NDArray[np.float64]:
 
 
 class Body:
-    """Base of the dataclass bodies; each lists its parameters as fields, ``speed`` last."""
+    """Base of the dataclass bodies; each lists its parameters as fields, ``speed`` last.
+
+    ``creases`` are the edges, joints, seams and tips of a body of smooth pieces.
+    """
+
+    @property
+    def creases(self) -> Sequence["Crease"]:
+        """None: the body is smooth as a whole."""
+        return ()
 
     def _set_speed(self) -> None:
         object.__setattr__(self, "speed", as_speed(getattr(self, "speed", None)))
