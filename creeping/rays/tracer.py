@@ -43,8 +43,9 @@ ACCEPTED = 1e-4
 ROUNDS = 10
 TOGETHER, TOGETHER_ON_PIECES = 192, 2048
 """Rays traced in one call, and on a body with creases, where a call has more to do beside them."""
-LONG = 2
-"""Steps of a search, in steps of what it finds: points err less than derivatives of curvature do."""
+LONG, LONG_ON_PIECES = 2, (6, 2)
+"""Steps of a search, in steps of what it finds: points err less than derivatives of curvature do. On a body with
+creases of both searches: sharp places next to tips and edges make steps short all over it."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
 
@@ -270,12 +271,13 @@ class RayTracer:
         found, moved : (m,)
             Their rows, and how far along the line they start from where the search began, in cells.
         """
-        found, result, moved = self._sought(directions, observers, near, times, cell, LONG, NEARLY)
+        quick, slow = LONG_ON_PIECES if is_creased(self.body) else (LONG, 1)
+        found, result, moved = self._sought(directions, observers, near, times, cell, quick, NEARLY)
         missing = np.setdiff1d(np.arange(len(times)), found)
         if len(missing):
             # those that the quick search gave up, or ended too early
             again, more, further = self._sought(
-                directions[missing], observers[missing], near[missing], times[missing], cell[missing], 1, 0.0
+                directions[missing], observers[missing], near[missing], times[missing], cell[missing], slow, 0.0
             )
             result = SingleRays.joined([result, more])
             found, moved = np.concatenate([found, missing[again]]), np.concatenate([moved, further])
