@@ -124,6 +124,8 @@ class Walk:
         if none.any():
             self._stop(mine[none], stops, out)
         good = np.flatnonzero(~bad)
+        if not len(good):
+            return
         mine, found, step = mine[good], found[good], step[good]
         path = np.stack([self.states[mine], found], axis=1)
         exits = self._exits(number, mine, path, np.stack([np.zeros(len(mine)), step], axis=1))

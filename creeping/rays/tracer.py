@@ -41,10 +41,17 @@ CLOSE = 1e-6
 ACCEPTED = 1e-4
 """Residual of what was found, on exact rays: its phase errs by half the square of it, in radii of curvature."""
 ROUNDS = 10
-TOGETHER = 192
-"""Rays traced in one call."""
-LONG = 2
-"""Steps of a search, in steps of what it finds: points err less than derivatives of curvature do."""
+FAR, FAR_ON_PIECES = 3.0, 1.5
+"""Cells by which a search may move before it is given up: most of those on bodies with creases go nowhere,"""
+SLOW = 0.95
+"""and are given up where a round does not bring the residual down to this share,"""
+HOPE = 0.25
+"""for good if it has never been less than this: others may have met the error of long steps next to a tip."""
+TOGETHER, TOGETHER_ON_PIECES = 192, 2048
+"""Rays traced in one call, and on a body with creases, where a call has more to do beside them."""
+LONG, LONG_ON_PIECES = 2, (6, 2)
+"""Steps of a search, in steps of what it finds: points err less than derivatives of curvature do. On a body with
+creases of both searches: sharp places next to tips and edges make steps short all over it."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
 
@@ -130,25 +137,26 @@ class RayTracer:
 
     def _states(
         self, directions: FloatArray, starts: FloatArray, latest: float, step: float, before: bool
-    ) -> FloatArray:
+    ) -> tuple[FloatArray, FloatArray]:
         """x, p, J, J' at equal steps, GUARD of them before the launch point and beyond a time: (n, K, 8).
 
-        Those ``before`` are copies of the launch point unless they are wanted.
+        Those ``before`` are copies of the launch point unless they are wanted. And the times (n,) at which rays end at
+        creases.
         """
         last = int(np.ceil(latest / step)) + GUARD + 1
         forward: FloatArray = step * np.arange(last + 1, dtype=np.float64)
-        ahead = self._traced(pack(starts, directions, jacobi=True), forward, step)
+        ahead, end = self._traced(pack(starts, directions, jacobi=True), forward, step)
         if not before:
             # never read, but polynomials of the first steps pass there
-            return np.concatenate([np.repeat(ahead[:, :1, :8], GUARD, axis=1), ahead[..., :8]], axis=1)
+            return np.concatenate([np.repeat(ahead[:, :1, :8], GUARD, axis=1), ahead[..., :8]], axis=1), end
         some = forward[: GUARD + 1]
-        back = self._traced(pack(starts, -directions, jacobi=True), some, step)
+        back, _ = self._traced(pack(starts, -directions, jacobi=True), some, step)
         states = np.empty((len(starts), last + 1 + GUARD, 8))
         states[:, GUARD:] = ahead[..., :8]
         behind = back[:, GUARD:0:-1]
         states[:, :GUARD, X], states[:, :GUARD, P] = behind[..., X], -behind[..., P]
         states[:, :GUARD, M11], states[:, :GUARD, M21] = behind[..., M11], -behind[..., M21]
-        return states
+        return states, end
 
     def at(
         self,
@@ -193,24 +201,25 @@ class RayTracer:
         times = np.array(times)
         whole, step = long == 0, max(1, long) * self.step
         scale = size(self.body)
-        latest = np.zeros(rays)
+        latest, ends_of = np.zeros(rays), np.full(rays, np.inf)
         np.maximum.at(latest, owner, times)
         # those of like length together: all rays of a call are traced to the latest time
         order = np.argsort(latest, kind="stable")
         rank = np.empty(rays, dtype=np.int64)
         rank[order] = np.arange(rays)
         place = np.argsort(rank[owner], kind="stable")
-        ends = np.searchsorted(rank[owner][place], np.arange(0, rays + TOGETHER, TOGETHER))
+        together = TOGETHER_ON_PIECES if is_creased(self.body) else TOGETHER
+        ends = np.searchsorted(rank[owner][place], np.arange(0, rays + together, together))
         with evaluators(self.body) as parts:
             evaluator = parts[:2]
-            for k in range(0, rays, TOGETHER):
-                mine = order[k : k + TOGETHER]
-                rows = place[ends[k // TOGETHER] : ends[k // TOGETHER + 1]]
+            for k in range(0, rays, together):
+                mine = order[k : k + together]
+                rows = place[ends[k // together] : ends[k // together + 1]]
                 if not len(rows):
                     continue
                 now, which = times[rows], rank[owner[rows]] - k
                 before = whole or float(np.min(now)) < GUARD * step
-                states = self._states(
+                states, ends_of[mine] = self._states(
                     directions[mine], starts[mine], float(np.max(latest[mine])) + 2 * step, step, before
                 )
                 seen = np.zeros((0, 3)) if observers is None else observers[rows]
@@ -228,16 +237,18 @@ class RayTracer:
         directions, starts, tangents = directions[owner], starts[owner], tangents[owner]
         first[:, 0] = np.sum(starts * directions, axis=1)
         first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
-        if whole and n and (hasattr(self.body, "non_smooth") or is_creased(self.body)):
+        if whole and n:
+            alive &= times < ends_of[owner]
+        if whole and n and hasattr(self.body, "non_smooth"):
             alive &= times < self._ends(directions, starts, times)
         return SingleRays(directions, starts, tangents, RayPoints(lanes, first, times, alive, scale), risen)
 
-    def _traced(self, states: FloatArray, times: FloatArray, step: float) -> FloatArray:
-        """Rays by equal steps; beyond an edge or tip as if their piece went on, for the polynomials' sake."""
+    def _traced(self, states: FloatArray, times: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
+        """Rays by equal steps, beyond an edge or tip as if their piece went on, for the polynomials' sake; and ends."""
         if is_creased(self.body):
-            long = (GUARD + 2) * step
-            return trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=long).states
-        return trace_states(self.body, states, times, rtol=0.0, step=step)
+            found = trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=(GUARD + 2) * step)
+            return found.states, found.end
+        return trace_states(self.body, states, times, rtol=0.0, step=step), np.full(len(states), np.inf)
 
     def _ends(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
         """Times (n,) at which rays come to an edge, a tip or to what is not smooth enough, inf if not by theirs."""
@@ -269,12 +280,13 @@ class RayTracer:
         found, moved : (m,)
             Their rows, and how far along the line they start from where the search began, in cells.
         """
-        found, result, moved = self._sought(directions, observers, near, times, cell, LONG, NEARLY)
-        missing = np.setdiff1d(np.arange(len(times)), found)
+        quick, slow = LONG_ON_PIECES if is_creased(self.body) else (LONG, 1)
+        found, result, moved, hopeless = self._sought(directions, observers, near, times, cell, quick, NEARLY)
+        missing = np.setdiff1d(np.flatnonzero(~hopeless), found)
         if len(missing):
             # those that the quick search gave up, or ended too early
-            again, more, further = self._sought(
-                directions[missing], observers[missing], near[missing], times[missing], cell[missing], 1, 0.0
+            again, more, further, _ = self._sought(
+                directions[missing], observers[missing], near[missing], times[missing], cell[missing], slow, 0.0
             )
             result = SingleRays.joined([result, more])
             found, moved = np.concatenate([found, missing[again]]), np.concatenate([moved, further])
@@ -291,20 +303,29 @@ class RayTracer:
         cell: FloatArray,
         long: int,
         nearly: float,
-    ) -> tuple[IntArray, SingleRays, FloatArray]:
-        """What `towards` finds with steps of so many, without another look after one from a residual of ``nearly``."""
+    ) -> tuple[IntArray, SingleRays, FloatArray, BoolArray]:
+        """What `towards` finds with steps of so many, without another look after one from a residual of ``nearly``.
+
+        And the searches (n,) on a body with creases that are not worth another with shorter steps.
+        """
         starts, tangents = self.onto_line(near, directions)
         times, begin = times.copy(), times
         moved = np.zeros(len(times))
         lanes, first = np.empty((len(times), LANES)), np.empty((len(times), START_LANES))
         active, wanted = np.arange(len(times)), np.zeros(len(times), dtype=bool)
+        far = FAR_ON_PIECES if is_creased(self.body) else FAR
+        slow, before = np.zeros(len(times), dtype=bool), np.full(len(times), np.inf)
         for _ in range(ROUNDS):
             rows = directions[active], starts[active], tangents[active], times[active]
             now = self.at(*rows, long=long).rays
             lanes[active], first[active] = now.lanes, now.starts
             residual = _apart(now, observers[active])
             wanted[active] = residual <= max(CLOSE, nearly)
-            missing = (np.abs(moved[active]) > 3) | (np.abs(times[active] - begin[active]) > 3 * cell[active, 1])
+            if is_creased(self.body):
+                slow[active] = ~(residual <= SLOW * before[active])
+                before[active] = np.fmin(residual, before[active])
+            missing = (np.abs(moved[active]) > far) | (np.abs(times[active] - begin[active]) > far * cell[active, 1])
+            missing |= slow[active]
             last = active[(residual > CLOSE) & ~missing]
             if not len(last):
                 break
@@ -316,11 +337,12 @@ class RayTracer:
             active = last[~wanted[last]]
             if not len(active):
                 break
-        within = (np.abs(moved) <= 3) & (np.abs(times - begin) <= 3 * cell[:, 1])
+        within = (np.abs(moved) <= far) & (np.abs(times - begin) <= far * cell[:, 1])
         kept = np.flatnonzero(wanted & within)
         found = self.at(directions[kept], starts[kept], tangents[kept], times[kept], observers=observers[kept])
         good = _apart(found.rays, observers[kept]) < ACCEPTED
-        return kept[good], found[good], moved[kept[good]]
+        hopeless = (slow | ~within) & (before > HOPE) & is_creased(self.body)
+        return kept[good], found[good], moved[kept[good]], hopeless
 
     def _newton(
         self,

@@ -1,0 +1,87 @@
+"""Cells of a fan on a body with creases in which a ray towards r is likely: of the others no ray need be traced.
+
+A cell lies between two rays and two times, and the search on the fan has it where n.r and b.r have both signs at its
+corners. Where rays part at a tip such cells are many, and most have no place where both heights vanish, or p = -r there.
+With both heights bilinear in the cell, the place is one step of Newton's method from the nearest one in the cell; it is
+likely up to MARGIN cells outside, where p.r, held in the cell, is above AHEAD.
+
+Sources: Derivations, R12.
+"""
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.geodesics.states import P, X
+
+MARGIN = 1.0
+"""How far outside a cell a place may be: its rays are parted by that much or the search gives them up soon."""
+AHEAD = 0.0
+"""p.r of a place, of unit vectors between the corners, above which rays leave towards r and not away from it."""
+
+
+def likely_cells(
+    body: Any,
+    states: FloatArray,
+    rays: IntArray,
+    sample: IntArray,
+    parts: int,
+    step: float,
+    observers: FloatArray,
+    places: FloatArray,
+) -> BoolArray:
+    """Whether a ray towards its observer is likely in each cell (n,).
+
+    Parameters
+    ----------
+    body : CreasedSurface
+    states : (rays, K, 6 or more)
+        At equal steps.
+    rays : (n, 2)
+        Of each cell.
+    sample : (n,)
+        First of both samples of each, ``parts`` of them a step.
+    parts, step : int, float
+    observers : (n, 3)
+    places : (n, 2)
+        Nearest fractions of the cell, across the rays and along them.
+    """
+    n = len(sample)
+    if not n:
+        return np.zeros(0, dtype=bool)
+    corner = np.stack([sample, sample + 1], axis=1)[:, None].repeat(2, axis=1)
+    owner = rays[:, :, None].repeat(2, axis=2)
+    x, p = _between(states, owner.reshape(-1), corner.reshape(-1), parts, step)
+    g = np.asarray(body.gradient(x))
+    with np.errstate(all="ignore"):
+        normal = g / np.linalg.norm(g, axis=1, keepdims=True)
+        p = p / np.linalg.norm(p, axis=1, keepdims=True)
+        r = np.repeat(observers, 4, axis=0)
+        f, h, ahead = (np.sum(v * r, axis=1).reshape(n, 2, 2) for v in (normal, np.cross(normal, p), p))
+        u, v = places.T
+        (f0, fu, fv), (h0, hu, hv) = _bilinear(f, u, v), _bilinear(h, u, v)
+        determinant = fu * hv - fv * hu
+        u1, v1 = u - (f0 * hv - fv * h0) / determinant, v - (fu * h0 - f0 * hu) / determinant
+        near = (np.abs(u1 - 0.5) <= 0.5 + MARGIN) & (np.abs(v1 - 0.5) <= 0.5 + MARGIN)
+        towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > AHEAD
+        # where nothing can be told, a cell is likely
+        return np.asarray((near & towards) | ~np.isfinite(u1 + v1))
+
+
+def _between(
+    states: FloatArray, ray: IntArray, sample: IntArray, parts: int, step: float
+) -> tuple[FloatArray, FloatArray]:
+    """x and x' of rays at samples (n,), of the cubics between their states."""
+    k = np.minimum(sample // parts, states.shape[1] - 2)
+    u = ((sample - k * parts) / parts)[:, None]
+    a, b = states[ray, k], states[ray, k + 1]
+    ends = (1 - u) ** 2 * (1 + 2 * u) * a[:, X] + u**2 * (3 - 2 * u) * b[:, X]
+    x = ends + step * u * (1 - u) * ((1 - u) * a[:, P] - u * b[:, P])
+    slope = 6 * u * (1 - u) * (b[:, X] - a[:, X]) / step
+    return x, slope + (1 - u) * (1 - 3 * u) * a[:, P] + u * (3 * u - 2) * b[:, P]
+
+
+def _bilinear(c: FloatArray, u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Value and slopes at (u, v) of what is c (n, 2, 2) at the corners."""
+    low, high = c[:, 0, 0] + v * (c[:, 0, 1] - c[:, 0, 0]), c[:, 1, 0] + v * (c[:, 1, 1] - c[:, 1, 0])
+    along = (1 - u) * (c[:, 0, 1] - c[:, 0, 0]) + u * (c[:, 1, 1] - c[:, 1, 0])
+    return low + u * (high - low), high - low, along
