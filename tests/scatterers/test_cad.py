@@ -179,7 +179,7 @@ def test_several_bodies_are_refused_by_default_too(files):
 
 @cache
 def parted(path, **options):
-    return sc.Cad(path, "m", points=500, cache=False, **options)
+    return sc.Cad(path, "m", **{"points": 500, "cache": False} | options)
 
 
 def kinds(body):
@@ -196,7 +196,9 @@ def test_edges_and_joints_are_taken_in_pieces(files):
     points = np.random.default_rng(5).uniform(-1.6, 1.6, size=(400, 3)) * [0.4, 0.4, 1]
     assert np.array_equal(capsule.level(points) > 0, exact.level(points) > 0)
     on = project(capsule, points)
-    np.testing.assert_allclose(exact.level(on), 0, atol=1e-6)
+    # across a joint the next piece goes on a little
+    np.testing.assert_allclose(exact.level(on), 0, atol=1e-4)
+    assert np.median(np.abs(exact.level(on))) < 1e-12
 
 
 def test_fillets_are_joints_and_halves_of_one_face_seams(files):
@@ -212,7 +214,7 @@ def test_fillets_are_joints_and_halves_of_one_face_seams(files):
 
 
 def test_parts_of_a_cad_file_are_chosen_and_united(files):
-    largest, second = parted(files / "two.brep", part="largest"), parted(files / "two.brep", part=2)
+    largest, second = (parted(files / "two.brep", points=2000, part=part) for part in ("largest", 2))
     directions = np.random.default_rng(8).normal(size=(50, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     np.testing.assert_allclose(largest.level(directions), 0, atol=1e-4)
