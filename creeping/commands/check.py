@@ -58,7 +58,8 @@ def check(
     try:
         shape = parse_body(body, speed, options=file)
     except InvalidInputError as error:
-        if suffix not in MESHES:
+        # an option of CAD files says nothing of a mesh
+        if suffix not in MESHES or file.sew is not None:
             raise
         refusal = error
     if (refusal is not None and suffix in MESHES) or output is not None:
@@ -128,7 +129,7 @@ def _mesh(
 
     try:
         mesh, quality = examined_mesh(body, **{k: v for k, v in file.given().items() if k != "strict"})
-    except ValueError as error:
+    except (ValueError, ModuleNotFoundError) as error:
         raise InvalidInputError(f"{body}: {error}") from error
     answer |= {"quality": quality.to_json(), "repairs": list(mesh.repairs)}
     texts += [*mesh.repairs, quality.summary(wavenumber)]

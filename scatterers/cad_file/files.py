@@ -266,7 +266,8 @@ def _corner_normals(mesh: TriangleMesh, of: IntArray, at: IntArray, face: IntArr
 
 
 def _creases(mesh: TriangleMesh, of: IntArray, normals: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Edges between faces whose normals differ there, and between others."""
+    """Edges between faces whose normals differ there, and between others; those of a mesh where no face is known."""
+    from scatterers.pieces.regions import regions_of
     from scatterers.triangles.topology import edges_of
 
     edges = edges_of(mesh.triangles)
@@ -278,7 +279,11 @@ def _creases(mesh: TriangleMesh, of: IntArray, normals: FloatArray) -> tuple[NDA
     after = np.where(left % 3 == 2, left - 2, left + 1), np.where(right % 3 == 2, right - 2, right + 1)
     turns = [np.linalg.norm(flat[a] - flat[b], axis=1) for a, b in ((left, after[1]), (after[0], right))]
     sharp = between & (np.minimum(*turns) > 2 * np.sin(np.radians(SHARP) / 2))
-    return sharp, between & ~sharp
+    # lids, and triangles that were cut as parts were united
+    lost = (of[order[:, 0] // 3] < 0) | (of[order[:, 1] // 3] < 0)
+    if lost.any():
+        sharp = np.where(lost, regions_of(mesh.vertices, mesh.triangles).crease, sharp)
+    return sharp, between & ~sharp & ~lost
 
 
 def _joined(

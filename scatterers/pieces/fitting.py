@@ -37,7 +37,9 @@ EVEN, MOST_POINTS = 400, 6_000
 MISSED = 1e-4
 """Distance in body sizes between a point and the level there, beyond which the level is not trusted about it."""
 JUMP = 0.1
-"""Jump of the curvature across a joint, relative to the larger, below which it is none."""
+"""Jump of the curvature across a joint, relative to the larger, below which it is none,"""
+NONE = 1e-6
+"""and times the length of the joint, for parts of one plane."""
 SHARE = 500
 """Triangles cut at a time."""
 ROUGH = 0.05
@@ -180,7 +182,8 @@ def _judged(crease: Crease, patches: list[Patch]) -> Crease:
         # across first, then along
         bends.append(curvatures(spline, x, across)[0][: len(x)])
     jump = float(np.median(np.abs(bends[0] - bends[1])))
-    return replace(crease, kind="seam") if jump <= JUMP * float(np.median(np.max(np.abs(bends), axis=0))) else crease
+    largest = float(np.median(np.max(np.abs(bends), axis=0)))
+    return replace(crease, kind="seam") if jump <= max(JUMP * largest, NONE / crease.length) else crease
 
 
 def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[FloatArray, IntArray]:

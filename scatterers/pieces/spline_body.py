@@ -117,7 +117,8 @@ class SplinePieces:
 
     def non_smooth(self, points: FloatArray) -> BoolArray:
         """Whether points (..., 3), L, lie where F is not trusted: (...)."""
-        x = np.asarray(points, dtype=float)
+        given = np.asarray(points, dtype=float)
+        x = given.reshape(-1, 3)
         found = np.isinf(self.reach)[self.space.numbers(x)]
         tree, reach = self._edges
         if len(reach) and x.size:
@@ -126,7 +127,7 @@ class SplinePieces:
             near = np.isfinite(distance)
             near[near] = distance[near] < reach[nearest[near]]
             found[finite] |= near
-        return np.asarray(found)
+        return np.asarray(found.reshape(given.shape[:-1]))
 
     @cached_property
     def _edges(self) -> tuple[Any, FloatArray]:

@@ -115,21 +115,67 @@ def test_check_of_a_mesh(ball, tmp_path, capsys):
 
 
 def test_check_of_a_cube_gives_its_quality(cube, tmp_path, capsys):
-    code, out, err = creeping("check", cube, "--units", "m", "-o", tmp_path, capsys=capsys)
+    strict = ["--units", "m", "--strict"]
+    code, out, err = creeping("check", cube, *strict, "-o", tmp_path, capsys=capsys)
     assert code == 3
     assert "verdict                    sharp" in out and "dihedral 50 %, 99 %, max" in out
     assert "refused: " in out and "round the edges off" in out
     assert "Traceback" not in err
     assert (tmp_path / "quality.png").stat().st_size > 5000
-    code, out, _ = creeping("check", cube, "--units", "m", "--json", capsys=capsys)
+    code, out, _ = creeping("check", cube, *strict, "--json", capsys=capsys)
     answer = json.loads(out)
     assert code == 3 and answer["ok"] is False
     assert answer["quality"]["verdict"] == "sharp" and "not smooth enough" in answer["refused"]
 
 
+def test_a_cube_is_taken_in_pieces(cube, tmp_path, capsys):
+    code, out, err = creeping("check", cube, "--units", "m", "--json", capsys=capsys)
+    answer = json.loads(out)
+    # its faces are planes, whose Hessians are nought
+    assert code == 0 and answer["ok"] is True, err
+    assert answer["area"] == pytest.approx(6) and answer["quality"]["verdict"] == "sharp" and "refused" not in answer
+    # rays along flat faces do not creep: all of the line lies on edges, and that is said
+    code, out, _ = creeping("run", cube, *SHORT, "--length", 0.5, "--units", "m", "-o", tmp_path, capsys=capsys)
+    assert code == 0 and "on edges and tips: 100 % of the line" in out
+    assert json.loads((tmp_path / "summary.json").read_text())["losses"]["line"] == 1
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory):
+    """Two balls, of radius 1 and 0.5 m."""
+    folder, small = tmp_path_factory.mktemp("meshes"), trimesh.creation.icosphere(3, radius=0.5)
+    small.apply_translation([3, 0, 0])
+    trimesh.util.concatenate([trimesh.creation.icosphere(3), small]).export(folder / "balls.off")
+    return folder / "balls.off"
+
+
+def test_options_of_files_reach_the_body(balls, capsys):
+    code, _, err = creeping("check", balls, "--units", "m", capsys=capsys)
+    assert code == 3 and "holds 2 separate surfaces" in err and "union" in err
+    for part, size in (("largest", 2.0), (2, 1.0)):
+        code, out, _ = creeping("check", balls, "--units", "m", "--part", part, "--json", capsys=capsys)
+        assert code == 0
+        np.testing.assert_allclose(json.loads(out)["quality"]["size"], size, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    "options, match",
+    [
+        (["--part", 3], "part = 3 is none of balls.off"),
+        (["--part", "wing"], "no part 'wing'"),
+        (["--cap", -1], "cap = -1.0 is no size in m"),
+        (["--subdivide", 4], "subdivide = 4; give 1, 2 or 3 times"),
+        (["--sew", 0.1], "--sew does not belong to this body"),
+    ],
+)
+def test_bad_options_of_files_are_exit_code_3(balls, options, match, capsys):
+    code, _, err = creeping("check", balls, "--units", "m", *options, capsys=capsys)
+    assert code == 3 and match in err and "Traceback" not in err
+
+
 @pytest.mark.parametrize("command", ["run", "check"])
 def test_a_body_without_charts_is_refused(command, tmp_path, capsys, monkeypatch):
-    """Found by a cone with --allow-rough, November 2026: a traceback."""
+    """Found by a cone whose tip was rounded off, November 2026: a traceback."""
 
     def none(*_, **__):
         raise ValueError("no charts for 68 of 25260 points of the body; give one without sharp parts")
@@ -154,14 +200,18 @@ def test_check_names_a_folder_that_cannot_be(ball, tmp_path, capsys):
     [
         ("ball", [], "does not state its unit"),
         ("ball", ["--units", "yard"], "units = 'yard' is none of m, mm"),
-        ("cube", ["--units", "m"], "not smooth enough (sharp)"),
+        ("cube", ["--units", "m", "--strict"], "not smooth enough (sharp)"),
         ("none.stl", ["--units", "m"], "none.stl is no file on this machine"),
         ("none.step", [], "none.step is no file"),
         ("none.xyz", [], "unknown body 'none.xyz'"),
         ("cuboid", [], "unknown body 'cuboid'; give one of sphere"),
-        ("torus", ["--units", "mm"], "--units belongs to a file; 'torus' is none"),
-        ("torus", ["--allow-rough"], "--allow-rough belongs to a file or an expression"),
-        ("x**2 + y**2 + z**2 - 1", ["--units", "mm"], "--units belongs to a file"),
+        ("torus", ["--units", "mm"], "--units does not belong to this body: torus takes none"),
+        ("torus", ["--strict"], "--strict does not belong to this body: torus takes none"),
+        (
+            "x**2 + y**2 + z**2 - 1",
+            ["--units", "mm"],
+            "--units does not belong to this body: 'x**2 + y**2 + z**2 - 1' takes --strict",
+        ),
         ("x**2 + y**2 - 1", [], "x**2 + y**2 - 1: "),
         ("x**2 + y**2 + z**2 - w", [], "w"),
         ("__import__('os').system('touch hey') + x", [], ""),

@@ -14,7 +14,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project
 from scatterers.cad_file import files as _cad_files
-from scatterers.cad_file.files import read_cad
+from scatterers.cad_file.files import CadReading, read_cad
+from scatterers.triangles.choice import Choice
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 
@@ -48,8 +49,19 @@ ends = [(3, make.addSphere(0, 0, z, 0.5)) for z in (-1, 1)]
 make.fuse([(3, rod)], ends)
 write("capsule.brep")
 make.addSphere(0, 0, 0, 1)
-make.addSphere(3, 0, 0, 1)
+make.addSphere(3, 0, 0, 0.5)
 write("two.brep")
+make.addBox(0, 0, 0, 1, 1, 1)
+make.addBox(0.5, 0.5, 0.5, 1, 1, 1)
+write("crossing.brep")
+make.fillet([make.addCylinder(0, 0, 0, 0, 0, 1, 0.5)], [1], [0.2])
+write("filleted.brep")
+# faces of one cylinder are not made one
+gmsh.option.setNumber("Geometry.OCCUnionUnify", 0)
+halves = [make.addCylinder(0, 0, 0, 0, 0, 1, 0.5, angle=3.141592653589793) for _ in range(2)]
+make.rotate([(3, halves[1])], 0, 0, 0, 0, 0, 1, 3.141592653589793)
+make.fuse([(3, halves[0])], [(3, halves[1])])
+write("halves.brep")
 """
 EXACT = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "torus": sc.Torus()}
 CLOSED = ("ellipsoid.step", "ellipsoid.brep", "torus.step")
@@ -63,9 +75,13 @@ def files(tmp_path_factory):
     return folder
 
 
+def read(path, units, points):
+    return read_cad(path, CadReading(units, points, Choice()), progress=lambda _: None)
+
+
 @cache
 def points_of(path):
-    return read_cad(path, "m" if path.suffix == ".brep" else None, 2000, progress=lambda _: None)
+    return read(path, "m" if path.suffix == ".brep" else None, 2000)
 
 
 @cache
@@ -88,22 +104,22 @@ def test_points_lie_on_the_body_with_its_normals(files, name):
 
 @pytest.mark.parametrize("points", [500, 4000])
 def test_as_many_points_as_asked(files, points):
-    found = read_cad(files / "torus.step", None, points, progress=lambda _: None)
+    found = read(files / "torus.step", None, points)
     assert len(found.mesh.vertices) == pytest.approx(points, rel=0.15)
 
 
 def test_step_files_state_their_unit(files, tmp_path):
-    stated = read_cad(files / "torus.step", "mm", 500, progress=lambda _: None)
+    stated = read(files / "torus.step", "mm", 500)
     np.testing.assert_allclose(np.ptp(stated.mesh.vertices[:, 2]), 1, atol=1e-3)
     for unit in ("m", "in"):
         with pytest.raises(ValueError, match=rf"torus.step is in mm, not in {unit}; leave units out"):
-            read_cad(files / "torus.step", unit, 500, progress=lambda _: None)
+            read(files / "torus.step", unit, 500)
     # the same numbers, said to be metres
     text = (files / "torus.step").read_text()
     large = tmp_path / "large.STP"
     large.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT($,.METRE.)"))
     assert text.count("SI_UNIT(.MILLI.,.METRE.)") == 1
-    metres = read_cad(large, "m", 500, progress=lambda _: None)
+    metres = read(large, "m", 500)
     np.testing.assert_allclose(np.ptp(metres.mesh.vertices[:, 2]), 1000, atol=1)
 
 
@@ -112,7 +128,7 @@ def test_brep_files_need_a_unit(files):
         sc.Cad(files / "box.brep", cache=False)
     with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
         sc.Cad(files / "box.brep", "yard", cache=False)
-    inches = read_cad(files / "ellipsoid.brep", "in", 500, progress=lambda _: None)
+    inches = read(files / "ellipsoid.brep", "in", 500)
     np.testing.assert_allclose(np.ptp(inches.mesh.vertices, axis=0), 0.0254 * np.array([2.4, 1.6, 1.6]), rtol=1e-2)
 
 
@@ -145,15 +161,79 @@ REFUSED = {
     "box.brep": r"box.brep is not smooth: edge between faces 1 and \d: 90 deg at \d+ points; .*; round its edges off",
     "cone.brep": r"cone.brep is not smooth: edge between faces 1 and 2: 117 deg at \d+ points",
     "capsule.brep": r"capsule.brep is not smooth enough \(curvature jumps\): the curvature jumps at \d+ of \d+",
-    "two.brep": r"two.brep holds 2 separate surfaces, .*; give one body at a time",
+    "two.brep": r"two.brep holds 2 separate surfaces, .*; take one, e.g. part='largest', or all with union=True",
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_no_smooth_body_is_refused(files, tmp_path, name):
+def test_what_is_no_smooth_body_is_refused_as_strict(files, tmp_path, name):
     with pytest.raises(ValueError, match=REFUSED[name]):
-        sc.Cad(files / name, "m", points=2000, cache=tmp_path)
+        sc.Cad(files / name, "m", points=2000, strict=True, cache=tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_several_bodies_are_refused_by_default_too(files):
+    with pytest.raises(ValueError, match=REFUSED["two.brep"]):
+        sc.Cad(files / "two.brep", "m", points=500, cache=False)
+
+
+@cache
+def parted(path, **options):
+    return sc.Cad(path, "m", **{"points": 500, "cache": False} | options)
+
+
+def kinds(body):
+    return sorted((crease.kind, round(crease.length, 2)) for crease in body.creases)
+
+
+def test_edges_and_joints_are_taken_in_pieces(files):
+    box, capsule = parted(files / "box.brep"), parted(files / "capsule.brep")
+    assert len(box.pieces) == 6 and kinds(box) == [("edge", 1.0)] * 12
+    assert all(crease.angle == pytest.approx(np.pi / 2) for crease in box.creases)
+    # a cylinder and two balls: the curvature jumps, the normal does not
+    assert len(capsule.pieces) == 3 and [kind for kind, _ in kinds(capsule)] == ["joint"] * 2
+    exact = sc.Capsule(0.5, 3.0)
+    points = np.random.default_rng(5).uniform(-1.6, 1.6, size=(400, 3)) * [0.4, 0.4, 1]
+    assert np.array_equal(capsule.level(points) > 0, exact.level(points) > 0)
+    on = project(capsule, points)
+    # across a joint the next piece goes on a little
+    np.testing.assert_allclose(exact.level(on), 0, atol=1e-4)
+    assert np.median(np.abs(exact.level(on))) < 1e-12
+
+
+def test_fillets_are_joints_and_halves_of_one_face_seams(files):
+    filleted, halves = parted(files / "filleted.brep"), parted(files / "halves.brep")
+    # the rims of the fillet: about the cylinder of radius 0.5, and about the lid of radius 0.3
+    assert kinds(filleted) == [("edge", 3.14), ("joint", 1.88), ("joint", 3.14)]
+    # the halves of both lids and of the cylinder are parts of one surface, parted along lines of length 1
+    assert {kind for kind, _ in kinds(halves)} == {"edge", "seam"}
+    assert [pair for pair in kinds(halves) if pair[0] == "seam"] == [("seam", 1.0)] * 4
+    angle = np.linspace(0, 2 * np.pi, 60)
+    points = np.stack([0.49 * np.cos(angle), 0.49 * np.sin(angle), 0 * angle + 0.5], axis=-1)
+    assert np.all(halves.level(points) < 0) and np.all(halves.level(points * [1.05, 1.05, 1]) > 0)
+
+
+def test_parts_of_a_cad_file_are_chosen_and_united(files):
+    largest, second = (parted(files / "two.brep", points=2000, part=part) for part in ("largest", 2))
+    directions = np.random.default_rng(8).normal(size=(50, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    np.testing.assert_allclose(largest.level(directions), 0, atol=1e-4)
+    np.testing.assert_allclose(second.level([3, 0, 0] + 0.5 * directions), 0, atol=1e-4)
+    assert largest.repairs == ("part 1 of 2 of two.brep taken; 20 % of its area left out",)
+    whole = parted(files / "crossing.brep", union=True)
+    # six faces each, and edges where they cross as well
+    assert len(whole.pieces) == 12 and {crease.kind for crease in whole.creases} == {"edge"}
+    crossing = [c for c in whole.creases if np.allclose(np.ptp(c.points, axis=0).max(), 0.5)]
+    assert len(crossing) == 12
+    points = np.random.default_rng(6).uniform(-0.2, 1.7, size=(2000, 3))
+    inside = np.all(np.abs(points - 0.5) < 0.5, axis=1) | np.all(np.abs(points - 1) < 0.5, axis=1)
+    assert np.array_equal(whole.level(points) < 0, inside)
+
+
+@pytest.mark.parametrize("sew", [0, -1.0, True, "wide", np.nan])
+def test_a_gap_to_be_sewn_is_a_length(files, sew):
+    with pytest.raises(ValueError, match=r"sew = .* is no distance in m"):
+        sc.Cad(files / "box.brep", "m", sew=sew, cache=False)
 
 
 def test_edges_are_where_they_are(files):
@@ -253,7 +333,7 @@ def test_modules_of_the_working_folder_are_not_imported(files, tmp_path, monkeyp
     for module in ("numpy", "gmsh", "scatterers"):
         (tmp_path / f"{module}.py").write_text("raise SystemExit('imported by accident')")
     monkeypatch.chdir(tmp_path)
-    assert len(read_cad(files / "torus.step", None, 500, progress=lambda _: None).mesh.vertices) > 400
+    assert len(read(files / "torus.step", None, 500).mesh.vertices) > 400
 
 
 def test_ellipsoid_against_the_exact_one(files):

@@ -257,11 +257,11 @@ def test_an_unwritable_cache_is_said_and_no_more(tmp_path):
 def test_what_is_asked_is_part_of_the_name():
     content = b"\0" * 100
     names = {
-        _fit_cache.key_of("mesh", content, units=None, allow_rough=False),
-        _fit_cache.key_of("mesh", content, units="m", allow_rough=False),
-        _fit_cache.key_of("mesh", content, units=None, allow_rough=True),
-        _fit_cache.key_of("cad", content, units=None, allow_rough=False),
-        _fit_cache.key_of("mesh", content + b"\0", units=None, allow_rough=False),
+        _fit_cache.key_of("mesh", content, units=None, strict=False),
+        _fit_cache.key_of("mesh", content, units="m", strict=False),
+        _fit_cache.key_of("mesh", content, units=None, strict=True),
+        _fit_cache.key_of("cad", content, units=None, strict=False),
+        _fit_cache.key_of("mesh", content + b"\0", units=None, strict=False),
     }
     assert len(names) == 5
 
@@ -304,12 +304,38 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_no_smooth_body_is_refused(name, tmp_path):
+def test_what_is_no_smooth_body_is_refused_as_strict(name, tmp_path):
     make, message = REFUSED[name]
     with pytest.raises(ValueError, match=message):
-        sc.Mesh(make(), cache=tmp_path)
+        sc.Mesh(make(), strict=True, cache=tmp_path)
     # nor is anything kept
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["open", "nothing", "words"])
+def test_what_is_no_body_is_refused_by_default_too(name):
+    make, message = REFUSED[name]
+    with pytest.raises(ValueError, match=message):
+        sc.Mesh(make(), cache=False)
+
+
+@pytest.mark.parametrize("make", [trimesh.creation.box, cube])
+def test_edges_are_taken_in_pieces(make):
+    body = sc.Mesh(make(), cache=False)
+    assert body.quality.verdict == "sharp" and len(body.pieces) == 6 and len(body.creases) == 12
+    points = np.random.default_rng(4).uniform(-0.7, 0.7, size=(2000, 3))
+    assert np.array_equal(body.level(points) < 0, np.all(np.abs(points) < 0.5, axis=1))
+
+
+def test_a_coarse_mesh_is_judged_by_its_fit():
+    body = sc.Mesh(Triangles(*torus_grid(444)), cache=False)
+    assert body.quality.verdict == "too coarse" and body.creases == ()
+    points, along = cloud("torus")
+    off = curvature(body, project(body, points), along) - curvature(exact("torus"), points, along)
+    # the error is told: within a factor of 10 of the truth
+    assert rms(off) / 10 < body.fit.normal_curvature_error < 10 * rms(off) and rms(off) < 0.25
+    with pytest.raises(ValueError, match="the fit has failed"):
+        sc.Mesh(trimesh.creation.icosphere(1), cache=False)
 
 
 def test_unknown_units_are_refused():
@@ -330,8 +356,8 @@ def drop():
 @pytest.mark.slow
 def test_the_non_smooth_region_is_at_the_tip_only():
     with pytest.raises(ValueError, match="not smooth enough"):
-        sc.Mesh(Triangles(*drop()), cache=False)
-    body = sc.Mesh(Triangles(*drop()), allow_rough=True, cache=False)
+        sc.Mesh(Triangles(*drop()), strict=True, cache=False)
+    body = sc.Mesh(Triangles(*drop()), cache=False)
     points = drop()[0]
     non_smooth, x = body.non_smooth(points), points[:, 0]
     assert body.non_smooth(np.array([1.0, 0, 0])) and non_smooth[x > 0.98].all()
@@ -351,20 +377,12 @@ def test_the_non_smooth_region_is_at_the_tip_only():
     assert np.all(back.status == cr.RayStatus.OK)
 
 
-@pytest.mark.parametrize(
-    "make", [trimesh.creation.box, lambda: trimesh.creation.icosphere(1), lambda: Triangles(*torus_grid(444))]
-)
-def test_a_mesh_that_is_rough_everywhere_is_refused(make):
-    with pytest.raises(ValueError, match=r"of \d+ points lie within .* m of places where the body is not smooth"):
-        sc.Mesh(make(), allow_rough=True, cache=False)
-
-
 @pytest.mark.slow
 def test_almond():
     vertices, triangles = almond(40000)
     with pytest.raises(ValueError, match="not smooth enough"):
-        sc.Mesh(Triangles(vertices, triangles), cache=False)
-    body = sc.Mesh(Triangles(vertices, triangles), allow_rough=True, cache=False)
+        sc.Mesh(Triangles(vertices, triangles), strict=True, cache=False)
+    body = sc.Mesh(Triangles(vertices, triangles), cache=False)
     assert body.non_smooth(vertices[-1]) and not body.non_smooth(vertices[0])
     x = vertices[:, 0]
     assert body.non_smooth(vertices[x > 0.57]).all() and not body.non_smooth(vertices[np.abs(x) < 0.2]).any()

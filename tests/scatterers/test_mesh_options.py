@@ -17,7 +17,7 @@ from studies._meshes import geodesic_sphere
     "options, match",
     [
         ({"units": ["m"]}, "units = .* is no text"),
-        ({"allow_rough": "yes"}, "allow_rough = 'yes' is neither True nor False"),
+        ({"strict": "yes"}, "strict = 'yes' is neither True nor False"),
         ({"cache": 5}, "cache = 5 is neither True, False nor a folder"),
         ({"cache": None}, "cache = None is neither"),
     ],

@@ -261,7 +261,7 @@ def test_geodesics_on_a_cylinder_are_helices(rng):
     phi, slope = rng.uniform(-3, 3, 20), rng.uniform(-1.5, 1.5, 20)
     x = np.stack([0.8 * np.cos(phi), 0.8 * np.sin(phi), 0 * phi], axis=-1)
     p = np.stack([-np.sin(phi) * np.cos(slope), np.cos(phi) * np.cos(slope), np.sin(slope)], axis=-1)
-    found, _ = cr.trace(body, x, p, 6.0, rtol=1e-12)
+    found, _ = cr.DirectFlow(body, rtol=1e-12).flow(x, p, 6.0)
     turned = phi + 6.0 * np.cos(slope) / 0.8
     expected = np.stack([0.8 * np.cos(turned), 0.8 * np.sin(turned), 6.0 * np.sin(slope)], axis=-1)
     np.testing.assert_allclose(found, expected, atol=GEODESIC)
@@ -277,7 +277,7 @@ def test_geodesics_on_a_cone_are_lines_of_its_plane(rng):
     # heading from the direction around
     across, down = np.cos(heading), np.sin(heading)
     p = np.stack([down * sine, across, -down * 2 * sine], axis=-1)
-    found, _ = cr.trace(body, x, p, 3.0, rtol=1e-12)
+    found, _ = cr.DirectFlow(body, rtol=1e-12).flow(x, p, 3.0)
     flat = np.stack([rho + 3 * down, 3 * across], axis=-1)
     rho, theta = np.linalg.norm(flat, axis=-1), np.arctan2(flat[:, 1], flat[:, 0])
     r, phi = rho * sine, theta / sine
@@ -293,8 +293,9 @@ def test_rays_keep_clairauts_constant(name, rng):
     z, heading = np.full(10, 0.2), rng.uniform(-0.4, 0.4, 10)
     x = project(body, np.stack([np.cos(phi), np.sin(phi), z], axis=-1))
     p = np.stack([-np.sin(phi) * np.cos(heading), np.cos(phi) * np.cos(heading), np.sin(heading)], axis=-1)
-    _, p0 = cr.trace(body, x, p, 0.0)
-    found, ahead = cr.trace(body, x, p, np.linspace(0.5, 5.0, 10), rtol=1e-12)
+    flow = cr.DirectFlow(body, rtol=1e-12)
+    _, p0 = flow.flow(x, p, 0.0)
+    found, ahead = flow.flow(x, p, np.linspace(0.5, 5.0, 10))
     start = x[:, 0] * p0[:, 1] - x[:, 1] * p0[:, 0]
     moment = found[..., 0] * ahead[..., 1] - found[..., 1] * ahead[..., 0]
     np.testing.assert_allclose(moment, np.broadcast_to(start[:, None], moment.shape), atol=GEODESIC)

@@ -120,7 +120,7 @@ def some_turned():
 
 REPAIRS = {
     "doubled": (doubled, r"of \d+ vertices of the mesh were doubles"),
-    "rounded": (rounded, "differed from others by rounding"),
+    "rounded": (rounded, r"798 of 960 vertices of the mesh were within .* of others; merged"),
     "degenerate": (lambda: mesh(faces=np.concatenate([FACES, [[1, 1, 2]]])), "1 of 321 triangles .* degenerate"),
     "repeated": (lambda: mesh(faces=np.concatenate([FACES, FACES[:4, [1, 2, 0]]])), "4 of 324 triangles .* doubles"),
     "unused": (lambda: mesh(np.concatenate([VERTICES, [[9, 9, 9]]])), None),
