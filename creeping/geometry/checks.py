@@ -132,7 +132,7 @@ def _creased_report(body: Any) -> SurfaceReport:
 
 
 def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:
-    """Analytic against central differences, relative to the largest value; a plane's Hessian to its slope over its size."""
+    """Analytic against central differences, relative to the largest value; of planes to slope over size."""
     step = 6e-6 * size(body)
     level, gradient, hessian = body.level, body.gradient(points), body.hessian(points)
     axes = step * np.eye(3)

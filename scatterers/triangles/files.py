@@ -102,7 +102,9 @@ def read_mesh(
     if units is not None and (not isinstance(units, str) or units not in UNITS):
         raise ValueError(f'units = {units!r} is none of {", ".join(UNITS)}; give e.g. units="mm"')
     in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
-    raw = _from_object(source) if in_memory else _from_file(source)
+    choice = choice or Choice()
+    named = isinstance(choice.part, str) and choice.part != "largest"
+    raw = _from_object(source) if in_memory else _from_file(source, named)
     _check_numbers(raw)
     scale = UNITS[_unit(raw, units, "m" if in_memory else None)]
     repairs: list[str] = []
@@ -111,7 +113,6 @@ def read_mesh(
         repairs.append(message)
         progress(message)
 
-    choice = choice or Choice()
     chosen = _named(raw, choice.part)
     vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else _silent, note)
     _check_size(raw.name, vertices, scale)
@@ -169,12 +170,12 @@ def _from_object(source: Any) -> _Raw:
     return _Raw(name, vertices, triangles.reshape(-1, 3), getattr(source, "units", None), True)
 
 
-def _from_file(source: Any) -> _Raw:
+def _from_file(source: Any, named: bool) -> _Raw:
     path, data = mesh_bytes(source)
     name, suffix = path.name, path.suffix.lower()
     check_whole(name, suffix, data)
     try:
-        vertices, triangles, stated, names = _loaded(data, suffix)
+        vertices, triangles, stated, names = _loaded(data, suffix, named)
     except Exception as error:  # the loaders raise whatever their parsing runs into
         text = str(error) or type(error).__name__
         raise ValueError(f"{name} cannot be read as {suffix[1:].upper()}: {text}; export it again") from None
@@ -237,12 +238,16 @@ class _Nothing:
     __getitem__ = get
 
 
-def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None, tuple[tuple[str, int], ...]]:
+def _loaded(
+    data: bytes, suffix: str, named: bool
+) -> tuple[FloatArray, IntArray, str | None, tuple[tuple[str, int], ...]]:
     """Vertices and triangles of everything in the file, the unit it states, and its parts: name, triangles."""
     if suffix == ".3mf":
         return *read_3mf(data, MOST_BYTES, MOST_TRIANGLES), ()
     import trimesh
 
+    # else all objects of an OBJ file are one part, by the name of the first
+    split = {"split_objects": True} if named and suffix == ".obj" else {}
     with warnings.catch_warnings(), _quiet("trimesh"):
         # older numpy only warns where it stops reading a text in the middle
         warnings.filterwarnings("error", category=DeprecationWarning, message=".*could not be read to its end")
@@ -253,6 +258,7 @@ def _loaded(data: bytes, suffix: str) -> tuple[FloatArray, IntArray, str | None,
             process=False,
             skip_materials=True,
             resolver=_Nothing(),
+            **split,
         )
     vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
     names = []

@@ -186,6 +186,7 @@ def kinds(body):
     return sorted((crease.kind, round(crease.length, 2)) for crease in body.creases)
 
 
+@pytest.mark.slow
 def test_edges_and_joints_are_taken_in_pieces(files):
     box, capsule = parted(files / "box.brep"), parted(files / "capsule.brep")
     assert len(box.pieces) == 6 and kinds(box) == [("edge", 1.0)] * 12

@@ -17,7 +17,11 @@ ROUND = np.stack([COS, SIN, NONE], axis=1)
 SURFACES = {
     "plane": (np.stack([U, V, 0.3 * U - 0.2 * V], axis=1), np.broadcast_to([-0.3, 0.2, 1], (200, 3)), 0 * U),
     "cylinder": (2 * ROUND + np.outer(V, [0, 0, 1]), ROUND, 0.5 + 0 * U),
-    "cone": ((2 - V)[:, None] * ROUND + np.outer(V, [0, 0, 1]), ROUND + np.array([0, 0, 1]), 1 / (np.sqrt(2) * (2 - V))),
+    "cone": (
+        (2 - V)[:, None] * ROUND + np.outer(V, [0, 0, 1]),
+        ROUND + np.array([0, 0, 1]),
+        1 / (np.sqrt(2) * (2 - V)),
+    ),
     "ball": (
         3 * np.stack([COS * np.cos(V), SIN * np.cos(V), np.sin(V)], axis=1),
         np.stack([COS * np.cos(V), SIN * np.cos(V), np.sin(V)], axis=1),
@@ -53,7 +57,9 @@ def test_other_surfaces_are_no_quadrics():
     np.testing.assert_allclose(body.level(points), 0, atol=1e-12)
     assert polynomial_through(points, normals, 1e-6) is None
     # two balls are none either, nor is a plane with normals along it
-    assert polynomial_through(np.concatenate([ROUND, ROUND + np.array([4, 0, 1])]), np.tile(ROUND, (2, 1)), 1e-6) is None
+    assert (
+        polynomial_through(np.concatenate([ROUND, ROUND + np.array([4, 0, 1])]), np.tile(ROUND, (2, 1)), 1e-6) is None
+    )
     flat = np.stack([U, V, NONE], axis=1)
     assert polynomial_through(flat, np.tile([1.0, 0, 0], (200, 1)), 1e-6) is None
 

@@ -9,7 +9,7 @@ from studies._meshes import geodesic_sphere, torus_grid
 
 
 def wedge(sections=24):
-    """A wing of thickness 0.2 and chord 1 between two parabolas, of span 2, each side a strip: edges at nose and tail."""
+    """A wing of thickness 0.2 and chord 1 between two parabolas, of span 2, with edges at nose and tail."""
     x = np.linspace(0, 1, sections + 1)
     outline = np.concatenate(
         [np.column_stack([x, 0.4 * x * (1 - x)]), np.column_stack([x, -0.4 * x * (1 - x)])[-2:0:-1]]

@@ -1,0 +1,164 @@
+"""What of a mesh is the body: parts by size, number and name, holes closed, parts united, subdivision; bad options."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import scatterers as sc
+from scatterers.triangles.choice import Choice
+
+
+def volume(mesh):
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    return float(np.sum(a * np.cross(b, c))) / 6
+
+
+def ball(radius=1.0, at=0.0, times=2):
+    mesh = trimesh.creation.icosphere(times, radius=radius)
+    mesh.apply_translation([at, 0, 0])
+    return mesh
+
+
+def taken(source, **options):
+    return sc.examined_mesh(source, "m", **options)[0]
+
+
+SMALL, LARGE = ball(0.5, 3.0), ball()
+TWO = trimesh.util.concatenate([SMALL, LARGE])
+
+
+@pytest.mark.parametrize("part, expected", [("largest", LARGE), (1, LARGE), (2, SMALL)])
+def test_a_part_is_taken_by_its_area(part, expected):
+    mesh = taken(TWO, part=part)
+    # area 4 pi and pi
+    share = "20" if expected is LARGE else "80"
+    number = 1 if expected is LARGE else 2
+    assert mesh.repairs == (f"part {number} of 2 of the mesh taken; {share} % of its area left out",)
+    assert volume(mesh) == pytest.approx(expected.volume)
+    np.testing.assert_allclose(mesh.vertices.mean(axis=0), expected.vertices.mean(axis=0), atol=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["glb", "obj"])
+def test_a_part_is_taken_by_its_name(tmp_path, suffix):
+    place = tmp_path / f"two.{suffix}"
+    if suffix == "glb":
+        trimesh.Scene({"hull": LARGE, "wheel": SMALL}).export(place)
+    else:
+        lines, begin = [], 1
+        for name, mesh in (("hull", LARGE), ("wheel", SMALL)):
+            lines += [f"o {name}", *(f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist())]
+            lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + begin).tolist()]
+            begin += len(mesh.vertices)
+        place.write_text("\n".join(lines))
+    mesh = taken(place, part="wheel")
+    assert volume(mesh) == pytest.approx(SMALL.volume, rel=1e-5)
+    with pytest.raises(ValueError, match=r"has no part 'keel'; it has (hull, wheel|wheel, hull)$"):
+        taken(place, part="keel")
+
+
+def test_several_parts_are_refused_with_what_to_do():
+    with pytest.raises(ValueError, match=r"2 separate surfaces, of 320, 320 triangles; .*part='largest', .*union=True"):
+        taken(TWO)
+    with pytest.raises(ValueError, match=r"part = 3 is none of the mesh; .*1: 320 triangles, 2 x 2 x 2 m; 2: 320 tri"):
+        taken(TWO, part=3)
+    with pytest.raises(ValueError, match="has no part 'hull'"):
+        taken(TWO, part="hull")
+
+
+def test_cavities_are_parts_that_are_left_out():
+    hollow = ball(0.4)
+    hollow.invert()
+    whole = trimesh.util.concatenate([LARGE, hollow])
+    with pytest.raises(ValueError, match="within the box of the largest: cavities or inner parts"):
+        taken(whole)
+    assert volume(taken(whole, part="largest")) == pytest.approx(LARGE.volume)
+    assert volume(taken(whole, union=True)) == pytest.approx(LARGE.volume)
+
+
+def holed(*tops):
+    """A box of fine triangles with the faces about these middles of its sides taken out, where they are so near."""
+    box = trimesh.creation.box().subdivide().subdivide().subdivide()
+    middle = box.triangles_center
+    out = np.zeros(len(middle), dtype=bool)
+    for centre, near in tops:
+        out |= np.linalg.norm(middle - centre, axis=1) < near
+    return trimesh.Trimesh(box.vertices, box.faces[~out], process=False)
+
+
+def test_holes_up_to_a_size_are_closed():
+    small, large = ([0, 0, 0.5], 0.1), ([0, 0, -0.5], 0.3)
+    with pytest.raises(ValueError, match=r"are open, .* cap= with the size of the largest hole"):
+        taken(holed(small))
+    for cap in (0.5, np.inf):
+        mesh = taken(holed(small), cap=cap)
+        assert volume(mesh) == pytest.approx(1) and len(mesh.repairs) == 1
+        assert mesh.repairs[0].startswith("a hole of the mesh with") and "closed about (" in mesh.repairs[0]
+    # the larger one is left open
+    with pytest.raises(ValueError, match=r"are open, .*near .*-0\.5\].* cap= with the size of the largest hole"):
+        taken(holed(small, large), cap=0.5)
+    assert volume(taken(holed(small, large), cap=1.2)) == pytest.approx(1)
+
+
+def test_crossing_parts_are_united():
+    pytest.importorskip("manifold3d")
+    first, second = trimesh.creation.box(), trimesh.creation.box()
+    second.apply_translation([0.5, 0.25, 0.3])
+    both = trimesh.util.concatenate([first, second])
+    mesh, quality = sc.examined_mesh(both, union=True)
+    # less what both have
+    assert volume(mesh) == pytest.approx(2 - 0.5 * 0.75 * 0.7)
+    assert quality.verdict == "sharp" and mesh.repairs[0].startswith("2 parts of the mesh united: 24 triangles became")
+
+
+def test_the_library_for_unions_is_named(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda *_: None)
+    with pytest.raises(ModuleNotFoundError, match=r"uniting parts needs manifold3d: pip install 'creeping\[mesh\]'"):
+        taken(TWO, union=True)
+
+
+def test_subdivision_of_a_coarse_mesh_is_told():
+    coarse = ball(times=1)
+    mesh, quality = sc.examined_mesh(coarse, subdivide=2)
+    assert len(mesh.triangles) == 16 * 80 and quality.verdict == "smooth"
+    assert mesh.repairs[0].startswith(
+        f"subdivided 2 times after Loop: 42 vertices became {len(mesh.vertices)}, moved by"
+    )
+    # Loop's limit surface lies within the ball
+    radius = np.linalg.norm(mesh.vertices, axis=1)
+    assert radius.max() < 1 and np.ptp(radius) < 0.05 * radius.mean()
+    assert "subdivided" in sc.examined_mesh(coarse, subdivide="auto")[0].repairs[0]
+    # a mesh that is fine enough is left
+    assert sc.examined_mesh(ball(times=3), subdivide="auto")[0].repairs == ()
+
+
+def test_a_coarse_ball_opens_when_subdivided():
+    body = sc.Mesh(ball(times=1), subdivide="auto", cache=False)
+    assert "subdivided" in body.repairs[0] and body.creases == ()
+    directions = np.random.default_rng(2).normal(size=(100, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    # as large as Loop's surface, and as round
+    radius = 1 - body.level(directions)
+    assert 0.8 < radius.min() and radius.max() < 1 and np.ptp(radius) < 0.05
+
+
+@pytest.mark.parametrize(
+    "options, match",
+    [
+        ({"part": ""}, "part = ''; give \"largest\", a number from 1"),
+        ({"part": 0}, "part = 0; give"),
+        ({"part": True}, "part = True; give"),
+        ({"part": 1.5}, "part = 1.5; give"),
+        ({"cap": 0}, "cap = 0 is no size in m"),
+        ({"cap": "wide"}, "cap = 'wide' is no size"),
+        ({"cap": np.nan}, "cap = nan is no size"),
+        ({"union": 1}, "union = 1 is neither True nor False"),
+        ({"subdivide": 0}, "subdivide = 0; give 1, 2 or 3"),
+        ({"subdivide": True}, "subdivide = True; give"),
+        ({"subdivide": "often"}, "subdivide = 'often'; give"),
+    ],
+)
+def test_bad_options_are_named(options, match):
+    with pytest.raises(ValueError, match=match):
+        Choice(**options)
+    with pytest.raises(ValueError, match=match):
+        sc.Mesh(LARGE, cache=False, **options)
