@@ -239,7 +239,9 @@ class FarGeometry:
                 mine = np.flatnonzero(self.incidence[row] == number)
                 cells = np.stack([ray, after], axis=1)[mine], sample[mine], PARTS, float(times[1])
                 r, places = self.directions[row[mine]], self._places[mine]
-                self._likely[mine] = likely_cells(self.body, states[number], *cells, r, places)
+                self._likely[mine] = likely_cells(
+                    self.body, states[number], *cells, r, places, launch.spacing[number, ray[mine]]
+                )
 
     @property
     def mean_root_radius(self) -> FloatArray:
