@@ -237,11 +237,9 @@ class FarGeometry:
             self._likely = np.ones(len(row), dtype=bool)
             for number in range(n):
                 mine = np.flatnonzero(self.incidence[row] == number)
-                cells = np.stack([ray, after], axis=1)[mine], sample[mine], PARTS, float(times[1])
-                r, places = self.directions[row[mine]], self._places[mine]
-                self._likely[mine] = likely_cells(
-                    self.body, states[number], *cells, r, places, launch.spacing[number, ray[mine]]
-                )
+                fans = states[number], np.stack([ray, after], axis=1)[mine]
+                seen = self.directions[row[mine]], self._places[mine], launch.spacing[number, ray[mine]]
+                self._likely[mine] = likely_cells(self.body, *fans, sample[mine], PARTS, float(times[1]), *seen)
 
     @property
     def mean_root_radius(self) -> FloatArray:

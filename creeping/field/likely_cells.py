@@ -1,6 +1,6 @@
 """Cells of a fan on a body with creases in which a ray towards r is likely: of the others no ray need be traced.
 
-A cell lies between two rays and two times, and the search on the fan has it where n.r and b.r have both signs at its
+A cell lies between two rays and two times; the search on the fan has it where n.r and b.r have both signs at its
 corners. Where rays part at a tip such cells are many, and most have no place where both heights vanish, or p = -r there.
 With both heights bilinear in the cell, the place is one step of Newton's method from the nearest one in the cell; it is
 likely up to MARGIN cells outside, where p.r, held in the cell, is above AHEAD. Between rays that have parted, one on
