@@ -1,7 +1,7 @@
 """Cells of a fan on a body with creases in which a ray towards r is likely: of the others no ray need be traced.
 
 A cell lies between two rays and two times; the search on the fan has it where n.r and b.r have both signs at its
-corners. Where rays part at a tip such cells are many, and most have no place where both heights vanish, or p = -r there.
+corners. Where rays part at a tip such cells are many; most have no place where both heights vanish, or p = -r there.
 With both heights bilinear in the cell, the place is one step of Newton's method from the nearest one in the cell; it is
 likely up to MARGIN cells outside, where p.r, held in the cell, is above AHEAD. Between rays that have parted, one on
 either side of a tip, nothing is bilinear: neighbours are parted where they are
@@ -25,6 +25,27 @@ GAP, SPREAD = 0.2, 3.0
 """Fans are refined to gaps of 0.1; J tells how far rays of coarser ones part where no tip parts them."""
 AHEAD = 0.0
 """p.r of a place, of unit vectors between the corners, above which rays leave towards r and not away from it."""
+
+
+def likely_found(
+    body: Any,
+    states: FloatArray,
+    spacing: FloatArray,
+    parts: int,
+    step: float,
+    incidence: IntArray,
+    found: IntArray,
+    directions: FloatArray,
+    places: FloatArray,
+) -> BoolArray:
+    """`likely_cells` of several incidences: states (n, rays, K, lanes), cells (m, 4) as the search numbers them."""
+    likely = np.ones(len(found), dtype=bool)
+    for number in np.unique(incidence):
+        mine = np.flatnonzero(incidence == number)
+        row, ray, after, sample = found[mine].T
+        rays, seen = np.stack([ray, after], axis=1), (directions[row], places[mine], spacing[number, ray])
+        likely[mine] = likely_cells(body, states[number], rays, sample, parts, step, *seen)
+    return likely
 
 
 def likely_cells(
