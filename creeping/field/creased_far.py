@@ -31,6 +31,7 @@ from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.far_geometry import FarGeometry, far_geometry, merging
 from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
 from creeping.field.far_result import FarField
+from creeping.field.likely_cells import parted
 from creeping.field.optics import lit_tiles, optics_field
 from creeping.field.shed_wave import smoothstep
 from creeping.geometry.creased import pieces_of, tiles_of
@@ -38,7 +39,7 @@ from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.rays.piece_specular import joined, smooth_parts, some, specular_on_pieces, stand_clear
 from creeping.rays.specular import SpecularPoints
-from creeping.rays.status import AT_CREASES
+from creeping.rays.status import AT_CREASES, RayStatus
 from creeping.shadow.edges import convex, unit_normals
 from creeping.shadow.occlusion import occluded
 
@@ -95,7 +96,14 @@ class CreasedParts(Parts):
         # hidden ground, and faces that see each other, have waves that are nowhere in particular
         self.dark = np.hypot(geometry.unserved * typical, facing * typical)
         ended = np.max([_ended(fan, r, wavenumber, kind) for kind in kinds], axis=0)
-        lost = [edges, ended, _tips(fan, wavenumber) * np.ones(m), (1 - self.in_forward) * np.max(ends, axis=0)]
+        between = max(_between(fan, wavenumber, kind) for kind in kinds)
+        lost = [
+            edges,
+            ended,
+            between * np.ones(m),
+            _tips(fan, wavenumber) * np.ones(m),
+            (1 - self.in_forward) * np.max(ends, axis=0),
+        ]
         self.specular = []
         tiles = lit_tiles(body, fan.line.direction, wavenumber)
         for part in smooth_parts(body):
@@ -212,7 +220,8 @@ def _line(fan: RayFan, part: tuple[int, ...], observers: FloatArray, k: float, j
 
 def _ended(fan: RayFan, observers: FloatArray, k: float, kind: Boundary) -> FloatArray:
     """What rays that end at edges and tips would give there (m,), L."""
-    ended = np.isin(fan.status, AT_CREASES)
+    # those that cannot go on end as well, in the middle of a piece
+    ended = np.isin(fan.status, (*AT_CREASES, RayStatus.NON_SMOOTH))
     if not np.any(ended):
         return np.zeros(len(observers))
     first = np.maximum(fan.curvature[ended, 0], 1e-300)
@@ -223,6 +232,21 @@ def _ended(fan: RayFan, observers: FloatArray, k: float, kind: Boundary) -> Floa
     phase = k * (path[:, None] - fan.points[ended, -1] @ observers.T)
     together = np.abs(np.sum(wave[:, None] * np.exp(1j * phase), axis=0))
     return np.asarray(np.hypot(together, np.sqrt(np.sum(wave**2))) / (2 * np.pi))
+
+
+def _between(fan: RayFan, k: float, kind: Boundary) -> float:
+    """What rays between neighbours that a tip parts would give (m,), L: no search is made for them."""
+    one = np.flatnonzero(fan.launched[1:] & fan.launched[:-1] & (np.diff(fan.arc_index) == 0))
+    J = np.maximum(np.abs(fan.spreading[one]), np.abs(fan.spreading[one + 1]))
+    apart = parted(fan.body, fan.points[one], fan.points[one + 1], J, fan.spacing[one, None])
+    apart &= fan.travel_time < np.minimum(fan.detachment[one], fan.detachment[one + 1])[:, None]
+    pair = np.flatnonzero(np.any(apart, axis=1))
+    if not len(pair):
+        return 0.0
+    one, step = one[pair], np.argmax(apart[pair], axis=1)
+    decay = np.min(np.atleast_2d(modes_of(kind, fock_scale(k, np.maximum(fan.curvature[one, 0], 1e-300))).tau.imag), -1)
+    left = 2 * np.exp(-np.cbrt(k / 2) * fan.attenuation[one, step] * np.maximum(decay, 0.0))
+    return float(np.sum(left * fan.spacing[one]) / (2 * np.pi))
 
 
 def _tips(fan: RayFan, k: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.field.arguments import observers_of
-from creeping.field.likely_cells import likely_cells
+from creeping.field.likely_cells import likely_found
 from creeping.field.ray_ends import RayEnds
 from creeping.field.reflected_fold import fold_error
 from creeping.geodesics.equations import natural_horizon
@@ -233,13 +233,8 @@ class FarGeometry:
         self._found, self._places, self._crossed = (np.concatenate(kind) for kind in zip(*pieces, strict=True))
         self._fine = times[:-1, None] + np.diff(times)[:, None] * (np.arange(PARTS) / PARTS)
         if self._end is not None:
-            row, ray, after, sample = self._found.T
-            self._likely = np.ones(len(row), dtype=bool)
-            for number in range(n):
-                mine = np.flatnonzero(self.incidence[row] == number)
-                cells = np.stack([ray, after], axis=1)[mine], sample[mine], PARTS, float(times[1])
-                r, places = self.directions[row[mine]], self._places[mine]
-                self._likely[mine] = likely_cells(self.body, states[number], *cells, r, places)
+            of = self.incidence[self._found[:, 0]], self._found, self.directions, self._places
+            self._likely = likely_found(self.body, states, launch.spacing, PARTS, float(times[1]), *of)
 
     @property
     def mean_root_radius(self) -> FloatArray:

@@ -1,9 +1,14 @@
 """Cells of a fan on a body with creases in which a ray towards r is likely: of the others no ray need be traced.
 
-A cell lies between two rays and two times, and the search on the fan has it where n.r and b.r have both signs at its
-corners. Where rays part at a tip such cells are many, and most have no place where both heights vanish, or p = -r there.
+A cell lies between two rays and two times; the search on the fan has it where n.r and b.r have both signs at its
+corners. Where rays part at a tip such cells are many; most have no place where both heights vanish, or p = -r there.
 With both heights bilinear in the cell, the place is one step of Newton's method from the nearest one in the cell; it is
-likely up to MARGIN cells outside, where p.r, held in the cell, is above AHEAD.
+likely up to MARGIN cells outside, where p.r, held in the cell, is above AHEAD. Between rays that have parted, one on
+either side of a tip, nothing is bilinear: neighbours are parted where they are
+
+    |x_2 - x_1| > max(GAP size, SPREAD |J| spacing)
+
+apart, and what would come to such a cell counts as lost.
 
 Sources: Derivations, R12.
 """
@@ -11,12 +16,36 @@ Sources: Derivations, R12.
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geodesics.states import P, X
+from creeping.geodesics.states import M11, P, X
+from creeping.geometry.surface import size
 
 MARGIN = 1.0
 """How far outside a cell a place may be: its rays are parted by that much or the search gives them up soon."""
+GAP, SPREAD = 0.2, 3.0
+"""Fans are refined to gaps of 0.1; J tells how far rays of coarser ones part where no tip parts them."""
 AHEAD = 0.0
 """p.r of a place, of unit vectors between the corners, above which rays leave towards r and not away from it."""
+
+
+def likely_found(
+    body: Any,
+    states: FloatArray,
+    spacing: FloatArray,
+    parts: int,
+    step: float,
+    incidence: IntArray,
+    found: IntArray,
+    directions: FloatArray,
+    places: FloatArray,
+) -> BoolArray:
+    """`likely_cells` of several incidences: states (n, rays, K, lanes), cells (m, 4) as the search numbers them."""
+    likely = np.ones(len(found), dtype=bool)
+    for number in np.unique(incidence):
+        mine = np.flatnonzero(incidence == number)
+        row, ray, after, sample = found[mine].T
+        rays, seen = np.stack([ray, after], axis=1), (directions[row], places[mine], spacing[number, ray])
+        likely[mine] = likely_cells(body, states[number], rays, sample, parts, step, *seen)
+    return likely
 
 
 def likely_cells(
@@ -28,13 +57,14 @@ def likely_cells(
     step: float,
     observers: FloatArray,
     places: FloatArray,
+    spacing: FloatArray,
 ) -> BoolArray:
     """Whether a ray towards its observer is likely in each cell (n,).
 
     Parameters
     ----------
     body : CreasedSurface
-    states : (rays, K, 6 or more)
+    states : (rays, K, 7 or more)
         At equal steps.
     rays : (n, 2)
         Of each cell.
@@ -44,6 +74,8 @@ def likely_cells(
     observers : (n, 3)
     places : (n, 2)
         Nearest fractions of the cell, across the rays and along them.
+    spacing : (n,), L
+        Share of the line that the first ray stands for.
     """
     n = len(sample)
     if not n:
@@ -63,8 +95,16 @@ def likely_cells(
         u1, v1 = u - (f0 * hv - fv * h0) / determinant, v - (fu * h0 - f0 * hu) / determinant
         near = (np.abs(u1 - 0.5) <= 0.5 + MARGIN) & (np.abs(v1 - 0.5) <= 0.5 + MARGIN)
         towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > AHEAD
+        corners, J = x.reshape(n, 2, 2, 3), states[rays, np.minimum(sample // parts, states.shape[1] - 1)[:, None], M11]
+        one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing[:, None])
         # where nothing can be told, a cell is likely
-        return np.asarray((near & towards) | ~np.isfinite(u1 + v1))
+        return np.asarray(((near & towards) | ~np.isfinite(u1 + v1)) & ~np.any(one, axis=1))
+
+
+def parted(body: Any, x: FloatArray, other: FloatArray, spreading: FloatArray, spacing: FloatArray) -> BoolArray:
+    """Whether neighbours at points (..., 3), L, with J and spacing (...), go on either side of a tip."""
+    gap = np.linalg.norm(x - other, axis=-1)
+    return np.asarray(gap > np.maximum(GAP * size(body), SPREAD * np.abs(spreading) * spacing))
 
 
 def _between(

@@ -40,9 +40,9 @@ class Exits(NamedTuple):
     interval: IntArray
     tip: IntArray
 
-    def __getitem__(self, index: Any) -> "Exits":  # type: ignore[override]
+    def some(self, index: IntArray) -> "Exits":
         """Those of part of the rays."""
-        return Exits(*(values[index] for values in tuple(self)))
+        return Exits(self.gone[index], self.low[index], self.high[index], self.interval[index], self.tip[index])
 
     def since(self, begin: FloatArray) -> "Exits":
         """With times (n,) from others on."""

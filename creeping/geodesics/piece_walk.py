@@ -5,7 +5,8 @@ is found again between exact states, TIGHT around it, so that it is exact to rou
 the next stop, and so do rays next to a tip, in steps that do not reach through it.
 
 What a ray does is bounded: after CROSSINGS it stays on its piece up to the end of the window, and after ROUNDS, or
-where no step however short is left to it, it ends as data, at the nearest edge or tip, without a crease if none is near.
+where no step however short is left to it, it ends as data, at the nearest edge or tip, without a crease if none is
+near.
 
 Sources: Derivations, R1 and R3.
 """
@@ -107,7 +108,7 @@ class Walk:
         if len(gone):
             k = exits.interval[gone]
             far, begin = path[gone, np.minimum(k + 1, path.shape[1] - 1)], own[k]
-            self._cross(number, mine[gone], far, own[k + 1] - begin, exits[gone].since(begin), stops, out)
+            self._cross(number, mine[gone], far, own[k + 1] - begin, exits.some(gone).since(begin), stops, out)
 
     def _alone(self, number: int, mine: IntArray, stops: FloatArray, out: FloatArray) -> None:
         """Go on with each ray to its next stop, if a step that does not reach through a tip does.
@@ -139,7 +140,7 @@ class Walk:
         self.now[at] = stops[self.place[at]]
         out[at, self.place[at]] = self.states[at]
         if len(gone):
-            self._cross(number, mine[gone], found[gone], step[gone], exits[gone], stops, out)
+            self._cross(number, mine[gone], found[gone], step[gone], exits.some(gone), stops, out)
 
     def _exits(self, number: int, mine: IntArray, path: FloatArray, own: FloatArray) -> Exits:
         exits = self.exits.of(number, path, own)
@@ -155,7 +156,7 @@ class Walk:
         stops: FloatArray,
         out: FloatArray,
     ) -> None:
-        """Find where rays leave a piece on their way from their states to those ``far``, and end them or send them on."""
+        """Find where rays leave a piece on their way to the states ``far``, and end them or send them on."""
         base, tip = self.states[rows], exits.tip
         tight = np.minimum(TIGHT * self.size, 0.5 * long)
         low, high = self._bisected(number, base, far, long, exits.low, exits.high, tip, 0.01 * TIGHT)

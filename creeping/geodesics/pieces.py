@@ -1,9 +1,9 @@
 """Geodesics of a body with creases, piece by piece: on each of them by the order-8 pair, up to where it ends.
 
 A ray is traced on the smooth F_i of its piece, which goes on a little beyond its creases; where `piece` changes along
-it, it has crossed a crease (`creeping.geodesics.piece_walk`). At a joint the ray starts anew on the next piece: J and J'
-are continuous there, J'' is not. At an edge it ends, and within REACH of a tip; a ray that has ended stays where it is,
-and so does one that cannot go on, far from any edge or tip: it ends without a crease.
+it, it has crossed a crease (`creeping.geodesics.piece_walk`). At a joint the ray starts anew on the next piece: J and
+J' are continuous there, J'' is not. At an edge it ends, and within REACH of a tip; a ray that has ended stays where it
+is, and so does one that cannot go on, far from any edge or tip: it ends without a crease.
 
 Sources: Derivations, R1 and R3.
 """

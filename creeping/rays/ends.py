@@ -33,7 +33,10 @@ def ends_of(
     first = detachment
     if path.shape[-1] > WHOLE:
         end = path[:, -1, END]
-        kinds = np.array([OF_CREASE.get(crease.kind, RayStatus.EDGE) for crease in body.creases])
+        # the last is of number -1: a ray that could not go on, far from any crease
+        kinds = np.array(
+            [*(OF_CREASE.get(crease.kind, RayStatus.EDGE) for crease in body.creases), RayStatus.NON_SMOOTH]
+        )
         status = np.where(creeping & (end < first), kinds[path[:, -1, CREASE].astype(np.int64)], status)
         first = np.minimum(first, end)
     if hasattr(body, "non_smooth"):

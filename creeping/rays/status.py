@@ -25,7 +25,8 @@ class RayStatus(IntEnum):
     STALLED = 4
     """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
     NON_SMOOTH = 5
-    """Came at ``RayFan.detachment`` to where the body is not smooth enough, by its own word; the field ends there."""
+    """Came at ``RayFan.detachment`` to where the body is not smooth enough, by its own word, or to where no
+    geodesic of its piece goes on; the field ends there."""
     EDGE = 6
     """Came at ``RayFan.detachment`` to an edge of the body; what it would give beyond is left out."""
     TIP = 7

@@ -13,7 +13,6 @@ Sources: Derivations, R4 and R12.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +29,7 @@ from creeping.geometry.surface import Surface, size
 from creeping.rays.fan import RayFan
 from creeping.rays.nonsmooth import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
+from creeping.rays.single_rays import SingleRays
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.panels import newton_step
 
@@ -54,43 +54,6 @@ LONG, LONG_ON_PIECES = 2, (6, 2)
 creases of both searches: sharp places next to tips and edges make steps short all over it."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
-
-
-@dataclass(frozen=True, eq=False)
-class SingleRays:
-    """Rays (n,), each with its incidence.
-
-    Attributes
-    ----------
-    directions : (n, 3)
-    starts : (n, 3), L
-        Launch points.
-    tangents : (n, 3)
-        Of the shadow line there.
-    rays : RayPoints
-        (n,) Where each ends.
-    risen : (n,) of bool
-        Whether n.r > 0 somewhere before, of rays traced for observers r.
-    """
-
-    directions: FloatArray
-    starts: FloatArray
-    tangents: FloatArray
-    rays: RayPoints
-    risen: BoolArray
-
-    def __getitem__(self, index: Any) -> "SingleRays":
-        """Part of the rays."""
-        return SingleRays(
-            self.directions[index], self.starts[index], self.tangents[index], self.rays[index], self.risen[index]
-        )
-
-    @classmethod
-    def joined(cls, parts: Sequence["SingleRays"]) -> "SingleRays":
-        """All parts as one."""
-        names = ("directions", "starts", "tangents", "risen")
-        directions, starts, tangents, risen = (np.concatenate([getattr(p, name) for p in parts]) for name in names)
-        return cls(directions, starts, tangents, RayPoints.joined([part.rays for part in parts]), risen)
 
 
 class RayTracer:
@@ -251,14 +214,10 @@ class RayTracer:
         return trace_states(self.body, states, times, rtol=0.0, step=step), np.full(len(states), np.inf)
 
     def _ends(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
-        """Times (n,) at which rays come to an edge, a tip or to what is not smooth enough, inf if not by theirs."""
+        """Times (n,) at which rays come to what is not smooth enough, inf if not by theirs."""
         forward = self.step * np.arange(int(np.ceil(np.max(times) / self.step)) + 1, dtype=float)
-        if not is_creased(self.body):
-            states = trace_states(self.body, pack(starts, directions), forward, rtol=0.0, step=self.step)
-            return non_smooth_from(self.body, states[..., X], forward)
-        every, owner = np.unique(np.concatenate([starts, directions], axis=1), axis=0, return_inverse=True)
-        found = trace_pieces(self.body, every, forward, rtol=0.0, step=self.step)
-        return np.minimum(found.end, non_smooth_from(self.body, found.states[..., X], forward))[owner]
+        states, _ = self._traced(pack(starts, directions), forward, self.step)
+        return non_smooth_from(self.body, states[..., X], forward)
 
     def towards(
         self, directions: FloatArray, observers: FloatArray, near: FloatArray, times: FloatArray, cell: FloatArray
