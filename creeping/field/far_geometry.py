@@ -256,14 +256,12 @@ class FarGeometry:
         long = fine[sample + 1] - fine[sample]
         begin = fine[sample] + along * long
         if self._end is not None:
-            some = begin <= np.fmax(self._end[which, ray], self._end[which, after]) + long
-            some &= self._likely
+            some = self._likely & (begin <= np.fmax(self._end[which, ray], self._end[which, after]) + long)
             row, ray, which, across = row[some], ray[some], which[some], across[some]
             near, begin, long = near[some], begin[some], long[some]
         cell = np.stack([launch.spacing[which, ray], long], axis=1)
         one, found, moved = self.tracer.towards(self.direction[row], self.directions[row], near, begin, cell)
-        row, ray, cell, across = row[found], ray[found], cell[found], across[found, 0]
-        which = which[found]
+        row, ray, cell, across, which = row[found], ray[found], cell[found], across[found, 0], which[found]
         arc = launch.arc_index
         same = arc[which] == arc[which, ray][:, None]
         if not len(which):
