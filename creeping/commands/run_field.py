@@ -23,6 +23,7 @@ from creeping.field.polarisation import turned_to_azimuth
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
+from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
@@ -193,7 +194,8 @@ class Job:
             currents = kept_currents(fan, self.wavenumber, self.boundary)
             plotting.currents_picture(output / "field.png", currents, backend=backend, dpi=DPI)
             names.append("field.png")
-        elif self.boundary != "pec":
+        # at points between rays the field needs a smooth body
+        elif self.boundary != "pec" and not is_creased(fan.body):
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
             plotting.surface_field_picture(output / "field.png", fan, backend=backend, dpi=DPI, **options)
             names.append("field.png")

@@ -13,8 +13,9 @@ from creeping.explorer.colours import ENDED, LEVEL_COLOURS, LINEAR, Span, field_
 from creeping.explorer.preview import NOTHING, Preview, joined, outline, segments
 from creeping.explorer.refined import Refined
 from creeping.field.on_rays import creeps
-from creeping.geometry.surface import Surface, normal, size
-from creeping.geometry.triangulation import Triangulation, triangulate
+from creeping.geometry.creased import drawn_mesh
+from creeping.geometry.surface import Surface, size
+from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, status_pieces
 from creeping.plotting._view import shadow_view
 
@@ -51,9 +52,9 @@ class DrawnBody:
     @classmethod
     def of(cls, body: Surface) -> "DrawnBody":
         """Triangulate a body."""
-        mesh = triangulate(body.level, body.gradient, body.bounds, cells=CELLS)
+        mesh, normals = drawn_mesh(body, CELLS)
         box = np.asarray(body.bounds, dtype=float)
-        return cls(body, mesh, normal(body, mesh.vertices), size(body), box.mean(axis=0))
+        return cls(body, mesh, normals, size(body), box.mean(axis=0))
 
     @property
     def inset(self) -> FloatArray:

@@ -13,7 +13,8 @@ import numpy as np
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.kept import kept
-from creeping.geometry.surface import project, size
+from creeping.geometry.surface import normal, project, size
+from creeping.geometry.triangulation import Triangulation, triangulate
 
 SAMPLE = 0.1
 """Longest sides of the triangles that samples of a body come from, in its sizes."""
@@ -102,6 +103,16 @@ def tiles_of(body: Any, share: float) -> Tiles:
         return Tiles(np.asarray(corners, float), np.asarray(normals, float), np.asarray(pieces, np.int64))
 
     return kept(body, f"tiles {share:g}", made)
+
+
+def drawn_mesh(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:
+    """A body as it is drawn, with the normals of its vertices (n, 3), 1; along edges these are there once a side."""
+    if is_creased(body):
+        tiles = tiles_of(body, 2.0 / cells)
+        corners = tiles.corners.reshape(-1, 3)
+        return Triangulation(corners, np.arange(len(corners)).reshape(-1, 3)), tiles.normals.reshape(-1, 3)
+    mesh = triangulate(body.level, body.gradient, body.bounds, cells=cells)
+    return mesh, normal(body, mesh.vertices)
 
 
 def pieces_of(body: Any) -> tuple[Any, ...]:

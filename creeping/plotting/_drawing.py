@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.surface import Surface
-from creeping.geometry.triangulation import Triangulation, triangulate
+from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._strokes import LevelColours, Stroke, strokes
 from creeping.plotting._view import View, shadow_view
 from creeping.rays.fan import RayFan
@@ -164,7 +165,7 @@ def compose(
         body,
         direction,
         shadow_view(direction) if view is None else view,
-        triangulate(body.level, body.gradient, body.bounds, cells=cells),
+        drawn_mesh(body, cells)[0],
         strokes(line, fan, curves, rays=rays, until=until),
         LevelColours.of(curves),
     )
