@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
+from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface, size
-from creeping.geometry.triangulation import triangulate
 from creeping.plotting import axes3d
 from creeping.plotting._drawing import Drawing, Mark
 from creeping.plotting._strokes import ARROW_COLOUR, RAY_COLOUR, LevelColours, Stroke, closed, refined
@@ -58,8 +58,7 @@ def draw_curves(
     """
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    mesh = triangulate(body.level, body.gradient, body.bounds, cells=80)
-    scene = Scene(body, np.zeros(3), view, mesh, list(strokes), LevelColours.of([]))
+    scene = Scene(body, np.zeros(3), view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
     ax.computed_zorder = False
     axes3d._draw_body(ax, scene)
     for stroke in scene.strokes:

@@ -70,6 +70,8 @@ class Drawing:
         Incidence.
     view : View
     mesh : Triangulation
+    normals : (n, 3)
+        Of the body at the vertices of the mesh.
     strokes : list of Stroke
     colours : LevelColours
     paint : (n, 3), optional
@@ -80,6 +82,7 @@ class Drawing:
     direction: FloatArray
     view: View
     mesh: Triangulation
+    normals: FloatArray
     strokes: list[Stroke]
     colours: LevelColours
     paint: FloatArray | None = None
@@ -165,7 +168,7 @@ def compose(
         body,
         direction,
         shadow_view(direction) if view is None else view,
-        drawn_mesh(body, cells)[0],
+        *drawn_mesh(body, cells),
         strokes(line, fan, curves, rays=rays, until=until),
         LevelColours.of(curves),
     )

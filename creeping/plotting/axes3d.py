@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.geometry.surface import normal
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
 from creeping.plotting._view import View
@@ -83,7 +82,8 @@ def _draw_body(ax: Any, drawing: Drawing) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     corners = drawing.mesh.vertices[drawing.mesh.triangles]
-    facing = normal(drawing.body, corners.mean(axis=1)) @ drawing.view.toward
+    middle = drawing.normals[drawing.mesh.triangles].mean(axis=1)
+    facing = middle @ drawing.view.toward / np.linalg.norm(middle, axis=1)
     front = facing > -0.05
     if drawing.paint is None:
         shade = brightness(facing[front])[:, None] * np.array(to_rgb(BODY_COLOUR))

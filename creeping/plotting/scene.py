@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
-from creeping.geometry.surface import normal
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
 from creeping.plotting._view import View
@@ -129,7 +128,7 @@ def _add_body(plotter: Any, drawing: Drawing) -> None:
 
     mesh = drawing.mesh
     surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.triangles)
-    surface.point_data["Normals"] = normal(drawing.body, mesh.vertices)
+    surface.point_data["Normals"] = drawing.normals
     surface.point_data.active_normals_name = "Normals"
     if drawing.paint is None:
         look = {"color": BODY_COLOUR, "ambient": 0.60, "diffuse": 0.42}
