@@ -24,6 +24,7 @@ from creeping.geometry.curvature import curvature_norms, principal_curvature_bou
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, size
+from creeping.geometry.triangulation import triangulate
 
 USUAL = 0.98
 """Share of the points of a body with creases that a scale of it goes by."""
@@ -36,8 +37,17 @@ def points_of_charts(body: Surface) -> FloatArray:
     samples: FloatArray | None = getattr(body, "samples", None)
     if samples is not None:
         return samples
+    try:
+        charts = body.atlas.charts
+    except ValueError:
+        # too thin or too sharply curved for charts somewhere, which direct integration does not ask for
+        return kept(body, "points without charts", lambda: _on_a_grid(body))
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
-    return np.concatenate([chart.point(uv) for chart in body.atlas.charts])
+    return np.concatenate([chart.point(uv) for chart in charts])
+
+
+def _on_a_grid(body: Surface) -> FloatArray:
+    return triangulate(body.level, body.gradient, body.bounds).vertices
 
 
 def natural_horizon(body: Surface) -> float:

@@ -79,7 +79,8 @@ def is_creased(body: Any) -> bool:
     >>> is_creased(sc.Sphere())
     False
     """
-    return len(getattr(body, "creases", ())) > 0
+    # what is no body at all is told by others
+    return not isinstance(body, type) and len(getattr(body, "creases", ())) > 0
 
 
 def checked_smooth(body: Any, what: str, remedy: str) -> None:
