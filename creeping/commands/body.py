@@ -65,7 +65,8 @@ class FileOptions:
         for name in ("part", "subdivide"):
             if isinstance(found[name], str) and found[name].isdigit():
                 found[name] = int(found[name])
-        return {name: value for name, value in found.items() if value not in (None, False)}
+        # 0 equals False, and is a bad size that is to be told
+        return {name: value for name, value in found.items() if value is not None and value is not False}
 
 
 AS_IT_IS = FileOptions()

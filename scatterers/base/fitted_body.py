@@ -38,7 +38,7 @@ NORMAL_WEIGHT = 0.1
 """Of the normals of noisy points: from jets they are noisier than the points."""
 SECOND = 0.4
 """Share of noisy points that the second fit sees."""
-CHARTS = "charts-"
+CHARTS, FITS = "charts-", ("fine", "coarse")
 FEWEST = 0.1
 """Share of the points that has to be farther off, for a fit to mean anything."""
 SLACK = 0.02
@@ -149,16 +149,18 @@ class FittedBody(SplineBody):
         if found is not None:
             try:
                 self._describe(*found)
-                _ = [_unpacked(found[0], name) for name in ("fine", "coarse")]
+                known = [_unpacked(found[0], name) for name in FITS]
             except (TypeError, ValueError, KeyError, AttributeError):
                 # signed, and yet none of ours
                 progress("the stored fit is damaged: fitting again")
                 found = None
         arrays, text = found or self._fitted(make(), progress)
-        self._describe(arrays, text)
+        if found is None:
+            self._describe(arrays, text)
+            known = [_unpacked(arrays, name) for name in FITS]
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
-        super().__init__(_unpacked(arrays, "fine"), key, speed)
-        self.coarse_fit = SplineBody(_unpacked(arrays, "coarse"), f"{key}, coarser", speed)
+        super().__init__(known[0], key, speed)
+        self.coarse_fit = SplineBody(known[1], f"{key}, coarser", speed)
         self.coarse_fit._non_smooth, self.coarse_fit._reach = self._non_smooth, self._reach
         if found is None and folder is not None:
             if not self.star_shaped and not self.creases:
@@ -284,7 +286,7 @@ def _fitted_pieces(cloud: PieceCloud, progress: Progress) -> tuple[dict[str, Flo
     fitted = fitted_pieces(cloud.vertices, cloud.triangles, cloud.regions, progress, cloud.normals)
     corners = cloud.vertices[cloud.triangles]
     arrays = {"rough": np.zeros((0, 3)), "badness": cloud.quality.badness}
-    for name in ("fine", "coarse"):
+    for name in FITS:
         arrays |= SplinePieces.of(fitted, corners, coarse=name == "coarse").arrays(name)
     text = {"fit": fitted.report().to_json(), "quality": cloud.quality.to_json(), "reach": 0.0}
     return arrays, text | cloud.notes

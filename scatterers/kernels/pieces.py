@@ -13,11 +13,8 @@ import numpy as np
 from numba import njit
 
 from scatterers.kernels.compiled import OPTIONS
+from scatterers.kernels.pieces_layout import BESIDES, LARGER, MOST_PIECES
 from scatterers.kernels.tensor import second_derivatives, value_and_gradient
-
-MOST = 8
-"""Values that a program holds at a time."""
-LARGER, SMALLER, BESIDES = -1, -2, -3
 
 
 @njit(**OPTIONS)
@@ -40,7 +37,7 @@ def chosen(x, y, z, parameters):  # type: ignore[no-untyped-def]
     if length == 1:
         return number
     pieces, height = int(parameters[8]), 0
-    values, numbers = np.empty(MOST), np.empty(MOST, np.int64)
+    values, numbers = np.empty(MOST_PIECES), np.empty(MOST_PIECES, np.int64)
     k, end = entry + 1, entry + 1 + length
     while k < end:
         token = int(parameters[k])

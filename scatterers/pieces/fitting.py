@@ -22,6 +22,7 @@ from scatterers.spline.fitting import SMOOTHING, tangents
 from scatterers.spline.report import FitReport
 from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.quality import BAD
+from scatterers.triangles.topology import components
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -237,9 +238,6 @@ def _parted(vertices: FloatArray, triangles: IntArray, regions: Regions) -> IntA
 
 def _by_axis(own: IntArray, normal: FloatArray, regions: Regions) -> IntArray:
     """Parts (k,) of triangles with these numbers: connected, and with the same axis nearest to their normals."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     axis = np.argmax(np.abs(normal), axis=1)
     face = 2 * axis + (np.take_along_axis(normal, axis[:, None], 1)[:, 0] < 0)
     place = np.full(len(regions.number), -1)
@@ -248,11 +246,7 @@ def _by_axis(own: IntArray, normal: FloatArray, regions: Regions) -> IntArray:
     joined = joined[np.all(joined >= 0, axis=1)]
     alike = joined[face[joined[:, 0]] == face[joined[:, 1]]]
 
-    def parts(pairs: IntArray) -> IntArray:
-        graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(own), len(own)))
-        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
-
-    label = parts(alike)
+    label = components(len(own), alike[:, 0], alike[:, 1])[1]
     # crumbs along the borders join the largest neighbour
     for _ in range(3):
         size = np.bincount(label)

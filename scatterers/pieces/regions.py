@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.pieces.crease import Crease
-from scatterers.triangles.topology import edges_of
+from scatterers.triangles.topology import components, edges_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -174,11 +174,7 @@ def _chained(turns: Turns, crease: BoolArray, count: int) -> BoolArray:
 
 
 def _connected(count: int, pairs: IntArray) -> IntArray:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    return components(count, pairs[:, 0], pairs[:, 1])[1]
 
 
 def _curves(vertices: FloatArray, turns: Turns, at: IntArray, piece: IntArray, kind: str) -> tuple[Crease, ...]:

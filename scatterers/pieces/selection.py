@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.kernels.pieces_layout import BESIDES, FIRST, LARGER, MOST_PIECES, SMALLER
 from scatterers.kernels.spline_constants import CENTRE, HEADER
 from scatterers.pieces.crease import Crease
 from scatterers.spline.tensor import TensorSpline, evaluated
@@ -28,14 +29,8 @@ IntArray = NDArray[np.int64]
 Program = tuple[float, ...]
 VOXELS = 500_000
 """Voxels about a body."""
-FIRST = 9
-"""Parameters before the tables."""
 SAME = 0.03
 """|F| in voxels at points of another piece, in the mean, below which both are parts of one smooth surface."""
-LARGER, SMALLER, BESIDES = -1, -2, -3
-"""Of the last two values, in a program; the last names a plane."""
-MOST_PIECES = 8
-"""Pieces that a voxel tells apart."""
 LONGEST = 6
 """Smooth neighbours in a voxel that are told apart."""
 MARGIN = 3

@@ -70,10 +70,10 @@ def whole_body(
     if choice.cap is not None:
         vertices, triangles = capped(name, vertices, triangles, choice.cap, scale, note)
     if choice.union:
-        vertices, triangles = united(name, vertices, triangles, lambda x, t: oriented(name, x, t, _silent), note)
-        vertices, triangles = cleaned(name, vertices, triangles, _silent, _silent)
+        vertices, triangles = united(name, vertices, triangles, lambda x, t: oriented(name, x, t, silent), note)
+        vertices, triangles = cleaned(name, vertices, triangles, silent, silent)
     return vertices, triangles
 
 
-def _silent(_: str) -> None:
-    pass
+def silent(_: str) -> None:
+    """Note of what needs no telling."""

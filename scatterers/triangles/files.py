@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.triangles.choice import Choice, whole_body
+from scatterers.triangles.choice import Choice, silent, whole_body
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.form import check_whole
 from scatterers.triangles.threemf import read_3mf
@@ -114,7 +114,7 @@ def read_mesh(
         progress(message)
 
     chosen = _named(raw, choice.part)
-    vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else _silent, note)
+    vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else silent, note)
     _check_size(raw.name, vertices, scale)
     named = chosen is not raw.triangles
     vertices, triangles = whole_body(raw.name, vertices, triangles, choice, scale, note, named=named)
@@ -144,10 +144,6 @@ def _named(raw: _Raw, part: str | int | None) -> IntArray:
         begin += count
     known = ", ".join(name for name, _ in raw.names[:20])
     raise ValueError(f"{raw.name} has no part {part!r}; it has {known}")
-
-
-def _silent(_: str) -> None:
-    pass
 
 
 def _where(point: FloatArray) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.triangles.topology import edges_of
+from scatterers.triangles.topology import components, edges_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -34,15 +34,10 @@ def parts_of(vertices: FloatArray, triangles: IntArray) -> IntArray:
     >>> parts_of(corners, np.array([[0, 1, 2], [3, 4, 5]]))
     array([1, 0])
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     number = edges_of(triangles).number
     m = len(triangles)
     # triangles and edges are the nodes of a graph
-    pairs = np.arange(3 * m) // 3, m + number
-    graph = coo_array((np.ones(3 * m, np.int8), pairs), shape=(m + int(number.max()) + 1,) * 2)
-    label = connected_components(graph, directed=False)[1][:m]
+    label = components(m + int(number.max()) + 1, np.arange(3 * m) // 3, m + number)[1][:m]
     _, label = np.unique(label, return_inverse=True)
     order = np.argsort(-np.bincount(label.ravel(), _areas(vertices, triangles)), kind="stable")
     rank = np.empty_like(order)

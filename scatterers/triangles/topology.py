@@ -108,8 +108,6 @@ def _merged(
     name: str, vertices: FloatArray, triangles: IntArray, border: IntArray, close: float, edges: Edges, note: Note
 ) -> tuple[FloatArray, IntArray]:
     """Merge vertices of a border that are so close, in diagonals of the body."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     reach = close * float(np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -120,8 +118,7 @@ def _merged(
     if not len(pairs):
         return vertices, triangles
     n = len(vertices)
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
+    _, label = components(n, pairs[:, 0], pairs[:, 1])
     _, first = np.unique(label, return_index=True)
     note(f"{n - len(first)} of {n} vertices of {name} were within {reach:.2g} of its units of others; merged")
     triangles = _proper(name, first[label][triangles], note)
@@ -173,7 +170,7 @@ def _check_edges(name: str, vertices: FloatArray, edges: Edges) -> None:
 def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: IntArray, edges: Edges) -> None:
     """ValueError unless the surface is one piece and no vertex joins two sheets."""
     left, right = order[:, 0], order[:, 1]
-    pieces, label = _components(len(triangles), left // 3, right // 3)
+    pieces, label = components(len(triangles), left // 3, right // 3)
     if pieces > 1:
         counts = np.sort(np.bincount(label))[::-1]
         boxes = [vertices[triangles[label == k]].reshape(-1, 3) for k in range(min(pieces, 50))]
@@ -190,7 +187,7 @@ def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: I
     same = edges.forward[left] == edges.forward[right]
     starts = np.concatenate([left, after[0]])
     ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
-    umbrellas, label = _components(3 * len(triangles), starts, ends)
+    umbrellas, label = components(3 * len(triangles), starts, ends)
     if umbrellas > len(vertices):
         _, corner = np.unique(label, return_index=True)
         shared = np.bincount(triangles.ravel()[corner], minlength=len(vertices)) > 1
@@ -210,13 +207,14 @@ def _turned(name: str, count: int, pairs: IntArray, agree: NDArray[np.bool_]) ->
     left, right = pairs.T
     starts = np.concatenate([left, left + count])
     ends = np.concatenate([np.where(agree, right, right + count), np.where(agree, right + count, right)])
-    _, label = _components(2 * count, starts, ends)
+    _, label = components(2 * count, starts, ends)
     if np.any(label[:count] == label[count:]):
         raise ValueError(f"{name} has one side only, like a Moebius strip or Klein bottle; give a body")
     return np.asarray(label[:count] > label[count:])
 
 
-def _components(count: int, starts: IntArray, ends: IntArray) -> tuple[int, IntArray]:
+def components(count: int, starts: IntArray, ends: IntArray) -> tuple[int, IntArray]:
+    """Number of connected parts of a graph, and that of each of its ``count`` nodes (count,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
