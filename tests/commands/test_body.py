@@ -164,6 +164,7 @@ def test_options_of_files_reach_the_body(balls, capsys):
         (["--part", 3], "part = 3 is none of balls.off"),
         (["--part", "wing"], "no part 'wing'"),
         (["--cap", -1], "cap = -1.0 is no size in m"),
+        (["--cap", 0], "cap = 0.0 is no size in m"),
         (["--subdivide", 4], "subdivide = 4; give 1, 2 or 3 times"),
         (["--sew", 0.1], "--sew does not belong to this body"),
     ],
