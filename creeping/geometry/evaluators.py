@@ -73,8 +73,14 @@ def _offered(body: Surface, role: str, make: Callable[[], Any], source: Any) -> 
 def _told(*functions: Any) -> Iterator[None]:
     """Raise at the end what callbacks have raised, unless something else ends the calls."""
     callbacks = [function for function in functions if hasattr(function, "raise_failure")]
-    try:
+    if not callbacks:
         yield
+        return
+    from creeping.kernels.callback import noted_interrupts
+
+    try:
+        with noted_interrupts():
+            yield
     except BaseException:
         for callback in callbacks:
             callback.forget_failure()

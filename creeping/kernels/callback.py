@@ -3,11 +3,16 @@
 numba passes an array to a C function field by field, (meminfo, parent, nitems, itemsize, data, shape..., strides...);
 a callback reads the fields and works on views of the kernel's own memory. It takes the interpreter's lock for each
 block of points. What a function raises cannot pass through a kernel: it is noted, the results are NaN, and
-`raise_failure` raises it afterwards.
+`raise_failure` raises it afterwards. An interrupt can come between any two steps of the interpreter, so also where a
+callback has not yet begun to catch: `noted_interrupts` hands it to the callback that it meets.
 """
 
 import ctypes
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 
 import numpy as np
 
@@ -83,6 +88,10 @@ class BlockCallback(types.WrapperAddressProtocol):  # type: ignore[misc]
                 if number not in self._inputs:
                     array[...] = np.nan if array.dtype.kind == "f" else 0
 
+    def note(self, error: BaseException) -> None:
+        """Let `raise_failure` raise this; what is left of the call is passed over."""
+        self._failure = error
+
     def raise_failure(self) -> None:
         """Raise what the function has raised since the last call of this or of `forget_failure`."""
         failure = self._failure
@@ -93,6 +102,40 @@ class BlockCallback(types.WrapperAddressProtocol):  # type: ignore[misc]
     def forget_failure(self) -> None:
         """Begin anew, where another error ends the call."""
         self._failure = None
+
+
+def _callback_of(frame: FrameType | None) -> BlockCallback | None:
+    """The callback that runs in a frame, or in one of those that have called it."""
+    while frame is not None:
+        if frame.f_code is BlockCallback._call.__code__:
+            found: BlockCallback = frame.f_locals["self"]
+            return found
+        frame = frame.f_back
+    return None
+
+
+@contextmanager
+def noted_interrupts() -> Iterator[None]:
+    """Inside, what the handler of SIGINT raises in a callback is noted there, where ctypes would swallow it."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def noting(number: int, frame: FrameType | None) -> None:
+        met = _callback_of(frame)
+        try:
+            handler(number, frame)
+        except BaseException as error:
+            if met is None:
+                raise
+            met.note(error)
+
+    signal.signal(signal.SIGINT, noting)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
 
 
 def level_callback(function: Callable[..., None]) -> BlockCallback:
