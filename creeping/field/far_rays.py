@@ -59,23 +59,16 @@ MERGED = (0.38, 0.52)
 
 def field_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int) -> FarField:
     """Far field of a geometry, one row for each observer of each incidence."""
+    return parts_of(geometry, k, boundary, order).field(boundary)
+
+
+def parts_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int) -> "Parts":
+    """What `field_of` is the sum of."""
     kinds = scalar_boundaries(boundary)
     parts = Parts(geometry, kinds, k, order)
     for number, kind in enumerate(kinds):
         parts.add(number, kind)
-    return FarField(
-        directions=geometry.directions.copy(),
-        creeping=parts.creeping,
-        reflected=parts.reflected,
-        forward=parts.forward,
-        method=_methods(parts.in_forward, parts.in_fan),
-        unresolved=parts.unresolved(),
-        error=parts.error(),
-        error_by="order",
-        wavenumber=k,
-        boundary=boundary_name(boundary),
-        order=order,
-    )
+    return parts
 
 
 def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
@@ -149,10 +142,29 @@ class Parts:
         self.left_out = (1 - self.in_forward) * np.hypot(lost, fold)
         # ground behind the rest of the line has no wave: its share of a field that is nowhere in particular
         self.dark = geometry.unserved * geometry.typical
+        # of the shed rays and of the specular points of the geometry, one of each for each polarisation
+        self.shed_waves: list[ComplexArray] = []
+        self.specular_waves: list[ComplexArray] = []
 
     def _zeros(self) -> ComplexArray:
         m = len(self.geometry.directions)
         return np.zeros((m, 2, 2) if self.vector else m, dtype=complex)
+
+    def field(self, boundary: BoundaryLike) -> FarField:
+        """The far field of all parts."""
+        return FarField(
+            directions=self.geometry.directions.copy(),
+            creeping=self.creeping,
+            reflected=self.reflected,
+            forward=self.forward,
+            method=_methods(self.in_forward, self.in_fan),
+            unresolved=self.unresolved(),
+            error=self.error(),
+            error_by="order",
+            wavenumber=self.wavenumber,
+            boundary=boundary_name(boundary),
+            order=self.order,
+        )
 
     def unresolved(self) -> BoolArray:
         """Directions in which an expansion fails, or something is left out, that matters there (m,)."""
@@ -257,7 +269,9 @@ class Parts:
 
         ``n0`` and ``n`` (n, 3) are the normals where they land and where they leave.
         """
-        into += self._summed(number, observer, wave, n0, n)
+        each = self._each(number, observer, wave, n0, n)
+        np.add.at(into, observer, each)
+        (self.shed_waves if into is self.creeping else self.specular_waves).append(each)
         self.doubt += np.abs(self._summed(number, observer, off, n0, n, squared=True))
         np.add.at(self.failing_size, observer, np.where(failing, np.abs(wave), 0.0))
 
@@ -279,17 +293,21 @@ class Parts:
         squared: bool = False,
     ) -> ComplexArray:
         """Sums (m, ...) of contributions (n,), or of their squares."""
-        out = self._zeros()
+        out, each = self._zeros(), self._each(number, observer, wave, n0, n)
+        np.add.at(out, observer, np.abs(each) ** 2 if squared else each)
+        return out
+
+    def _each(
+        self, number: int, observer: IntArray, wave: ComplexArray | FloatArray, n0: FloatArray, n: FloatArray
+    ) -> ComplexArray:
+        """Contributions (n,) as they are summed: (n,), or (n, 2, 2) of a conductor."""
         if not self.vector:
-            np.add.at(out, observer, wave**2 if squared else wave)
-            return out
+            return np.asarray(wave, dtype=complex)
         d, r = self.incident[observer], self.geometry.directions[observer]
         spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=-1)])
         spare /= np.maximum(np.linalg.norm(spare, axis=-1, keepdims=True), 1e-300)
         pair = dyads(wave_frame(n0, d, spare), wave_frame(n, r, spare), d, r)[:, number]
-        each = np.asarray(wave)[:, None, None] * pair
-        np.add.at(out, observer, np.abs(each) ** 2 if squared else each)
-        return out
+        return np.asarray(np.asarray(wave)[:, None, None] * pair)
 
 
 def beyond(change: FloatArray, wave: ComplexArray, order: int, unsure: float = 1.0) -> FloatArray:

@@ -10,13 +10,18 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.geometry.arguments import real_array
+from creeping.geometry.evaluators import evaluators, is_compiled
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface, normal, project, size
+from creeping.kernels.threads import in_threads
 
 FARTHEST = 1e15
 """Coordinate, L, beyond which neither a phase nor a distance has digits left."""
 OFF_BODY = 1e-3
 """Largest distance of a given point from the body, in units of its size, that projection silently mends."""
+
+NORMAL = 1e-6
+"""Least tangential part of a direction."""
 
 
 def project_bundle(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -47,6 +52,18 @@ def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
     InvalidInputError
         On a wrong shape, a value that is not finite, a point off the body, a direction that is zero or normal.
     """
+    states, shape = bundle_states(body, points, directions)
+    return states[:, :3].reshape(shape), states[:, 3:].reshape(shape)
+
+
+def bundle_states(body: Surface, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+    """States (n, 6) of what `bundle_points` takes, and the shape (..., 3) of points and directions together.
+
+    Raises
+    ------
+    InvalidInputError
+        As `bundle_points`.
+    """
     try:
         x, p = np.broadcast_arrays(real_array(points, "points"), real_array(directions, "directions"))
     except InvalidInputError:
@@ -55,6 +72,28 @@ def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
         raise InvalidInputError(f"points and directions are not arrays that broadcast together: {error}") from error
     if x.ndim == 0 or x.shape[-1] != 3:
         raise InvalidInputError(f"points have shape {np.shape(points)}; the last axis must hold x, y, z")
+    flat = np.ascontiguousarray(x.reshape(-1, 3)), np.ascontiguousarray(p.reshape(-1, 3))
+    states = _entered(body, *flat) if is_compiled(body) else None
+    return (_checked(body, *flat) if states is None else states), x.shape
+
+
+def _entered(body: Surface, x: FloatArray, p: FloatArray) -> FloatArray | None:
+    """What `_checked` gives, none where it raises."""
+    from creeping.geodesics.kernels.entry import enter
+
+    out, refused, length = np.empty((len(x), 6)), [0], size(body)
+    with evaluators(body) as parts:
+        level = parts.level, parts.level_parameters
+
+        def run(part: slice) -> None:
+            refused.append(enter(*level, x[part], p[part], OFF_BODY * length, 1e-15 * length, NORMAL, out[part]))
+
+        in_threads(run, len(x), seconds=5e-8)
+    return None if sum(refused) else out
+
+
+def _checked(body: Surface, x: FloatArray, p: FloatArray) -> FloatArray:
+    """States (n, 6) of points and directions (n, 3), by the body's own methods."""
     for name, values in (("points", x), ("directions", p)):
         bad = ~np.all(np.isfinite(values), axis=-1)
         if bad.any():
@@ -67,11 +106,11 @@ def bundle_points(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
     p = p / length
     tangent = p - np.sum(p * n, axis=-1, keepdims=True) * n
     norm = np.linalg.norm(tangent, axis=-1, keepdims=True)
-    if np.any(norm < 1e-6):
+    if np.any(norm < NORMAL):
         raise InvalidInputError(
-            f"{int(np.sum(norm < 1e-6))} of {norm.size} directions are normal to the body; a ray needs a tangent"
+            f"{int(np.sum(norm < NORMAL))} of {norm.size} directions are normal to the body; a ray needs a tangent"
         )
-    return x, tangent / norm
+    return np.concatenate([x, tangent / norm], axis=1)
 
 
 def as_points(points: ArrayLike) -> FloatArray:

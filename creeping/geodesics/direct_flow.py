@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from creeping._presenting import Shown, brief
 from creeping._typing import ArrayLike, FloatArray
 from creeping.geodesics.attenuation import with_attenuation
-from creeping.geodesics.bundle import bundle_points
+from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
 from creeping.geodesics.pieces import with_ends
-from creeping.geodesics.states import checked_states, pack, unpack
+from creeping.geodesics.states import checked_states, unpack
 from creeping.geometry.arguments import checked_body, number_between, one_of, positive_number
 from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import Surface
@@ -93,8 +93,8 @@ class DirectFlow(Shown):
             On bad points, directions or times.
         """
         values, scalar = as_times(times)
-        x, p = bundle_points(self.body, points, directions)
-        return unpack(self.transport(pack(x, p), values), x.shape, scalar)
+        states, shape = bundle_states(self.body, points, directions)
+        return unpack(self.transport(states, values), shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 6, 10 or 12) to ascending times (m,), L: (n, m, the same); see `PhaseMap.transport`.

@@ -14,8 +14,8 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import IntegrationError, InvalidInputError
-from creeping.geodesics.bundle import bundle_points
-from creeping.geodesics.states import pack, unpack
+from creeping.geodesics.bundle import bundle_states
+from creeping.geodesics.states import unpack
 from creeping.geometry.arguments import checked_body, number_between, real_array
 from creeping.geometry.creased import checked_smooth
 from creeping.geometry.evaluators import evaluators
@@ -101,9 +101,9 @@ def as_times(times: ArrayLike) -> tuple[FloatArray, bool]:
     if t.ndim > 1:
         raise InvalidInputError(f"times have shape {t.shape}; give a number or a list of numbers")
     values = np.atleast_1d(t)
-    if values.size == 0 or not np.all(np.isfinite(values)) or np.any(values < 0):
+    if values.size == 0 or not np.all((values >= 0) & (values < np.inf)):
         raise InvalidInputError("times must be finite numbers >= 0; reverse the direction to go back")
-    if np.any(np.diff(values) < 0):
+    if values.size > 1 and np.any(values[1:] < values[:-1]):
         raise InvalidInputError("times must ascend; sort them")
     return values, t.ndim == 0
 
@@ -149,8 +149,8 @@ def trace(
     values, scalar = as_times(times)
     checked_smooth(body, "creeping.trace", "take creeping.DirectFlow(body).flow instead")
     checked_body(body)
-    x, p = bundle_points(body, points, directions)
-    return unpack(trace_states(body, pack(x, p), values, rtol=rtol), x.shape, scalar)
+    states, shape = bundle_states(body, points, directions)
+    return unpack(trace_states(body, states, values, rtol=rtol), shape, scalar)
 
 
 def trace_states(

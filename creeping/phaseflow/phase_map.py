@@ -6,7 +6,9 @@ g_(m T0) = g_T0 o ... o g_T0 [YC06a, Algorithm 2]. The remainder of a time below
 the tower, if there is one, and below those by the order-8 integrator.
 """
 
+import hashlib
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +18,9 @@ from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
-from creeping.geodesics.bundle import bundle_points
+from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
-from creeping.geodesics.states import checked_states, pack, unpack
+from creeping.geodesics.states import checked_states, unpack
 from creeping.geometry.arguments import folder_path, positive_number, real_number, whole_number
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model
@@ -139,6 +141,15 @@ class PhaseMap(Drawn):
         """Memory of the splines, bytes."""
         return sum(leap.nbytes for leap in self.leaps)
 
+    @cached_property
+    def digest(self) -> str:
+        """Of the contents of the tables; taken once, they are not to be changed."""
+        tables = hashlib.blake2b(digest_size=16)
+        for leap in self.leaps:
+            for array in (leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature):
+                tables.update(np.ascontiguousarray(array).view(np.uint8).reshape(-1).data)
+        return tables.hexdigest()
+
     @property
     def has_jacobi(self) -> bool:
         """Whether it carries the Jacobi matrix, as fans need it to."""
@@ -174,9 +185,8 @@ class PhaseMap(Drawn):
         InvalidInputError
             On bad points or directions.
         """
-        x, p = bundle_points(self.body, points, directions)
-        states = self.leap(pack(x, p), 1)
-        return states[:, :3].reshape(x.shape), states[:, 3:6].reshape(x.shape)
+        states, shape = bundle_states(self.body, points, directions)
+        return unpack(self.leap(states, 1)[:, None], shape, scalar=True)
 
     def flow(self, points: ArrayLike, directions: ArrayLike, times: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Advance to any times >= 0.
@@ -198,8 +208,8 @@ class PhaseMap(Drawn):
             On bad points, directions or times.
         """
         values, scalar = as_times(times)
-        x, p = bundle_points(self.body, points, directions)
-        return unpack(self.transport(pack(x, p), values), x.shape, scalar)
+        states, shape = bundle_states(self.body, points, directions)
+        return unpack(self._transported(states, values), shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """Advance states (n, 6, 10 or 12) to the ascending times (m,), L: (n, m, the same).
@@ -213,7 +223,10 @@ class PhaseMap(Drawn):
         InvalidInputError
             If the states carry a Jacobi matrix and the map does not.
         """
-        states, times = checked_states(states), as_times(times)[0]
+        return self._transported(checked_states(states), as_times(times)[0])
+
+    def _transported(self, states: FloatArray, times: FloatArray) -> FloatArray:
+        """What `transport` gives of checked states and times."""
         if states.shape[1] > 10 and not self._attenuates_at(times):
             return with_attenuation(self.body, states, times, rtol=self._rtol, transport=self.transport)
         if len(times) and times.max() > MOST_LEAPS * self.horizon:
@@ -228,7 +241,7 @@ class PhaseMap(Drawn):
         if states.shape[1] > 10:
             # multiples of the horizon they are, but for rounding
             whole, rest = np.round(times / self.horizon).astype(np.int64), np.zeros_like(times)
-        stops, place = np.unique(whole, return_inverse=True)
+        stops, place = np.unique(whole, return_inverse=True) if len(times) > 1 else (whole, np.zeros(1, np.int64))
         at = self._composed(states, self.leaps[-1], np.diff(stops, prepend=0))
         if stops[0] == 0:
             at[:, 0] = states

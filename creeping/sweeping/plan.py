@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -125,7 +126,7 @@ def bytes_of(request: SweepRequest) -> int:
     """Results of one incidence, in memory."""
     sizes = request.sizes
     counts = (
-        np.dtype(v.dtype).itemsize * int(np.prod([sizes[d] for d in v.dims], dtype=object))
+        np.dtype(v.dtype).itemsize * prod(sizes[d] for d in v.dims)
         for v in request.variables.values()
     )
     return sum(counts)
@@ -198,10 +199,6 @@ def describe_flow(flow: Flow) -> dict[str, Any]:
     """Parameters of a flow, from which `open_flow` makes it again; the tables of a map by their digest."""
     measured = None if flow.error is None else [flow.error.rms, flow.error.max, flow.error.samples]
     if isinstance(flow, PhaseMap):
-        tables = hashlib.blake2b(digest_size=16)
-        for leap in flow.leaps:
-            for array in (leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature):
-                tables.update(np.ascontiguousarray(array).view(np.uint8).reshape(-1).data)
         return {
             "kind": "map",
             "horizon": flow.horizon,
@@ -209,7 +206,7 @@ def describe_flow(flow: Flow) -> dict[str, Any]:
             "degree": flow.grid.degree,
             "charts": len(flow.leaps[-1].state),
             "type": str(flow.leaps[-1].state.dtype),
-            "tables": tables.hexdigest(),
+            "tables": flow.digest,
             "error": measured,
         }
     if isinstance(flow, DirectFlow):
