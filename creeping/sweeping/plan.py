@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from math import prod
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -24,8 +25,8 @@ from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
+from creeping.sweeping.between.choice import sweeper_of
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.sweeper import Sweeper
 
 MOST_IN_TASK, MOST_AT_ONCE = 1024, 256
 """Incidences of a task, and of one that nobody else waits for."""
@@ -35,8 +36,21 @@ INCIDENCE_BYTES = 1_000_000_000
 """Results of one incidence, which is computed whole and is a chunk of its own at least."""
 MISTAKES = (MemoryError, TypeError, AttributeError, NameError, ImportError)
 """Errors that tell of the program or the machine, not of an incidence."""
-Maker = Callable[[Flow, SweepRequest], Sweeper]
 Arrays = dict[str, np.ndarray[Any, Any]]
+
+
+class Computing(Protocol):
+    """What gives the results of unit directions (n, 3), as `Sweeper` does."""
+
+    @property
+    def request(self) -> SweepRequest:
+        """What is computed."""
+
+    def __call__(self, incidences: FloatArray) -> Arrays:
+        """Arrays whose first axis is the incidence."""
+
+
+Maker = Callable[[Flow, SweepRequest], Computing]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +77,7 @@ class SweepPlan:
     request: SweepRequest
     incidences: FloatArray
     chunk: int
-    make: Maker = Sweeper
+    make: Maker = sweeper_of
     asked: dict[str, Any] = field(default_factory=dict)
     text: str = ""
 
@@ -125,10 +139,7 @@ def task_size(request: SweepRequest, count: int, asked: int | None = None, *, sh
 def bytes_of(request: SweepRequest) -> int:
     """Results of one incidence, in memory."""
     sizes = request.sizes
-    counts = (
-        np.dtype(v.dtype).itemsize * prod(sizes[d] for d in v.dims)
-        for v in request.variables.values()
-    )
+    counts = (np.dtype(v.dtype).itemsize * prod(sizes[d] for d in v.dims) for v in request.variables.values())
     return sum(counts)
 
 
@@ -144,7 +155,7 @@ def too_large(request: SweepRequest) -> str:
     )
 
 
-def compute(sweeper: Sweeper, incidences: FloatArray) -> tuple[Arrays, dict[int, str]]:
+def compute(sweeper: Computing, incidences: FloatArray) -> tuple[Arrays, dict[int, str]]:
     """Results of incidences (n, 3), and the errors of those that failed, by row.
 
     If the sweeper raises, each incidence is tried alone, so that one does not cost the others their results. `MISTAKES`

@@ -4,7 +4,7 @@ Every quantity gives the shadow line of each incidence; "rays" adds its fan, "mo
 the wave came from, "bistatic" that in given directions. Results are arrays whose first axis is the incidence.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 from creeping.rays.reach import AUTO, asked_length, body_length
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
+from creeping.sweeping.lattice import Lattice, lattice_of
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
@@ -28,7 +29,7 @@ MOST_RAYS, MOST_STEPS, MOST_WAVENUMBERS = 65_536, 4096, 100_000
 
 
 class Variable(NamedTuple):
-    """One array of results: its dimensions after the incidence, type, what it is, and its truth where it is unknown."""
+    """One array of results: its dimensions after the incidence, type, what it is, whether it may be unknown."""
 
     dims: tuple[str, ...]
     dtype: str
@@ -40,7 +41,7 @@ class Variable(NamedTuple):
     def fill(self) -> Any:
         """Value where nothing is given."""
         kind = np.dtype(self.dtype).kind
-        return {"f": np.nan, "c": complex(np.nan, np.nan), "b": self.unknown}.get(kind, -1)
+        return {"f": np.nan if self.unknown else 0.0, "c": complex(np.nan, np.nan), "b": self.unknown}.get(kind, -1)
 
 
 LINE = {
@@ -105,6 +106,10 @@ class SweepRequest:
         Of the creeping waves.
     method : {"rays", "auto", "currents"}
         Of the fields: isolated rays, currents of the whole body where rays do not resolve an incidence, or for all.
+    accuracy : float, optional
+        Error allowed to interpolation between incidences; without it each is computed.
+    lattice : Lattice, optional
+        Nodes of the interpolation; without it there are too few incidences for one.
     """
 
     quantity: Quantity
@@ -116,6 +121,8 @@ class SweepRequest:
     observation: tuple[tuple[float, float, float], ...] = ()
     order: int = 2
     method: str = "rays"
+    accuracy: float | None = None
+    lattice: Lattice | None = None
 
     def __post_init__(self) -> None:
         mistakes = list(self._mistakes())
@@ -135,6 +142,12 @@ class SweepRequest:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
                 yield f"{name} = {value!r} is not a whole number from 1 to {most}"
+        if self.accuracy is not None:
+            number = isinstance(self.accuracy, float) and 0 < self.accuracy < 1
+            if not number:
+                yield f"accuracy = {self.accuracy!r} is not a number between 0 and 1"
+            elif self.method == "currents":
+                yield 'accuracy goes with rays; method "currents" computes every incidence'
         if self.quantity == "rays":
             for name in ("wavenumbers", "boundaries", "observation"):
                 if getattr(self, name):
@@ -191,6 +204,23 @@ class SweepRequest:
     @property
     def variables(self) -> dict[str, Variable]:
         """The arrays of results by name."""
+        return self._own | (self._between if self.accuracy is not None else {})
+
+    @property
+    def _between(self) -> dict[str, Variable]:
+        """What is said of interpolation."""
+        found = {"interpolated": Variable((), "bool", "1", "whether its results are interpolated", False)}
+        if self.quantity == "rays":
+            text = "change of x, J/(1 + |J|) or attenuation, the largest, with fewer nodes; 0 of what is computed"
+            return found | {"interpolation_error": Variable(("ray",), "float64", "1", text, False)}
+        for name, of in self._own.items():
+            if name.startswith("error"):
+                text = "change of the amplitude with fewer nodes; 0 of what is computed"
+                found[f"interpolation_{name}"] = Variable(of.dims, of.dtype, of.units, text, False)
+        return found
+
+    @property
+    def _own(self) -> dict[str, Variable]:
         if self.quantity == "rays":
             return LINE | CURVED | RAYS
         observer = ("observer",) if self.quantity == "bistatic" else ()
@@ -242,6 +272,7 @@ def sweep_request(
     observation: ArrayLike | None = None,
     order: int = 2,
     method: str = "rays",
+    accuracy: float | None = None,
 ) -> SweepRequest:
     """Make a request of what users write: one boundary or a list, numbers or arrays.
 
@@ -268,7 +299,13 @@ def sweep_request(
         observation=tuple((float(x), float(y), float(z)) for x, y, z in seen),
         order=_plain(order),
         method=method,
+        accuracy=None if accuracy is None else _plain(accuracy),
     )
+
+
+def with_lattice(request: SweepRequest, incidences: FloatArray) -> SweepRequest:
+    """The request with the lattice of unit directions (n, 3), where an accuracy is asked for and a lattice pays."""
+    return request if request.accuracy is None else replace(request, lattice=lattice_of(incidences))
 
 
 def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike) -> float:

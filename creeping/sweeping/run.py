@@ -17,7 +17,7 @@ from creeping.geometry.directions import unit_directions
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
-from creeping.sweeping.request import Quantity, sweep_length, sweep_request
+from creeping.sweeping.request import Quantity, sweep_length, sweep_request, with_lattice
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.mending import mended
@@ -45,6 +45,7 @@ def sweep_directions(
     n_steps: int = 1,
     order: int = 2,
     method: str = "rays",
+    accuracy: float | None = None,
     store: str | Path | None = None,
     resume: bool = False,
     client: Any = None,
@@ -80,6 +81,11 @@ def sweep_directions(
         Of the fields. "auto" computes an incidence again by the currents of the whole body where isolated rays leave a
         direction unresolved, a tenth of a second or so for each boundary and wavenumber, "currents" every one that a
         mesh of the body resolves: ``by_currents`` says which.
+    accuracy : float, optional
+        Interpolate between incidences, where they are dense and that is known to err by less than this share of the
+        field's size, ten times it of the creeping part's own; 1e-3 is a good one. Each incidence that cannot be had so
+        is computed: ``interpolated`` says which were, ``interpolation_error`` how well. Launch points of interpolated
+        rays follow the line from one incidence to the next and are not evenly spaced on each.
     store : path, optional
         Folder for the results (zarr), written task by task; the dataset is read from it when it is used. Without it
         results are in memory.
@@ -128,6 +134,7 @@ def sweep_directions(
         observation=observation,
         order=order,
         method=method,
+        accuracy=accuracy,
     )
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:
@@ -139,7 +146,7 @@ def sweep_directions(
         if going_on
         else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
-    plan = SweepPlan(flow, request, unit, chunk)
+    plan = SweepPlan(flow, with_lattice(request, unit), unit, chunk)
     if store is None:
         return in_memory(plan, progress)
     opened = open_store(plan, store, resume=resume)

@@ -1,16 +1,17 @@
 """What computes the results of a sweep: lines of many incidences, then all their rays at once, or their fields."""
 
+from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundaries
 from creeping.field.currents.kept import affordable
 from creeping.field.far import far_field
 from creeping.field.far_geometry import FarGeometry
-from creeping.field.far_rays import field_of
+from creeping.field.far_rays import Parts, parts_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
@@ -31,6 +32,10 @@ from creeping.sweeping.request import CURVED, VALID, SweepRequest
 BATCH, FIELD_BATCH = 16_384, 65_536
 """Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
 numbers, and want more."""
+
+Made = tuple[IntArray, FarGeometry, list[Parts]]
+"""Rows of incidences, and what their fields are made of, one `Parts` for each boundary and wavenumber."""
+Told = Callable[[IntArray, FarGeometry, list[Parts]], None]
 
 
 def outputs_of(body: Surface, request: SweepRequest) -> int:
@@ -70,29 +75,34 @@ class Sweeper:
         """Body of the flow."""
         return self.flow.body
 
-    def __call__(self, incidences: FloatArray) -> dict[str, np.ndarray[Any, Any]]:
-        """Arrays of results of unit directions (n, 3), the first axis the incidence; see `SweepRequest.variables`."""
+    def __call__(self, incidences: FloatArray, told: Told | None = None) -> dict[str, np.ndarray[Any, Any]]:
+        """Arrays of results of unit directions (n, 3), the first axis the incidence; see `SweepRequest.variables`.
+
+        ``told`` is called with what the fields of some of them are made of: their rows, geometry and parts.
+        """
         incidences = np.asarray(incidences, dtype=float)
         out = self.request.empty(len(incidences))
         together = BATCH if self._tracer is None else FIELD_BATCH
         batch = max(1, together // self.request.n_rays)
         for first in range(0, len(incidences), batch):
             part = slice(first, first + batch)
-            self._batch(incidences[part], {name: values[part] for name, values in out.items()})
+            made = self._batch(incidences[part], {name: values[part] for name, values in out.items()})
+            if told and made:
+                told(first + made[0], *made[1:])
         return out
 
-    def _batch(self, incidences: FloatArray, out: dict[str, Any]) -> None:
+    def _batch(self, incidences: FloatArray, out: dict[str, Any]) -> Made | None:
         lines = shadow_lines(self.body, incidences, self.request.n_rays)
         fill_lines(lines, out)
         if self._tracer is None:
             fill_rays(self.flow, lines, self.request.travel_times, out)
-        else:
-            self._fill_fields(lines, self._tracer, out)
+            return None
+        return self._fill_fields(lines, self._tracer, out)
 
-    def _fill_fields(self, lines: ShadowLines, tracer: RayTracer, out: dict[str, Any]) -> None:
+    def _fill_fields(self, lines: ShadowLines, tracer: RayTracer, out: dict[str, Any]) -> Made | None:
         rows = np.flatnonzero(lines.status != SINGULAR)
         if not len(rows):
-            return
+            return None
         request, directions = self.request, lines.directions[rows]
         for name, found in zip(
             VALID, validities(self.body, lines.launch.of(rows), self._early, request.wavenumbers), strict=True
@@ -114,11 +124,13 @@ class Sweeper:
                 fans[number] = self._fan(directions[number])
             return fans[number]
 
+        made: list[Parts] = []
         geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, lines.attached[rows], forward)
         for name, which, suffix in request.problems:
             boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
-                field = FieldArrays.of(field_of(geometry, wavenumber, boundary, request.order), len(rows))
+                made.append(parts_of(geometry, wavenumber, boundary, request.order))
+                field = FieldArrays.of(made[-1].field(boundary), len(rows))
                 if request.method == "currents":
                     for number in range(len(rows)):
                         asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "method": "currents"}
@@ -133,6 +145,7 @@ class Sweeper:
                 for part, values in field.arrays.items():
                     if part + suffix in out:
                         out[part + suffix][(rows, *which, k)] = values if bistatic else values[:, 0]
+        return rows, geometry, made
 
     def _fan(self, direction: FloatArray) -> RayFan:
         line, request = shadow_line(self.body, direction), self.request

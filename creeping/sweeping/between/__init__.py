@@ -1,0 +1,1 @@
+"""Results between incidences, interpolated where that is known to be good enough."""

@@ -1,0 +1,175 @@
+"""Fields of incidences from those of the nodes of a lattice: sheets are interpolated, their waves summed.
+
+    f(d) = sum over sheets of a(d) exp(i k L(d)),   a and L by six nodes along each axis
+
+An incidence has its field so at the first level at which
+
+    (sum (|da| + k |dL| |a|)^2)^(1/2) <= A (sum |a|^2)^(1/2)   of all sheets, and with 10 A of the creeping ones,
+
+d being the error of `stencil`, A the accuracy asked for. All sheets of the cell's own node go over
+into one of each other node of the stencil, and its corners have no others: none begins or ends. What fails at all
+levels is computed. Errors are the largest of the corners, and the sum in squares with them.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.geometry.surface import Surface
+from creeping.rays.transport import Flow
+from creeping.shadow.status import FOLLOWED, OK
+from creeping.sweeping.between.nodes import Arrays, Nodes
+from creeping.sweeping.between.stencil import corner_weights, corners, weights
+from creeping.sweeping.field_arrays import FieldArrays
+from creeping.sweeping.request import LINE, VALID, SweepRequest
+from creeping.sweeping.sweeper import Sweeper
+
+OF_CREEPING = 10.0
+"""Error allowed to the creeping part, of its own size, over that allowed to the whole field."""
+SHARES = ("attached", "occluded", "concave", "singular_distance")
+
+
+class Problem(NamedTuple):
+    """Results of one boundary and wavenumber.
+
+    Attributes
+    ----------
+    which : tuple of int
+        Its place in arrays of results, after the incidence.
+    suffix : str
+        Of their names.
+    difference : (n, m) or (n, m, 2, 2), L
+        Error of the interpolation.
+    arrays : dict
+        As of `FieldArrays`.
+    """
+
+    which: tuple[int, ...]
+    suffix: str
+    difference: FloatArray
+    arrays: Arrays
+
+
+class FieldsBetween:
+    """Fields of incidences, interpolated where that is good enough; called as a `Sweeper` is.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+    request : SweepRequest
+        With an accuracy and a lattice.
+    """
+
+    def __init__(self, flow: Flow, request: SweepRequest) -> None:
+        assert request.lattice is not None and request.accuracy is not None
+        self.flow, self.request = flow, request
+        self._lattice, self._accuracy = request.lattice, request.accuracy
+        self._direct, self._nodes = Sweeper(flow, request), Sweeper(flow, replace(request, method="rays"))
+        # columns of amplitudes: the components of one boundary and wavenumber after the other
+        widths = [4 if name == "pec" else 1 for name, _, _ in request.problems for _ in request.wavenumbers]
+        self._first = np.cumsum(widths) - np.array(widths)
+        self._many = max(1, len(request.observation))
+        self._wavenumbers = np.repeat(np.tile(request.wavenumbers, len(request.problems)), widths)
+
+    @property
+    def body(self) -> Surface:
+        """Body of the flow."""
+        return self.flow.body
+
+    def __call__(self, incidences: FloatArray) -> Arrays:
+        """Arrays of results of unit directions (n, 3)."""
+        incidences = np.asarray(incidences, dtype=float)
+        out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
+        nodes = Nodes(self._nodes, self._lattice)
+        for level in range(self._lattice.levels):
+            if len(left):
+                left = self._level(nodes, level, incidences, left, out)
+        if len(left):
+            for name, values in self._direct(incidences[left]).items():
+                out[name][left] = values
+        return out
+
+    def _level(self, nodes: Nodes, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
+        """Fill the results of those rows that the level gives; returns the others."""
+        cell, places = self._lattice.located(incidences[rows], level)
+        own, which = np.unique(cell, axis=0, return_inverse=True)
+        which = which.reshape(-1)
+        cells = nodes.cells(level, own)
+        six, errors = weights(places)
+        stencil = cells.stencil[which]
+        length, *off = (np.sum(w * nodes.results["line_length"][stencil], axis=1) for w in (six, *errors))
+        # of a line that is not there it is not known
+        passed = np.max(np.abs(off), axis=0) <= self._accuracy * length
+        shape = len(rows), self._many, 2, len(self._wavenumbers)
+        fields, differences = np.zeros(shape, dtype=complex), np.zeros(shape)
+        order = np.argsort(which, kind="stable")
+        for chain, mine in zip(cells.chains, np.split(order, np.cumsum(np.bincount(which))[:-1]), strict=True):
+            if chain is None:
+                passed[mine] = False
+            else:
+                fields[mine], differences[mine], good = self._summed(nodes, chain, six[mine], [w[mine] for w in errors])
+                passed[mine] &= good
+        inside = stencil[:, corners(self._lattice.dimensions)]
+        problems = list(self._problems(nodes.results, inside, fields, differences))
+        if self.request.method == "auto":
+            for problem in problems:
+                passed[FieldArrays(problem.arrays).unclear] = False
+        done, some = np.flatnonzero(passed), rows[passed]
+        known = {name: nodes.results[name][inside[done]] for name in (*LINE, *VALID)}
+        out["incidence_status"][some] = np.where(np.any(known["incidence_status"] == FOLLOWED, axis=1), FOLLOWED, OK)
+        out["curves"][some], out["line_length"][some] = known["curves"][:, 0], length[done]
+        out["line_error"][some] = known["line_error"].max(axis=1)
+        near = corner_weights(places[done])
+        for name in SHARES:
+            out[name][some] = np.sum(near * known[name], axis=1)
+        for name, worst in zip(VALID, (np.min, np.max), strict=True):
+            out[name][some] = worst(known[name], axis=1)
+        out["interpolated"][some] = True
+        for which_, suffix, difference, arrays in problems:
+            for name, values in (arrays | {"interpolation_error": difference}).items():
+                if name + suffix in out:
+                    # one observer is no axis of "monostatic"
+                    found = values[done] if self.request.observation else values[done, 0]
+                    out[name + suffix][(some, *which_)] = found
+        return rows[~passed]
+
+    def _summed(
+        self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: list[FloatArray]
+    ) -> tuple[Any, FloatArray, BoolArray]:
+        """Fields (n, m, 2, columns) of reflected and of creeping sheets, their differences, and who passes (n,)."""
+        k, amplitudes = self._wavenumbers, np.zeros((0, 1)) if nodes.amplitudes is None else nodes.amplitudes
+        paths, sheets = nodes.path[chain], amplitudes[chain]
+        between = np.tensordot(six, sheets, axes=(1, 1))
+        waves, size = between * np.exp(1j * k * (six @ paths.T)[..., None]), np.abs(between)
+        off = np.zeros_like(size)
+        for w in errors:
+            change = np.abs(np.tensordot(w, sheets, axes=(1, 1)))
+            off = np.maximum(off, change + size * k * np.abs(w @ paths.T)[..., None])
+        to = (np.arange(2 * self._many)[:, None] == nodes.label[chain[:, 0]]).astype(float)
+        fields, differences, squares, size = (
+            np.matmul(to, each).reshape(len(six), self._many, 2, len(k)) for each in (waves, off, off**2, size**2)
+        )
+        # of a conductor's components together
+        squares, size = (np.add.reduceat(each, self._first, axis=-1) for each in (squares, size))
+        whole = squares.sum(axis=2) <= self._accuracy**2 * size.sum(axis=2)
+        creeping = squares[:, :, 1] <= (OF_CREEPING * self._accuracy) ** 2 * size[:, :, 1]
+        return fields, differences, np.all(whole & creeping, axis=(1, 2))
+
+    def _problems(self, results: Arrays, inside: IntArray, fields: Any, differences: FloatArray) -> Iterator[Problem]:
+        request, n = self.request, len(fields)
+        numbers = [(*which, k) for _, which, _ in request.problems for k in range(len(request.wavenumbers))]
+        suffixes = np.repeat([suffix for _, _, suffix in request.problems], len(request.wavenumbers))
+        columns = zip(self._first, [*self._first[1:], len(self._wavenumbers)], strict=True)
+        for which, suffix, (first, last) in zip(numbers, suffixes.tolist(), columns, strict=True):
+            shape = (n, self._many, 2, 2) if suffix else (n, self._many)
+            reflected, creeping = (fields[:, :, part, first:last].reshape(shape) for part in (0, 1))
+            difference = differences[..., first:last].sum(axis=2).reshape(shape)
+            error, unresolved = (results[name + suffix][(inside, *which)] for name in ("error", "unresolved"))
+            arrays = {"creeping": creeping, "reflected": reflected, "forward": np.zeros(shape, dtype=complex)}
+            arrays["error"] = np.hypot(error.max(axis=1).reshape(shape), difference)
+            arrays["unresolved"] = unresolved.any(axis=1).reshape(n, self._many)
+            arrays["by_currents"] = np.zeros((n, self._many), dtype=bool)
+            yield Problem(which, suffix, difference, arrays)

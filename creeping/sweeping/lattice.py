@@ -1,0 +1,137 @@
+"""Where the incidences lie whose results are interpolated: lattices on a cut, a circle of directions, or on the sphere.
+
+    d = h a + sqrt(1 - h^2) (cos u e1 + sin u e2)                     a cut, u its angle about a
+    d = (e_f + tan u e_g + tan v e_h)/|...|,  |u|, |v| <= pi/4        six faces f of the sphere
+
+A lattice has levels, of ever finer steps; all of it follows from the whole set of incidences, so that an incidence has
+the same nodes in whatever task it is computed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+
+TURN = 96
+"""Steps of the coarsest level in a whole turn: 0.065 rad."""
+FINER = 2
+"""Steps of a level in one of the level before."""
+CROWDED = 3.0
+"""Incidences that a cell of a level has, on average, for the level to pay."""
+MOST_LEVELS = 6
+FLAT = 1e-9
+"""Largest distance of the directions of a cut from its plane."""
+HIGHEST = 0.999
+"""Largest height of a cut: a narrower one is no circle worth the name."""
+FEWEST = 24
+"""Incidences from which on a lattice pays at all."""
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Nodes among incidences.
+
+    Attributes
+    ----------
+    axes : tuple
+        Unit vectors (a, e1, e2) of a cut, none of the sphere.
+    height : float
+        h.
+    levels : int
+    """
+
+    axes: tuple[tuple[float, float, float], ...]
+    height: float
+    levels: int
+
+    @property
+    def dimensions(self) -> int:
+        """1 or 2."""
+        return 1 if self.axes else 2
+
+    def step(self, level: int) -> float:
+        """Step of a level, radians of u."""
+        return 2 * np.pi / (TURN * FINER**level)
+
+    def spacing(self, level: int) -> float:
+        """Largest angle between neighbouring nodes of a level, radians."""
+        return self.step(level) * float(np.sqrt(1 - self.height**2) if self.axes else 1.0)
+
+    def located(self, directions: FloatArray, level: int) -> tuple[IntArray, FloatArray]:
+        """Cells (n, 1 + dimensions), the face and the number of the first node, and the place in them in [0, 1)."""
+        if self.axes:
+            _, first, second = np.array(self.axes)
+            face = np.zeros(len(directions), dtype=np.int64)
+            u = np.arctan2(directions @ second, directions @ first)[:, None]
+        else:
+            face = 2 * np.argmax(np.abs(directions), axis=1)
+            rows, axis = np.arange(len(directions)), face // 2
+            main = directions[rows, axis]
+            face = face + (main < 0)
+            # e_g, e_h follow e_f in the cycle x, y, z
+            other = np.stack([directions[rows, (axis + 1) % 3], directions[rows, (axis + 2) % 3]], axis=1)
+            u = np.arctan(other / np.abs(main)[:, None])
+        place = u / self.step(level)
+        number = np.floor(place)
+        return np.concatenate([face[:, None], number.astype(np.int64)], axis=1), place - number
+
+    def directions(self, nodes: IntArray, level: int) -> FloatArray:
+        """Unit directions of nodes (n, 1 + dimensions), the face and numbers: (n, 3)."""
+        u = nodes[:, 1:] * self.step(level)
+        if self.axes:
+            axis, first, second = np.array(self.axes)
+            across = np.sqrt(1 - self.height**2)
+            d = self.height * axis + across * (np.cos(u) * first + np.sin(u) * second)
+        else:
+            rows, axis = np.arange(len(nodes)), nodes[:, 0] // 2
+            d = np.empty((len(nodes), 3))
+            d[rows, axis] = np.where(nodes[:, 0] % 2, -1.0, 1.0)
+            d[rows, (axis + 1) % 3], d[rows, (axis + 2) % 3] = np.tan(u).T
+        return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
+
+    def wrapped(self, nodes: IntArray, level: int) -> IntArray:
+        """Nodes with those that are one numbered alike: a cut closes after a turn."""
+        if not self.axes:
+            return nodes
+        return np.stack([nodes[:, 0], nodes[:, 1] % (TURN * FINER**level)], axis=1)
+
+
+def lattice_of(directions: FloatArray) -> Lattice | None:
+    """Lattice that pays for unit directions (n, 3), none if they are too few or too far apart.
+
+    Examples
+    --------
+    >>> turn = np.radians(np.arange(0, 360, 0.1))
+    >>> cut = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    >>> lattice_of(cut).levels, lattice_of(cut[::40])
+    (4, None)
+    """
+    if len(directions) < FEWEST:
+        return None
+    for axes, height in (*_circle(directions), ((), 0.0)):
+        levels = 0
+        while levels < MOST_LEVELS:
+            cells, _ = Lattice(axes, height, levels + 1).located(directions, levels)
+            if len(directions) < CROWDED * len(np.unique(cells, axis=0)):
+                break
+            levels += 1
+        if levels:
+            return Lattice(axes, height, levels)
+    return None
+
+
+def _circle(directions: FloatArray) -> list[tuple[Any, float]]:
+    """Axes and height of the circle on which all directions lie, if there is one."""
+    normal = np.linalg.svd(directions - directions.mean(axis=0), full_matrices=False)[2][2]
+    # digits that another machine has too, and one of both signs
+    normal = np.round(normal * np.sign(normal[np.argmax(np.abs(normal))]), 10)
+    normal /= np.linalg.norm(normal)
+    heights = directions @ normal
+    height = float(np.round(heights.mean(), 12))
+    if np.max(np.abs(heights - height)) > FLAT or abs(height) > HIGHEST:
+        return []
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    first /= np.linalg.norm(first)
+    axes = tuple((float(x), float(y), float(z)) for x, y, z in (normal, first, np.cross(normal, first)))
+    return [(axes, height)]
