@@ -227,7 +227,7 @@ class PhaseMap(Drawn):
 
     def _transported(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """What `transport` gives of checked states and times."""
-        if states.shape[1] > 10 and not self._attenuates_at(times):
+        if states.shape[1] > 10 and not self.attenuates_at(times):
             return with_attenuation(self.body, states, times, rtol=self._rtol, transport=self.transport)
         if len(times) and times.max() > MOST_LEAPS * self.horizon:
             raise InvalidInputError(
@@ -253,7 +253,7 @@ class PhaseMap(Drawn):
                 out[:, mine] = self._remainder(at[:, k], rest[mine])
         return out
 
-    def _attenuates_at(self, times: FloatArray) -> bool:
+    def attenuates_at(self, times: FloatArray) -> bool:
         """Whether the map itself carries the attenuation to the times: multiples of its horizon."""
         leaps = times / self.horizon
         return self.leaps[-1].has_curvature and bool(np.all(np.abs(leaps - np.round(leaps)) < 1e-11 * (1 + leaps)))

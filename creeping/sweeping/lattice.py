@@ -7,6 +7,7 @@ A lattice has levels, of ever finer steps; all of it follows from the whole set 
 the same nodes in whatever task it is computed.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,11 +40,14 @@ class Lattice:
     height : float
         h.
     levels : int
+    crowding : float
+        Incidences in a cell of the coarsest level, the mean of cells that have any.
     """
 
     axes: tuple[tuple[float, float, float], ...]
     height: float
     levels: int
+    crowding: float
 
     @property
     def dimensions(self) -> int:
@@ -52,11 +56,15 @@ class Lattice:
 
     def step(self, level: int) -> float:
         """Step of a level, radians of u."""
-        return 2 * np.pi / (TURN * FINER**level)
+        return float(2 * np.pi / (TURN * FINER**level))
 
     def spacing(self, level: int) -> float:
         """Largest angle between neighbouring nodes of a level, radians."""
-        return self.step(level) * float(np.sqrt(1 - self.height**2) if self.axes else 1.0)
+        return self.step(level) * (math.sqrt(1 - self.height**2) if self.axes else 1.0)
+
+    def crowded(self, level: int) -> float:
+        """Incidences in a cell of a level, about."""
+        return self.crowding / float(FINER ** (level * self.dimensions))
 
     def located(self, directions: FloatArray, level: int) -> tuple[IntArray, FloatArray]:
         """Cells (n, 1 + dimensions), the face and the number of the first node, and the place in them in [0, 1)."""
@@ -110,14 +118,14 @@ def lattice_of(directions: FloatArray) -> Lattice | None:
     if len(directions) < FEWEST:
         return None
     for axes, height in (*_circle(directions), ((), 0.0)):
-        levels = 0
-        while levels < MOST_LEVELS:
-            cells, _ = Lattice(axes, height, levels + 1).located(directions, levels)
-            if len(directions) < CROWDED * len(np.unique(cells, axis=0)):
-                break
-            levels += 1
+        found = Lattice(axes, height, MOST_LEVELS, 0.0)
+        crowding = [
+            len(directions) / len(np.unique(found.located(directions, level)[0], axis=0))
+            for level in range(MOST_LEVELS)
+        ]
+        levels = next((level for level, mean in enumerate(crowding) if mean < CROWDED), MOST_LEVELS)
         if levels:
-            return Lattice(axes, height, levels)
+            return Lattice(axes, height, levels, round(crowding[0], 3))
     return None
 
 

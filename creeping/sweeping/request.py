@@ -54,6 +54,7 @@ LINE = {
     "concave": Variable((), "float64", "1", "share of the length in concave regions"),
     "singular_distance": Variable((), "float64", "1", "least |n.d| at a critical point of n.d, n = +-d apart"),
 }
+SHARES = ("attached", "occluded", "concave")
 RAYS = {
     "ray_status": Variable(("ray",), "int8", "1", "codes of RayStatus; -1 where there is no ray"),
     "curve_index": Variable(("ray",), "int16", "1", "curve of the shadow line, the longest first"),

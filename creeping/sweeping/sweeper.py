@@ -33,6 +33,7 @@ BATCH, FIELD_BATCH = 16_384, 65_536
 """Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
 numbers, and want more."""
 
+Arrays = dict[str, np.ndarray[Any, Any]]
 Made = tuple[IntArray, FarGeometry, list[Parts]]
 """Rows of incidences, and what their fields are made of, one `Parts` for each boundary and wavenumber."""
 Told = Callable[[IntArray, FarGeometry, list[Parts]], None]

@@ -2,10 +2,13 @@
 
 from creeping.rays.transport import Flow
 from creeping.sweeping.between.fields import FieldsBetween
+from creeping.sweeping.between.rays import RaysBetween
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.sweeper import Sweeper
 
 
-def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween:
+def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween | RaysBetween:
     """What gives the results of unit directions (n, 3)."""
-    return Sweeper(flow, request) if request.lattice is None else FieldsBetween(flow, request)
+    if request.lattice is None:
+        return Sweeper(flow, request)
+    return RaysBetween(flow, request) if request.quantity == "rays" else FieldsBetween(flow, request)

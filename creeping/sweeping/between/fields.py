@@ -21,15 +21,16 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
-from creeping.sweeping.between.nodes import Arrays, Nodes
-from creeping.sweeping.between.stencil import corner_weights, corners, weights
+from creeping.sweeping.between.nodes import Nodes
+from creeping.sweeping.between.stencil import combined, corner_weights, corners, weights
 from creeping.sweeping.field_arrays import FieldArrays
-from creeping.sweeping.request import LINE, VALID, SweepRequest
-from creeping.sweeping.sweeper import Sweeper
+from creeping.sweeping.request import LINE, SHARES, VALID, SweepRequest
+from creeping.sweeping.sweeper import Arrays, Sweeper
 
+MOST_NODES = 20_000
+"""Nodes that are kept from one call to the next."""
 OF_CREEPING = 10.0
 """Error allowed to the creeping part, of its own size, over that allowed to the whole field."""
-SHARES = ("attached", "occluded", "concave", "singular_distance")
 
 
 class Problem(NamedTuple):
@@ -67,7 +68,8 @@ class FieldsBetween:
         assert request.lattice is not None and request.accuracy is not None
         self.flow, self.request = flow, request
         self._lattice, self._accuracy = request.lattice, request.accuracy
-        self._direct, self._nodes = Sweeper(flow, request), Sweeper(flow, replace(request, method="rays"))
+        self._direct, self._plain = Sweeper(flow, request), Sweeper(flow, replace(request, method="rays"))
+        self._nodes: Nodes | None = None
         # columns of amplitudes: the components of one boundary and wavenumber after the other
         widths = [4 if name == "pec" else 1 for name, _, _ in request.problems for _ in request.wavenumbers]
         self._first = np.cumsum(widths) - np.array(widths)
@@ -83,10 +85,11 @@ class FieldsBetween:
         """Arrays of results of unit directions (n, 3)."""
         incidences = np.asarray(incidences, dtype=float)
         out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
-        nodes = Nodes(self._nodes, self._lattice)
+        if self._nodes is None or len(self._nodes) > MOST_NODES:
+            self._nodes = Nodes(self._plain, self._lattice)
         for level in range(self._lattice.levels):
             if len(left):
-                left = self._level(nodes, level, incidences, left, out)
+                left = self._level(self._nodes, level, incidences, left, out)
         if len(left):
             for name, values in self._direct(incidences[left]).items():
                 out[name][left] = values
@@ -100,7 +103,8 @@ class FieldsBetween:
         cells = nodes.cells(level, own)
         six, errors = weights(places)
         stencil = cells.stencil[which]
-        length, *off = (np.sum(w * nodes.results["line_length"][stencil], axis=1) for w in (six, *errors))
+        lengths = nodes.results["line_length"][stencil].T
+        length, *off = (_totals(w.T * lengths) for w in (six, *errors))
         # of a line that is not there it is not known
         passed = np.max(np.abs(off), axis=0) <= self._accuracy * length
         shape = len(rows), self._many, 2, len(self._wavenumbers)
@@ -123,8 +127,9 @@ class FieldsBetween:
         out["curves"][some], out["line_length"][some] = known["curves"][:, 0], length[done]
         out["line_error"][some] = known["line_error"].max(axis=1)
         near = corner_weights(places[done])
+        out["singular_distance"][some] = known["singular_distance"].min(axis=1)
         for name in SHARES:
-            out[name][some] = np.sum(near * known[name], axis=1)
+            out[name][some] = _totals(near.T * known[name].T)
         for name, worst in zip(VALID, (np.min, np.max), strict=True):
             out[name][some] = worst(known[name], axis=1)
         out["interpolated"][some] = True
@@ -134,28 +139,30 @@ class FieldsBetween:
                     # one observer is no axis of "monostatic"
                     found = values[done] if self.request.observation else values[done, 0]
                     out[name + suffix][(some, *which_)] = found
-        return rows[~passed]
+        return np.asarray(rows[~passed])
 
     def _summed(
         self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: list[FloatArray]
     ) -> tuple[Any, FloatArray, BoolArray]:
         """Fields (n, m, 2, columns) of reflected and of creeping sheets, their differences, and who passes (n,)."""
         k, amplitudes = self._wavenumbers, np.zeros((0, 1)) if nodes.amplitudes is None else nodes.amplitudes
-        paths, sheets = nodes.path[chain], amplitudes[chain]
-        between = np.tensordot(six, sheets, axes=(1, 1))
-        waves, size = between * np.exp(1j * k * (six @ paths.T)[..., None]), np.abs(between)
+        paths, sheets = nodes.path[chain].T, amplitudes[chain].swapaxes(0, 1)
+        between = combined(six, sheets)
+        waves, size = between * np.exp(1j * k * combined(six, paths)[..., None]), np.abs(between)
         off = np.zeros_like(size)
         for w in errors:
-            change = np.abs(np.tensordot(w, sheets, axes=(1, 1)))
-            off = np.maximum(off, change + size * k * np.abs(w @ paths.T)[..., None])
-        to = (np.arange(2 * self._many)[:, None] == nodes.label[chain[:, 0]]).astype(float)
-        fields, differences, squares, size = (
-            np.matmul(to, each).reshape(len(six), self._many, 2, len(k)) for each in (waves, off, off**2, size**2)
-        )
+            change = np.abs(combined(w, sheets)) + size * k * np.abs(combined(w, paths))[..., None]
+            np.maximum(off, change, out=off)
+        shape = len(six), self._many, 2, len(k)
+        fields, (differences, squares, sizes) = np.zeros(shape, dtype=complex), np.zeros((3, *shape))
+        # one after the other: sums are to be the same in whatever company
+        for sheet, label in enumerate(nodes.label[chain[:, 0]]):
+            for total, each in ((fields, waves), (differences, off), (squares, off**2), (sizes, size**2)):
+                total[:, label // 2, label % 2] += each[:, sheet]
         # of a conductor's components together
-        squares, size = (np.add.reduceat(each, self._first, axis=-1) for each in (squares, size))
-        whole = squares.sum(axis=2) <= self._accuracy**2 * size.sum(axis=2)
-        creeping = squares[:, :, 1] <= (OF_CREEPING * self._accuracy) ** 2 * size[:, :, 1]
+        squares, sizes = (np.add.reduceat(each, self._first, axis=-1) for each in (squares, sizes))
+        whole = squares[:, :, 0] + squares[:, :, 1] <= self._accuracy**2 * (sizes[:, :, 0] + sizes[:, :, 1])
+        creeping = squares[:, :, 1] <= (OF_CREEPING * self._accuracy) ** 2 * sizes[:, :, 1]
         return fields, differences, np.all(whole & creeping, axis=(1, 2))
 
     def _problems(self, results: Arrays, inside: IntArray, fields: Any, differences: FloatArray) -> Iterator[Problem]:
@@ -166,10 +173,18 @@ class FieldsBetween:
         for which, suffix, (first, last) in zip(numbers, suffixes.tolist(), columns, strict=True):
             shape = (n, self._many, 2, 2) if suffix else (n, self._many)
             reflected, creeping = (fields[:, :, part, first:last].reshape(shape) for part in (0, 1))
-            difference = differences[..., first:last].sum(axis=2).reshape(shape)
+            difference = (differences[:, :, 0, first:last] + differences[:, :, 1, first:last]).reshape(shape)
             error, unresolved = (results[name + suffix][(inside, *which)] for name in ("error", "unresolved"))
             arrays = {"creeping": creeping, "reflected": reflected, "forward": np.zeros(shape, dtype=complex)}
             arrays["error"] = np.hypot(error.max(axis=1).reshape(shape), difference)
             arrays["unresolved"] = unresolved.any(axis=1).reshape(n, self._many)
             arrays["by_currents"] = np.zeros((n, self._many), dtype=bool)
             yield Problem(which, suffix, difference, arrays)
+
+
+def _totals(values: FloatArray) -> FloatArray:
+    """Sums (n,) of rows (m, n), one after the other."""
+    out: FloatArray = values[0]
+    for row in values[1:]:
+        out = out + row
+    return out

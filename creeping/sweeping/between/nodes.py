@@ -11,9 +11,7 @@ from creeping.field.sheets import isolated, sheets_of
 from creeping.sweeping.between.matching import chains, links
 from creeping.sweeping.between.stencil import BASE, NODES, corners, offsets
 from creeping.sweeping.lattice import FINER, Lattice
-from creeping.sweeping.sweeper import Sweeper
-
-Arrays = dict[str, np.ndarray[Any, Any]]
+from creeping.sweeping.sweeper import Arrays, Sweeper
 
 
 class Cells(NamedTuple):
@@ -62,6 +60,9 @@ class Nodes:
         self.label, self._key = np.zeros(0, dtype=np.int64), np.zeros((0, 4))
         self.path: FloatArray = np.zeros(0)
         self.amplitudes: ComplexArray | None = None
+
+    def __len__(self) -> int:
+        return len(self._known)
 
     def cells(self, level: int, own: IntArray) -> Cells:
         """Cells of a level, (n, 1 + dimensions) the face and the number of their own node."""

@@ -11,7 +11,7 @@ Sources: [AS64, sec. 25.2].
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, FloatArray, IntArray
 
 NODES = np.arange(-2, 4)
 COARSE = 1.0
@@ -51,6 +51,15 @@ def weights(places: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
         differences += [COARSE * (_lagrange(place, slice(0, 4)) - _lagrange(place, slice(2, 6)))]
         errors += [_tensor([*axes[:axis], one, *axes[axis + 1 :]]) for one in differences]
     return six, errors
+
+
+def combined(weights: FloatArray, values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Sums over nodes, in their order in whatever company: weights (n, nodes), values (nodes, ...) -> (n, ...)."""
+    more = (1,) * (values.ndim - 1)
+    out: np.ndarray[Any, Any] = weights[:, 0].reshape(-1, *more) * values[0]
+    for weight, value in zip(weights.T[1:], values[1:], strict=True):
+        out += weight.reshape(-1, *more) * value
+    return out
 
 
 def corner_weights(places: FloatArray) -> FloatArray:

@@ -65,6 +65,7 @@ STUDY = {
     "steps": Key("count", most=MOST_STEPS),
     "order": Key("count", most=2),
     "method": Key("text", choices=METHODS),
+    "accuracy": Key("positive"),
     "length": Key("length"),
     "length_in_body_sizes": Key("positive"),
 }
@@ -271,6 +272,7 @@ def _request(
             observation=seen if seen is not None or quantity != "bistatic" else (0, 0, 1),
             order=main["order"] or 2,
             method="rays" if quantity == "rays" else main["method"] or "rays",
+            accuracy=main["accuracy"],
         )
     except InvalidInputError as error:
         reasons = getattr(error, "mistakes", [str(error)])
