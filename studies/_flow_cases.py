@@ -44,6 +44,8 @@ def body(name: str) -> Any:
     match name:
         case "ellipsoid":
             return sc.Ellipsoid(1.2, 0.8, 0.8)
+        case "triaxial":
+            return sc.Ellipsoid(1.37, 0.91, 0.66)
         case "torus":
             return sc.Torus()
         case "twisted":

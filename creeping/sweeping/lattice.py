@@ -5,6 +5,8 @@
 
 A lattice has levels, of ever finer steps; all of it follows from the whole set of incidences, so that an incidence has
 the same nodes in whatever task it is computed.
+
+Sources: Derivations, F22.
 """
 
 import math

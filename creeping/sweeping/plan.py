@@ -28,8 +28,8 @@ from creeping.storage.folder import content_digest
 from creeping.sweeping.between.choice import sweeper_of
 from creeping.sweeping.request import SweepRequest
 
-MOST_IN_TASK, MOST_AT_ONCE = 1024, 256
-"""Incidences of a task, and of one that nobody else waits for."""
+MOST_IN_TASK, MOST_AT_ONCE, MOST_BETWEEN = 1024, 256, 4096
+"""Incidences of a task, of one that nobody else waits for, and of one whose results are interpolated."""
 TASK_BYTES = 64_000_000
 """Results of one task, in memory."""
 INCIDENCE_BYTES = 1_000_000_000
@@ -133,7 +133,13 @@ def task_size(request: SweepRequest, count: int, asked: int | None = None, *, sh
     if asked:
         return min(int(asked), count)
     most = -(-count // 32) if shared else min(count, MOST_AT_ONCE)
-    return int(np.clip(min(most, TASK_BYTES // bytes_of(request)), 1, MOST_IN_TASK))
+    largest = MOST_IN_TASK
+    if request.lattice is not None:
+        # nodes at the ends of a task belong to two
+        most, largest = max(most, min(count, MOST_BETWEEN)), MOST_BETWEEN
+    # memory that the next task takes again costs less than new memory
+    limit = TASK_BYTES if request.lattice is None else TASK_BYTES // 2
+    return int(np.clip(min(most, limit // bytes_of(request)), 1, largest))
 
 
 def bytes_of(request: SweepRequest) -> int:

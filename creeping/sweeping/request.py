@@ -251,13 +251,12 @@ class SweepRequest:
             found["by_currents"] = ("bool", "1", "whether currents of the whole body served, else isolated rays", False)
         return found
 
-    def empty(self, count: int) -> dict[str, np.ndarray[Any, Any]]:
-        """Arrays of results for so many incidences, filled with what stands for nothing; FAILED."""
-        sizes = self.sizes
-        out = {
-            name: np.full((count, *(sizes[d] for d in v.dims)), v.fill, dtype=v.dtype)
-            for name, v in self.variables.items()
-        }
+    def empty(self, count: int, *, filled: bool = True) -> dict[str, np.ndarray[Any, Any]]:
+        """Arrays of results for so many incidences, filled with what stands for nothing; FAILED. Or not filled."""
+        shapes = {name: (count, *(self.sizes[d] for d in v.dims)) for name, v in self.variables.items()}
+        if not filled:
+            return {name: np.empty(shapes[name], dtype=v.dtype) for name, v in self.variables.items()}
+        out = {name: np.full(shapes[name], v.fill, dtype=v.dtype) for name, v in self.variables.items()}
         out["incidence_status"][:] = FAILED
         return out
 

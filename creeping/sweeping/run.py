@@ -139,6 +139,7 @@ def sweep_directions(
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:
         raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
+    request = with_lattice(request, unit)
     chunk = None if chunk is None else whole_number(chunk, "chunk")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (
@@ -146,7 +147,7 @@ def sweep_directions(
         if going_on
         else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
-    plan = SweepPlan(flow, with_lattice(request, unit), unit, chunk)
+    plan = SweepPlan(flow, request, unit, chunk)
     if store is None:
         return in_memory(plan, progress)
     opened = open_store(plan, store, resume=resume)
@@ -169,7 +170,7 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Datas
         )
     started = time.perf_counter()
     sweeper = plan.make(plan.flow, plan.request)
-    arrays: Arrays = plan.request.empty(count)
+    arrays: Arrays = plan.request.empty(count, filled=False)
     errors: list[tuple[int, str]] = []
     guard = FirstTaskGuard()
     for task in range(plan.tasks):

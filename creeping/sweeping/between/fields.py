@@ -9,6 +9,8 @@ An incidence has its field so at the first level at which
 d being the error of `stencil`, A the accuracy asked for. All sheets of the cell's own node go over
 into one of each other node of the stencil, and its corners have no others: none begins or ends. What fails at all
 levels is computed. Errors are the largest of the corners, and the sum in squares with them.
+
+Sources: Derivations, F22.
 """
 
 from collections.abc import Iterator

@@ -7,6 +7,8 @@ the same place on the arc. On a line that is one whole curve they are the points
 for each block of cells, by steps of least norm onto the line of d: a smooth function of d on the block. A cell serves
 its incidences if few of their rays err by more than asked for; these are launched from their interpolated points and
 carried. What no level serves is computed.
+
+Sources: Derivations, F22.
 """
 
 import numpy as np
