@@ -254,7 +254,7 @@ class PhaseMap(Drawn):
         return out
 
     def attenuates_at(self, times: FloatArray) -> bool:
-        """Whether the map itself carries the attenuation to the times: multiples of its horizon."""
+        """Whether the map itself carries the attenuation to the times (m,), L: multiples of its horizon."""
         leaps = times / self.horizon
         return self.leaps[-1].has_curvature and bool(np.all(np.abs(leaps - np.round(leaps)) < 1e-11 * (1 + leaps)))
 
