@@ -1,0 +1,370 @@
+"""Waves on the surface along rays, by marching the boundary layer above them.
+
+In coordinates (s, n) along a ray, with h = 1 + kappa_n n and h_t = 1 + kappa_t n, what is marched is y, the wave less
+its tube and its phase:
+
+    y = u sqrt(J h_t) e^{-iks},   y_s = ik (sqrt(1 + X) - 1) y
+    X = [h^2 d_nn + h kappa_n d_n]/k^2 + h^2 - 1 + ((kappa_n - kappa_t)^2 - kappa_n^2)/(4k^2)
+    soft u = 0;   else u_n + ik eta u = 0:   y_n + (ik eta - kappa_t/2) y = 0
+
+Nothing here asks for convex or smooth ground, and amplitudes of any order come out. The scattered wave starts on lit
+ground as that of optics and is driven by the incident one on the surface; where the ray has turned away the incident
+wave is added, and the total goes on by itself. Waves that come back along the ray are left out.
+
+Sources: [C93]; Derivations, F22.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import Boundary
+from creeping.field.marching.elements import DEPTH, LayerGrid, layer_grid
+from creeping.field.marching.pade import ORDER, rational_step
+from creeping.field.marching.plan import MarchPlan, MarchStatus, march_plan
+from creeping.field.marching.profile import RayProfiles
+from creeping.kernels.threads import in_threads
+
+LEAST_SPREADING = 0.05
+"""J below which the incident wave's tube is held: behind the line rays may cross."""
+BACK = 3.0
+"""Rays of optics come from so many radii of curvature behind the start at most."""
+SECONDS = 6e-9
+"""Of one pole, unknown, step and ray."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarchedRays:
+    """Waves on the surface along rays.
+
+    Attributes
+    ----------
+    s : (rays, n), L
+        Places of each ray; the last one is repeated where a ray has fewer.
+    values : (rays, n) complex
+        sqrt(J) e^{-iks} times u, or times du/dn if soft, for a wave of phase 0 at s = 0.
+    counts : (rays,)
+        Places of each ray.
+    start, switch : (rays,), L
+        Where the wave of optics was taken, and where the driven part ends.
+    status : (rays,) of int
+        Codes of `MarchStatus`.
+    reliable : (rays,), L
+        s up to which the status does not touch the wave.
+    misfit : (rays,)
+        Largest share of the incident wave by which its traces at the poles fail to add up to it.
+    wavenumber : float, 1/L
+    """
+
+    s: FloatArray
+    values: ComplexArray
+    counts: IntArray
+    start: FloatArray
+    switch: FloatArray
+    status: IntArray
+    reliable: FloatArray
+    misfit: FloatArray
+    wavenumber: float
+    profiles: RayProfiles
+
+    def __len__(self) -> int:
+        return len(self.s)
+
+    def at(self, ray: int, s: ArrayLike) -> ComplexArray:
+        """Values (m,) of a ray at places (m,), L; 0 where it was not marched.
+
+        Splines between jumps of the curvature: of the wave in terms of the incident one where that drives it.
+        """
+        from scipy.interpolate import CubicSpline
+
+        at = np.asarray(s, dtype=float)
+        found = np.zeros(at.shape, dtype=complex)
+        if self.status[ray] in (MarchStatus.UNLIT, MarchStatus.UNSTABLE):
+            return found
+        places, values = self.s[ray, : self.counts[ray]], self.values[ray, : self.counts[ray]]
+        lead = self._incident_phase(ray, places)
+        marks = np.unique([places[0], *self.profiles.jumps(ray), self.switch[ray], places[-1]])
+        marks = marks[(marks >= places[0]) & (marks <= places[-1])]
+        for low, high in pairwise(marks):
+            inside = (places >= low - 1e-12) & (places <= high + 1e-12)
+            asked = (at >= low) & (at <= high)
+            if not np.any(asked):
+                continue
+            turn = np.exp(-1j * lead[inside]) if high <= self.switch[ray] else 1.0
+            if np.sum(inside) > 1:
+                spline = CubicSpline(places[inside], values[inside] * turn)
+                found[asked] = spline(at[asked])
+            if high <= self.switch[ray]:
+                found[asked] *= np.exp(1j * self._incident_phase(ray, at[asked]))
+        return found
+
+    def _incident_phase(self, ray: int, at: FloatArray) -> FloatArray:
+        """Phase k (d.x - s) of the incident wave at places."""
+        return np.asarray(self.wavenumber * (self.profiles.along(ray, at)[:, 2] - at))
+
+
+def march_rays(profiles: RayProfiles, *, wavenumber: float, boundary: Boundary) -> MarchedRays:
+    """March the wave along each ray of a batch, from lit ground to its end.
+
+    Parameters
+    ----------
+    profiles : RayProfiles
+    wavenumber : float, 1/L
+    boundary : Boundary
+        Soft, hard or impedance; an impedance that varies is in the profiles, else its admittance holds.
+
+    Returns
+    -------
+    MarchedRays
+
+    Raises
+    ------
+    InvalidInputError
+        If the boundary is none of these.
+    """
+    if boundary.kind not in ("soft", "hard", "impedance"):
+        raise InvalidInputError(f"boundary of kind {boundary.kind!r} is not marched; give soft, hard or impedance")
+    plan = march_plan(profiles, wavenumber)
+    march = _March(profiles, plan, wavenumber, boundary)
+    return march.run()
+
+
+class _March:
+    """Rays on their way: steps and boundary data by ray, blocks of rays that share a grid."""
+
+    def __init__(self, profiles: RayProfiles, plan: MarchPlan, k: float, boundary: Boundary) -> None:
+        self.profiles, self.plan, self.k = profiles, plan, k
+        self.soft = boundary.kind == "soft"
+        self.admittance = boundary.admittance if boundary.kind == "impedance" else 0j
+        self.varies = boundary.kind == "impedance" and profiles.admittance is not None
+        ways = [self._edges(ray) for ray in range(len(profiles))]
+        self.edges = [np.concatenate([first, second[1:]]) for first, second in ways]
+        self.driven = np.array([len(first) - 1 for first, _ in ways])
+        most = max(len(edges) for edges in self.edges)
+        self.s = np.stack([np.pad(edges, (0, most - len(edges)), mode="edge") for edges in self.edges])
+        self.values = np.zeros(self.s.shape, dtype=complex)
+        self.misfit = np.zeros(len(ways))
+        self.status = plan.status.copy()
+        self.reliable = plan.reliable.copy()
+        sizes = np.round(k * np.concatenate([np.diff(edges) for edges in self.edges]), 9)
+        distinct, which = np.unique(sizes, return_inverse=True)
+        self.rational = rational_step(distinct)
+        self.which = np.split(which, np.cumsum([len(edges) - 1 for edges in self.edges])[:-1])
+
+    def run(self) -> MarchedRays:
+        """March all blocks."""
+        from creeping.kernels.vectors import LANES
+
+        live = [ray for ray, status in enumerate(self.status) if status != MarchStatus.UNLIT]
+        counts = np.array([len(edges) - 1 for edges in self.edges])
+        # rays of one grid and about as many steps make a block
+        order = sorted(live, key=lambda ray: (hash(self.plan.specs[ray]), counts[ray]))
+        blocks: list[list[int]] = []
+        for ray in order:
+            fits = blocks and len(blocks[-1]) < LANES and self.plan.specs[blocks[-1][0]] == self.plan.specs[ray]
+            if fits:
+                blocks[-1].append(ray)
+            else:
+                blocks.append([ray])
+        costs = [ORDER * counts[block].max() * LANES * 100 * SECONDS for block in blocks]
+        if blocks:
+            in_threads(
+                lambda part: self._march_blocks(blocks[part]), len(blocks), least=2, multiple=1, seconds=max(costs)
+            )
+        return MarchedRays(
+            s=self.s,
+            values=self.values,
+            counts=counts + 1,
+            start=self.plan.start,
+            switch=np.array([edges[n] for edges, n in zip(self.edges, self.driven, strict=True)]),
+            status=self.status,
+            reliable=self.reliable,
+            misfit=self.misfit,
+            wavenumber=self.k,
+            profiles=self.profiles,
+        )
+
+    def _edges(self, ray: int) -> tuple[FloatArray, FloatArray]:
+        """Ends of the steps of the driven part and of the rest; steps end at jumps."""
+        plan, jumps = self.plan, self.profiles.jumps(ray)
+        stops = (plan.start[ray], plan.switch[ray], self.profiles.s[ray, -1])
+        ways = []
+        for low, high, step in zip(stops[:-1], stops[1:], plan.steps[ray], strict=True):
+            marks = [low, *jumps[(jumps > low + 1e-9 * step) & (jumps < high - 1e-9 * step)], high]
+            parts = [np.array([low])]
+            for a, b in pairwise(marks):
+                parts.append(np.linspace(a, b, max(1, int(np.ceil((b - a) / step))) + 1)[1:])
+            ways.append(np.concatenate(parts))
+        return ways[0], ways[1]
+
+    def _march_blocks(self, blocks: list[list[int]]) -> None:
+        for block in blocks:
+            self._march_block(block)
+
+    def _march_block(self, block: list[int]) -> None:
+        """March one block of rays and keep what is on the surface."""
+        from creeping.field.kernels.layer_march import march_block
+        from creeping.kernels.vectors import LANES
+
+        grid = layer_grid(self.plan.specs[block[0]])
+        data = _BlockData(max(len(self.edges[ray]) for ray in block) - 1, len(grid.nodes), LANES)
+        for lane, ray in enumerate(block):
+            self._load(ray, lane, grid, data)
+        for lane in range(len(block), LANES):
+            data.repeat(lane)
+        out = np.empty((len(data.kappa) + 1, 2, 2 * LANES))
+        march_block(
+            grid.matrices,
+            grid.heights,
+            grid.rates,
+            grid.cut,
+            grid.scale,
+            self.k,
+            self.soft,
+            *(data.kappa, data.transverse, data.poles, data.weights, data.drive, data.beta),
+            *(data.switch, data.incident, data.wave, out),
+        )
+        for lane, ray in enumerate(block):
+            self._take(ray, out[:, int(self.soft), lane] + 1j * out[:, int(self.soft), LANES + lane])
+
+    def _load(self, ray: int, lane: int, grid: LayerGrid, data: "_BlockData") -> None:
+        """Put a ray's steps, start and boundary data into a lane."""
+        from creeping.field.kernels.plane_wave import drive
+
+        k, edges, driven = self.k, self.edges[ray], int(self.driven[ray])
+        count = len(edges) - 1
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        kappa, kappa_t = self.profiles.along(ray, middle)[:, 0], self.profiles.of("transverse", ray, middle)
+        eta = self._eta(ray, middle)
+        lit = edges[: driven + 1]
+        profile = self.profiles.along(ray, lit)
+        spreading = np.maximum(self.profiles.of("spreading", ray, lit, 1.0).real, LEAST_SPREADING)
+        kappa_lit = self.profiles.of("transverse", ray, lit).real
+        at_edges = np.stack([profile[:, 1], profile[:, 2] - lit, kappa_lit, spreading], axis=1)
+        poles, weights = self._rational(ray)
+        misfit = np.zeros(count)
+        middles = np.ascontiguousarray(np.stack([kappa, kappa_t.real], axis=1))
+        drive(k, self.soft, driven, middles, at_edges, eta, poles, weights, lane, data.drive, misfit)
+        self.misfit[ray] = np.max(misfit[:driven], initial=0.0)
+        data.put(lane, kappa, kappa_t.real, poles, weights, 1j * k * eta + 0.5 * (kappa - kappa_t.real))
+        data.switch[lane] = driven
+        data.wave_of(lane, self._first_wave(ray, grid) * np.array([1.0, grid.scale]))
+        data.incident_of(lane, self._incident(profile[-1], at_edges[-1], grid) * np.array([1.0, grid.scale]))
+        # the total is the scattered wave and this
+        self.values[ray, : driven + 1] = self._on_surface(at_edges)
+
+    def _rational(self, ray: int) -> tuple[ComplexArray, ComplexArray]:
+        """Poles and weights (steps, ORDER) of a ray's steps."""
+        b, c = self.rational
+        return b[self.which[ray]], c[self.which[ray]]
+
+    def _eta(self, ray: int, at: FloatArray) -> ComplexArray:
+        if self.varies:
+            return np.asarray(self.profiles.of("admittance", ray, at))
+        return np.full(len(at), self.admittance)
+
+    def _on_surface(self, at_edges: FloatArray) -> ComplexArray:
+        """The incident y, or its slope if soft, at the edges of the driven part."""
+        y = np.sqrt(at_edges[:, 3]) * np.exp(1j * self.k * at_edges[:, 1])
+        return np.asarray((1j * self.k * np.sin(at_edges[:, 0]) + 0.5 * at_edges[:, 2]) * y if self.soft else y)
+
+    def _incident(self, place: FloatArray, edge: FloatArray, grid: LayerGrid) -> ComplexArray:
+        """The incident y and its slope at the heights of a grid (nodes, 2), at a place."""
+        tube = np.maximum(1 + edge[2] * grid.heights, 0.2)
+        q = np.sin(place[1])
+        y = np.sqrt(edge[3] * tube) * np.exp(1j * self.k * (edge[1] + grid.nodes * q))
+        return np.stack([y, (1j * self.k * q + 0.5 * edge[2] * grid.rates / tube) * y], axis=1)
+
+    def _first_wave(self, ray: int, grid: LayerGrid) -> ComplexArray:
+        """The reflected y and its slope at the heights of a grid (nodes, 2) at the start, faded out in the absorber."""
+        from creeping.field.kernels.reflected_wave import reflected
+
+        s, profiles, start = self.profiles.s[ray], self.profiles, self.plan.start[ray]
+        radius = 1 / max(profiles.along(ray, np.array([start]))[0, 0], 0.05 * np.max(np.abs(profiles.curvature[ray])))
+        curvature = profiles.cubics["curvature"][ray]
+        transverse = profiles.cubics["transverse"][ray] if profiles.transverse is not None else np.zeros_like(curvature)
+        if self.varies:
+            eta = profiles.cubics["admittance"][ray]
+        else:
+            eta = np.zeros(curvature.shape, dtype=complex)
+            eta[:, 0] = self.admittance
+        out = np.empty((len(grid.nodes), 2), dtype=complex)
+        stop = max(s[0], start - BACK * radius)
+        reflected(
+            *(self.k, self.soft, s, curvature, profiles.curves[ray], transverse, eta, start, stop, grid.nodes, out)
+        )
+        back = np.array([start])
+        kappa_t = profiles.of("transverse", ray, back).real
+        spread = max(float(profiles.of("spreading", ray, back[:1], 1.0)[0].real), LEAST_SPREADING)
+        tube = np.maximum(1 + kappa_t[0] * grid.heights, 0.2)
+        top = grid.nodes[-1]
+        t = np.clip((grid.nodes * (1 + DEPTH) / top - 1) / DEPTH, 0, 1)
+        fade, rate = 1 - t**3 * (10 - 15 * t + 6 * t**2), -30 * t**2 * (1 - t) ** 2 * (1 + DEPTH) / (top * DEPTH)
+        out[:, 1] = out[:, 1] * fade + out[:, 0] * (rate + 0.5 * kappa_t[0] * grid.rates / tube * fade)
+        out[:, 0] *= fade
+        return np.asarray(out * (np.sqrt(spread * tube) * np.exp(-1j * self.k * start))[:, None])
+
+    def _take(self, ray: int, found: ComplexArray) -> None:
+        """Keep a ray's wave, or say that it did not stay finite."""
+        count = len(self.edges[ray])
+        found = found[:count]
+        if not np.all(np.isfinite(found)):
+            self.status[ray], self.reliable[ray] = MarchStatus.UNSTABLE, self.edges[ray][0]
+            self.values[ray] = 0
+            return
+        driven = int(self.driven[ray]) + 1
+        self.values[ray, :driven] += found[:driven]
+        self.values[ray, driven:count] = found[driven:]
+        self.values[ray, count:] = found[-1]
+
+
+class _BlockData:
+    """What the kernel wants of a block: all its arrays, by step and lane."""
+
+    def __init__(self, steps: int, nodes: int, lanes: int) -> None:
+        self.kappa, self.transverse = np.zeros((steps, lanes)), np.zeros((steps, lanes))
+        self.poles, self.weights, self.drive = (np.zeros((steps, ORDER, 2 * lanes)) for _ in range(3))
+        self.beta = np.zeros((steps, 2 * lanes))
+        self.switch = np.full(lanes, -1, dtype=np.int64)
+        self.incident, self.wave = np.zeros(2 * nodes * 2 * lanes), np.zeros(2 * nodes * 2 * lanes)
+        self.lanes = lanes
+
+    def put(
+        self,
+        lane: int,
+        kappa: FloatArray,
+        kappa_t: FloatArray,
+        poles: ComplexArray,
+        weights: ComplexArray,
+        beta: ComplexArray,
+    ) -> None:
+        """Steps of a lane; the last is repeated to the block's end."""
+        n = len(kappa)
+        self.kappa[:n, lane], self.kappa[n:, lane] = kappa, kappa[-1]
+        self.transverse[:n, lane], self.transverse[n:, lane] = kappa_t, kappa_t[-1]
+        arrays: tuple[tuple[Any, Any], ...] = ((self.poles, poles), (self.weights, weights), (self.beta, beta))
+        for into, given in arrays:
+            for part, half in ((given.real, lane), (given.imag, self.lanes + lane)):
+                into[:n, ..., half], into[n:, ..., half] = part, part[-1]
+
+    def repeat(self, lane: int) -> None:
+        """Steps of the first lane in an empty one; its wave is 0."""
+        self.kappa[:, lane], self.transverse[:, lane] = self.kappa[:, 0], self.transverse[:, 0]
+        arrays: tuple[Any, ...] = (self.poles, self.weights, self.beta)
+        for array in arrays:
+            array[..., lane], array[..., self.lanes + lane] = array[..., 0], array[..., self.lanes]
+
+    def wave_of(self, lane: int, values: ComplexArray) -> None:
+        """Nodal values and slopes (nodes, 2) of the first wave."""
+        self._nodal(self.wave, lane, values)
+
+    def incident_of(self, lane: int, values: ComplexArray) -> None:
+        """Nodal values and slopes (nodes, 2) of the wave that is added at the switch."""
+        self._nodal(self.incident, lane, values)
+
+    def _nodal(self, into: FloatArray, lane: int, values: ComplexArray) -> None:
+        rows = into.reshape(-1, 2, self.lanes)
+        rows[:, 0, lane], rows[:, 1, lane] = values.real.ravel(), values.imag.ravel()
