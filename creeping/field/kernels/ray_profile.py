@@ -112,11 +112,3 @@ def sample(s, c, curve, at, out):
         out[j, 1] = angle(c[i], curve[i, 0], t)
         along, across = displacement(c[i], curve[i, 0], t)
         out[j, 2], out[j, 3] = curve[i, 1] + along, curve[i, 2] + across
-
-
-@njit(**strict_options)
-def interpolate(s, c, at, out):
-    """Values out (n,) of cubics at places (n,)."""
-    for j in range(len(at)):
-        i = interval(s, at[j])
-        out[j] = value(c[i], at[j] - s[i])

@@ -67,7 +67,9 @@ class LayerGrid:
     heights, rates : (j,)
         m and m'.
     cut : (j, 2)
-        What the total wave is multiplied with when it is first put together, and its slope.
+        What the total wave is multiplied with when it is first put together, and its slope times the scale.
+    fade : (j, 2)
+        What the reflected wave is multiplied with at the start, and its slope, 1/L.
     scale : float, L
         Unknown slopes are those of the field times this.
     matrices : (4, 2 j, 8)
@@ -78,6 +80,7 @@ class LayerGrid:
     heights: FloatArray
     rates: FloatArray
     cut: FloatArray
+    fade: FloatArray
     scale: float
     matrices: FloatArray
 
@@ -88,10 +91,16 @@ def layer_grid(spec: GridSpec) -> LayerGrid:
     nodes = _nodes(spec)
     scale = float(np.median(np.diff(nodes)))
     heights, rates = _levelled(nodes, spec.cap)
-    begin, end = FADED[0] * spec.height, spec.height + FADED[1] * (nodes[-1] - spec.height)
-    t = np.clip((nodes - begin) / (end - begin), 0, 1)
-    cut = np.stack([1 - t**3 * (10 - 15 * t + 6 * t**2), -30 * t**2 * (1 - t) ** 2 / (end - begin) * scale], axis=-1)
-    return LayerGrid(nodes, heights, rates, cut, scale, _matrices(spec, nodes, scale))
+    top = nodes[-1] - spec.height
+    cut = _fade(nodes, FADED[0] * spec.height, spec.height + FADED[1] * top) * np.array([1.0, scale])
+    fade = _fade(nodes, spec.height, nodes[-1])
+    return LayerGrid(nodes, heights, rates, cut, fade, scale, _matrices(spec, nodes, scale))
+
+
+def _fade(n: FloatArray, begin: float, end: float) -> FloatArray:
+    """1 below, 0 above, a quintic between, and its slope (n, 2)."""
+    t = np.clip((n - begin) / (end - begin), 0, 1)
+    return np.stack([1 - t**3 * (10 - 15 * t + 6 * t**2), -30 * t**2 * (1 - t) ** 2 / (end - begin)], axis=-1)
 
 
 def _nodes(spec: GridSpec) -> FloatArray:

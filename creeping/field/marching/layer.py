@@ -19,19 +19,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
+from creeping._typing import ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary
-from creeping.field.marching.elements import DEPTH, LayerGrid, layer_grid
+from creeping.field.marching.elements import LayerGrid, layer_grid
 from creeping.field.marching.pade import ORDER, rational_step
 from creeping.field.marching.plan import MarchPlan, MarchStatus, march_plan
 from creeping.field.marching.profile import RayProfiles
 from creeping.kernels.threads import in_threads
 
-LEAST_SPREADING = 0.05
-"""J below which the incident wave's tube is held: behind the line rays may cross."""
-BACK = 3.0
-"""Rays of optics come from so many radii of curvature behind the start at most."""
 SECONDS = 6e-9
 """Of one pole, unknown, step and ray."""
 
@@ -211,101 +207,48 @@ class _March:
 
         grid = layer_grid(self.plan.specs[block[0]])
         data = _BlockData(max(len(self.edges[ray]) for ray in block) - 1, len(grid.nodes), LANES)
-        for lane, ray in enumerate(block):
-            self._load(ray, lane, grid, data)
-        for lane in range(len(block), LANES):
-            data.repeat(lane)
-        out = np.empty((len(data.kappa) + 1, 2, 2 * LANES))
+        # empty lanes march the first ray once more
+        for lane in range(LANES):
+            self._load(block[lane] if lane < len(block) else block[0], lane, grid, data)
+        out = np.empty((len(data.beta) + 1, 2, 2 * LANES))
         march_block(
-            grid.matrices,
-            grid.heights,
-            grid.rates,
-            grid.cut,
-            grid.scale,
-            self.k,
-            self.soft,
-            *(data.kappa, data.transverse, data.poles, data.weights, data.drive, data.beta),
-            *(data.switch, data.incident, data.wave, out),
+            *(grid.matrices, grid.heights, grid.rates, grid.cut, grid.scale, self.k, self.soft, *data.steps),
+            *(data.poles, data.weights, data.drive, data.beta, data.switch),
+            *(data.incident.ravel(), data.wave.ravel(), out),
         )
         for lane, ray in enumerate(block):
             self._take(ray, out[:, int(self.soft), lane] + 1j * out[:, int(self.soft), LANES + lane])
 
     def _load(self, ray: int, lane: int, grid: LayerGrid, data: "_BlockData") -> None:
         """Put a ray's steps, start and boundary data into a lane."""
-        from creeping.field.kernels.plane_wave import drive
+        from creeping.field.kernels.ray_load import load_steps, load_waves
 
-        k, edges, driven = self.k, self.edges[ray], int(self.driven[ray])
-        count = len(edges) - 1
-        middle = 0.5 * (edges[1:] + edges[:-1])
-        kappa, kappa_t = self.profiles.along(ray, middle)[:, 0], self.profiles.of("transverse", ray, middle)
-        eta = self._eta(ray, middle)
-        lit = edges[: driven + 1]
-        profile = self.profiles.along(ray, lit)
-        spreading = np.maximum(self.profiles.of("spreading", ray, lit, 1.0).real, LEAST_SPREADING)
-        kappa_lit = self.profiles.of("transverse", ray, lit).real
-        at_edges = np.stack([profile[:, 1], profile[:, 2] - lit, kappa_lit, spreading], axis=1)
-        poles, weights = self._rational(ray)
-        misfit = np.zeros(count)
-        middles = np.ascontiguousarray(np.stack([kappa, kappa_t.real], axis=1))
-        drive(k, self.soft, driven, middles, at_edges, eta, poles, weights, lane, data.drive, misfit)
-        self.misfit[ray] = np.max(misfit[:driven], initial=0.0)
-        data.put(lane, kappa, kappa_t.real, poles, weights, 1j * k * eta + 0.5 * (kappa - kappa_t.real))
-        data.switch[lane] = driven
-        data.wave_of(lane, self._first_wave(ray, grid) * np.array([1.0, grid.scale]))
-        data.incident_of(lane, self._incident(profile[-1], at_edges[-1], grid) * np.array([1.0, grid.scale]))
-        # the total is the scattered wave and this
-        self.values[ray, : driven + 1] = self._on_surface(at_edges)
-
-    def _rational(self, ray: int) -> tuple[ComplexArray, ComplexArray]:
-        """Poles and weights (steps, ORDER) of a ray's steps."""
-        b, c = self.rational
-        return b[self.which[ray]], c[self.which[ray]]
-
-    def _eta(self, ray: int, at: FloatArray) -> ComplexArray:
-        if self.varies:
-            return np.asarray(self.profiles.of("admittance", ray, at))
-        return np.full(len(at), self.admittance)
-
-    def _on_surface(self, at_edges: FloatArray) -> ComplexArray:
-        """The incident y, or its slope if soft, at the edges of the driven part."""
-        y = np.sqrt(at_edges[:, 3]) * np.exp(1j * self.k * at_edges[:, 1])
-        return np.asarray((1j * self.k * np.sin(at_edges[:, 0]) + 0.5 * at_edges[:, 2]) * y if self.soft else y)
-
-    def _incident(self, place: FloatArray, edge: FloatArray, grid: LayerGrid) -> ComplexArray:
-        """The incident y and its slope at the heights of a grid (nodes, 2), at a place."""
-        tube = np.maximum(1 + edge[2] * grid.heights, 0.2)
-        q = np.sin(place[1])
-        y = np.sqrt(edge[3] * tube) * np.exp(1j * self.k * (edge[1] + grid.nodes * q))
-        return np.stack([y, (1j * self.k * q + 0.5 * edge[2] * grid.rates / tube) * y], axis=1)
-
-    def _first_wave(self, ray: int, grid: LayerGrid) -> ComplexArray:
-        """The reflected y and its slope at the heights of a grid (nodes, 2) at the start, faded out in the absorber."""
-        from creeping.field.kernels.reflected_wave import reflected
-
-        s, profiles, start = self.profiles.s[ray], self.profiles, self.plan.start[ray]
-        radius = 1 / max(profiles.along(ray, np.array([start]))[0, 0], 0.05 * np.max(np.abs(profiles.curvature[ray])))
-        curvature = profiles.cubics["curvature"][ray]
-        transverse = profiles.cubics["transverse"][ray] if profiles.transverse is not None else np.zeros_like(curvature)
-        if self.varies:
-            eta = profiles.cubics["admittance"][ray]
-        else:
-            eta = np.zeros(curvature.shape, dtype=complex)
-            eta[:, 0] = self.admittance
-        out = np.empty((len(grid.nodes), 2), dtype=complex)
-        stop = max(s[0], start - BACK * radius)
-        reflected(
-            *(self.k, self.soft, s, curvature, profiles.curves[ray], transverse, eta, start, stop, grid.nodes, out)
+        profiles, edges, driven = self.profiles, self.edges[ray], int(self.driven[ray])
+        s, curve, start = profiles.s[ray], profiles.curves[ray], float(edges[0])
+        kappa, transverse = profiles.cubics_of("curvature", ray), profiles.cubics_of("transverse", ray)
+        spreading, eta = profiles.cubics_of("spreading", ray), self._admittance(ray)
+        lit = np.empty((driven + 1, 4))
+        b, c = (part[self.which[ray]] for part in self.rational)
+        self.misfit[ray] = load_steps(
+            *(self.k, self.soft, lane, s, kappa, transverse, spreading, eta, curve, edges, driven, b, c),
+            *(data.steps, data.poles, data.weights, data.drive, data.beta, lit),
         )
-        back = np.array([start])
-        kappa_t = profiles.of("transverse", ray, back).real
-        spread = max(float(profiles.of("spreading", ray, back[:1], 1.0)[0].real), LEAST_SPREADING)
-        tube = np.maximum(1 + kappa_t[0] * grid.heights, 0.2)
-        top = grid.nodes[-1]
-        t = np.clip((grid.nodes * (1 + DEPTH) / top - 1) / DEPTH, 0, 1)
-        fade, rate = 1 - t**3 * (10 - 15 * t + 6 * t**2), -30 * t**2 * (1 - t) ** 2 * (1 + DEPTH) / (top * DEPTH)
-        out[:, 1] = out[:, 1] * fade + out[:, 0] * (rate + 0.5 * kappa_t[0] * grid.rates / tube * fade)
-        out[:, 0] *= fade
-        return np.asarray(out * (np.sqrt(spread * tube) * np.exp(-1j * self.k * start))[:, None])
+        data.switch[lane] = driven
+        load_waves(
+            *(self.k, self.soft, lane, s, kappa, transverse, eta, curve, start, self.plan.stop[ray], lit),
+            *(grid.nodes, grid.heights, grid.rates, grid.fade, grid.scale, data.wave, data.incident),
+        )
+        y = np.sqrt(lit[:, 3]) * np.exp(1j * self.k * lit[:, 1])
+        # the total is the scattered wave and this, or its slope
+        self.values[ray, : driven + 1] = (1j * self.k * np.sin(lit[:, 0]) + 0.5 * lit[:, 2]) * y if self.soft else y
+
+    def _admittance(self, ray: int) -> ComplexArray:
+        """Cubics of the admittance along a ray."""
+        if self.varies:
+            return np.asarray(self.profiles.cubics_of("admittance", ray))
+        cubics = np.zeros((self.profiles.s.shape[1] - 1, 4), dtype=complex)
+        cubics[:, 0] = self.admittance
+        return cubics
 
     def _take(self, ray: int, found: ComplexArray) -> None:
         """Keep a ray's wave, or say that it did not stay finite."""
@@ -322,49 +265,11 @@ class _March:
 
 
 class _BlockData:
-    """What the kernel wants of a block: all its arrays, by step and lane."""
+    """What the kernel wants of a block: all its arrays, by step and lane, real parts before imaginary ones."""
 
     def __init__(self, steps: int, nodes: int, lanes: int) -> None:
-        self.kappa, self.transverse = np.zeros((steps, lanes)), np.zeros((steps, lanes))
+        self.steps = np.zeros((2, steps, lanes))
         self.poles, self.weights, self.drive = (np.zeros((steps, ORDER, 2 * lanes)) for _ in range(3))
         self.beta = np.zeros((steps, 2 * lanes))
-        self.switch = np.full(lanes, -1, dtype=np.int64)
-        self.incident, self.wave = np.zeros(2 * nodes * 2 * lanes), np.zeros(2 * nodes * 2 * lanes)
-        self.lanes = lanes
-
-    def put(
-        self,
-        lane: int,
-        kappa: FloatArray,
-        kappa_t: FloatArray,
-        poles: ComplexArray,
-        weights: ComplexArray,
-        beta: ComplexArray,
-    ) -> None:
-        """Steps of a lane; the last is repeated to the block's end."""
-        n = len(kappa)
-        self.kappa[:n, lane], self.kappa[n:, lane] = kappa, kappa[-1]
-        self.transverse[:n, lane], self.transverse[n:, lane] = kappa_t, kappa_t[-1]
-        arrays: tuple[tuple[Any, Any], ...] = ((self.poles, poles), (self.weights, weights), (self.beta, beta))
-        for into, given in arrays:
-            for part, half in ((given.real, lane), (given.imag, self.lanes + lane)):
-                into[:n, ..., half], into[n:, ..., half] = part, part[-1]
-
-    def repeat(self, lane: int) -> None:
-        """Steps of the first lane in an empty one; its wave is 0."""
-        self.kappa[:, lane], self.transverse[:, lane] = self.kappa[:, 0], self.transverse[:, 0]
-        arrays: tuple[Any, ...] = (self.poles, self.weights, self.beta)
-        for array in arrays:
-            array[..., lane], array[..., self.lanes + lane] = array[..., 0], array[..., self.lanes]
-
-    def wave_of(self, lane: int, values: ComplexArray) -> None:
-        """Nodal values and slopes (nodes, 2) of the first wave."""
-        self._nodal(self.wave, lane, values)
-
-    def incident_of(self, lane: int, values: ComplexArray) -> None:
-        """Nodal values and slopes (nodes, 2) of the wave that is added at the switch."""
-        self._nodal(self.incident, lane, values)
-
-    def _nodal(self, into: FloatArray, lane: int, values: ComplexArray) -> None:
-        rows = into.reshape(-1, 2, self.lanes)
-        rows[:, 0, lane], rows[:, 1, lane] = values.real.ravel(), values.imag.ravel()
+        self.switch = np.zeros(lanes, dtype=np.int64)
+        self.incident, self.wave = np.zeros((2 * nodes, 2 * lanes)), np.zeros((2 * nodes, 2 * lanes))

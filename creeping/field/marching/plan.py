@@ -40,6 +40,8 @@ FLAT = 0.3
 LEAST_CURVATURE = 0.05
 """Share of the largest curvature that scales are taken from at least."""
 LATTICE = 1.1
+BACK = 3.0
+"""Rays of optics come from so many radii of curvature behind the start at most."""
 BLUNT = 3.0
 """k rho below which the ground is an edge to the wave."""
 STEEPEST = np.radians(50.0)
@@ -80,7 +82,8 @@ class MarchPlan:
 
     Attributes
     ----------
-    start, switch : (rays,), L
+    start, stop, switch : (rays,), L
+        Where the march starts, from where on the rays of optics come that make up the wave there, and where it turns.
     steps : (rays, 2), L
         Longest step before and after the switch.
     specs : list of GridSpec
@@ -91,6 +94,7 @@ class MarchPlan:
     """
 
     start: FloatArray
+    stop: FloatArray
     switch: FloatArray
     steps: FloatArray
     specs: list[GridSpec]
@@ -109,6 +113,8 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
     edge = np.stack([profiles.along(ray, np.array([-1e-9, 0.0]) * ends[ray, 1])[:, 0] for ray in range(rays)])
     reference = np.maximum(np.max(edge, axis=1), floor)
     start, alpha = _starts(at, kappa, psi)
+    here = np.stack([profiles.along(ray, start[ray : ray + 1])[0, 0] for ray in range(rays)])
+    stop = np.maximum(ends[:, 0], start - BACK / np.maximum(here, floor))
     layer = (2 / (reference**2 * k)) ** (1 / 3)
     scale = (k / (2 * reference)) ** (1 / 3)
     past = (at >= 0) & (np.cumsum((at >= 0) & (psi > AWAY), axis=1) == 0)
@@ -134,7 +140,7 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
         GridSpec(float(a), float(b), float(c), float(d), float(k))
         for a, b, c, d in zip(height, element, first, cap, strict=True)
     ]
-    return MarchPlan(start, switch, steps, specs, status, reliable)
+    return MarchPlan(start, stop, switch, steps, specs, status, reliable)
 
 
 def _delta(k: float, kappa: FloatArray) -> FloatArray:

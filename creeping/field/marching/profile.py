@@ -108,16 +108,13 @@ class RayProfiles:
         sample(self.s[ray], self.cubics["curvature"][ray], self.curves[ray], at, out)
         return out
 
-    def of(self, name: str, ray: int, at: FloatArray, default: complex = 0.0) -> Any:
-        """Transverse curvature, spreading or admittance (n,) of a ray at places (n,)."""
-        from creeping.field.kernels.ray_profile import interpolate
-
-        if getattr(self, name) is None:
-            return np.full(len(at), default)
-        cubics = self.cubics[name][ray]
-        out = np.empty(len(at), cubics.dtype)
-        interpolate(self.s[ray], cubics, at, out)
-        return out
+    def cubics_of(self, name: str, ray: int) -> Any:
+        """Cubics (m - 1, 4) of a quantity along a ray; of one that is not given, those of its constant."""
+        if getattr(self, name) is not None:
+            return self.cubics[name][ray]
+        constant = np.zeros((self.s.shape[1] - 1, 4))
+        constant[:, 0] = 1.0 if name == "spreading" else 0.0
+        return constant
 
     def jumps(self, ray: int) -> FloatArray:
         """Places where the curvature may jump."""
