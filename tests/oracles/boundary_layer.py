@@ -24,8 +24,10 @@ def step(grid, k, soft, c, t, poles, weights, g, beta, y):
     w = np.empty_like(y)
     w[0::2] = y[0::2] / np.sqrt(h)
     w[1::2] = (y[1::2] - lean * y[0::2]) / np.sqrt(h)
+    if not soft:
+        w[1] = (g[-1] - beta * w[0]) * grid.scale
     total = np.zeros_like(w)
-    for b, weight, value in zip(poles, weights, g, strict=True):
+    for b, weight, value in zip(poles, weights, g[:-1], strict=True):
         matrix, right = m0 + b * operator, m0 @ w
         if soft:
             matrix[0] = 0

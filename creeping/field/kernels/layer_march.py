@@ -216,13 +216,21 @@ def switch_to_total(w, incident, cut, lane):
 
 
 @njit(**options)
+def meet_condition(w, beta, g, scale):
+    """Make the slope on the surface g - beta w: the condition is a step's own from its start on."""
+    u, v = times(load(beta, 0), load(beta, LANES), load(w, 0), load(w, LANES))
+    store(w, ROW, spread(scale) * (load(g, 0) - u))
+    store(w, ROW + LANES, spread(scale) * (load(g, LANES) - v))
+
+
+@njit(**options)
 def march_block(mats, heights, rates, cut, scale, k, soft, c, t, poles, weights, g, beta, switch, incident, w, out):
     """March one block of rays.
 
-    Parameters are C-contiguous: c, t (steps, LANES); poles b_j and weights c_j (steps, p, ROW); g (steps, p, ROW);
-    beta (steps, ROW); switch (LANES,), the step before which a lane turns to the total wave; incident (nd ROW,) the
-    wave added there; w (nd ROW,) nodal values and slopes of y times scale, changed in place; out (steps + 1, 2, ROW)
-    gets y and its slope on the surface.
+    Parameters are C-contiguous: c, t (steps, LANES) at mid steps; poles b_j and weights c_j (steps, p, ROW);
+    g (steps, p + 1, ROW), at the poles and at the step's start; beta (steps, ROW); switch (LANES,), the step before which
+    a lane turns to the total wave; incident (nd ROW,) the wave added there; w (nd ROW,) nodal values and slopes of y,
+    slopes times scale, changed in place; out (steps + 1, 2, ROW) gets y and its slope on the surface.
     """
     nd = mats.shape[1]
     per = 1.0 / (k * k)
@@ -235,6 +243,8 @@ def march_block(mats, heights, rates, cut, scale, k, soft, c, t, poles, weights,
             if switch[lane] == step:
                 switch_to_total(w, incident, cut, lane)
         into_step(w, c[step], heights, rates, scale)
+        if not soft:
+            meet_condition(w, beta[step], g[step, poles.shape[1]], scale)
         operator(mats, c[step], t[step], k, K)
         mass(mats, w, rhs)
         w[:] = 0.0

@@ -114,7 +114,8 @@ def drive(k, soft, driven, mid, edges, eta, poles, weights, lane, g, misfit):
     """Boundary values g of the scattered wave at the poles of a ray's first ``driven`` steps; later ones are left 0.
 
     mid (steps, 2) holds kappa, kappa_t at mid step; edges (steps + 1, 4) psi, d.x - s, kappa_t and J; eta (steps,);
-    g (steps, p, 2 LANES) is filled in a lane; misfit (steps,) gets what was to be shared among the poles.
+    g (steps, p + 1, 2 LANES) is filled in a lane, its last row with the condition at the step's start; misfit (steps,)
+    gets what was to be shared among the poles.
     """
     p = poles.shape[1]
     traces = np.empty((p, 2), np.complex128)
@@ -137,6 +138,8 @@ def drive(k, soft, driven, mid, edges, eta, poles, weights, lane, g, misfit):
             traces[j, 0] = value
             missing -= weights[i, j] * value
             size += abs(weights[i, j]) ** 2
+        begin = -1j * k * (q0 + eta[i]) * before
+        g[i, p, lane], g[i, p, LANES + lane] = begin.real, begin.imag
         missing -= after if soft else 1j * k * (q1 + eta[i]) * after
         for j in range(p):
             value = traces[j, 0] + np.conj(weights[i, j]) / size * missing

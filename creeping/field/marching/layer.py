@@ -269,7 +269,8 @@ class _BlockData:
 
     def __init__(self, steps: int, nodes: int, lanes: int) -> None:
         self.steps = np.zeros((2, steps, lanes))
-        self.poles, self.weights, self.drive = (np.zeros((steps, ORDER, 2 * lanes)) for _ in range(3))
+        self.poles, self.weights = (np.zeros((steps, ORDER, 2 * lanes)) for _ in range(2))
+        self.drive = np.zeros((steps, ORDER + 1, 2 * lanes))
         self.beta = np.zeros((steps, 2 * lanes))
         self.switch = np.zeros(lanes, dtype=np.int64)
         self.incident, self.wave = np.zeros((2 * nodes, 2 * lanes)), np.zeros((2 * nodes, 2 * lanes))

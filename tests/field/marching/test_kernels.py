@@ -28,7 +28,7 @@ def test_march_equals_numpy_twin(soft):
     c, t = rng.uniform(-0.4, 1, (steps, LANES)), rng.uniform(-0.5, 0.5, (steps, LANES))
     b, weight = rational_step(rng.uniform(0.5, 3, steps * LANES))
     b, weight = b.reshape(steps, LANES, ORDER), weight.reshape(steps, LANES, ORDER)
-    g, beta = noise(steps, LANES, ORDER), noise(steps, LANES)
+    g, beta = noise(steps, LANES, ORDER + 1), noise(steps, LANES)
     y, incident = noise(LANES, n), noise(LANES, n)
     y[:, -2] = incident[:, -2] = 0
     switch = rng.integers(0, steps + 1, LANES)
