@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies._section_waves import REGIONS, far_errors, region_errors
+from studies._section_waves import REGIONS, Admittance, far_errors, region_errors
 from studies.reference.section import SectionSolver
 from studies.reference.section_shapes import CapsuleSection, Section, bump, ellipse, kite, peanut
 
@@ -141,6 +141,26 @@ FAR: list[tuple[str, float, str, tuple[float | None, float | None]]] = [
 """Figures of the prototype, per cent: largest over largest |F|; median of relative ones in the back half."""
 
 
+VARYING: list[tuple[str, float, tuple[float, float]]] = [
+    ("0.5", 20, (0.07, 0.16)),
+    ("0.5", 60, (0.07, 0.16)),
+    ("0.3 - 0.4i", 20, (0.07, 0.16)),
+    ("0.3 - 0.4i", 60, (0.07, 0.16)),
+    ("0.5 + 0.4 cos", 20, (3.5, 2.5)),
+    ("0.5 + 0.4 cos", 60, (1.5, 1.6)),
+    ("0.3 + 0.5i cos", 20, (4.8, 3.2)),
+    ("0.3 + 0.5i cos", 60, (2.7, 2.6)),
+]
+"""Figures of the prototype in the penumbra and the deep shadow of a circle with an admittance, per cent."""
+ADMITTANCES: dict[str, Admittance] = {
+    "0.5": lambda s: 0.5 + 0j * s,
+    "0.3 - 0.4i": lambda s: 0.3 - 0.4j + 0j * s,
+    "0.5 + 0.4 cos": lambda s: 0.5 + 0.4 * np.cos(6 * s) + 0j,
+    "0.3 + 0.5i cos": lambda s: 0.3 + 0.5j * np.cos(6 * s),
+}
+"""Admittances round the unit circle, with six periods where they vary."""
+
+
 class Solvers:
     """Exact solvers, the last one kept: rows of a section and wavenumber stand together."""
 
@@ -169,6 +189,13 @@ def far_row(name: str, k: float, boundary: str, solvers: Solvers) -> tuple[float
     return far_errors(case.section, k, angle, boundary, solvers.solver(name, k).solve(angle, boundary))
 
 
+def varying_row(name: str, k: float, solvers: Solvers) -> dict[str, tuple[float, float, float]]:
+    """Errors on a circle with an admittance, by region."""
+    eta, solver = ADMITTANCES[name], solvers.solver("circle", k)
+    exact = solver.solve(0.0, eta(solver.nodes.s))
+    return region_errors(CASES["circle"].section, k, 0.0, "impedance", exact, eta)
+
+
 def cell(found: float, limit: float | None) -> str:
     """A figure beside that to be reached, with a mark where it is not."""
     if limit is None:
@@ -183,18 +210,25 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="k = 20 alone")
     most = 20 if parser.parse_args().quick else np.inf
     solvers = Solvers()
-    print(f"{'on the surface, per cent (prototype)':34}" + "".join(f"{name:>17}" for name in REGIONS))
+    print(f"{'on the surface, per cent (prototype)':34}" + "".join(f"{name:>17}" for name in (*REGIONS, "covered")))
     for name, k, boundary, limits in SURFACE:
         if k <= most:
             found = surface_row(name, k, boundary, solvers)
             pairs = zip(REGIONS, limits, strict=True)
             cells = [cell(found[part][0], limit) if part in found else " " * 17 for part, limit in pairs]
+            cells.append(f"{found['covered'][0]:8.1f}")
             print(f"{name:20}{k:5g} {boundary:8}" + "".join(cells), flush=True)
+    print(f"{'circle with an admittance, per cent (prototype)':51}{REGIONS[1]:>17}{REGIONS[2]:>17}{'covered':>17}")
+    for name, k, both in VARYING:
+        if k <= most:
+            found = varying_row(name, k, solvers)
+            cells = [cell(found[part][0], limit) for part, limit in zip(REGIONS[1:3], both, strict=True)]
+            print(f"{name:20}{k:5g} {'':25}" + "".join(cells) + f"{found['covered'][0]:8.1f}", flush=True)
     print(f"{'far away, per cent (prototype)':34}{'largest':>12}{'back half':>17}")
     for name, k, boundary, pair in FAR:
         if k <= most:
-            both = far_row(name, k, boundary, solvers)
-            cells = [cell(one, limit) for one, limit in zip(both, pair, strict=True)]
+            shares = far_row(name, k, boundary, solvers)
+            cells = [cell(one, limit) for one, limit in zip(shares, pair, strict=True)]
             print(f"{name:20}{k:5g} {boundary:8}" + "".join(cells), flush=True)
 
 

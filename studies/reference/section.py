@@ -56,7 +56,7 @@ class SectionField:
 
 
 def surface_data(
-    section: Section, wavenumber: float, angle: float, boundary: str | complex | FloatArray
+    section: Section, wavenumber: float, angle: float, boundary: str | complex | ComplexArray
 ) -> SectionField:
     """Wave on a section for incidence along (cos angle, sin angle).
 
@@ -153,7 +153,7 @@ class SectionSolver:
         tangential = slope @ self._single(np.ones(n)) @ slope / self.nodes.speed[:, None]
         return np.asarray(tangential + self.k**2 * self.single * (normals @ normals.T))
 
-    def solve(self, angle: float, boundary: str | complex | FloatArray) -> SectionField:
+    def solve(self, angle: float, boundary: str | complex | ComplexArray) -> SectionField:
         """Wave on the section for incidence along (cos angle, sin angle)."""
         k, places = self.k, self.nodes.places
         direction = np.array([np.cos(angle), np.sin(angle)])

@@ -8,8 +8,7 @@ matrices of `creeping.field.marching.elements` and, at mid step, c = kappa_n and
     (M0 + b_j K_j) w_j = M0 w + b_j g_j/k^2 e_0,   w(s + ds) = sum_j c_j w_j
 
 K_j is K with beta/k^2 at (0, 0), for w' + beta w = g_j on the surface; if soft, w_j = g_j there instead. Matrices are
-complex symmetric of half-width 3 and factorised as L D L^T without pivoting, which was never unstable: M0 is positive
-and b_j K has no eigenvalue near -1 for poles 1/b_j off the real axis.
+complex symmetric of half-width 3 and factorised as L D L^T without pivoting, which never was unstable.
 
 Sources: [C93]; Derivations, F22.
 """
@@ -228,8 +227,8 @@ def march_block(mats, heights, rates, cut, scale, k, soft, c, t, poles, weights,
     """March one block of rays.
 
     Parameters are C-contiguous: c, t (steps, LANES) at mid steps; poles b_j and weights c_j (steps, p, ROW);
-    g (steps, p + 1, ROW), at the poles and at the step's start; beta (steps, ROW); switch (LANES,), the step before which
-    a lane turns to the total wave; incident (nd ROW,) the wave added there; w (nd ROW,) nodal values and slopes of y,
+    g (steps, p + 1, ROW), at the poles and at the start of a step; beta (steps, ROW); switch (LANES,), the step before
+    which a lane turns to the total wave; incident (nd ROW,) the wave added there; w (nd ROW,) values and slopes of y,
     slopes times scale, changed in place; out (steps + 1, 2, ROW) gets y and its slope on the surface.
     """
     nd = mats.shape[1]

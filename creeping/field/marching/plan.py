@@ -58,7 +58,9 @@ class MarchStatus(IntEnum):
     """A dip deeper or steeper than a layer over it can be: the wave behind ``reliable`` is not that of the body."""
     UNLIT = 3
     """No convex lit ground from which to start: there is no wave."""
-    UNSTABLE = 4
+    HOLLOW = 4
+    """Concave ground in the light behind the start: what it throws along the body is left out everywhere."""
+    UNSTABLE = 5
     """The march did not stay finite: there is no wave."""
 
     @property
@@ -72,6 +74,7 @@ _REMEDIES = {
     MarchStatus.SHARP: "take a higher wavenumber, or round the edge off",
     MarchStatus.DEEP: "none by marching: the wave leaves one part of the body for another",
     MarchStatus.UNLIT: "begin the profile further back on lit ground",
+    MarchStatus.HOLLOW: "none by marching: the error may be several times that stated",
     MarchStatus.UNSTABLE: "give the curvature on more nodes",
 }
 
@@ -190,6 +193,9 @@ def _status(
         deep = _too_deep(at[ray], look[ray], KEPT_BELOW * cap[ray], served[ray])
         if deep < reliable[ray]:
             status[ray], reliable[ray] = MarchStatus.DEEP, deep
+        lit = (at[ray] < 0) & (np.cumsum((np.sin(look[ray, ::-1, 1]) >= 0) & (at[ray, ::-1] < 0))[::-1] == 0)
+        if np.any(lit & ~served[ray] & (kappa[ray] < -FLAT * np.max(kappa[ray]) * LEAST_CURVATURE)):
+            status[ray], reliable[ray] = MarchStatus.HOLLOW, at[ray, 0]
         if alpha[ray] < LEAST_START:
             status[ray], reliable[ray] = MarchStatus.UNLIT, at[ray, 0]
     return status, reliable

@@ -46,6 +46,8 @@ def test_circle(boundary, eta, limits):
     error = 100 * np.abs(found - exact(20.0, 1.0, np.pi / 2 - s, eta)) / size
     regions = (s < -0.46, (s > -0.46) & (s < 0.46), s > 0.6)
     assert all(np.median(error[q]) < limit for q, limit in zip(regions, limits, strict=True))
+    covered = error * size / 100 < np.interp(s, marched.s[0], marched.error[0])
+    assert np.mean(covered) > 0.95
     assert marched.status[0] == MarchStatus.OK
 
 
@@ -90,7 +92,7 @@ def test_nothing_where_there_is_no_light():
     s[np.argmin(np.abs(s))] = 0
     marched = march_rays(RayProfiles(s=s[None], curvature=np.ones((1, 60))), wavenumber=20.0, boundary=HARD)
     assert marched.status[0] == MarchStatus.UNLIT
-    assert np.all(marched.at(0, s) == 0) and np.all(marched.values == 0)
+    assert np.all(marched.at(0, s) == 0) and np.all(marched.values == 0) and np.all(np.isinf(marched.error))
 
 
 def test_edges_and_deep_dips_are_told():
