@@ -10,6 +10,7 @@ Sources: Derivations, R1 and R3.
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.field.arguments import checked_plain
 from creeping.field.marching.profile import RayProfiles
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, P, X, pack
@@ -42,7 +43,13 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
     -------
     RayProfiles
         In the order of the fan's rays.
+
+    Raises
+    ------
+    InvalidInputError
+        If the body has a speed, or edges, joints or tips.
     """
+    checked_plain(fan.body, smooth="marching along rays of a fan")
     body, x, p = fan.body, fan.points[:, 0], fan.directions[:, 0]
     kappa = normal_curvature(body, x, p)
     least = 1 / size(body)

@@ -21,6 +21,7 @@ import numpy as np
 
 from creeping._typing import ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary
 from creeping.field.marching.elements import LayerGrid, layer_grid
 from creeping.field.marching.error import march_error
@@ -33,7 +34,7 @@ SECONDS = 6e-9
 """Of one pole, unknown, step and ray."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MarchedRays:
     """Waves on the surface along rays.
 
@@ -73,6 +74,14 @@ class MarchedRays:
 
     def __len__(self) -> int:
         return len(self.s)
+
+    def __repr__(self) -> str:
+        counts = {code.name: int(np.sum(self.status == code)) for code in MarchStatus if np.any(self.status == code)}
+        return (
+            f"MarchedRays: {len(self)} rays, {int(np.sum(self.counts))} places, k = {self.wavenumber:g}\n"
+            f"  status: {counts}\n"
+            f"  largest misfit of a trace: {np.max(self.misfit, initial=0.0):.2g}"
+        )
 
     def at(self, ray: int, s: ArrayLike) -> ComplexArray:
         """Values (m,) of a ray at places (m,), L; 0 where it was not marched.
@@ -124,13 +133,12 @@ def march_rays(profiles: RayProfiles, *, wavenumber: float, boundary: Boundary) 
     Raises
     ------
     InvalidInputError
-        If the boundary is none of these.
+        If the wavenumber is no positive number, or the boundary none of these.
     """
+    k = checked(wavenumber, 2)
     if boundary.kind not in ("soft", "hard", "impedance"):
         raise InvalidInputError(f"boundary of kind {boundary.kind!r} is not marched; give soft, hard or impedance")
-    plan = march_plan(profiles, wavenumber)
-    march = _March(profiles, plan, wavenumber, boundary)
-    return march.run()
+    return _March(profiles, march_plan(profiles, k), k, boundary).run()
 
 
 class _March:

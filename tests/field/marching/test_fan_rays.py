@@ -64,6 +64,13 @@ def test_profiles_of_the_sphere(fan):
     np.testing.assert_allclose(profiles.spreading, np.cos(profiles.s), atol=1e-7)
 
 
+def test_weighted_bodies_are_refused():
+    ball = sc.Sphere(speed="1 + x/4")
+    fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, direction=(0, 0, 1)), length=1.0, n_rays=4)
+    with pytest.raises(cr.InvalidInputError, match="has a speed"):
+        fan_profiles(fan)
+
+
 def test_rays_of_a_body_that_they_leave():
     """On the twisted ellipsoid rays detach; marched waves go on there and are finite."""
     body = sc.TwistedEllipsoid()

@@ -106,6 +106,7 @@ def test_edges_and_deep_dips_are_told():
     assert marched.reliable[2] == pytest.approx(S[-1])
     assert np.all(np.isfinite(marched.values))
     assert all(status.remedy for status in MarchStatus)
+    assert "3 rays" in repr(marched) and "'SHARP': 1" in repr(marched)
 
 
 def test_bad_profiles_are_refused():
@@ -120,5 +121,7 @@ def test_bad_profiles_are_refused():
     joined = np.concatenate([S[:60], S[59:62], S[61:]])
     with pytest.raises(InvalidInputError, match="fewer than 4 nodes"):
         RayProfiles(s=joined[None], curvature=np.ones((1, len(joined))))
+    with pytest.raises(InvalidInputError, match="wavenumber"):
+        march_rays(circle(), wavenumber=-1.0, boundary=HARD)
     with pytest.raises(InvalidInputError, match="not marched"):
         march_rays(circle(), wavenumber=20.0, boundary=ELECTRIC_SOFT)
