@@ -9,7 +9,7 @@ the tangent to d, and psi that by which it has turned away behind the line:
     height    20 delta; over flatter ground max(20 delta, min(14 delta(kappa_min), 6 sqrt(flat length/k)))
     elements  0.2 delta(kappa_max) on the surface growing to min(0.6 delta, 1.3/(k sin alpha))
 
-Heights and elements are rounded to powers of LATTICE, towards the finer grid, so that rays share grids.
+Heights and elements are rounded to powers of numbers, towards the finer grid, so that rays share grids.
 
 Sources: [C93]; Derivations, F22.
 """
@@ -39,7 +39,8 @@ FLAT = 0.3
 """Share of the curvature at the shadow line below which ground is flat."""
 LEAST_CURVATURE = 0.05
 """Share of the largest curvature that scales are taken from at least."""
-LATTICE = 1.1
+CAPS, ELEMENTS, HEIGHTS = 1.1, 1.2, 1.35
+"""Ratios of neighbouring caps, of longest elements, and of heights and first elements: finer ones fill fewer lanes."""
 BACK = 3.0
 """Rays of optics come from so many radii of curvature behind the start at most."""
 BLUNT = 3.0
@@ -134,10 +135,12 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
     flat = np.mean((at >= 0) & (kappa < FLAT * reference[:, None]), axis=1) * (ends[:, 1] - ends[:, 0])
     height = HEIGHT * _delta(k, reference)
     wide = np.minimum(FLAT_HEIGHT * _delta(k, np.maximum(least, 0.2 * floor)), FLAT_PATH * np.sqrt(flat / k))
-    height = _rounded(np.maximum(height, wide), up=True)
-    element = _rounded(np.minimum(ELEMENT * _delta(k, reference), SLANTED / (k * np.sin(np.maximum(alpha, 0.3)))))
-    first = _rounded(FIRST * _delta(k, most))
-    cap = np.where(lowest < -1e-6 * most, _rounded(CAP / np.maximum(-lowest, 1e-6 * most)), np.inf)
+    height = _rounded(np.maximum(height, wide), HEIGHTS, up=True)
+    element = _rounded(
+        np.minimum(ELEMENT * _delta(k, reference), SLANTED / (k * np.sin(np.maximum(alpha, 0.3)))), ELEMENTS
+    )
+    first = _rounded(FIRST * _delta(k, most), HEIGHTS)
+    cap = np.where(lowest < -1e-6 * most, _rounded(CAP / np.maximum(-lowest, 1e-6 * most), CAPS), np.inf)
     status, reliable = _status(k, at, look, start, alpha, cap, served)
     specs = [
         GridSpec(float(a), float(b), float(c), float(d), float(k))
@@ -150,9 +153,9 @@ def _delta(k: float, kappa: FloatArray) -> FloatArray:
     return (2 * k * k * kappa) ** (-1 / 3)
 
 
-def _rounded(length: FloatArray, *, up: bool = False) -> FloatArray:
-    steps = np.log(length) / np.log(LATTICE)
-    return np.asarray(LATTICE ** (np.ceil(steps) if up else np.floor(steps)))
+def _rounded(length: FloatArray, lattice: float, *, up: bool = False) -> FloatArray:
+    steps = np.log(length) / np.log(lattice)
+    return np.asarray(lattice ** (np.ceil(steps) if up else np.floor(steps)))
 
 
 def _at_last(at: FloatArray, mask: BoolArray) -> FloatArray:
