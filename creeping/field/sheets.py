@@ -5,7 +5,7 @@
 A sheet is a ray shed towards an observer, or a specular point; its path L and its amplitudes a_c, one of each problem c
 (a boundary, its component and a wavenumber), are smooth functions of the incidence where the field itself oscillates.
 
-Sources: [LK59]; Derivations, F3 and F22.
+Sources: [LK59]; Derivations, F3 and F23.
 """
 
 from typing import NamedTuple

@@ -6,7 +6,7 @@
 A lattice has levels, of ever finer steps; all of it follows from the whole set of incidences, so that an incidence has
 the same nodes in whatever task it is computed.
 
-Sources: Derivations, F22.
+Sources: Derivations, F23.
 """
 
 import math

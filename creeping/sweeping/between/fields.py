@@ -10,7 +10,7 @@ d being the error of `stencil`, A the accuracy asked for. All sheets of the cell
 into one of each other node of the stencil, and its corners have no others: none begins or ends. What fails at all
 levels is computed. Errors are the largest of the corners, and the sum in squares with them.
 
-Sources: Derivations, F22.
+Sources: Derivations, F23.
 """
 
 from collections.abc import Iterator

@@ -8,7 +8,7 @@ for each block of cells, by steps of least norm onto the line of d: a smooth fun
 its incidences if few of their rays err by more than asked for; these are launched from their interpolated points and
 carried. What no level serves is computed.
 
-Sources: Derivations, F22.
+Sources: Derivations, F23.
 """
 
 import numpy as np

@@ -1,0 +1,1 @@
+"""Waves along rays of any curvature, by marching the boundary layer."""

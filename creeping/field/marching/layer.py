@@ -1,0 +1,294 @@
+"""Waves on the surface along rays, by marching the boundary layer above them.
+
+In coordinates (s, n) along a ray, with h = 1 + kappa_n n and h_t = 1 + kappa_t n, what is marched is y, the wave less
+its tube and its phase:
+
+    y = u sqrt(J h_t) e^{-iks},   y_s = ik (sqrt(1 + X) - 1) y
+    X = [h^2 d_nn + h kappa_n d_n]/k^2 + h^2 - 1 + ((kappa_n - kappa_t)^2 - kappa_n^2)/(4k^2)
+    soft u = 0;   else u_n + ik eta u = 0:   y_n + (ik eta - kappa_t/2) y = 0
+
+Nothing here asks for convex or smooth ground, and amplitudes of any order come out. The scattered wave starts on lit
+ground as that of optics and is driven by the incident one on the surface; where the ray has turned away the incident
+wave is added, and the total goes on by itself. Waves that come back along the ray are left out.
+
+Sources: [C93]; Derivations, F22.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from creeping._typing import ArrayLike, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked
+from creeping.field.boundary import Boundary
+from creeping.field.marching.elements import LayerGrid, layer_grid
+from creeping.field.marching.error import march_error
+from creeping.field.marching.pade import ORDER, rational_step
+from creeping.field.marching.plan import MarchPlan, MarchStatus, march_plan
+from creeping.field.marching.profile import RayProfiles
+from creeping.kernels.threads import in_threads
+
+SECONDS = 6e-9
+"""Of one pole, unknown, step and ray."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MarchedRays:
+    """Waves on the surface along rays.
+
+    Attributes
+    ----------
+    s : (rays, n), L
+        Places of each ray; the last one is repeated where a ray has fewer.
+    values : (rays, n) complex
+        sqrt(J) e^{-iks} times u, or times du/dn if soft, for a wave of phase 0 at s = 0.
+    counts : (rays,)
+        Places of each ray.
+    start, switch : (rays,), L
+        Where the wave of optics was taken, and where the driven part ends.
+    status : (rays,) of int
+        Codes of `MarchStatus`.
+    reliable : (rays,), L
+        s up to which the status does not touch the wave.
+    error : (rays, n)
+        Of the values where the status is OK or s is up to ``reliable``, meant to hold at 95 of 100 places of plane
+        sections; infinite where there is no wave.
+    misfit : (rays,)
+        Largest share of the incident wave by which its traces at the poles fail to add up to it.
+    wavenumber : float, 1/L
+    """
+
+    s: FloatArray
+    values: ComplexArray
+    counts: IntArray
+    start: FloatArray
+    switch: FloatArray
+    status: IntArray
+    reliable: FloatArray
+    error: FloatArray
+    misfit: FloatArray
+    wavenumber: float
+    profiles: RayProfiles
+
+    def __len__(self) -> int:
+        return len(self.s)
+
+    def __repr__(self) -> str:
+        counts = {code.name: int(np.sum(self.status == code)) for code in MarchStatus if np.any(self.status == code)}
+        return (
+            f"MarchedRays: {len(self)} rays, {int(np.sum(self.counts))} places, k = {self.wavenumber:g}\n"
+            f"  status: {counts}\n"
+            f"  largest misfit of a trace: {np.max(self.misfit, initial=0.0):.2g}"
+        )
+
+    def at(self, ray: int, s: ArrayLike) -> ComplexArray:
+        """Values (m,) of a ray at places (m,), L; 0 where it was not marched.
+
+        Splines between jumps of the curvature: of the wave in terms of the incident one where that drives it.
+        """
+        from scipy.interpolate import CubicSpline
+
+        at = np.asarray(s, dtype=float)
+        found = np.zeros(at.shape, dtype=complex)
+        if self.status[ray] in (MarchStatus.UNLIT, MarchStatus.UNSTABLE):
+            return found
+        places, values = self.s[ray, : self.counts[ray]], self.values[ray, : self.counts[ray]]
+        lead = self._incident_phase(ray, places)
+        marks = np.unique([places[0], *self.profiles.jumps(ray), self.switch[ray], places[-1]])
+        marks = marks[(marks >= places[0]) & (marks <= places[-1])]
+        for low, high in pairwise(marks):
+            inside = (places >= low - 1e-12) & (places <= high + 1e-12)
+            asked = (at >= low) & (at <= high)
+            if not np.any(asked):
+                continue
+            turn = np.exp(-1j * lead[inside]) if high <= self.switch[ray] else 1.0
+            if np.sum(inside) > 1:
+                spline = CubicSpline(places[inside], values[inside] * turn)
+                found[asked] = spline(at[asked])
+            if high <= self.switch[ray]:
+                found[asked] *= np.exp(1j * self._incident_phase(ray, at[asked]))
+        return found
+
+    def _incident_phase(self, ray: int, at: FloatArray) -> FloatArray:
+        """Phase k (d.x - s) of the incident wave at places."""
+        return np.asarray(self.wavenumber * (self.profiles.along(ray, at)[:, 2] - at))
+
+
+def march_rays(profiles: RayProfiles, *, wavenumber: float, boundary: Boundary) -> MarchedRays:
+    """March the wave along each ray of a batch, from lit ground to its end.
+
+    Parameters
+    ----------
+    profiles : RayProfiles
+    wavenumber : float, 1/L
+    boundary : Boundary
+        Soft, hard or impedance; an impedance that varies is in the profiles, else its admittance holds.
+
+    Returns
+    -------
+    MarchedRays
+
+    Raises
+    ------
+    InvalidInputError
+        If the wavenumber is no positive number, or the boundary none of these.
+    """
+    k = checked(wavenumber, 2)
+    if boundary.kind not in ("soft", "hard", "impedance"):
+        raise InvalidInputError(f"boundary of kind {boundary.kind!r} is not marched; give soft, hard or impedance")
+    return _March(profiles, march_plan(profiles, k), k, boundary).run()
+
+
+class _March:
+    """Rays on their way: steps and boundary data by ray, blocks of rays that share a grid."""
+
+    def __init__(self, profiles: RayProfiles, plan: MarchPlan, k: float, boundary: Boundary) -> None:
+        self.profiles, self.plan, self.k = profiles, plan, k
+        self.soft = boundary.kind == "soft"
+        self.admittance = boundary.admittance if boundary.kind == "impedance" else 0j
+        self.varies = boundary.kind == "impedance" and profiles.admittance is not None
+        ways = [self._edges(ray) for ray in range(len(profiles))]
+        self.edges = [np.concatenate([first, second[1:]]) for first, second in ways]
+        self.driven = np.array([len(first) - 1 for first, _ in ways])
+        most = max(len(edges) for edges in self.edges)
+        self.s = np.stack([np.pad(edges, (0, most - len(edges)), mode="edge") for edges in self.edges])
+        self.values = np.zeros(self.s.shape, dtype=complex)
+        self.error = np.full(self.s.shape, np.inf)
+        self.misfit = np.zeros(len(ways))
+        self.status = plan.status.copy()
+        self.reliable = plan.reliable.copy()
+        sizes = np.round(k * np.concatenate([np.diff(edges) for edges in self.edges]), 9)
+        distinct, which = np.unique(sizes, return_inverse=True)
+        self.rational = rational_step(distinct)
+        self.which = np.split(which, np.cumsum([len(edges) - 1 for edges in self.edges])[:-1])
+
+    def run(self) -> MarchedRays:
+        """March all blocks."""
+        from creeping.kernels.vectors import LANES
+
+        live = [ray for ray, status in enumerate(self.status) if status != MarchStatus.UNLIT]
+        counts = np.array([len(edges) - 1 for edges in self.edges])
+        # rays of one grid and about as many steps make a block
+        order = sorted(live, key=lambda ray: (hash(self.plan.specs[ray]), counts[ray]))
+        blocks: list[list[int]] = []
+        for ray in order:
+            fits = blocks and len(blocks[-1]) < LANES and self.plan.specs[blocks[-1][0]] == self.plan.specs[ray]
+            if fits:
+                blocks[-1].append(ray)
+            else:
+                blocks.append([ray])
+        costs = [ORDER * counts[block].max() * LANES * 100 * SECONDS for block in blocks]
+        if blocks:
+            in_threads(
+                lambda part: self._march_blocks(blocks[part]), len(blocks), least=2, multiple=1, seconds=max(costs)
+            )
+        return MarchedRays(
+            s=self.s,
+            values=self.values,
+            counts=counts + 1,
+            start=self.plan.start,
+            switch=np.array([edges[n] for edges, n in zip(self.edges, self.driven, strict=True)]),
+            status=self.status,
+            reliable=self.reliable,
+            error=self.error,
+            misfit=self.misfit,
+            wavenumber=self.k,
+            profiles=self.profiles,
+        )
+
+    def _edges(self, ray: int) -> tuple[FloatArray, FloatArray]:
+        """Ends of the steps of the driven part and of the rest; steps end at jumps."""
+        plan, jumps = self.plan, self.profiles.jumps(ray)
+        stops = (plan.start[ray], plan.switch[ray], self.profiles.s[ray, -1])
+        ways = []
+        for low, high, step in zip(stops[:-1], stops[1:], plan.steps[ray], strict=True):
+            marks = [low, *jumps[(jumps > low + 1e-9 * step) & (jumps < high - 1e-9 * step)], high]
+            parts = [np.array([low])]
+            for a, b in pairwise(marks):
+                parts.append(np.linspace(a, b, max(1, int(np.ceil((b - a) / step))) + 1)[1:])
+            ways.append(np.concatenate(parts))
+        return ways[0], ways[1]
+
+    def _march_blocks(self, blocks: list[list[int]]) -> None:
+        for block in blocks:
+            self._march_block(block)
+
+    def _march_block(self, block: list[int]) -> None:
+        """March one block of rays and keep what is on the surface."""
+        from creeping.field.kernels.layer_march import march_block
+        from creeping.kernels.vectors import LANES
+
+        grid = layer_grid(self.plan.specs[block[0]])
+        data = _BlockData(max(len(self.edges[ray]) for ray in block) - 1, len(grid.nodes), LANES)
+        # empty lanes march the first ray once more
+        for lane in range(LANES):
+            self._load(block[lane] if lane < len(block) else block[0], lane, grid, data)
+        out = np.empty((len(data.beta) + 1, 2, 2 * LANES))
+        march_block(
+            *(grid.matrices, grid.heights, grid.rates, grid.cut, grid.scale, self.k, self.soft, *data.steps),
+            *(data.poles, data.weights, data.drive, data.beta, data.switch),
+            *(data.incident.ravel(), data.wave.ravel(), out),
+        )
+        for lane, ray in enumerate(block):
+            self._take(ray, out[:, int(self.soft), lane] + 1j * out[:, int(self.soft), LANES + lane])
+
+    def _load(self, ray: int, lane: int, grid: LayerGrid, data: "_BlockData") -> None:
+        """Put a ray's steps, start and boundary data into a lane."""
+        from creeping.field.kernels.ray_load import load_steps, load_waves
+
+        profiles, edges, driven = self.profiles, self.edges[ray], int(self.driven[ray])
+        s, curve, start = profiles.s[ray], profiles.curves[ray], float(edges[0])
+        kappa, transverse = profiles.cubics_of("curvature", ray), profiles.cubics_of("transverse", ray)
+        spreading, eta = profiles.cubics_of("spreading", ray), self._admittance(ray)
+        lit = np.empty((driven + 1, 4))
+        b, c = (part[self.which[ray]] for part in self.rational)
+        self.misfit[ray] = load_steps(
+            *(self.k, self.soft, lane, s, kappa, transverse, spreading, eta, curve, edges, driven, b, c),
+            *(data.steps, data.poles, data.weights, data.drive, data.beta, lit),
+        )
+        data.switch[lane] = driven
+        load_waves(
+            *(self.k, self.soft, lane, s, kappa, transverse, eta, curve, start, self.plan.stop[ray], lit),
+            *(grid.nodes, grid.heights, grid.rates, grid.fade, grid.scale, data.wave, data.incident),
+        )
+        y = np.sqrt(lit[:, 3]) * np.exp(1j * self.k * lit[:, 1])
+        # the total is the scattered wave and this, or its slope
+        self.values[ray, : driven + 1] = (1j * self.k * np.sin(lit[:, 0]) + 0.5 * lit[:, 2]) * y if self.soft else y
+
+    def _admittance(self, ray: int) -> ComplexArray:
+        """Cubics of the admittance along a ray."""
+        if self.varies:
+            return np.asarray(self.profiles.cubics_of("admittance", ray))
+        cubics = np.zeros((self.profiles.s.shape[1] - 1, 4), dtype=complex)
+        cubics[:, 0] = self.admittance
+        return cubics
+
+    def _take(self, ray: int, found: ComplexArray) -> None:
+        """Keep a ray's wave, or say that it did not stay finite."""
+        count = len(self.edges[ray])
+        found = found[:count]
+        if not np.all(np.isfinite(found)):
+            self.status[ray], self.reliable[ray] = MarchStatus.UNSTABLE, self.edges[ray][0]
+            self.values[ray] = 0
+            return
+        driven = int(self.driven[ray]) + 1
+        self.values[ray, :driven] += found[:driven]
+        self.values[ray, driven:count] = found[driven:]
+        self.values[ray, count:] = found[-1]
+        mine, error = self.s[ray, :count], self.error[ray]
+        error[:count] = march_error(self.profiles, ray, self.k, mine, self.values[ray, :count], varies=self.varies)
+        error[count:] = error[count - 1]
+
+
+class _BlockData:
+    """What the kernel wants of a block: all its arrays, by step and lane, real parts before imaginary ones."""
+
+    def __init__(self, steps: int, nodes: int, lanes: int) -> None:
+        self.steps = np.zeros((2, steps, lanes))
+        self.poles, self.weights = (np.zeros((steps, ORDER, 2 * lanes)) for _ in range(2))
+        self.drive = np.zeros((steps, ORDER + 1, 2 * lanes))
+        self.beta = np.zeros((steps, 2 * lanes))
+        self.switch = np.zeros(lanes, dtype=np.int64)
+        self.incident, self.wave = np.zeros((2 * nodes, 2 * lanes)), np.zeros((2 * nodes, 2 * lanes))

@@ -1,0 +1,236 @@
+"""Where a march starts, turns to the total wave and how finely it goes.
+
+With L = (2 rho^2/k)^(1/3) and m = (k rho/2)^(1/3) at the shadow line, delta = (2 k^2 kappa)^(-1/3), alpha the angle of
+the tangent to d, and psi that by which it has turned away behind the line:
+
+    start     kappa > 0 and sin^3(alpha)/kappa largest for alpha of 50..75 degrees: optics is best there
+    switch    the last place with psi < min(TURN/m, 60 degrees) before psi = 100 degrees
+    steps     0.12 L, in the driven part at most 0.3 wavelengths
+    height    20 delta; over flatter ground max(20 delta, min(14 delta(kappa_min), 6 sqrt(flat length/k)))
+    elements  0.2 delta(kappa_max) on the surface growing to min(0.6 delta, 1.3/(k sin alpha))
+
+Heights and elements are rounded to powers of numbers, towards the finer grid, so that rays share grids.
+
+Sources: [C93]; Derivations, F22.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.field.marching.elements import CAP, KEPT_BELOW, GridSpec
+from creeping.field.marching.profile import RayProfiles
+
+PROBES = 512
+"""Places of a ray at which it is looked at,"""
+COARSER = 2
+"""and of how many of them one is, for dips."""
+START = (np.radians(75.0), np.radians(50.0))
+LEAST_START = np.radians(20.0)
+"""Angle to d below which a start is no start: optics has no value there."""
+TURN, MOST_TURN = 1.0, np.radians(60.0)
+AWAY = np.radians(100.0)
+STEP, LIT_STEP = 0.12, 0.3
+HEIGHT, FLAT_HEIGHT, FLAT_PATH = 20.0, 14.0, 6.0
+ELEMENT, SLANTED, FIRST = 0.6, 1.3, 0.2
+FLAT = 0.3
+"""Share of the curvature at the shadow line below which ground is flat."""
+LEAST_CURVATURE = 0.05
+"""Share of the largest curvature that scales are taken from at least."""
+CAPS, ELEMENTS, HEIGHTS = 1.1, 1.2, 1.35
+"""Ratios of neighbouring caps, of longest elements, and of heights and first elements: finer ones fill fewer lanes."""
+BACK = 3.0
+"""Rays of optics come from so many radii of curvature behind the start at most."""
+BLUNT = 3.0
+"""k rho below which the ground is an edge to the wave."""
+STEEPEST = np.radians(50.0)
+"""Angle between tangent and chord over a dip up to which the rational step follows the wave."""
+
+
+class MarchStatus(IntEnum):
+    """What is to be thought of a marched wave."""
+
+    OK = 0
+    SHARP = 1
+    """k rho < 3 somewhere: from ``reliable`` on the wave may be off by its whole size."""
+    DEEP = 2
+    """A dip deeper or steeper than a layer over it can be: the wave behind ``reliable`` is not that of the body."""
+    UNLIT = 3
+    """No convex lit ground from which to start: there is no wave."""
+    HOLLOW = 4
+    """Concave ground in the light behind the start: what it throws along the body is left out everywhere."""
+    UNSTABLE = 5
+    """The march did not stay finite: there is no wave."""
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it."""
+        return _REMEDIES[self]
+
+
+_REMEDIES = {
+    MarchStatus.OK: "none needed",
+    MarchStatus.SHARP: "take a higher wavenumber, or round the edge off",
+    MarchStatus.DEEP: "none by marching: the wave leaves one part of the body for another",
+    MarchStatus.UNLIT: "begin the profile further back on lit ground",
+    MarchStatus.HOLLOW: "none by marching: the error may be several times that stated",
+    MarchStatus.UNSTABLE: "give the curvature on more nodes",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class MarchPlan:
+    """Plan of each ray (rays,).
+
+    Attributes
+    ----------
+    start, stop, switch : (rays,), L
+        Where the march starts, from where on the rays of optics come that make up the wave there, and where it turns.
+    steps : (rays, 2), L
+        Longest step before and after the switch.
+    specs : list of GridSpec
+    status : (rays,) of int
+        Codes of `MarchStatus`.
+    reliable : (rays,), L
+        s up to which the wave is to be trusted.
+    """
+
+    start: FloatArray
+    stop: FloatArray
+    switch: FloatArray
+    steps: FloatArray
+    specs: list[GridSpec]
+    status: IntArray
+    reliable: FloatArray
+
+
+def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
+    """Plan the marches of rays."""
+    k, rays = wavenumber, len(profiles)
+    ends = profiles.s[:, [0, -1]]
+    at = ends[:, :1] + np.linspace(0, 1, PROBES) * (ends[:, 1:] - ends[:, :1])
+    look = np.stack([profiles.along(ray, at[ray]) for ray in range(rays)])
+    kappa, psi = look[..., 0], look[..., 1]
+    floor = LEAST_CURVATURE * np.max(np.abs(kappa), axis=1)
+    edge = np.stack([profiles.along(ray, np.array([-1e-9, 0.0]) * ends[ray, 1])[:, 0] for ray in range(rays)])
+    reference = np.maximum(np.max(edge, axis=1), floor)
+    start, alpha = _starts(at, kappa, psi)
+    here = np.stack([profiles.along(ray, start[ray : ray + 1])[0, 0] for ray in range(rays)])
+    stop = np.maximum(ends[:, 0], start - BACK / np.maximum(here, floor))
+    layer = (2 / (reference**2 * k)) ** (1 / 3)
+    scale = (k / (2 * reference)) ** (1 / 3)
+    past = (at >= 0) & (np.cumsum((at >= 0) & (psi > AWAY), axis=1) == 0)
+    turned = past & (psi < np.minimum(TURN / scale, MOST_TURN)[:, None])
+    switch = _at_last(at, turned)
+    step = STEP * layer
+    steps = np.stack([np.minimum(step, LIT_STEP * 2 * np.pi / k), step], axis=1)
+    served = at >= start[:, None]
+    # the second half of a closed way decides no height: what comes there has decayed
+    ahead = (at >= 0) & (at < 0.65 * ends[:, 1:])
+    least = np.min(np.where(ahead, kappa, np.inf), axis=1)
+    lowest = np.min(np.where(served, kappa, np.inf), axis=1)
+    most = np.maximum(np.max(np.where(served, kappa, -np.inf), axis=1), reference)
+    flat = np.mean((at >= 0) & (kappa < FLAT * reference[:, None]), axis=1) * (ends[:, 1] - ends[:, 0])
+    height = HEIGHT * _delta(k, reference)
+    wide = np.minimum(FLAT_HEIGHT * _delta(k, np.maximum(least, 0.2 * floor)), FLAT_PATH * np.sqrt(flat / k))
+    height = _rounded(np.maximum(height, wide), HEIGHTS, up=True)
+    element = _rounded(
+        np.minimum(ELEMENT * _delta(k, reference), SLANTED / (k * np.sin(np.maximum(alpha, 0.3)))), ELEMENTS
+    )
+    first = _rounded(FIRST * _delta(k, most), HEIGHTS)
+    cap = np.where(lowest < -1e-6 * most, _rounded(CAP / np.maximum(-lowest, 1e-6 * most), CAPS), np.inf)
+    status, reliable = _status(k, at, look, start, alpha, cap, served)
+    specs = [
+        GridSpec(float(a), float(b), float(c), float(d), float(k))
+        for a, b, c, d in zip(height, element, first, cap, strict=True)
+    ]
+    return MarchPlan(start, stop, switch, steps, specs, status, reliable)
+
+
+def _delta(k: float, kappa: FloatArray) -> FloatArray:
+    return (2 * k * k * kappa) ** (-1 / 3)
+
+
+def _rounded(length: FloatArray, lattice: float, *, up: bool = False) -> FloatArray:
+    steps = np.log(length) / np.log(lattice)
+    return np.asarray(lattice ** (np.ceil(steps) if up else np.floor(steps)))
+
+
+def _at_last(at: FloatArray, mask: BoolArray) -> FloatArray:
+    """Last place (rays,) where a mask holds, 0 if nowhere."""
+    last = at.shape[1] - 1 - np.argmax(mask[:, ::-1], axis=1)
+    return np.where(np.any(mask, axis=1), at[np.arange(len(at)), last], 0.0)
+
+
+def _starts(at: FloatArray, kappa: FloatArray, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Start and its angle to d (rays,)."""
+    rows = np.arange(len(at))
+    alpha = np.where(at < 0, np.arccos(np.cos(psi)), -1.0)
+    largest = at[rows, np.argmax(alpha, axis=1)]
+    low, high = (np.where(np.any(alpha >= a, axis=1), _at_last(at, alpha >= a), largest) for a in START)
+    worth = np.sin(np.maximum(alpha, 0)) ** 3 / np.maximum(kappa, 0.1 * np.max(np.abs(kappa), axis=1, keepdims=True))
+    worth = np.where((at >= low[:, None]) & (at <= high[:, None]) & (kappa > 0), worth, 0)
+    best = np.where(np.max(worth, axis=1) > 0, np.argmax(worth, axis=1), np.argmin(np.abs(at - low[:, None]), axis=1))
+    return at[rows, best], alpha[rows, best]
+
+
+def _status(
+    k: float,
+    at: FloatArray,
+    look: FloatArray,
+    start: FloatArray,
+    alpha: FloatArray,
+    cap: FloatArray,
+    served: BoolArray,
+) -> tuple[IntArray, FloatArray]:
+    """Status and place up to which the wave is reliable (rays,)."""
+    kappa = look[..., 0]
+    status = np.full(len(at), MarchStatus.OK, dtype=np.int64)
+    reliable = at[:, -1].copy()
+    for ray in range(len(at)):
+        sharp = served[ray] & (kappa[ray] > k / BLUNT)
+        if np.any(sharp):
+            status[ray], reliable[ray] = MarchStatus.SHARP, at[ray, np.argmax(sharp)]
+        deep = _too_deep(at[ray], look[ray], KEPT_BELOW * cap[ray], served[ray])
+        if deep < reliable[ray]:
+            status[ray], reliable[ray] = MarchStatus.DEEP, deep
+        lit = (at[ray] < 0) & (np.cumsum((np.sin(look[ray, ::-1, 1]) >= 0) & (at[ray, ::-1] < 0))[::-1] == 0)
+        if np.any(lit & ~served[ray] & (kappa[ray] < -FLAT * np.max(kappa[ray]) * LEAST_CURVATURE)):
+            status[ray], reliable[ray] = MarchStatus.HOLLOW, at[ray, 0]
+        if alpha[ray] < LEAST_START:
+            status[ray], reliable[ray] = MarchStatus.UNLIT, at[ray, 0]
+    return status, reliable
+
+
+def _too_deep(s: FloatArray, look: FloatArray, depth: float, served: BoolArray) -> float:
+    """Place behind which the chord over a dip is higher than ``depth`` above it, or too steep; infinite if none is.
+
+    The chord begins at the last place before the dip whose tangent no ground ahead rises above.
+    """
+    if not np.isfinite(depth):
+        return np.inf
+    some = np.flatnonzero(served & (s >= 0))[::COARSER]
+    s, kappa, psi, x = s[some], look[some, 0], look[some, 1], look[some, 2:]
+    tangent, normal = np.stack([np.cos(psi), np.sin(psi)], 1), np.stack([np.sin(psi), -np.cos(psi)], 1)
+    for dip in np.flatnonzero((kappa[:-1] > 0) & (kappa[1:] <= 0)):
+        off = x[None, :] - x[: dip + 1, None]
+        above = np.einsum("ijc,ic->ij", off, normal[: dip + 1])
+        ahead = np.abs(psi[None, :] - psi[: dip + 1, None]) < AWAY
+        clear = np.all((above <= 1e-9) | ~ahead | (s[None, :] <= s[: dip + 1, None]), axis=1)
+        # none is where the ground ahead is lit again: the wave that grazes the shadow line is the chord
+        i = np.max(np.flatnonzero(clear), initial=0)
+        turn = psi[i:] - psi[i]
+        towards = np.cos(turn)
+        here = np.maximum(towards, 0.05)
+        # the chord meets the normal of a place at this height
+        length = np.sum((x[i:] - x[i]) * tangent[i:], axis=1) / here
+        height = np.sum((x[i] + length[:, None] * tangent[i] - x[i:]) * normal[i:], axis=1)
+        # it lands where it meets the ground, or where rising ground turns parallel to it again
+        rising = np.maximum.accumulate((turn < 0) & (s[i:] > s[dip]))
+        landed = (towards < 0.1) | ((height < 0) & (s[i:] > s[dip])) | (rising & (turn >= 0))
+        over = np.cumsum(landed) == 0
+        if np.any(over & ((height > depth) | (np.abs(turn) > STEEPEST))):
+            return float(s[i])
+    return np.inf

@@ -1,0 +1,117 @@
+"""Vectors of LANES numbers as values in kernels: loaded, stored, added and multiplied lane by lane.
+
+A compiler that vectorises loops has to prove first that their arrays do not overlap; in recurrences over many arrays it
+does not succeed. Here the vector is explicit, and a recurrence keeps its state in registers. On machines with shorter
+registers the compiler splits a vector into several.
+"""
+
+import operator
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+from creeping._typing import Any
+
+LANES = 8
+_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
+_FLAGS = ("contract",)
+
+
+class Vector(types.Type):  # type: ignore[misc]
+    """The type of a vector in compiled code."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"float64x{LANES}")
+
+
+VECTOR = Vector()
+
+
+@register_model(Vector)
+class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _DOUBLES)
+
+
+class _Binary(AbstractTemplate):  # type: ignore[misc]
+    def generic(self, args: Any, keywords: Any) -> Any:
+        if len(args) == 2 and all(isinstance(kind, Vector) for kind in args) and not keywords:
+            return signature(VECTOR, VECTOR, VECTOR)
+        return None
+
+
+def _define(symbol: Any, instruction: str) -> None:
+    infer_global(symbol)(type(f"_{instruction}", (_Binary,), {}))
+
+    @lower_builtin(symbol, Vector, Vector)
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return getattr(builder, instruction)(*args, flags=_FLAGS)
+
+
+for _symbol, _instruction in (
+    (operator.add, "fadd"),
+    (operator.iadd, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.isub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.imul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
+    _define(_symbol, _instruction)
+
+
+def _place(context: Any, builder: Any, kind: Any, array: Any, start: Any) -> Any:
+    """Pointer to the vector that begins at an element of a flat array."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [start]), _DOUBLES.as_pointer())
+
+
+@intrinsic
+def load(typing: Any, array: Any, start: Any) -> Any:
+    """Elements start .. start + LANES of a flat contiguous array of floats."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        index = context.cast(builder, args[1], sig.args[1], types.intp)
+        value = builder.load(_place(context, builder, sig.args[0], args[0], index))
+        value.align = 8
+        return value
+
+    return VECTOR(array, start), codegen
+
+
+@intrinsic
+def store(typing: Any, array: Any, start: Any, value: Any) -> Any:
+    """Put a vector into a flat contiguous array of floats from an element on."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        index = context.cast(builder, args[1], sig.args[1], types.intp)
+        builder.store(args[2], _place(context, builder, sig.args[0], args[0], index)).align = 8
+        return context.get_dummy_value()
+
+    return types.void(array, start, value), codegen
+
+
+@intrinsic
+def spread(typing: Any, number: Any) -> Any:
+    """Vector of one float in all lanes."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        nothing = ir.Constant(_DOUBLES, ir.Undefined)
+        first = builder.insert_element(nothing, args[0], ir.Constant(ir.IntType(32), 0))
+        return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+
+    return VECTOR(types.float64), codegen
+
+
+@intrinsic
+def root(typing: Any, value: Any) -> Any:
+    """Square roots of a vector."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.FunctionType(_DOUBLES, [_DOUBLES])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{LANES}f64"), args)
+
+    return VECTOR(value), codegen
