@@ -23,7 +23,8 @@ from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.ambient import AmbientModel
 from creeping.phaseflow.coordinates.base import Model, nodes_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
-from creeping.phaseflow.grid import Grid, Leap
+from creeping.phaseflow.grid import PACKED, Grid, Leap
+from creeping.phaseflow.packing import packed_lanes, with_flags
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
 from creeping.phaseflow.splines import prefilter
 
@@ -56,6 +57,8 @@ class Plan:
         Along u and v, if the grid is refined or thinned.
     reach : float
         Longest horizon over which curvatures are carried, in natural ones; see `curvature_reach`.
+    tolerance : float
+        Of the attenuation over a leap; see `packing`.
     """
 
     horizon: float
@@ -65,6 +68,7 @@ class Plan:
     doublings: int = 0
     least_cells: int = 1
     reach: float = 1.0
+    tolerance: float = 1e-9
 
 
 def curvature_reach(tolerance: float) -> float:
@@ -83,13 +87,18 @@ def build_direct(body: Surface, model: Model, plan: Plan, progress: Progress, *,
     progress(f"tracing {len(nodes)} nodes to {now:g}")
     curved = isinstance(model, CompiledModel) and plan.horizon <= 1.01 * plan.reach * natural_horizon(body)
     values = _traced(body, model, nodes, now, plan.carry_jacobi, curved, rtol)
-    leap = _leap(values, plan.grid, now, model, single=plan.single and doublings == 0)
+    leap = _leap(values, plan.grid, now, model, single=plan.single and doublings == 0, whole=doublings == 0)
     for k in range(doublings):
         assert isinstance(model, CompiledModel)
         progress(f"doubling to {2 * now:g}")
         values = model.doubled(plan.grid, leap, nodes)
         now *= 2
-        leap = _leap(values, plan.grid, now, model, single=plan.single and k == doublings - 1)
+        last = k == doublings - 1
+        leap = _leap(values, plan.grid, now, model, single=plan.single and last, whole=last)
+    if leap.is_packed:
+        assert isinstance(model, CompiledModel)
+        progress("judging the attenuation of cells")
+        leap = with_flags(model, plan.grid, leap, plan.tolerance)
     parameters = {"method": "direct", "doublings": doublings}
     return PhaseMap(body, model, plan.grid, (leap,), UNMEASURED, None, parameters)
 
@@ -155,17 +164,25 @@ def _leap(
     model: Model,
     *,
     single: bool = False,
+    whole: bool = False,
 ) -> Leap:
-    """Spline coefficients of displacements, Jacobi matrices and curvatures at the nodes."""
+    """Spline coefficients of displacements, Jacobi matrices and curvatures at the nodes; packed, if ``whole``."""
     values, matrices, curvatures = quantities
     kind = np.float32 if single else np.float64
     # means go out of what is stored in single precision, so that its rounding is relative to what varies
     apart = single and isinstance(model, CompiledModel)
     centre = values.mean(axis=0) if apart else np.zeros(model.lanes)
     matrix = matrices.mean(axis=0) if apart and len(matrices) else np.array([1.0, 0.0, time, 1.0])
+    lanes = None
+    if whole and len(curvatures) and isinstance(model, CompiledModel):
+        lanes = packed_lanes(model, values, matrices, curvatures, time)
+    if lanes is not None:
+        matrices, matrix = lanes, lanes.mean(axis=0) if apart else np.zeros(PACKED)
     if model.name == "octant":
         # these change sign with the mirrors
         centre[1:3] = 0.0
+        if lanes is not None:
+            matrix[:2] = 0.0
 
     def fitted(quantity: FloatArray) -> Any:
         if not len(quantity):
@@ -173,7 +190,10 @@ def _leap(
         nodes = quantity.reshape(model.charts, *grid.nodes, quantity.shape[1])
         return np.asarray(prefilter(nodes, grid.degree, grid.periodic), dtype=kind)
 
-    return Leap(time, fitted(values - centre), centre, fitted(matrices - matrix), matrix, fitted(curvatures))
+    # no cell is trusted before it is judged
+    flagged = np.ones((model.charts if lanes is not None else 0, *grid.sides), dtype=np.uint8)
+    state, jacobi = fitted(values - centre), fitted(matrices - matrix)
+    return Leap(time, state, centre, jacobi, matrix, fitted(curvatures), flagged)
 
 
 def measure(flow: PhaseMap, *, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> ErrorEstimate:

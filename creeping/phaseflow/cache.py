@@ -15,7 +15,8 @@ from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.arguments import checked_body, folder_path
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model, model_of
-from creeping.phaseflow.grid import Grid, Leap
+from creeping.phaseflow.coordinates.rotation import CompiledModel
+from creeping.phaseflow.grid import PACKED, Grid, Leap
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
 from creeping.storage.folder import SCHEMA, content_digest, open_array, private_folder, read_manifest
 
@@ -77,6 +78,7 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
                 open_array(folder, f"jacobi-{k}.npy", content),
                 np.array([float(value) for value in content["matrices"][k]]),
                 open_array(folder, f"curvature-{k}.npy", content),
+                open_array(folder, f"flagged-{k}.npy", content),
             )
             for k, time in enumerate(content["times"])
         )
@@ -108,9 +110,13 @@ def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Mode
     whole = (model.charts, *grid.sides)
     for leap in leaps:
         fits = leap.state.shape == (*whole, model.lanes) and grid.degree in (3, 5)
-        fits &= leap.centre.shape == (model.lanes,) and leap.matrix.shape == (4,)
+        fits &= leap.centre.shape == (model.lanes,)
         fits &= leap.curvature.shape in ((*whole, 8), (0, *grid.sides, 8)) and leap.curvature.dtype == leap.state.dtype
-        fits &= leap.jacobi.shape in ((*whole, 4), (0, *grid.sides, 4)) and leap.jacobi.dtype == leap.state.dtype
+        packed = leap.is_packed and leap.has_curvature and isinstance(model, CompiledModel)
+        shapes = ((*whole, PACKED),) if packed else ((*whole, 4), (0, *grid.sides, 4))
+        fits &= leap.jacobi.shape in shapes and leap.jacobi.dtype == leap.state.dtype
+        fits &= leap.matrix.shape == leap.jacobi.shape[4:]
+        fits &= leap.flagged.shape == (whole if packed else (0, *grid.sides)) and leap.flagged.dtype == np.uint8
         if not fits:
             raise StoredMapError(f"{folder}: tables {leap.state.shape} do not fit grid {grid.nodes}; rebuild the map")
 

@@ -10,6 +10,9 @@ from creeping.geometry.surface import Surface
 MARGIN = 2
 """Nodes of a chart beyond each edge of its unit square: every point finds a chart two grid points from the edge."""
 
+PACKED = 8
+"""Lanes of a table that holds displacement, Jacobi matrix and attenuation."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -53,12 +56,17 @@ class Leap:
         Coefficients of the displacement less its mean.
     centre : (lanes,)
         The mean: float32 coefficients resolve what is left of it.
-    jacobi : (charts, nu, nv, na, 4), of the same type
-        Coefficients of M less ``matrix``; no charts if the map does not carry M.
-    matrix : (4,)
-        Mean of (M11, M21, M12, M22); (1, 0, t, 1) if there is none.
+    jacobi : (charts, nu, nv, na, 4 or 8), of the same type
+        Coefficients of M less ``matrix``; no charts if the map does not carry M. Packed they are of (q1, q2, q3, M11,
+        M21, M12, M22, A): the displacement is that of ``state`` again, of a rotation the vector part of its quaternion
+        with q0 > 0, and A the attenuation integral over the leap.
+    matrix : (4,) or (8,)
+        Mean of what ``jacobi`` is of; (1, 0, t, 1) if there is none.
     curvature : (charts, nu, nv, na, 8), of the same type
         Coefficients of c^(3/2) kappa_n at Chebyshev times (`attenuation`); no charts if the map does not carry it.
+    flagged : (charts, nu, nv, na) of uint8
+        By the number of a stencil's first coefficient, whether A is not good enough there, and the curvature is to be
+        taken; no charts unless packed.
     """
 
     time: float
@@ -67,11 +75,17 @@ class Leap:
     jacobi: Any
     matrix: FloatArray
     curvature: Any
+    flagged: Any
 
     def __post_init__(self) -> None:
         # read-only like the arrays of a stored map: kernels are compiled for one kind of array
-        for table in (self.state, self.jacobi, self.curvature):
+        for table in (self.state, self.jacobi, self.curvature, self.flagged):
             table.flags.writeable = False
+
+    @property
+    def is_packed(self) -> bool:
+        """Whether ``jacobi`` has the displacement and the attenuation too."""
+        return bool(self.jacobi.shape[-1] == PACKED)
 
     @property
     def has_jacobi(self) -> bool:
@@ -86,7 +100,7 @@ class Leap:
     @property
     def nbytes(self) -> int:
         """Memory of the tables."""
-        return int(self.state.nbytes + self.jacobi.nbytes + self.curvature.nbytes)
+        return int(self.state.nbytes + self.jacobi.nbytes + self.curvature.nbytes + self.flagged.nbytes)
 
 
 def least_cells(body: Surface) -> int:

@@ -146,7 +146,7 @@ class PhaseMap(Drawn):
         """Of the contents of the tables; taken once, they are not to be changed."""
         tables = hashlib.blake2b(digest_size=16)
         for leap in self.leaps:
-            for array in (leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature):
+            for array in (leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature, leap.flagged):
                 tables.update(np.ascontiguousarray(array).view(np.uint8).reshape(-1).data)
         return tables.hexdigest()
 
@@ -326,4 +326,5 @@ class PhaseMap(Drawn):
         states = {f"state-{k}.npy": leap.state for k, leap in enumerate(self.leaps)}
         jacobis = {f"jacobi-{k}.npy": leap.jacobi for k, leap in enumerate(self.leaps)}
         curvatures = {f"curvature-{k}.npy": leap.curvature for k, leap in enumerate(self.leaps)}
-        return write_folder(folder, content, states | jacobis | curvatures)
+        flagged = {f"flagged-{k}.npy": leap.flagged for k, leap in enumerate(self.leaps)}
+        return write_folder(folder, content, states | jacobis | curvatures | flagged)

@@ -16,7 +16,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError, StoredMapError
 
-SCHEMA = 2
+SCHEMA = 3
 MANIFEST = "manifest.json"
 _MAX_MANIFEST = 1_000_000
 
@@ -150,7 +150,7 @@ def open_array(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
     """
     path, entry = folder / name, content["files"][name]
     shape = tuple(int(n) for n in entry["shape"])
-    kind = {"float32": np.float32, "float64": np.float64}[entry["type"]]
+    kind = {"float32": np.float32, "float64": np.float64, "uint8": np.uint8}[entry["type"]]
     try:
         # the header of a .npy file takes one or two blocks of 64 bytes; a longer file is not what was written
         extra = path.stat().st_size - np.dtype(kind).itemsize * int(np.prod(shape, dtype=object))

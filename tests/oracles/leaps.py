@@ -34,6 +34,12 @@ def carry_jacobi_and_curvatures(grid, leap, chart, place, states, out):
     lanes = states.shape[1]
     if lanes > 6:
         m = evaluate(leap.jacobi, chart, place, grid.degree) + leap.matrix
+        trusted = np.zeros(len(states), dtype=bool)
+        if leap.is_packed:
+            cell = np.floor(place).astype(int)
+            cells = np.array(leap.jacobi.shape[1:4]) - grid.degree
+            trusted = leap.flagged[chart, *np.clip(cell, 0, cells - 1).T] == 0
+            m, attenuation = m[:, 3:7], m[:, 7]
         for first in (6, 8):
             i, j = states[:, first], states[:, first + 1]
             out[:, first] = m[:, 0] * i + m[:, 2] * j
@@ -41,7 +47,11 @@ def carry_jacobi_and_curvatures(grid, leap, chart, place, states, out):
     if lanes > 10:
         out[:, 10:] = states[:, 10:]
         values = evaluate(leap.curvature, chart, place, grid.degree)
+        creeping = np.isinf(states[:, 11])
         extend(values, leap.time, np.zeros(len(states)), out[:, 10], out[:, 11])
+        if leap.is_packed:
+            quick = trusted & creeping
+            out[quick, 10], out[quick, 11] = states[quick, 10] + attenuation[quick], np.inf
 
 
 def leap(flow, states):
@@ -58,6 +68,10 @@ def leap(flow, states):
     scale, shift = model.placement(grid)
     place = shift + scale * located
     d = evaluate(table.state, chart, place, grid.degree) + table.centre
+    if table.is_packed and states.shape[1] > 6:
+        q = (evaluate(table.jacobi, chart, place, grid.degree) + table.matrix)[:, :3]
+        first = np.sqrt(1 - np.sum(q**2, axis=1, keepdims=True))
+        d = np.concatenate([q, 0 * first] if model.name == "angles" else [first, q], axis=1)
     out = np.empty_like(states)
     out[:, :3], out[:, 3:6] = move(model, inner, d)
     carry_jacobi_and_curvatures(grid, table, chart, place, states, out)

@@ -35,7 +35,8 @@ def test_round_trip(original, folder):
     x, p = [0, 0, 0.6], [1.0, 1.0, 0]
     for a, b in zip(loaded.flow(x, p, 1.3), original.flow(x, p, 1.3), strict=True):
         np.testing.assert_array_equal(a, b)
-    assert sorted(f.name for f in folder.iterdir()) == ["curvature-0.npy", "jacobi-0.npy", MANIFEST, "state-0.npy"]
+    tables = ["curvature-0.npy", "flagged-0.npy", "jacobi-0.npy", MANIFEST, "state-0.npy"]
+    assert sorted(f.name for f in folder.iterdir()) == tables
     assert not list(folder.parent.glob(".map-*"))
 
 

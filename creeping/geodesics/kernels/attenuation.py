@@ -50,27 +50,29 @@ def extend(values, rules, time, now, a, sampled, count):
     sampling, searching, points, weights, nodes = rules
     gauss = points.shape[0]
     least, rows = sampled[gauss + 2], sampled[gauss + 3 : gauss + 11]
+    # whole vectors of rays, and no more: a leap may need it of a few
+    width = min(BLOCK, (count + 7) // 8 * 8)
     # by rows: reading every eighth number would be what takes the time
-    for i in range(BLOCK):
+    for i in range(width):
         for k in range(8):
             rows[k, i] = values[8 * i + k]
-    for i in range(BLOCK):
+    for i in range(width):
         least[i] = 1e300
     for g in range(gauss + 2):
         row = sampled[g]
         c = sampling[g]
         c0, c1, c2, c3, c4, c5, c6, c7 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
         v = rows.reshape(-1)
-        for i in range(BLOCK):
+        for i in range(width):
             total = c0 * v[i] + c1 * v[BLOCK + i] + c2 * v[2 * BLOCK + i] + c3 * v[3 * BLOCK + i]
             total += c4 * v[4 * BLOCK + i] + c5 * v[5 * BLOCK + i] + c6 * v[6 * BLOCK + i] + c7 * v[7 * BLOCK + i]
             row[i] = total
-        for i in range(BLOCK):
+        for i in range(width):
             least[i] = min(least[i], row[i])
     for g in range(gauss):
-        two_thirds(sampled[g], weights[g] * time)
+        two_thirds(sampled[g, :width], weights[g] * time)
     for g in range(1, gauss):
-        for i in range(BLOCK):
+        for i in range(width):
             sampled[0, i] += sampled[g, i]
     for i in range(count):
         if a[1, i] == math.inf:

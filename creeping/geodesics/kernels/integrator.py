@@ -93,7 +93,7 @@ def _attenuation_rate(g, kf):
 
 @njit(**options)
 def two_thirds(values, factor):
-    """Replace each value v (BLOCK,) by factor max(v, 0)^(2/3), to rounding.
+    """Replace each value v (n,), n <= BLOCK, by factor max(v, 0)^(2/3), to rounding.
 
     v^(-1/3) by Newton steps y <- y (4 - v y^3)/3 from the exponent and mantissa divided by -3 as one integer; no call
     of pow, which does not vectorise.
@@ -101,10 +101,10 @@ def two_thirds(values, factor):
     bits = values.view(np.int64)
     guess = np.empty(BLOCK, np.int64)
     root = guess.view(np.float64)
-    for i in range(BLOCK):
+    for i in range(values.shape[0]):
         # 0x553e... is (4/3) of the bits of 1.0, tuned for the smallest first error
         guess[i] = 6142571428571428864 - np.int64(bits[i] * 0.3333333333333333)
-    for i in range(BLOCK):
+    for i in range(values.shape[0]):
         v = values[i] if values[i] > 1e-30 else 1.0
         y = root[i] if values[i] > 1e-30 else 1.0
         y *= (4.0 - v * y * y * y) * (1 / 3)

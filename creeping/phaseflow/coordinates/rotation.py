@@ -60,6 +60,10 @@ class CompiledModel:
         """Scale and shift from the coordinates of ``locate`` to those of the grid."""
         raise NotImplementedError
 
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`."""
+        raise NotImplementedError
+
     def states(self, coordinates: FloatArray) -> FloatArray:
         """See `Model`."""
         from creeping.phaseflow.kernels.nodes import to_body
@@ -218,7 +222,7 @@ class AngleModel(CompiledModel):
 
 def _tables(leap: Leap) -> tuple[Any, ...]:
     """Arrays of a leap in the order of the kernels."""
-    return leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature
+    return leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature, leap.flagged
 
 
 def exit_table(body: Surface, model: "RotationModel") -> FloatArray:

@@ -9,9 +9,17 @@ cache line.
 import numpy as np
 from numba import njit
 
-from creeping.geodesics.kernels.attenuation import SAMPLES, extend
+from creeping.geodesics.kernels.attenuation import SAMPLES
 from creeping.kernels.block import BLOCK, aligned, options
-from creeping.phaseflow.kernels.composition import WORK, from_coordinates, leap_block, place_block, to_coordinates
+from creeping.phaseflow.kernels.composition import (
+    INTERPOLATED,
+    WORK,
+    extend_some,
+    from_coordinates,
+    leap_block,
+    place_block,
+    to_coordinates,
+)
 
 
 @njit(**options)
@@ -30,8 +38,9 @@ def flow_ordered(
     extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
     x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
     m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
-    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
-    place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((INTERPOLATED, 4))
+    place, cell, bent = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    a = aligned(2, BLOCK)
     odd = np.zeros(BLOCK)
     flat, order = ray.reshape(-1), np.empty(n, np.int64)
     # a whole number times the next number above 1/na never falls below the quotient, and division is slow
@@ -75,9 +84,10 @@ def flow_ordered(
                     at = mine[min(i, count - 1)]
                     for k in range(more):
                         m[k, i] = carried[at, k]
-                creeping = leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d)
-                if creeping > 0:
-                    extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
+                some = leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d, bent)
+                if some > 0:
+                    values = d[2 * BLOCK : 4 * BLOCK].reshape(-1)
+                    extend_some(values, rules, time, now, m, bent, some, a, sampled)
                 place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
                 _put(flat, mine, r, uva, place, work[7], inverse, bucket, ends)
                 for i in range(count):

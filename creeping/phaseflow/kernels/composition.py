@@ -5,6 +5,8 @@ is a table of their displacement; a ray is converted to the model once, is compo
 output. FOLDED are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes.
 """
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -14,11 +16,13 @@ from creeping.kernels.splines import cells_and_fractions, weights
 from creeping.phaseflow.kernels import angles as _angles
 from creeping.phaseflow.kernels import rotation as _rotations
 from creeping.phaseflow.kernels import surface_table as _surface_table
-from creeping.phaseflow.kernels.stencil import interpolate, interpolate_where
+from creeping.phaseflow.kernels.stencil import interpolate, interpolate_some
 
 ROTATION, ANGLES, FOLDED = 0, 1, 2
 WORK = 48
 """Rows of work space for a block."""
+INTERPOLATED = 6 * BLOCK
+"""Rows of four of what a block interpolates: displacements, matrices, curvatures, and packed lanes."""
 KEPT = 10
 """Rows that a block keeps between two calls: coordinates, Jacobi matrix, attenuation, time of detachment."""
 
@@ -86,29 +90,72 @@ def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
 
 
 @njit(**options)
-def leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d):
-    """Move r (4, BLOCK) and the Jacobi matrices, m (6, BLOCK), by one leap, their stencils being placed.
+def leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d, mine):
+    """Move r (4, BLOCK), Jacobi matrices and attenuation, m (6, BLOCK), by one leap, their stencils being placed.
 
-    ``leap`` is (table, centre, jacobi, matrix, curvature). d (4 BLOCK, 4) keeps what is interpolated: displacements,
-    matrices, and for extras = 2 the curvatures of rays that have not detached, row 5 of m; ``odd`` says what was
-    reflected. Returns the number of these rays.
+    ``leap`` is (table, centre, jacobi, matrix, curvature, flagged). d (D, 4) keeps what is interpolated: displacements,
+    matrices, and for extras = 2 the curvatures of rays that have not detached, row 5 of m, and whose attenuation the
+    leap does not have: mine[:n] of them, n is returned; ``odd`` says what was reflected.
     """
-    table, centre, jacobi, matrix, curvature = leap
+    table, centre, jacobi, matrix, curvature, flagged = leap
     rf, df, ef = r.reshape(-1), d[:BLOCK].reshape(-1), d[BLOCK : 2 * BLOCK].reshape(-1)
     wu, wv, wa = w[0:6].reshape(-1), w[6:12].reshape(-1), w[12:18].reshape(-1)
     weights(uva[0], degree, wu)
     weights(uva[1], degree, wv)
     weights(uva[2], degree, wa)
-    interpolate(table, degree, place, wu, wv, wa, count, df)
+    packed = extras > 0 and jacobi.shape[4] == 8
+    pf = d[4 * BLOCK :].reshape(-1)
+    if packed:
+        interpolate(jacobi, degree, place, wu, wv, wa, count, pf)
+        _unpack(kind, pf, matrix, centre, df, ef)
+    else:
+        interpolate(table, degree, place, wu, wv, wa, count, df)
+        if extras:
+            interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
     if kind == FOLDED:
         _unfold(df, odd)
     move(kind, rf, df, centre)
     if extras:
-        interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
-        _carry_jacobi(ef, matrix, m.reshape(-1))
+        _carry_jacobi(ef, matrix[3:7] if packed else matrix, m.reshape(-1))
+    some = 0
     if extras > 1:
-        return interpolate_where(curvature, degree, place, wu, wv, wa, m[5], count, d[2 * BLOCK :].reshape(-1))
-    return 0
+        flags = flagged.reshape(-1)
+        for i in range(count):
+            if m[5, i] == math.inf:
+                if packed and flags[place[i]] == 0:
+                    m[4, i] += matrix[7] + pf[8 * i + 7]
+                else:
+                    mine[some] = i
+                    some += 1
+        interpolate_some(curvature, degree, place, wu, wv, wa, mine, some, d[2 * BLOCK : 4 * BLOCK].reshape(-1))
+    return some
+
+
+@njit(**options)
+def extend_some(values, rules, time, now, m, mine, some, a, sampled):
+    """Carry A and the time of detachment, rows 4 and 5 of m, of the rays mine[:some]; a (2, BLOCK) is work space."""
+    for j in range(some):
+        a[0, j], a[1, j] = m[4, mine[j]], m[5, mine[j]]
+    for j in range(some, BLOCK):
+        a[1, j] = 0.0
+    extend(values, rules, time, now, a, sampled, some)
+    for j in range(some):
+        m[4, mine[j]], m[5, mine[j]] = a[0, j], a[1, j]
+
+
+@njit(**options)
+def _unpack(kind, packed, mean, centre, d, e):
+    """Displacements less ``centre``, d (BLOCK, 4), and matrices, e (BLOCK, 4), of packed lanes (BLOCK, 8); all flat."""
+    for i in range(BLOCK):
+        x, y, z = packed[8 * i] + mean[0], packed[8 * i + 1] + mean[1], packed[8 * i + 2] + mean[2]
+        if kind == ANGLES:
+            d[4 * i], d[4 * i + 1], d[4 * i + 2], d[4 * i + 3] = x - centre[0], y - centre[1], z - centre[2], -centre[3]
+        else:
+            w = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
+            d[4 * i], d[4 * i + 1] = w - centre[0], x - centre[1]
+            d[4 * i + 2], d[4 * i + 3] = y - centre[2], z - centre[3]
+        e[4 * i], e[4 * i + 1] = packed[8 * i + 3], packed[8 * i + 4]
+        e[4 * i + 2], e[4 * i + 3] = packed[8 * i + 5], packed[8 * i + 6]
 
 
 @njit(**options)
@@ -129,10 +176,11 @@ def flow(
 ):  # fmt: skip
     """Compose the map counts[0], then counts[1], ... times on states (n, 6, 10 or 12) into out (n, m, the same).
 
-    ``leap`` is (table, centre, jacobi, matrix, curvature): table (charts, nu, nv, na, 4) holds the displacement less
-    its mean ``centre``, jacobi the Jacobi matrix less its mean ``matrix`` (4,), curvature (..., 8) that of
-    `geodesics.kernels.attenuation`, as are the ``rules``. ``there`` takes the model to the body, ``back`` the body to
-    the model; ``surface_table`` (6 or 0, n, n, 4) is a table of x(u, v) that replaces ``there``.
+    ``leap`` is (table, centre, jacobi, matrix, curvature, flagged), as of `phaseflow.grid.Leap`: table (charts, nu, nv,
+    na, 4) holds the displacement less its mean ``centre``, jacobi (..., 4 or 8) the Jacobi matrix less its mean
+    ``matrix``, or all three, curvature (..., 8) that of `geodesics.kernels.attenuation`, as are the ``rules``.
+    ``there`` takes the model to the body, ``back`` the body to it; ``surface_table`` (6 or 0, n, n, 4) is a table of
+    x(u, v) that replaces ``there``.
 
     Returns whether all is done. After ``budget`` leaps of a block it is not, and is to be called again with the same
     arguments: ``reached`` (5,), zeros at first, keeps ray, output and leap, the time, and whether it is on its way;
@@ -142,8 +190,9 @@ def flow(
     x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
     # Jacobi matrix, attenuation, time of detachment
     m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
-    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((4 * BLOCK, 4))
-    place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((INTERPOLATED, 4))
+    place, cell, mine = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    a = aligned(2, BLOCK)
     extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
     spent, again = 0, reached[4] > 0.0
     for start in range(int(reached[0]), n, BLOCK):
@@ -171,9 +220,10 @@ def flow(
                     return False
                 spent += 1
                 place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
-                creeping = leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d)
-                if creeping > 0:
-                    extend(d[2 * BLOCK :].reshape(-1), rules, time, now, m[4:], sampled, count)
+                some = leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d, mine)
+                if some > 0:
+                    bent = d[2 * BLOCK : 4 * BLOCK].reshape(-1)
+                    extend_some(bent, rules, time, now, m, mine, some, a, sampled)
                 now += time
             from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
             for i in range(count):

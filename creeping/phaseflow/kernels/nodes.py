@@ -8,6 +8,7 @@ from numba import njit
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.phaseflow.kernels.composition import (
     ANGLES,
+    INTERPOLATED,
     WORK,
     from_coordinates,
     leap_block,
@@ -19,10 +20,13 @@ from creeping.phaseflow.kernels.composition import (
 
 @njit(**options)
 def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curvatures):
-    """Displacement (n, 4), Jacobi matrix (n or 0, 4) and curvatures (n or 0, 16) of two leaps from the nodes (n, 4)."""
-    r, m, d = aligned(4, BLOCK), aligned(6, BLOCK), np.zeros((4 * BLOCK, 4))
+    """Displacement (n, 4), Jacobi matrix (n or 0, 4) and curvatures (n or 0, 16) of two leaps from the nodes (n, 4).
+
+    The leap is not packed.
+    """
+    r, m, d = aligned(4, BLOCK), aligned(6, BLOCK), np.zeros((INTERPOLATED, 4))
     work, uva, w = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK)
-    place, cell = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    place, cell, mine = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     # no ray detaches from a node
     m[5, :] = math.inf
     n = nodes.shape[0]
@@ -38,10 +42,10 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
             whole[0, i], whole[1, i], whole[2, i], whole[3, i] = 0.0 if kind == ANGLES else 1.0, 0.0, 0.0, 0.0
         for half in range(2):
             place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
-            leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d)
+            leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d, mine)
             move(kind, whole.reshape(-1), d[:BLOCK].reshape(-1), leap[1])
             if extras > 1:
-                kappa = d[2 * BLOCK :].reshape(BLOCK, 8)
+                kappa = d[2 * BLOCK : 4 * BLOCK].reshape(BLOCK, 8)
                 for i in range(count):
                     for k in range(8):
                         curvatures[start + i, 8 * half + k] = kappa[i, k]

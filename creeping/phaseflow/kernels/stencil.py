@@ -68,21 +68,15 @@ def interpolate(table, degree, first, wu, wv, wa, count, out):
 
 
 @njit(**options)
-def interpolate_where(table, degree, first, wu, wv, wa, end, count, out):
-    """Eight-lane sums of those of the first ``count`` rays whose time ``end`` is infinite; see `interpolate`.
-
-    Returns their number.
-    """
+def interpolate_some(table, degree, first, wu, wv, wa, mine, some, out):
+    """Eight-lane sums of the rays mine[:some] of a block, one after the other in ``out``; see `interpolate`."""
     row = table.shape[3]
-    su, sv, some = 8 * row * table.shape[2], 8 * row, 0
+    su, sv = 8 * row * table.shape[2], 8 * row
     if degree == 3:
-        for i in range(count):
-            if end[i] == math.inf:
-                _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
-                some += 1
+        for j in range(some):
+            i = mine[j]
+            _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
     else:
-        for i in range(count):
-            if end[i] == math.inf:
-                _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
-                some += 1
-    return some
+        for j in range(some):
+            i = mine[j]
+            _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)

@@ -201,7 +201,14 @@ def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
                 continue
             doublings = doublings_of(horizon, natural, cost)
             plan = Plan(
-                horizon, grid, single, spec.carry_jacobi, doublings, least_cells(body), curvature_reach(tolerance)
+                horizon,
+                grid,
+                single,
+                spec.carry_jacobi,
+                doublings,
+                least_cells(body),
+                curvature_reach(tolerance),
+                tolerance,
             )
             leap = leap_seconds(degree, nbytes, carry_jacobi=spec.carry_jacobi)
             build = build_seconds(plan, model, cost) + 2 * _budget(spec, cost)
