@@ -257,7 +257,8 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             f"stated error: {summary['error_db_median']:.2g} dB in the median, "
             f"{summary['error_db_95']:.2g} dB in 95 of 100 values"
         )
-    served = f"{summary['by_currents']} of {summary['values']} values by currents, the others by rays"
+    others = "rays" if summary["otherwise_by"] == "rays" else "rays and physical optics"
+    served = f"{summary['by_currents']} of {summary['values']} values by currents, the others by {others}"
     rows.append(f"{served}; {summary['unresolved']} unresolved")
     least, largest = summary["validity"]["least_k_rho"], summary["validity"]["largest_transverse"]
     if least is not None and largest is not None:

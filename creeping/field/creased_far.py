@@ -8,15 +8,17 @@ w where the part has specular points and all stand clear of its creases (`creepi
 besides what is beyond the second order of each ray and specular point,
 
     edges      C/(2π) |∫ e^{ik(d - r).x} dl|        lit or part of the outline, and their parts, C of order 1
-    line       1/(2π) |∫ min[κ/(k (1 - d.r)²), (kρ)^(1/3)] e^{ik(d - r).x} dl|, of a conductor 1/(1 - d.r) more
+    line       1/(2π) |∫ min[κ/(k (1 - d.r)²), (kρ)^(1/3)] e^{ik(d - r).x} dl|, of a conductor |d x r|/(1 - d.r) more
     ends       1/(2π) |Σ 2 e^(-ξ Im τ) |J|^(1/2) h e^{ik(d.x0 + s - r.x)}|       rays that end at edges and tips
     tips       1/(4k) each lit one
+    joints     3/2 |f_optics - f_specular| of parts with joints, where specular points serve; a conductor's as if soft
     optics     its next order, κ/(k cos³θᵢ) of each tile
 
 An incremental length of edge radiates about C/(2π) beside what physical optics has of it; the current of physical
 optics starts with a kink at the line, whose end-point contribution is the first under ``line``; the second is the wave
-of the penumbra, ahead. Between the faces of a concave edge the wave is reflected more than once: that is left out, and
-so is everything shed by an edge and scattered again.
+of the penumbra, ahead. That of a conductor starts with a jump, of a current along d, which sends nothing along d.
+Between the faces of a concave edge the wave is reflected more than once: that is left out, and so is everything shed by
+an edge and scattered again.
 
 Sources: [LK59], [KLS56]; Derivations, F3 and F13.
 """
@@ -25,16 +27,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray
-from creeping.field.boundary import Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping.field.boundary import SOFT, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.far_geometry import FarGeometry, far_geometry, merging
-from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
+from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold, strong_coupling
 from creeping.field.far_result import FarField
 from creeping.field.likely_cells import parted
-from creeping.field.optics import lit_tiles, optics_field
+from creeping.field.optics import lit_tiles, optics_field, side_of_tiles
+from creeping.field.reflected import plane_reflection
 from creeping.field.shed_wave import smoothstep
 from creeping.geometry.creased import pieces_of, tiles_of
+from creeping.geometry.kept import kept
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.rays.piece_specular import joined, smooth_parts, some, specular_on_pieces, stand_clear
@@ -45,6 +49,10 @@ from creeping.shadow.occlusion import occluded
 
 WEDGE = 1.0
 """C: what a wedge scatters beside physical optics, times 2π, is of this size but next to its shadow boundaries."""
+JOINTS = 1.5
+"""What joints scatter beside specular points, over what physical optics has of it."""
+STRAIGHT = 1e-6
+"""Curvature, in inverse body sizes, up to which a ray that seems to detach goes straight, as along a generator."""
 PARTS_OF_EDGE = 16
 """Parts of an edge whose waves are added in squares too: stationary points of its phase stand apart."""
 MATTERS = 0.25
@@ -105,13 +113,21 @@ class CreasedParts(Parts):
             (1 - self.in_forward) * np.max(ends, axis=0),
         ]
         self.specular = []
-        tiles = lit_tiles(body, fan.line.direction, wavenumber)
+        side = side_of_tiles(body, wavenumber)
+        # frequencies share them
+        tiles = kept(fan, f"lit tiles {side:g}", lambda: lit_tiles(body, fan.line.direction, side))
         for part in smooth_parts(body):
             clear, points = _clear_points(body, part, fan.line.direction, r, wavenumber)
             share = np.where(clear, self.in_forward, 1.0)
             if points is not None:
                 self.specular.append((points, (1 - share)[points.observer]))
             optics = optics_field(tiles.on(part), r, wavenumber, kinds, self.in_forward)
+            if len(part) > 1 and points is not None:
+                kind = kinds[0] if len(kinds) == 1 else SOFT
+                scalar = (
+                    optics if len(kinds) == 1 else optics_field(tiles.on(part), r, wavenumber, (SOFT,), self.in_forward)
+                )
+                lost.append(JOINTS * (1 - share) * np.abs(scalar.values - self._leading(points, kind)))
             self.reflected += share.reshape(-1, *(1,) * (self.creeping.ndim - 1)) * optics.values
             lost += [share * optics.next_order, share * _line(fan, part, r, wavenumber, self.vector)]
         self.left_out = np.sqrt(np.sum(np.square(lost), axis=0))
@@ -125,6 +141,7 @@ class CreasedParts(Parts):
             wave = isolated_rays(g, self.wavenumber, kind, order)
             waves.append(np.where(share > 0, share * np.where(share > 0, wave, 0.0), 0.0))
         merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
+        merged |= strong_coupling(shed.rays, self.wavenumber, kind)
         first, second = waves
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
@@ -132,6 +149,16 @@ class CreasedParts(Parts):
         self._add_apart(self.creeping, number, shed.observer, wave, off, *normals, merged)
         for points, by in self.specular:
             self._add_specular(number, kind, points, by)
+
+    def _leading(self, points: SpecularPoints, kind: Boundary) -> ComplexArray:
+        """What specular points are in physical optics of a scalar problem, all of each (m,)."""
+        r, d = self.geometry.directions[points.observer], self.incident[points.observer]
+        turns = np.sum(points.principal < 0, axis=1)
+        phase = self.wavenumber * np.sum((d - r) * points.points, axis=1) - 0.5 * np.pi * turns
+        mirror = 0.5 / np.sqrt(np.abs(np.prod(points.principal, axis=1)))
+        out = np.zeros(len(self.geometry.directions), dtype=complex)
+        np.add.at(out, points.observer, mirror * plane_reflection(points.cosine, kind) * np.exp(1j * phase))
+        return out
 
     def unresolved(self) -> BoolArray:
         """Directions in which what is left out matters (m,)."""
@@ -201,6 +228,7 @@ def _line(fan: RayFan, part: tuple[int, ...], observers: FloatArray, k: float, j
     """What physical optics has wrong next to the line on a smooth part of the body (m,), L."""
     d, out = fan.line.direction, np.zeros(len(observers), dtype=complex)
     steep = np.maximum(1 - observers @ d, STEEP)
+    jump = np.linalg.norm(np.cross(observers, d), axis=1) / steep if jumps else 0.0
     for curve in fan.line.curves:
         for start, end, status in curve.arcs:
             if status != "attached" or curve.piece not in part:
@@ -210,7 +238,7 @@ def _line(fan: RayFan, part: tuple[int, ...], observers: FloatArray, k: float, j
             x = curve.at(s)
             kappa = np.maximum(np.interp(np.mod(s, curve.length), curve.arclength, curve.curvature), 0.0)[:, None]
             with np.errstate(divide="ignore"):
-                end_point = kappa / (k * steep**2) + (1 / steep if jumps else 0.0)
+                end_point = kappa / (k * steep**2) + jump
                 size_of = np.minimum(end_point, np.cbrt(k / kappa))
             across = np.linalg.norm(np.cross(x - np.roll(x, 1, axis=0), d), axis=1)
             across[0] = across[1] if len(across) > 1 else 0.0
@@ -221,7 +249,7 @@ def _line(fan: RayFan, part: tuple[int, ...], observers: FloatArray, k: float, j
 def _ended(fan: RayFan, observers: FloatArray, k: float, kind: Boundary) -> FloatArray:
     """What rays that end at edges and tips would give there (m,), L."""
     # those that cannot go on end as well, in the middle of a piece
-    ended = np.isin(fan.status, (*AT_CREASES, RayStatus.NON_SMOOTH))
+    ended = np.isin(fan.status, (*AT_CREASES, RayStatus.NON_SMOOTH)) | _goes_straight(fan)
     if not np.any(ended):
         return np.zeros(len(observers))
     first = np.maximum(fan.curvature[ended, 0], 1e-300)
@@ -232,6 +260,13 @@ def _ended(fan: RayFan, observers: FloatArray, k: float, kind: Boundary) -> Floa
     phase = k * (path[:, None] - fan.points[ended, -1] @ observers.T)
     together = np.abs(np.sum(wave[:, None] * np.exp(1j * phase), axis=0))
     return np.asarray(np.hypot(together, np.sqrt(np.sum(wave**2))) / (2 * np.pi))
+
+
+def _goes_straight(fan: RayFan) -> BoolArray:
+    """Rays (rays,) that detach by rounding, where they come to straight ground beyond a joint, and by theory do not."""
+    after = np.minimum(np.searchsorted(fan.travel_time, fan.detachment), len(fan.travel_time) - 1)
+    bent = np.take_along_axis(fan.curvature, after[:, None], axis=1)[:, 0]
+    return np.asarray((fan.status == RayStatus.DETACHED) & (bent > -STRAIGHT / size(fan.body)))
 
 
 def _between(fan: RayFan, k: float, kind: Boundary) -> float:

@@ -45,6 +45,8 @@ class Echo:
     unresolved, by_currents : (c, n, k) of bool
     sound_speed : float, m/s, optional
         That of light if None.
+    otherwise : str
+        What served where currents did not: "rays", or "rays+optics" of a body with edges, joints or tips.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class Echo:
     unresolved: BoolArray
     by_currents: BoolArray
     sound_speed: float | None = None
+    otherwise: str = "rays"
 
     def __post_init__(self) -> None:
         if self.quantity not in LEVELS:
@@ -131,6 +134,7 @@ class Echo:
             "error_db_95": _finite(np.quantile(known, 0.95)) if known.size else None,
             "unresolved": int(self.unresolved.sum()),
             "by_currents": int(self.by_currents.sum()),
+            "otherwise_by": self.otherwise,
             "values": int(levels.size),
         }
 

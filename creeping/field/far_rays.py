@@ -53,6 +53,8 @@ THIRD, UNSURE = 3.0, 1.5
 are left out, so many times that."""
 AHEAD = 0.1
 """Error of the forward lobe over itself and 1/m̄⁴."""
+STRONG = 0.5
+"""Size of the coupling of polarisations from which its expansion fails."""
 MERGED = (0.38, 0.52)
 """χ between which the fan integral replaces isolated rays."""
 
@@ -81,7 +83,8 @@ def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, 
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if order == 2 and boundary in CROSSED:
             sign, other = CROSSED[boundary]
-            wave = wave + sign * gradient_coupling(rays, wavenumber) * shed_wave(rays, wavenumber, other, order)
+            held = held_coupling(gradient_coupling(rays, wavenumber))
+            wave = wave + sign * held * shed_wave(rays, wavenumber, other, order)
         amplitude = np.sqrt(2 * m1 * m2 / wavenumber / held_rate(rays, m2, passed_fold(geometry)))
         wave = np.where(amplitude > 0, -amplitude * wave * np.exp(1j * phase), 0.0)
     return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
@@ -116,6 +119,26 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
     first, last = rays.transverse
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(1j * np.maximum(first * last, 0.0) / (wavenumber * rays.spreading_rate))
+
+
+def held_coupling(coupling: ComplexArray) -> ComplexArray:
+    """The coupling c held below 1 in size, c/(1 + |c|⁴)^(1/4).
+
+    As the next order of a wave it cannot be larger than what it comes from.
+    """
+    # the size first: its fourth power may not be a number
+    large = np.abs(coupling) > 1
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        out = np.where(large, coupling / np.abs(coupling) / (1 + np.abs(coupling) ** -4.0) ** 0.25, coupling)
+        out = np.where(large, out, coupling / (1 + np.abs(coupling) ** 4) ** 0.25)
+    return np.asarray(np.nan_to_num(out, nan=1.0))
+
+
+def strong_coupling(rays: RayPoints, wavenumber: float, boundary: Boundary) -> BoolArray:
+    """Whether the wave of the other polarisation is too large a part of a ray's for an expansion (n,)."""
+    if boundary not in CROSSED:
+        return np.zeros(rays.alive.shape, dtype=bool)
+    return np.asarray(~(np.abs(gradient_coupling(rays, wavenumber)) < STRONG))
 
 
 class Parts:
@@ -192,6 +215,7 @@ class Parts:
         first, second = (_weighted(share, isolated_rays(g, k, kind, order)) for order in (1, 2))
         # the first zero of J' is the launch point itself, where the forward lobe serves
         merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
+        merged |= strong_coupling(shed.rays, k, kind)
         normals = shed.rays.first_normal, g.shed_normals
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)

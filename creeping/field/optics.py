@@ -24,7 +24,7 @@ from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.polarisation import spherical_frame
 from creeping.field.reflected import plane_reflection
-from creeping.geometry.creased import Tiles, pieces_of, tiles_of
+from creeping.geometry.creased import Tiles, is_convex, pieces_of, tiles_of
 from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.surface import size
 from creeping.shadow.occlusion import occluded
@@ -101,19 +101,19 @@ def _curvatures(body: Any, tiles: Tiles, middles: FloatArray) -> FloatArray:
     return out
 
 
-def lit_tiles(body: Any, direction: FloatArray, wavenumber: float) -> LitTiles:
-    """The tiles that the wave comes to."""
-    share = side_of_tiles(body, wavenumber)
+def lit_tiles(body: Any, direction: FloatArray, share: float) -> LitTiles:
+    """The tiles that the wave comes to, of sides of a share of the body's size (`side_of_tiles`)."""
     tiles = tiles_of(body, share)
     within_budget(1000.0 * len(tiles.corners), f"{len(tiles.corners)} tiles of the body", "lower the wavenumber")
     n = tiles.normals.mean(axis=1)
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     lit = np.flatnonzero(n @ direction < 0)
     middles = tiles.corners[lit].mean(axis=1)
-    asked, of = _representatives(tiles, lit, middles, share * size(body))
-    above = middles[asked] + (OUTWARD + share**2) * size(body) * n[lit][asked]
-    free = ~occluded(body, above, direction)[of]
-    lit, middles = lit[free], middles[free]
+    if not is_convex(body):
+        asked, of = _representatives(tiles, lit, middles, share * size(body))
+        above = middles[asked] + (OUTWARD + share**2) * size(body) * n[lit][asked]
+        free = ~occluded(body, above, direction)[of]
+        lit, middles = lit[free], middles[free]
     some = Tiles(tiles.corners[lit], tiles.normals[lit], tiles.pieces[lit])
     curvature = _curvatures(body, some, middles)
     return LitTiles(direction, some.corners, n[lit], -n[lit] @ direction, curvature, some.pieces, size(body))

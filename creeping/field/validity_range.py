@@ -22,12 +22,10 @@ from creeping.geodesics.integrator import runge_kutta_4, trace_states
 from creeping.geodesics.states import ATTENUATION, P, X, pack
 from creeping.geometry.arguments import one_of
 from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.surface import Surface, normal
 from creeping.rays.fan import RayFan
-from creeping.rays.reach import INCIDENCES, TRIALS, early_length
+from creeping.rays.reach import early_length, trial_points
 from creeping.shadow.attachment import LaunchPoints, evenly_chosen
-from creeping.shadow.many import shadow_lines
 
 EARLY = 1.0
 """xi up to which a ray matters."""
@@ -157,7 +155,7 @@ def launch_validity(body: Surface, launch: LaunchPoints) -> tuple[FloatArray, Fl
 
 
 def body_validity(body: Surface, *, wavenumber: float) -> Validity:
-    """The worse of both numbers over INCIDENCES evenly spread incidences; NaN if none launches a ray.
+    """The worse of both numbers over twelve evenly spread incidences; NaN if none launches a ray.
 
     Examples
     --------
@@ -166,7 +164,7 @@ def body_validity(body: Surface, *, wavenumber: float) -> Validity:
     54.0
     """
     k = checked(wavenumber, 2)
-    launch = shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch
+    launch = trial_points(body)
     least, largest = validities(body, launch, early_length(body, k), (k,))
     known = np.isfinite(least)
     return (

@@ -43,7 +43,10 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo") -> None:
     name, unit = LEVELS[echo.quantity]
     words = COLUMNS | {"level_db": f"{name}, {unit}"}
     words |= {f"{part}_{axis}_m": f"{part} part of f" for part in echo.parts for axis in ("re", "im")}
-    words |= {"unresolved": "1 where an expansion fails or the error is large", "method": "rays or currents"}
+    words |= {
+        "unresolved": "1 where an expansion fails or the error is large",
+        "method": "rays, currents, or rays+optics of a body with edges, joints or tips",
+    }
     hertz = echo.hertz
     with written_aside(path) as aside, open(aside, "w", encoding="utf-8", newline="\n") as stream:
         stream.writelines(f"# {key}: {text}\n" for key, text in words.items() if text)
@@ -61,7 +64,7 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo") -> None:
             row += [low[at], high[at], phase[at], total[at].real, total[at].imag, echo.error[at]]
             for part in echo.parts.values():
                 row += [part[at].real, part[at].imag]
-            row += [echo.unresolved[at].astype(int), "currents" if echo.by_currents[at] else "rays"]
+            row += [echo.unresolved[at].astype(int), "currents" if echo.by_currents[at] else echo.otherwise]
             stream.write(",".join(map(_text, row)) + "\n")
 
 

@@ -114,6 +114,7 @@ def _echo(echo: Echo) -> tuple[dict[str, Any], dict[str, str]]:
         "level_high": high,
         "unresolved": echo.unresolved,
         "by_currents": echo.by_currents,
+        "otherwise_by": echo.otherwise,
     }
     if echo.incidence is not None:
         content["incidence"] = np.array(echo.incidence)

@@ -34,15 +34,18 @@ class SurfaceReport:
     Attributes
     ----------
     checks : tuple of Check
-    genus : int
-        Handles of the body; -1 of a body with creases, whose triangles need not fit.
+    genus : int or None
+        Handles of the body; None of a body with creases, whose triangles need not fit.
     area : float
         L^2, of a triangulation: a few digits.
+    pieces : int
+        Smooth pieces that bound it.
     """
 
     checks: tuple[Check, ...]
-    genus: int
+    genus: int | None
     area: float
+    pieces: int = 1
 
     @property
     def ok(self) -> bool:
@@ -57,7 +60,8 @@ class SurfaceReport:
 
     def __repr__(self) -> str:
         rows = [f"  {'ok ' if c.ok else 'BAD'} {c.name}: {c.worst:.2g} (limit {c.limit:.2g})" for c in self.checks]
-        return "\n".join([f"SurfaceReport(genus {self.genus}, area {self.area:.4g} L^2)", *rows])
+        made = f"{self.pieces} smooth pieces" if self.genus is None else f"genus {self.genus}"
+        return "\n".join([f"SurfaceReport({made}, area {self.area:.4g} L^2)", *rows])
 
 
 def check_surface(body: Surface) -> SurfaceReport:
@@ -128,7 +132,7 @@ def _creased_report(body: Any) -> SurfaceReport:
                             "mend tiles()"))  # fmt: skip
         checks += [Check(f"piece {number}: {c.name}", c.worst, c.limit, c.remedy) for c in _derivative_checks(piece, x)]
     checks.append(Check("share of points where F has the wrong sign outside or inside", out, 0.01, "mend level()"))
-    return SurfaceReport(checks=tuple(checks), genus=-1, area=area)
+    return SurfaceReport(checks=tuple(checks), genus=None, area=area, pieces=len(pieces))
 
 
 def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:

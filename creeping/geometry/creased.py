@@ -9,6 +9,7 @@ Sources: Derivations, R1.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
@@ -20,6 +21,8 @@ SAMPLE = 0.1
 """Longest sides of the triangles that samples of a body come from, in its sizes."""
 AHEAD = 1e-12
 """δ, in body sizes: some digits above rounding."""
+CONVEX = 1e-7
+"""Depth below the convex hull, in body sizes, up to which a corner of a triangle lies on it."""
 KINDS = ("edge", "joint", "tip", "seam")
 SMOOTH = ("joint", "seam")
 """Creases across which the normal does not jump: rays and lines go on there."""
@@ -104,6 +107,26 @@ def tiles_of(body: Any, share: float) -> Tiles:
         return Tiles(np.asarray(corners, float), np.asarray(normals, float), np.asarray(pieces, np.int64))
 
     return kept(body, f"tiles {share:g}", made)
+
+
+def is_convex(body: Any) -> bool:
+    """Whether all corners of the triangles of a body with creases lie on their convex hull; asked once.
+
+    Nothing on a convex body hides another part of it.
+    """
+
+    def asked() -> bool:
+        corners = np.unique(tiles_of(body, SAMPLE).corners.reshape(-1, 3), axis=0)
+        hull = ConvexHull(corners)
+        block = max(1, 4_000_000 // len(hull.equations))
+        # distances of all points inward from their nearest plane
+        depth = [
+            -np.max(corners[k : k + block] @ hull.equations[:, :3].T + hull.equations[:, 3], axis=1)
+            for k in range(0, len(corners), block)
+        ]
+        return bool(np.max(np.concatenate(depth)) < CONVEX * size(body))
+
+    return kept(body, "is convex", asked)
 
 
 def drawn_mesh(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:

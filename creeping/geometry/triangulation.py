@@ -7,7 +7,7 @@ oriented by construction and follows the topology of F at the grid's resolution,
 Sources: [G98], [JLSW02]; Derivations, B8.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,9 @@ from creeping.geometry.surface import step_onto
 
 MAX_POINTS = 12_000_000
 """Grid points of the finest triangulation."""
+OTHERS = (0.94, 0.88, 0.81)
+"""Shares of the cells that are tried where more would be too many: a grid may meet a saddle just so that its triangles
+are not closed, and another does not."""
 LARGEST = 1e40
 """Extent of a body, and inverse of the least one, beyond which powers of lengths leave the range of numbers."""
 
@@ -138,21 +141,29 @@ def quadrilaterals(
 ) -> tuple[FloatArray, IntArray]:
     """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there."""
     box = checked_extent(bounds)
-    while True:
-        axes = _grid_axes(box, cells)
+    for count in _counts(box, cells):
+        axes = _grid_axes(box, count)
         values = _grid_values(level, axes)
         vertices, number = _cell_vertices(values, values < 0, axes)
         tiles = _around_edges(values < 0, number)
         if _closed(tiles):
             break
-        finer = cells + cells // 2
-        if np.prod([len(axis) for axis in _grid_axes(box, finer)]) > MAX_POINTS:
-            raise SurfaceError(
-                f"{values.size} grid points do not resolve the surface; it is too thin, or crosses itself"
-            )
-        cells = finer
+    else:
+        raise SurfaceError(f"{values.size} grid points do not resolve the surface; it is too thin, or crosses itself")
     reach = max(float(axis[1] - axis[0]) for axis in axes)
     return _onto_surface(level, gradient, vertices, reach), tiles
+
+
+def _counts(box: FloatArray, cells: int) -> Iterator[int]:
+    """Cells to try: more by half while there may be, then a few less."""
+    while True:
+        yield cells
+        finer = cells + cells // 2
+        if np.prod([len(axis) for axis in _grid_axes(box, finer)]) > MAX_POINTS:
+            break
+        cells = finer
+    for share in OTHERS:
+        yield int(share * cells)
 
 
 def _grid_axes(box: FloatArray, cells: int) -> list[FloatArray]:

@@ -21,6 +21,7 @@ from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, END, WHOLE, pack, whole_lanes
 from creeping.geometry.arguments import positive_number, shown
 from creeping.geometry.directions import fibonacci_directions
+from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, size
 from creeping.rays.transport import carried
@@ -131,14 +132,17 @@ def body_length(body: Surface, wavenumber: float | None = None) -> float:
     """
     if speed_of(body) is not None:
         return weighted_length(body)
-    launch = shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch
-    return float(np.max(decayed_lengths(body, launch, wavenumber)))
+    return float(np.max(decayed_lengths(body, trial_points(body), wavenumber)))
 
 
 def early_length(body: Surface, wavenumber: float) -> float:
     """Length, L, beyond which xi > 1 on all rays of INCIDENCES evenly spread incidences."""
-    launch = shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch
-    return float(np.max(decayed_lengths(body, launch, wavenumber, DECAY, spared=0.0)))
+    return float(np.max(decayed_lengths(body, trial_points(body), wavenumber, DECAY, spared=0.0)))
+
+
+def trial_points(body: Surface) -> LaunchPoints:
+    """Launch points of INCIDENCES evenly spread incidences, found once."""
+    return kept(body, "trial points", lambda: shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch)
 
 
 def decayed_lengths(

@@ -49,7 +49,7 @@ HOPE = 0.25
 """for good if it has never been less than this: others may have met the error of long steps next to a tip."""
 TOGETHER, TOGETHER_ON_PIECES = 192, 2048
 """Rays traced in one call, and on a body with creases, where a call has more to do beside them."""
-LONG, LONG_ON_PIECES = 2, (6, 2)
+LONG, LONG_ON_PIECES = 2, (6, 2, 1)
 """Steps of a search, in steps of what it finds: points err less than derivatives of curvature do. On a body with
 creases of both searches: sharp places next to tips and edges make steps short all over it."""
 NEARLY = 2e-4
@@ -194,7 +194,8 @@ class RayTracer:
                     np.zeros(len(rows), dtype=bool),
                     np.zeros(len(rows), dtype=bool),
                 )
-                quantities_at(*evaluator, *self._rule, scale, states, step, which, now, whole, seen, *out)
+                joints = is_creased(self.body)
+                quantities_at(*evaluator, *self._rule, scale, states, step, which, now, whole, joints, seen, *out)
                 times[rows] = now
                 lanes[rows], first[rows], alive[rows], risen[rows] = out
         directions, starts, tangents = directions[owner], starts[owner], tangents[owner]
@@ -239,18 +240,21 @@ class RayTracer:
         found, moved : (m,)
             Their rows, and how far along the line they start from where the search began, in cells.
         """
-        quick, slow = LONG_ON_PIECES if is_creased(self.body) else (LONG, 1)
+        quick, *slower = LONG_ON_PIECES if is_creased(self.body) else (LONG, 1)
         found, result, moved, hopeless = self._sought(directions, observers, near, times, cell, quick, NEARLY)
         missing = np.setdiff1d(np.flatnonzero(~hopeless), found)
-        if len(missing):
+        for long in slower:
+            if not len(missing):
+                break
             # those that the quick search gave up, or ended too early
             again, more, further, _ = self._sought(
-                directions[missing], observers[missing], near[missing], times[missing], cell[missing], slow, 0.0
+                directions[missing], observers[missing], near[missing], times[missing], cell[missing], long, 0.0
             )
             result = SingleRays.joined([result, more])
             found, moved = np.concatenate([found, missing[again]]), np.concatenate([moved, further])
             order = np.argsort(found)
             found, moved, result = found[order], moved[order], result[order]
+            missing = np.setdiff1d(missing, found)
         return result, found, moved
 
     def _sought(

@@ -33,6 +33,8 @@ SHORTEST = 1e-9
 """Length, in body sizes, of a curve below which there is none."""
 MEET = 1e-7
 """Distance of the ends of two curves, in body sizes, up to which they meet."""
+MOST_PANELS = 1000
+"""Of a curve: one that takes more, as along a generator that the wave goes along, is lost, and takes minutes."""
 EXACT = 1e-12
 """Relative error of a length: panels are exact to rounding."""
 
@@ -82,7 +84,7 @@ def _finished(
     body: Any, piece: Any, number: int, direction: FloatArray, found: PieceCurve, n_points: int
 ) -> ShadowCurve:
     chords = np.linalg.norm(np.roll(found.nodes, -1, axis=0) - found.nodes, axis=1)
-    panels = fit_panels(piece, direction, found.nodes, chords, closed=found.closed)
+    panels = fit_panels(piece, direction, found.nodes, chords, closed=found.closed, most=MOST_PANELS)
     arclength = np.linspace(0.0, panels.length, n_points, endpoint=not found.closed)
     points = panels.at(arclength)
     _, tangents = newton_step(piece, direction, points)

@@ -4,6 +4,7 @@ Each line is sought on the coarsest mesh, and again on the next where a step was
 not resolve is followed by itself. `creeping.shadow.line` gives one of them with its points.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -17,7 +18,7 @@ from creeping.kernels.threads import in_threads
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.creased import launched_from
 from creeping.shadow.following import followed
-from creeping.shadow.line import shadow_line
+from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, finished, judged, prepared
 from creeping.shadow.status import FOLLOWED, NO_RAY, OK, SINGULAR
@@ -115,25 +116,44 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, v, launch)
 
 
-def _one_by_one(body: Surface, directions: FloatArray, n_rays: int, every: bool) -> ShadowLines:
-    """Lines of a body with creases, each by itself."""
+def lines_together(
+    directions: FloatArray, lines: Sequence[ShadowLine | None], n_rays: int, *, every: bool = False
+) -> ShadowLines:
+    """Lines of unit directions (n, 3) that were found one by one, None where one crosses itself; as `shadow_lines`."""
     n = len(directions)
     numbers, status = np.full((n, 6), np.nan), np.full(n, SINGULAR, np.int8)
-    columns: dict[str, list[Any]] = {one.name: [] for one in fields(LaunchPoints)}
-    for row, direction in enumerate(directions):
-        try:
-            line = shadow_line(body, direction, n_points=16)
-            shares = line.fractions.values()
-            numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
-            launch = line.launch_points(n_rays, "all" if every else "attached")
-        except SingularIncidenceError:
-            launch = launched_from((), [], direction, n_rays)
-        for name, values in columns.items():
-            values.append(getattr(launch, name)[0])
-    launched = LaunchPoints(**{name: np.array(values) for name, values in columns.items()})
+    near, launches = np.zeros(n), []
+    for row, (direction, line) in enumerate(zip(directions, lines, strict=True)):
+        if line is None:
+            launches.append(launched_from((), [], direction, n_rays))
+            continue
+        shares = line.fractions.values()
+        numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
+        near[row] = line.singular_distance
+        launches.append(line.launch_points(n_rays, "all" if every else "attached"))
+    launched = LaunchPoints(
+        directions,
+        *(
+            np.concatenate(
+                [np.zeros((0, n_rays, 3) if one.name == "points" else (0, n_rays))]
+                + [getattr(launch, one.name) for launch in launches]
+            )
+            for one in fields(LaunchPoints)[1:]
+        ),
+    )
     curves, length, error, attached, occluded, concave = numbers.T
-    near = np.full(n, np.inf)
     return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, near, launched)
+
+
+def _one_by_one(body: Surface, directions: FloatArray, n_rays: int, every: bool) -> ShadowLines:
+    """Lines of a body with creases, each by itself."""
+    lines: list[ShadowLine | None] = []
+    for direction in directions:
+        try:
+            lines.append(shadow_line(body, direction, n_points=16))
+        except SingularIncidenceError:
+            lines.append(None)
+    return lines_together(directions, lines, n_rays, every=every)
 
 
 def _follow(

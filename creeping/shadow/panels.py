@@ -127,7 +127,13 @@ class PanelCurve:
 
 
 def fit_panels(
-    body: Surface, direction: FloatArray, nodes: FloatArray, spacing: FloatArray, *, closed: bool = True
+    body: Surface,
+    direction: FloatArray,
+    nodes: FloatArray,
+    spacing: FloatArray,
+    *,
+    closed: bool = True,
+    most: int = 20_000,
 ) -> PanelCurve:
     """Panels of the curve through ordered nodes.
 
@@ -140,6 +146,8 @@ def fit_panels(
         Size of the mesh at the nodes.
     closed : bool
         Whether the curve goes on from the last node to the first; else these are its ends.
+    most : int
+        Panels after which it is given up.
 
     Returns
     -------
@@ -175,7 +183,7 @@ def fit_panels(
             if middle not in known:
                 known[middle] = _middle(body, direction, a[i], Ta[i], b[i], Tb[i])
             halves += [(low, middle), (middle, high)]
-        if len(done) + len(halves) > 20_000 or (
+        if len(done) + len(halves) > most or (
             len(bad) and np.min(np.linalg.norm(b - a, axis=1)[bad]) < 1e-11 * size(body)
         ):
             raise SingularIncidenceError(

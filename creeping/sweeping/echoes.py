@@ -18,6 +18,7 @@ from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
 from creeping.field.labelled import PARTS
 from creeping.geometry.arguments import checked_body, whole_number
+from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.surface import Surface
 from creeping.phaseflow.tuning.flow_choice import choose_flow
@@ -28,8 +29,8 @@ from creeping.sweeping.run import Progress, sweep_directions
 if TYPE_CHECKING:
     import xarray
 
-TASK = 32
-"""Incidences of one task where they are many."""
+TASK, CREASED_TASK = 32, 2
+"""Incidences of one task where they are many; those of a body with creases are computed one by one."""
 MOST = 10_000_000
 """Values of one call."""
 
@@ -164,7 +165,7 @@ def _swept(
     progress: Progress | None,
 ) -> xarray.Dataset:
     """Sweep of checked arguments."""
-    checked_body(body)
+    checked_body(body, charts=not is_creased(body))
     checked_plain(body)
     checked_method(asked["method"], 2)
     asked["n_rays"] = whole_number(asked["n_rays"], "n_rays")
@@ -180,7 +181,11 @@ def _swept(
     length = body_length(body, float(k.min()))
     flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
     # small enough that progress is told in time, large enough that a task is not all overhead
-    options: dict[str, Any] = {"chunk": TASK, "progress": progress, "length": length}
+    options: dict[str, Any] = {
+        "chunk": CREASED_TASK if is_creased(body) else TASK,
+        "progress": progress,
+        "length": length,
+    }
     return sweep_directions(flow, incidences, wavenumbers=k, **options, **asked)
 
 
@@ -238,5 +243,6 @@ def echo_of(
         error=flags["error"],
         unresolved=flags["unresolved"],
         by_currents=served,
+        otherwise=dataset.attrs.get("served_by", "rays"),
         sound_speed=sound_speed,
     )

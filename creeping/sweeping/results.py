@@ -10,11 +10,13 @@ import numpy as np
 from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
 from creeping.field.labelled import COMPONENTS, power
+from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import angles_of
 from creeping.geometry.unit import unit_of
 from creeping.shadow.status import INCIDENCE_STATUSES
 from creeping.storage.extras import required
 from creeping.sweeping.accessor import register
+from creeping.sweeping.creased_fields import SERVED
 from creeping.sweeping.plan import Arrays, SweepPlan
 from creeping.sweeping.request import SweepRequest
 
@@ -100,6 +102,8 @@ def sweep_attributes(plan: SweepPlan) -> dict[str, Any]:
     }
     if request.quantity != "rays":
         words |= {"boundaries": ", ".join(request.boundaries), "order_of_creeping_waves": int(request.order)}
+        if is_creased(plan.body):
+            words["served_by"] = SERVED
     for name, value in flow.items():
         if name != "error" and value is not None:
             words[f"flow_{name}" if name != "kind" else "flow"] = value

@@ -16,7 +16,7 @@ from creeping.field.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, P, X, whole_lanes
-from creeping.geometry.creased import checked_smooth
+from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch, ray_arrays
 from creeping.rays.reach import early_length
@@ -26,6 +26,7 @@ from creeping.rays.transport import Flow, carried
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.many import ShadowLines, shadow_lines
 from creeping.shadow.status import SINGULAR
+from creeping.sweeping.creased_fields import creased_lines, fill_creased
 from creeping.sweeping.field_arrays import FieldArrays
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
 
@@ -64,11 +65,11 @@ class Sweeper:
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
-        if request.quantity != "rays":
-            checked_smooth(flow.body, "a sweep of fields", "call creeping.far_field for each incidence, or sweep rays")
-        self._tracer = None if request.quantity == "rays" else RayTracer(flow.body, request.length)
+        self._one_by_one = request.quantity != "rays" and is_creased(flow.body)
+        together = request.quantity != "rays" and not self._one_by_one
+        self._tracer = RayTracer(flow.body, request.length) if together else None
         self._early = 0.0
-        if request.quantity != "rays":
+        if together:
             self._early = min(request.length, early_length(flow.body, min(request.wavenumbers)))
 
     @property
@@ -93,6 +94,11 @@ class Sweeper:
         return out
 
     def _batch(self, incidences: FloatArray, out: dict[str, Any]) -> Made | None:
+        if self._one_by_one:
+            found, lines = creased_lines(self.body, incidences, self.request.n_rays)
+            fill_lines(lines, out)
+            fill_creased(self.flow, self.request, found, out)
+            return None
         lines = shadow_lines(self.body, incidences, self.request.n_rays)
         fill_lines(lines, out)
         if self._tracer is None:

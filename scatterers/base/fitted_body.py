@@ -38,7 +38,7 @@ NORMAL_WEIGHT = 0.1
 """Of the normals of noisy points: from jets they are noisier than the points."""
 SECOND = 0.4
 """Share of noisy points that the second fit sees."""
-CHARTS, FITS = "charts-", ("fine", "coarse")
+CHARTS, NO_CHARTS, FITS = "charts-", "no_charts", ("fine", "coarse")
 FEWEST = 0.1
 """Share of the points that has to be farther off, for a fit to mean anything."""
 SLACK = 0.02
@@ -160,6 +160,7 @@ class FittedBody(SplineBody):
             known = [_unpacked(arrays, name) for name in FITS]
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(known[0], key, speed)
+        self._no_charts = str(text.get(NO_CHARTS, ""))
         self.coarse_fit = SplineBody(known[1], f"{key}, coarser", speed)
         self.coarse_fit._non_smooth, self.coarse_fit._reach = self._non_smooth, self._reach
         if found is None and folder is not None:
@@ -169,6 +170,7 @@ class FittedBody(SplineBody):
                 with suppress(ValueError):
                     charts = cast("MongeAtlas", self.atlas).arrays()
                     arrays |= {CHARTS + name: array for name, array in charts.items()}
+                text |= {NO_CHARTS: self._no_charts}
             if trouble := _fit_cache.store(folder, key, arrays, text):
                 progress(trouble)
 

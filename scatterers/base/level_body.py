@@ -39,6 +39,8 @@ class LevelBody(Body):
     # places where the body is not smooth, and how far from them rays are not trusted
     _non_smooth: FloatArray = np.zeros((0, 3))
     _reach: float = 0.0
+    # why there are none, once that is known
+    _no_charts: str = ""
     # charts found before
     _charts: Mapping[str, FloatArray] = MappingProxyType({})
 
@@ -135,6 +137,8 @@ class LevelBody(Body):
 
         if self._charts:
             return MongeAtlas.restored(self.level, self.gradient, self._charts)
+        if self._no_charts:
+            raise ValueError(self._no_charts)
         failure = ""
         for count in CLOUDS:
             cloud = body_cloud(self.level, self.gradient, self._bounds, count)
@@ -143,4 +147,6 @@ class LevelBody(Body):
             except ValueError as error:
                 # parts may be finer than the points
                 failure = str(error)
-        raise ValueError(f"the body is too thin, or too sharply curved, in places for charts: {failure}")
+        # to find that out takes as long as charts do
+        self._no_charts = f"the body is too thin, or too sharply curved, in places for charts: {failure}"
+        raise ValueError(self._no_charts)

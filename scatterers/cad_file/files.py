@@ -29,6 +29,9 @@ FAR_OFF = 60.0
 """Degrees between the normal of a face and that of a triangle of it, beyond which a face has none there."""
 UNCERTAIN = 20.0
 """Degrees between the normal of a face and that of the triangles: at a pole of its parameters a face has none."""
+LACKING, MOST_LACKING = 1.5, 16.0
+"""Points of all bodies of a file over those of the part that is asked for, from which it is meshed again, with so many
+times the points at most."""
 # what a STEP file may call its length unit
 PREFIXES = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".MICRO.": "um", ".KILO.": "km"}
 IGES_UNITS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 9: "um", 10: "cm"}
@@ -110,17 +113,23 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
         raise ModuleNotFoundError(
             "CAD files need gmsh: pip install 'creeping[cad]' (gmsh is under the GPL)", name="gmsh"
         )
-    found = _meshed(path, reading, curved)
+    found = _meshed(path, reading.points, reading.sew, curved)
     # a file cut short may have lost its unit: gmsh says more of it
     scale = _scale(path, kind, reading.units)
-    number = np.zeros(int(found["nodes"].max(initial=0)) + 1, dtype=np.int64)
-    number[found["nodes"]] = np.arange(len(found["nodes"]))
-    used, triangles = np.unique(number[found["triangles"]], return_inverse=True)
-    triangles = triangles.reshape(-1, 3)
-    repairs: list[str] = []
-    before = found["points"][used]
-    vertices, triangles = cleaned(path.name, before, triangles, repairs.append, repairs.append)
-    vertices, triangles = whole_body(path.name, vertices, triangles, reading.choice, scale, repairs.append)
+    for again in (reading.choice.part is not None, False):
+        number = np.zeros(int(found["nodes"].max(initial=0)) + 1, dtype=np.int64)
+        number[found["nodes"]] = np.arange(len(found["nodes"]))
+        used, triangles = np.unique(number[found["triangles"]], return_inverse=True)
+        triangles = triangles.reshape(-1, 3)
+        repairs: list[str] = []
+        before = found["points"][used]
+        vertices, triangles = cleaned(path.name, before, triangles, repairs.append, repairs.append)
+        vertices, triangles = whole_body(path.name, vertices, triangles, reading.choice, scale, repairs.append)
+        lacking = len(before) / max(len(vertices), 1)
+        if not (again and lacking > LACKING):
+            break
+        # points were for all bodies of the file together
+        found = _meshed(path, int(reading.points * min(lacking, MOST_LACKING)), reading.sew, curved)
     triangles = oriented(path.name, vertices - vertices.mean(0), triangles, repairs.append)
     # an even mesh of a clean file needs no merging; if it was done, points are found again by their place
     place = {tuple(p): k for k, p in enumerate(vertices)}
@@ -203,14 +212,14 @@ def _without_strings(text: str) -> str:
     return out + text[k:]
 
 
-def _meshed(path: Path, reading: CadReading, curved: int) -> dict[str, NDArray[np.generic]]:
+def _meshed(path: Path, points: int, sew: float | None, curved: int) -> dict[str, NDArray[np.generic]]:
     """Run the worker and read what it wrote."""
     with tempfile.TemporaryDirectory(prefix="creeping-") as folder:
         out = Path(folder) / "points.npz"
         # -P: modules that happen to lie in the working folder are not imported
         worker = Path(__file__).with_name("worker.py")
-        command = [sys.executable, "-P", str(worker), str(path.resolve()), str(reading.points), str(out)]
-        command += [str(curved), repr(1e3 * float(reading.sew or 0.0))]
+        command = [sys.executable, "-P", str(worker), str(path.resolve()), str(points), str(out)]
+        command += [str(curved), repr(1e3 * float(sew or 0.0))]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, text=True)
         except subprocess.TimeoutExpired:

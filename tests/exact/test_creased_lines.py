@@ -5,6 +5,7 @@ import pytest
 from creased_bodies import Capsule, TwoBalls, cone, cut_sphere, cylinder
 
 import creeping as cr
+import scatterers as sc
 
 LENGTH = 1e-10
 """Relative error of lengths: panels are exact to rounding, ends to 1e-12 of the size."""
@@ -98,3 +99,11 @@ def test_points_and_rays_of_open_curves():
     launch = line.launch_points(10)
     np.testing.assert_allclose(launch.arclength[0], (np.arange(10) + 0.5) * curve.length / 10)
     assert not launch.closed.any() and launch.there.all()
+
+
+def test_along_a_generator_the_line_is_told_as_lost_soon():
+    """It turns within rounding of a crossing all along the generator."""
+    angle = np.radians(7)
+    body = sc.ConeSphere(radius=0.0749, length=0.0749 * (1 + 1 / np.sin(angle)))
+    line = cr.shadow_line(body, -np.array([np.sin(angle), 0, np.cos(angle)]), n_points=16)
+    assert line.at_tips > 0 and np.isfinite(line.length)

@@ -1,6 +1,7 @@
 """The page that needs no server."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -120,3 +121,17 @@ def test_names_are_titles(tmp_path):
         cli.main(["explore", "sphere", *arguments])
     page = (tmp_path / "a.html").read_text()
     assert caught.value.code == 0 and "<title>sphere</title>" in page and "1 GHz" in page and "dBsm" in page
+
+
+def test_a_body_with_joints_has_rays_and_a_cut():
+    """Its field at points of the body is not known; that of each ray, and the far field, are."""
+    from creeping.explorer.preview import preview_of, step_of
+    from creeping.explorer.refined import refined_view
+
+    body = sc.Capsule(0.4, 1.8)
+    flow, request = cr.DirectFlow(body, rtol=1e-8), REQUEST.changed(rays=16, length=0.8, wavenumber=10.0)
+    frame = preview_of(flow, request, step_of(body))
+    for boundary in ("soft", "pec"):
+        found = refined_view(flow, replace(frame, request=request.changed(boundary=boundary)), np.zeros((1, 3)))
+        assert found.body_levels is None and len(found.far.total) == len(found.cut_angles)
+    assert np.isfinite(frame.ray_segments).all()

@@ -220,6 +220,8 @@ def test_parts_of_a_cad_file_are_chosen_and_united(files):
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     np.testing.assert_allclose(largest.level(directions), 0, atol=1e-4)
     np.testing.assert_allclose(second.level([3, 0, 0] + 0.5 * directions), 0, atol=1e-4)
+    # points are of the part alone, of a fifth of the area here
+    assert min(body.fit.points for body in (largest, second)) > 1500
     assert largest.repairs == ("part 1 of 2 of two.brep taken; 20 % of its area left out",)
     whole = parted(files / "crossing.brep", union=True)
     # six faces each, and edges where they cross as well

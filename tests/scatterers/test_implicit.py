@@ -371,3 +371,22 @@ def test_three_curves_on_the_peanut_along_its_axis():
     near = cr.shadow_line(body_of("peanut"), (1, 0.05, 0.02))
     assert len(near.curves) == 3
     assert near.curves[2].fractions["concave"] == pytest.approx(1)
+
+
+def test_charts_that_cannot_be_are_sought_once(monkeypatch):
+    """To find that out takes as long as charts do."""
+    from scatterers.atlas.monge.atlas import MongeAtlas
+
+    asked = []
+
+    def covering(*_, **__):
+        asked.append(1)
+        raise ValueError("too thin")
+
+    monkeypatch.setattr(MongeAtlas, "covering", covering)
+    body = sc.Implicit("(x**2 + y**2 + z**2 + 0.84)**2 - 4*(x**2 + y**2)")
+    asked.clear()
+    for _ in range(2):
+        with pytest.raises(ValueError, match="too sharply curved"):
+            _ = body.atlas
+    assert len(asked) <= 2

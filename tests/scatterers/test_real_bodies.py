@@ -30,7 +30,7 @@ def opened(name, **options):
         ("oded_torus.obj", {}, 0),
         ("trimesh_round.stl", {}, 4),
         ("trimesh_multibody.stl", {"part": "largest"}, 6),
-        ("trimesh_box_sides.STEP", {"part": "largest"}, 50),
+        ("trimesh_box_sides.STEP", {"part": "largest", "points": 1500}, 50),
     ],
 )
 def test_files_open_as_far_as_a_fan(name, options, pieces):

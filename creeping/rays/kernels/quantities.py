@@ -17,6 +17,8 @@ from creeping.kernels.curvature import second_form
 from creeping.rays.quantities import GAUSS, GUARD, SHARPEST
 
 WIDTH = 2 * GUARD
+STRAIGHT = 1e-6
+"""Curvature, in inverse body sizes, up to which a ray goes straight."""
 
 
 def polynomial_matrix() -> np.ndarray:
@@ -93,11 +95,12 @@ def cross(level, level_par, matrix, states, step, owner, observers, times):
 
 
 @njit(**options)
-def _along(level, level_par, rule, scale, ray, step, known, kappa, across, normals, totals, angles, good, g):
+def _along(level, level_par, rule, scale, ray, step, known, kappa, across, normals, totals, angles, good, g, joints):
     """Fill what is known along one ray, states (K, 8), at its steps from the launch point to number ``known``.
 
     kappa, across (K,) and normals (3, K) at all states; totals (K, 5), angles (K,) and good (K,) are integrals, the
-    angle phi and whether kappa_n has stayed positive, at the steps counted from the launch point.
+    angle phi and whether kappa_n has stayed positive, at the steps counted from the launch point. With ``joints`` it
+    may be 0, as along the generators of a cylinder, and is looked at there alone: polynomials swing where it jumps.
     """
     K = ray.shape[0]
     weights, gauss_weights = rule
@@ -126,7 +129,7 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
         # where the creeping ray has ended, the integrals stay
         for q in range(GAUSS if positive else 0):
             curved = _applied(weights[q], 0, kappa, i)
-            positive &= curved > 0.0
+            positive &= joints or curved > 0.0
             _add(
                 curved,
                 _applied(weights[q], 1, kappa, i),
@@ -135,7 +138,7 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
                 gauss_weights[q] * step,
                 totals[k + 1],
             )
-        good[k + 1] = positive
+        good[k + 1] = positive and (not joints or kappa[i + 1] > -STRAIGHT / scale)
         angles[k + 1] = _turned(angles[k], ray[i + 1, 6], ray[i + 1, 7], scale)
 
 
@@ -159,6 +162,7 @@ def quantities_at(
     owner,
     times,
     whole,
+    joints,
     observers,
     lanes,
     starts,
@@ -179,6 +183,8 @@ def quantities_at(
         x, p, J, J' at equal steps; the launch point is at number GUARD.
     owner, times : (n,)
         Ray of each point, ascending, and its time.
+    joints : bool
+        Whether kappa_n may jump, and be 0 for a while.
     observers : (n or 0, 3)
         With observers, risen (n,) tells whether n.r > 0 somewhere before, two steps or more.
     """
@@ -199,7 +205,7 @@ def quantities_at(
         known = min(max(int(latest / step), 0), K - 2 * GUARD - 1) if whole else 0
         _along(
             level, level_par, (weights, gauss_weights), scale, ray, step, known, kappa, across, normals, totals,
-            angles, good, g,
+            angles, good, g, joints,
         )  # fmt: skip
         _weights(matrix, 0.0, step, w)
         for d in range(3):
@@ -228,7 +234,7 @@ def quantities_at(
             for q in range(GAUSS if part > 0.0 and positive else 0):
                 _weights(matrix, part * nodes[q], step, w)
                 curved = _applied(w, 0, kappa, i)
-                positive &= curved > 0.0
+                positive &= joints or curved > 0.0
                 _add(
                     curved,
                     _applied(w, 1, kappa, i),
@@ -239,7 +245,7 @@ def quantities_at(
                 )
             for d in range(5):
                 lanes[point, 13 + d] = total[d]
-            alive[point] = positive and lanes[point, 9] > 0.0
+            alive[point] = positive and lanes[point, 9] > (STRAIGHT / scale if joints else 0.0)
             if observers.shape[0]:
                 risen[point] = False
                 for k in range(GUARD, i - 1):

@@ -1,0 +1,54 @@
+"""Fields of many incidences on a body with edges, joints or tips: of each alone, as `creeping.far_field` has them."""
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.errors import SingularIncidenceError
+from creeping.field.boundary import parse_boundary
+from creeping.field.far import far_field
+from creeping.geometry.surface import Surface
+from creeping.rays.fan import launch
+from creeping.rays.transport import Flow
+from creeping.shadow.line import ShadowLine, shadow_line
+from creeping.shadow.many import ShadowLines, lines_together
+from creeping.sweeping.field_arrays import FieldArrays
+from creeping.sweeping.request import VALID, SweepRequest
+
+SERVED = "rays+optics"
+"""What serves in place of isolated rays alone, as `creeping.FarField.method` says it."""
+
+
+def creased_lines(
+    body: Surface, directions: FloatArray, n_rays: int
+) -> tuple[tuple[ShadowLine | None, ...], ShadowLines]:
+    """Lines of unit directions (n, 3), None where one crosses itself, and what sweeps say of them."""
+    lines: list[ShadowLine | None] = []
+    for direction in directions:
+        try:
+            lines.append(shadow_line(body, direction))
+        except SingularIncidenceError:
+            lines.append(None)
+    return tuple(lines), lines_together(directions, lines, n_rays)
+
+
+def fill_creased(
+    flow: Flow, request: SweepRequest, lines: tuple[ShadowLine | None, ...], out: dict[str, np.ndarray[Any, Any]]
+) -> None:
+    """Fields of incidences with these lines into arrays whose first axis is the incidence."""
+    bistatic = request.quantity == "bistatic"
+    for row, line in enumerate(lines):
+        if line is None:
+            continue
+        fan = launch(flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
+        observers = np.array(request.observation) if bistatic else -line.direction[None]
+        for name, which, suffix in request.problems:
+            boundary = parse_boundary(name)
+            for k, wavenumber in enumerate(request.wavenumbers):
+                field = far_field(fan, observers, wavenumber=wavenumber, boundary=boundary, order=request.order)
+                for part, values in FieldArrays.of(field, 1).arrays.items():
+                    if part + suffix in out:
+                        out[part + suffix][(row, *which, k)] = values[0] if bistatic else values[0, 0]
+                if field.validity is not None:
+                    numbers = (field.validity.least_k_rho, field.validity.largest_transverse)
+                    for known, value in zip(VALID, numbers, strict=True):
+                        out[known][row, k] = value
