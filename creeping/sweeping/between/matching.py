@@ -76,7 +76,7 @@ def chains(start: IntArray, after: list[IntArray], before: list[IntArray], base:
         crossed = start[:, None]
         for one, other in zip(after[::-1], before[::-1], strict=True):
             crossed = _along(crossed, one, other, base, count)
-        turned = crossed.reshape(len(start), count, count).swapaxes(1, 2).reshape(len(start), -1)
+        turned = crossed.reshape(len(start), count, count).swapaxes(1, 2).reshape(found.shape)
         found = np.where(found == turned, found, -1)
     return found
 
@@ -89,4 +89,4 @@ def _along(sheets: IntArray, after: IntArray, before: IntArray, base: int, count
         out[..., place] = np.where(out[..., place - 1] >= 0, after[out[..., place - 1]], -1)
     for place in range(base - 1, -1, -1):
         out[..., place] = np.where(out[..., place + 1] >= 0, before[out[..., place + 1]], -1)
-    return out.reshape(len(sheets), -1)
+    return out.reshape(len(sheets), sheets.shape[1] * count)

@@ -153,7 +153,7 @@ class RaysBetween:
         if not len(rows):
             return
         body, times, directions = self.body, self.request.travel_times, incidences[rows]
-        points = onto_line(body, directions, starts, reach=0.1 * size(body), iterations=1)[:, None]
+        points = onto_line(body, directions, starts, reach=0.1 * size(body), iterations=6)[:, None]
         states = self._alone(pack(points, directions, lanes=whole_lanes(body)), rows)[:, None]
         none = np.full((len(rows), 1), np.nan)
         begun = np.full((len(rows), 1), float(ATTACHED))

@@ -71,7 +71,7 @@ def _tensor(factors: list[FloatArray]) -> FloatArray:
     """Products (n, m1 m2 ...) of weights (n, m1), (n, m2), ..."""
     out = factors[0]
     for factor in factors[1:]:
-        out = (out[:, :, None] * factor[:, None, :]).reshape(len(out), -1)
+        out = (out[:, :, None] * factor[:, None, :]).reshape(len(out), out.shape[1] * factor.shape[1])
     return out
 
 

@@ -118,3 +118,11 @@ def test_sums_do_not_depend_on_their_company():
     whole = combined(w, values)
     for row in range(40):
         assert np.array_equal(combined(w[row : row + 1], values)[0], whole[row])
+
+
+@pytest.mark.parametrize("dimensions", [1, 2])
+def test_no_places_have_no_weights(dimensions):
+    none = np.zeros((0, dimensions))
+    six, errors = weights(none)
+    assert six.shape == (0, 6**dimensions) and all(one.shape == six.shape for one in errors)
+    assert corner_weights(none).shape == (0, 2**dimensions)

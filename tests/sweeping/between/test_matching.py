@@ -55,3 +55,9 @@ def test_chains_around_a_point_must_close():
         both = [first, straight], [inverse(first), inverse(straight)]
         found = chains(np.array([0, 1]), *both, 0, 2)
         assert np.all(found >= 0) == whole
+
+
+def test_no_sheets_have_no_chains():
+    none = np.zeros(0, dtype=int)
+    assert chains(none, [none], [none], 2, 6).shape == (0, 6)
+    assert chains(none, [none, none], [none, none], 2, 6).shape == (0, 36)

@@ -174,3 +174,28 @@ def test_an_accuracy_is_a_number_between_0_and_1(accuracy):
 def test_currents_are_not_interpolated():
     with pytest.raises(cr.CreepingError, match="accuracy goes with rays"):
         cr.sweep_directions(FLOW, arc(0, 3, 1.0), accuracy=1e-3, method="currents", boundary="hard", **FIELD)
+
+
+def test_a_patch_of_the_sphere_of_which_nothing_is_interpolated():
+    near = np.array([0.1, 0.15, 1.0]) + 0.02 * np.random.default_rng(0).uniform(-1, 1, (80, 3))
+    asked = {"wavenumbers": [18.0], "n_rays": 64, "length": 4.0, "boundary": "pec"}
+    computed, between = both(near / np.linalg.norm(near, axis=1, keepdims=True), 1e-6, **asked)
+    assert not between.interpolated.any()
+    assert computed.creeping_pec.values.tobytes() == between.creeping_pec.values.tobytes()
+
+
+def test_rays_that_are_carried_start_on_the_line():
+    # launch points that are moved far are not where the interpolation has them
+    body = sc.Ellipsoid(2, 0.5, 0.4)
+    directions = arc(-20, 40, 0.2, height=0.1)
+    asked = {"quantity": "rays", "n_rays": 50, "length": 1.0, "accuracy": 1e-2}
+    found = cr.sweep_directions(cr.DirectFlow(body, rtol=1e-8), directions, **asked)
+    carried = found.interpolated.values[:, None] & (found.interpolation_error.values == 0)
+    row, ray = np.nonzero(carried)
+    assert len(row) > 100
+    x, p = (found[name].values[row, ray, 0] for name in ("points", "directions"))
+    start, back = cr.DirectFlow(body, rtol=1e-10).flow(x, -p, 1.0)
+    d = directions[row]
+    assert np.abs(np.sum(start * d, axis=1) - found.launch_phase.values[row, ray]).max() < 1e-6
+    assert np.abs(-back - d).max() < 1e-6
+    assert np.abs(np.linalg.norm(onto_line(body, d, start, reach=0.1) - start, axis=1)).max() < 1e-6
