@@ -6,9 +6,10 @@ An incidence has its field so at the first level at which
 
     (sum (|da| + k |dL| |a|)^2)^(1/2) <= A (sum |a|^2)^(1/2)   of all sheets, and with 10 A of the creeping ones,
 
-d being the error of `stencil`, A the accuracy asked for. All sheets of the cell's own node go over
-into one of each other node of the stencil, and its corners have no others: none begins or ends. What fails at all
-levels is computed. Errors are the largest of the corners, and the sum in squares with them.
+d being the error of `stencil`, A the accuracy asked for. All sheets of the cell's own node go over into one of each other
+node of the stencil, and its corners have no others: none begins or ends. What fails at all levels is computed. Errors
+are the largest of the corners, and in squares with them the stated one of interpolation, SAFE times the sum of
+|da| + k |dL| |a| and NOISE times (sum |a|^2)^(1/2).
 
 Sources: Derivations, F23.
 """
@@ -31,6 +32,9 @@ from creeping.sweeping.sweeper import Arrays, Sweeper
 
 MOST_NODES = 20_000
 """Nodes that are kept from one call to the next."""
+SAFE, NOISE = 2.0, 1e-5
+"""Stated error over that of `stencil`, and what the flow and the searches for rays leave, over the sheets' sizes; both
+set on six bodies."""
 OF_CREEPING = 10.0
 """Error allowed to the creeping part, of its own size, over that allowed to the whole field."""
 
@@ -161,6 +165,7 @@ class FieldsBetween:
         for sheet, label in enumerate(nodes.label[chain[:, 0]]):
             for total, each in ((fields, waves), (differences, off), (squares, off**2), (sizes, size**2)):
                 total[:, label // 2, label % 2] += each[:, sheet]
+        differences = SAFE * differences + NOISE * np.sqrt(sizes)
         # of a conductor's components together
         squares, sizes = (np.add.reduceat(each, self._first, axis=-1) for each in (squares, sizes))
         whole = squares[:, :, 0] + squares[:, :, 1] <= self._accuracy**2 * (sizes[:, :, 0] + sizes[:, :, 1])
