@@ -6,9 +6,9 @@ An incidence has its field so at the first level at which
 
     (sum (|da| + k |dL| |a|)^2)^(1/2) <= A (sum |a|^2)^(1/2)   of all sheets, and with 10 A of the creeping ones,
 
-d being the error of `stencil`, A the accuracy asked for. All sheets of the cell's own node go over into one of each other
-node of the stencil, and its corners have no others: none begins or ends. What fails at all levels is computed. Errors
-are the largest of the corners, and in squares with them the stated one of interpolation, SAFE times the sum of
+d being the error of `stencil`, A the accuracy asked for. All sheets of the cell's own node go over into one of each
+other node of the stencil, and its corners have no others: none begins or ends. What fails at all levels is computed.
+Errors are the largest of the corners, and in squares with them the stated one of interpolation, SAFE times the sum of
 |da| + k |dL| |a| and NOISE times (sum |a|^2)^(1/2).
 
 Sources: Derivations, F23.
