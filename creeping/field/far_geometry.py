@@ -27,7 +27,7 @@ from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
-from creeping.rays.tracer import ACCEPTED, TURN, RayTracer
+from creeping.rays.tracer import TURN, RayTracer, same_within
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine
@@ -48,9 +48,6 @@ EARLY = 0.28
 """Time, in body sizes, before which a horizon crossing does not count for merging."""
 TAPERED = 0.2
 """p.r up to which a crossing is no node of the fan integral: its taper starts at 0.3."""
-ALIKE = (1e-2, 1e-1)
-"""Distances, in cells, between which lies the one below which two rays found are one: searches end at residuals up to
-ACCEPTED, which on flat ground is far."""
 LOBE_BYTES = 600.0
 """Memory that a node of the forward integral takes."""
 APART = 2.0
@@ -129,17 +126,6 @@ def merging(rays: RayPoints) -> FloatArray:
     J, rate = np.abs(rays.spreading), np.abs(rays.spreading_rate)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.nan_to_num(J / (J + rate / rays.curvature[1]))
-
-
-def _same_within(rays: RayPoints, cell: FloatArray) -> FloatArray:
-    """Distance of launch points, L, and difference of times below which two rays are one (n, 2); see `ALIKE`.
-
-    What is left of r - p is a step of J' across the rays and of κₙ along them.
-    """
-    turn = np.stack([np.abs(rays.spreading_rate), np.abs(rays.curvature[1])], axis=1)
-    with np.errstate(divide="ignore"):
-        left = 2 * ACCEPTED / turn
-    return np.asarray(np.clip(left, ALIKE[0] * cell, ALIKE[1] * cell))
 
 
 class FarGeometry:
@@ -284,7 +270,7 @@ class FarGeometry:
         inside = (launch.closed[which, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))
         kept = np.flatnonzero(inside)
         starts, found_rays = one.starts[kept], one.rays[kept]
-        ends, width = found_rays.time, _same_within(found_rays, cell[kept])
+        ends, width = found_rays.time, same_within(found_rays, cell[kept])
 
         def alike(i: IntArray, j: IntArray) -> BoolArray:
             late = np.abs(ends[i] - ends[j]) < width[i, 1]

@@ -40,6 +40,8 @@ CLOSE = 1e-6
 """Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
 ACCEPTED = 1e-4
 """Residual of what was found, on exact rays: its phase errs by half the square of it, in radii of curvature."""
+ALIKE = (1e-2, 1e-1)
+"""Distances, in cells, between which lies the one below which two rays that searches found are one."""
 ROUNDS = 10
 FAR, FAR_ON_PIECES = 3.0, 1.5
 """Cells by which a search may move before it is given up: most of those on bodies with creases go nowhere,"""
@@ -383,3 +385,15 @@ def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray
         alive,
         found.scale,
     )
+
+
+def same_within(rays: RayPoints, cell: FloatArray) -> FloatArray:
+    """Distance of launch points, L, and difference of times below which two rays found (n,) are one: (n, 2).
+
+    ``cell`` (n, 2) is that of the fan in which each was sought. What is left of r - p, up to ACCEPTED, is a step of J'
+    across the rays and of κₙ along them: far on flat ground.
+    """
+    turn = np.stack([np.abs(rays.spreading_rate), np.abs(rays.curvature[1])], axis=1)
+    with np.errstate(divide="ignore"):
+        left = 2 * ACCEPTED / turn
+    return np.asarray(np.clip(left, ALIKE[0] * cell, ALIKE[1] * cell))
