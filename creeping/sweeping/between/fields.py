@@ -127,25 +127,39 @@ class FieldsBetween:
         if self.request.method == "auto":
             for problem in problems:
                 passed[FieldArrays(problem.arrays).unclear] = False
+        self._write(nodes.results, inside, places, length, problems, rows, passed, out)
+        return np.asarray(rows[~passed])
+
+    def _write(
+        self,
+        results: Arrays,
+        inside: IntArray,
+        places: FloatArray,
+        length: FloatArray,
+        problems: list[Problem],
+        rows: IntArray,
+        passed: BoolArray,
+        out: Arrays,
+    ) -> None:
+        """Results of the rows (n,) that have passed, from the corners of their cells (n, 2^dimensions) and the sums."""
         done, some = np.flatnonzero(passed), rows[passed]
-        known = {name: nodes.results[name][inside[done]] for name in (*LINE, *VALID)}
+        known = {name: results[name][inside[done]] for name in (*LINE, *VALID)}
         out["incidence_status"][some] = np.where(np.any(known["incidence_status"] == FOLLOWED, axis=1), FOLLOWED, OK)
         out["curves"][some], out["line_length"][some] = known["curves"][:, 0], length[done]
         out["line_error"][some] = known["line_error"].max(axis=1)
-        near = corner_weights(places[done])
         out["singular_distance"][some] = known["singular_distance"].min(axis=1)
+        near = corner_weights(places[done])
         for name in SHARES:
             out[name][some] = _totals(near.T * known[name].T)
         for name, worst in zip(VALID, (np.min, np.max), strict=True):
             out[name][some] = worst(known[name], axis=1)
         out["interpolated"][some] = True
-        for which_, suffix, difference, arrays in problems:
-            for name, values in (arrays | {"interpolation_error": difference}).items():
-                if name + suffix in out:
+        for problem in problems:
+            at: Any = (some, *problem.which)
+            for name, values in (problem.arrays | {"interpolation_error": problem.difference}).items():
+                if name + problem.suffix in out:
                     # one observer is no axis of "monostatic"
-                    found = values[done] if self.request.observation else values[done, 0]
-                    out[name + suffix][(some, *which_)] = found
-        return np.asarray(rows[~passed])
+                    out[name + problem.suffix][at] = values[done] if self.request.observation else values[done, 0]
 
     def _summed(
         self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: list[FloatArray]
@@ -173,6 +187,7 @@ class FieldsBetween:
         return fields, differences, np.all(whole & creeping, axis=(1, 2))
 
     def _problems(self, results: Arrays, inside: IntArray, fields: Any, differences: FloatArray) -> Iterator[Problem]:
+        """What was summed, by boundary and wavenumber, with the errors and flags of the corners."""
         request, n = self.request, len(fields)
         numbers = [(*which, k) for _, which, _ in request.problems for k in range(len(request.wavenumbers))]
         suffixes = np.repeat([suffix for _, _, suffix in request.problems], len(request.wavenumbers))
