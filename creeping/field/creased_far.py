@@ -153,9 +153,9 @@ class CreasedParts(Parts):
 
     def _leading(self, points: SpecularPoints, kind: Boundary) -> ComplexArray:
         """What specular points are in physical optics of a scalar problem, all of each (m,)."""
-        r, d = self.geometry.directions[points.observer], self.incident[points.observer]
+        path = points.path(self.incident[points.observer], self.geometry.directions)
         turns = np.sum(points.principal < 0, axis=1)
-        phase = self.wavenumber * np.sum((d - r) * points.points, axis=1) - 0.5 * np.pi * turns
+        phase = self.wavenumber * path - 0.5 * np.pi * turns
         mirror = 0.5 / np.sqrt(np.abs(np.prod(points.principal, axis=1)))
         out = np.zeros(len(self.geometry.directions), dtype=complex)
         np.add.at(out, points.observer, mirror * plane_reflection(points.cosine, kind) * np.exp(1j * phase))

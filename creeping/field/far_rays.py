@@ -77,8 +77,7 @@ def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, 
     """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
     rays = geometry.shed.rays
     m1, m2 = scales(rays, wavenumber)
-    path = rays.eikonal - np.sum(rays.directions * rays.points, axis=-1)
-    phase = wavenumber * path - 0.5 * np.pi * rays.far_caustics
+    phase = wavenumber * rays.departing - 0.5 * np.pi * rays.far_caustics
     wave = shed_wave(rays, wavenumber, boundary, order)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if order == 2 and boundary in CROSSED:

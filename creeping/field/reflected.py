@@ -147,7 +147,7 @@ def reflected_amplitude(
 ) -> ComplexArray:
     """Contribution of each specular point to the far field (n,), L."""
     R = reflection(specular.cosine, *curvatures(specular), wavenumber, boundary, order)
-    path = np.sum((direction - observers[specular.observer]) * specular.points, axis=1)
+    path = specular.path(direction, observers)
     with np.errstate(divide="ignore"):
         spread = 0.5 / np.sqrt(np.abs(np.prod(specular.principal, axis=1)))
     turns = np.sum(specular.principal < 0, axis=1)

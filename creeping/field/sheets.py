@@ -47,8 +47,7 @@ def sheets_of(geometry: FarGeometry, parts: list[Parts]) -> Sheets:
     shed, specular = geometry.shed, geometry.specular
     rays, length = shed.rays, size(geometry.body)
     points = specular.points
-    away = geometry.direction[specular.observer] - geometry.directions[specular.observer]
-    path = np.concatenate([rays.eikonal - np.sum(rays.directions * rays.points, axis=1), np.sum(away * points, axis=1)])
+    path = np.concatenate([rays.departing, specular.path(geometry.direction[specular.observer], geometry.directions)])
     key = np.concatenate(
         [
             np.concatenate([rays.points, rays.time[:, None]], axis=1),

@@ -127,6 +127,11 @@ class RayPoints:
         return np.asarray(self.starts[..., 0] + self.time)
 
     @property
+    def departing(self) -> FloatArray:
+        """d.x0 + s - p.x, L: k times it is the far phase of a ray that leaves along its tangent."""
+        return np.asarray(self.eikonal - np.sum(self.directions * self.points, axis=-1))
+
+    @property
     def width(self) -> FloatArray:
         """dσ⊥/dσ: arclength of the shadow line across the ray."""
         return self.starts[..., 1]

@@ -61,6 +61,10 @@ class SpecularPoints:
         """Sine of the angle of incidence (n,)."""
         return np.sqrt(np.maximum(1 - self.cosine**2, 0.0))
 
+    def path(self, direction: FloatArray, observers: FloatArray) -> FloatArray:
+        """(d - r).x (n,), L, of the incidence of each point (n, 3) and the observers (m, 3)."""
+        return np.asarray(np.sum((direction - observers[self.observer]) * self.points, axis=1))
+
 
 def specular_points(
     body: Surface, direction: FloatArray, observers: FloatArray, mesh: Triangulation | None = None

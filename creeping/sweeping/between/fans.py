@@ -13,7 +13,7 @@ from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.many import ShadowLines, shadow_lines
 from creeping.shadow.panels import newton_step, onto_line
 from creeping.shadow.status import OK
-from creeping.sweeping.between.stencil import offsets
+from creeping.sweeping.between.stencil import around
 from creeping.sweeping.lattice import FINER, Lattice
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.sweeper import Arrays, fill_lines, fill_rays
@@ -68,11 +68,9 @@ class Fans:
     def stencils(self, level: int, own: IntArray) -> list[IntArray | None]:
         """Nodes of each cell, (n, 1 + dimensions) the face and its own number; None where rays cannot be told."""
         lattice, finer = self._lattice, FINER ** (self._lattice.levels - 1 - level)
-        steps = offsets(lattice.dimensions)
-        around = np.repeat(own[:, None], len(steps), axis=1)
-        around[..., 1:] += steps
-        numbers = lattice.wrapped(around.reshape(-1, own.shape[1]), level)
-        block = np.repeat(own[:, 1:] // (SPAN * FINER**level), len(steps), axis=0)
+        nodes = around(own)
+        numbers = lattice.wrapped(nodes.reshape(-1, own.shape[1]), level)
+        block = np.repeat(own[:, 1:] // (SPAN * FINER**level), nodes.shape[1], axis=0)
         keys = np.concatenate([block, numbers[:, :1], numbers[:, 1:] * finer], axis=1)
         keys, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         new = [n for n, key in enumerate(map(tuple, keys.tolist())) if key not in self._known]
@@ -80,8 +78,8 @@ class Fans:
             count = len(self._known)
             self._known |= {tuple(keys[n].tolist()): count + k for k, n in enumerate(new)}
             self._compute(lattice.directions(numbers[first[new]], level), keys[new][:, : own.shape[1]])
-        nodes = np.array([self._known[tuple(key)] for key in keys.tolist()], dtype=np.int64)
-        return [self._served(stencil) for stencil in nodes[place.reshape(len(own), -1)]]
+        fans = np.array([self._known[tuple(key)] for key in keys.tolist()], dtype=np.int64)
+        return [self._served(stencil) for stencil in fans[place.reshape(len(own), -1)]]
 
     def alike(self, stencil: IntArray) -> BoolArray:
         """Whether a ray is of one status at all nodes, and detached at the same outputs (rays,)."""

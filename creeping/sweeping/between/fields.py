@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
+from creeping.sweeping.between.levels import Between, by_cell
 from creeping.sweeping.between.nodes import Nodes
 from creeping.sweeping.between.stencil import combined, corner_weights, corners, weights
 from creeping.sweeping.field_arrays import FieldArrays
@@ -60,52 +60,26 @@ class Problem(NamedTuple):
     arrays: Arrays
 
 
-class FieldsBetween:
-    """Fields of incidences, interpolated where that is good enough; called as a `Sweeper` is.
-
-    Parameters
-    ----------
-    flow : PhaseMap or DirectFlow
-    request : SweepRequest
-        With an accuracy and a lattice.
-    """
+class FieldsBetween(Between):
+    """Fields of incidences; see `Between`."""
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
-        assert request.lattice is not None and request.accuracy is not None
-        self.flow, self.request = flow, request
-        self._lattice, self._accuracy = request.lattice, request.accuracy
-        self._direct, self._plain = Sweeper(flow, request), Sweeper(flow, replace(request, method="rays"))
-        self._nodes: Nodes | None = None
+        super().__init__(flow, request)
+        self._plain = Sweeper(flow, replace(request, method="rays"))
+        self._nodes = Nodes(self._plain, self._lattice)
         # columns of amplitudes: the components of one boundary and wavenumber after the other
         widths = [4 if name == "pec" else 1 for name, _, _ in request.problems for _ in request.wavenumbers]
         self._first = np.cumsum(widths) - np.array(widths)
         self._many = max(1, len(request.observation))
         self._wavenumbers = np.repeat(np.tile(request.wavenumbers, len(request.problems)), widths)
 
-    @property
-    def body(self) -> Surface:
-        """Body of the flow."""
-        return self.flow.body
-
-    def __call__(self, incidences: FloatArray) -> Arrays:
-        """Arrays of results of unit directions (n, 3)."""
-        incidences = np.asarray(incidences, dtype=float)
-        out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
-        if self._nodes is None or len(self._nodes) > MOST_NODES:
+    def _begin(self) -> None:
+        if len(self._nodes) > MOST_NODES:
             self._nodes = Nodes(self._plain, self._lattice)
-        for level in range(self._lattice.levels):
-            if len(left):
-                left = self._level(self._nodes, level, incidences, left, out)
-        if len(left):
-            for name, values in self._direct(incidences[left]).items():
-                out[name][left] = values
-        return out
 
-    def _level(self, nodes: Nodes, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
-        """Fill the results of those rows that the level gives; returns the others."""
-        cell, places = self._lattice.located(incidences[rows], level)
-        own, which = np.unique(cell, axis=0, return_inverse=True)
-        which = which.reshape(-1)
+    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
+        nodes = self._nodes
+        own, which, members, places = by_cell(self._lattice, level, incidences[rows])
         cells = nodes.cells(level, own)
         six, errors = weights(places)
         stencil = cells.stencil[which]
@@ -115,8 +89,7 @@ class FieldsBetween:
         passed = np.max(np.abs(off), axis=0) <= self._accuracy * length
         shape = len(rows), self._many, 2, len(self._wavenumbers)
         fields, differences = np.zeros(shape, dtype=complex), np.zeros(shape)
-        order = np.argsort(which, kind="stable")
-        for chain, mine in zip(cells.chains, np.split(order, np.cumsum(np.bincount(which))[:-1]), strict=True):
+        for chain, mine in zip(cells.chains, members, strict=True):
             if chain is None:
                 passed[mine] = False
             else:

@@ -9,7 +9,7 @@ from creeping.field.far_geometry import FarGeometry
 from creeping.field.far_rays import Parts
 from creeping.field.sheets import isolated, sheets_of
 from creeping.sweeping.between.matching import chains, links
-from creeping.sweeping.between.stencil import BASE, NODES, corners, offsets
+from creeping.sweeping.between.stencil import BASE, NODES, around, corners, offsets
 from creeping.sweeping.lattice import FINER, Lattice
 from creeping.sweeping.sweeper import Arrays, Sweeper
 
@@ -68,9 +68,7 @@ class Nodes:
         """Cells of a level, (n, 1 + dimensions) the face and the number of their own node."""
         lattice = self._lattice
         steps = offsets(lattice.dimensions)
-        around = np.repeat(own[:, None], len(steps), axis=1)
-        around[..., 1:] += steps
-        numbers = lattice.wrapped(around.reshape(-1, own.shape[1]), level)
+        numbers = lattice.wrapped(around(own).reshape(-1, own.shape[1]), level)
         numbers, place = np.unique(numbers, axis=0, return_inverse=True)
         nodes = self._at(level, numbers)
         stencil = nodes[place.reshape(len(own), -1)]

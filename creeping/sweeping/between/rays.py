@@ -15,7 +15,7 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from creeping.geodesics.states import ATTENUATION, P, X, pack, whole_lanes
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import size
 from creeping.kernels.threads import CHUNK
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.fan import ray_arrays
@@ -24,9 +24,10 @@ from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.panels import onto_line
 from creeping.shadow.status import ATTACHED, FOLLOWED, OK
 from creeping.sweeping.between.fans import ARCLENGTH, END, PHASE, POINTS, START, Fans, steps_of
+from creeping.sweeping.between.levels import Between, by_cell
 from creeping.sweeping.between.stencil import combined, corner_weights, corners, weights
 from creeping.sweeping.request import CURVED, LINE, SHARES, SweepRequest
-from creeping.sweeping.sweeper import Arrays, Sweeper
+from creeping.sweeping.sweeper import Arrays
 
 TESTS = (0.2, 0.5, 0.8)
 """Places in a cell at which its rays are judged."""
@@ -36,57 +37,28 @@ SOME = 0.5
 """Largest share of an incidence's rays that are carried by themselves."""
 
 
-class RaysBetween:
-    """Rays of incidences, interpolated where that is good enough; called as a `Sweeper` is.
-
-    Parameters
-    ----------
-    flow : PhaseMap or DirectFlow
-    request : SweepRequest
-        With an accuracy and a lattice.
-    """
+class RaysBetween(Between):
+    """Rays of incidences; see `Between`."""
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
-        assert request.lattice is not None and request.accuracy is not None
-        self.flow, self.request = flow, request
-        self._lattice, self._accuracy = request.lattice, request.accuracy
-        self._direct = Sweeper(flow, request)
-        self._fans: Fans | None = None
+        super().__init__(flow, request)
+        self._fans = Fans(flow, request, self._lattice)
         # a cell is judged by itself, whatever incidences it holds
         tests = np.stack(np.meshgrid(*[TESTS] * self._lattice.dimensions, indexing="ij"), axis=-1)
         self._tests = weights(tests.reshape(-1, self._lattice.dimensions))
 
-    @property
-    def body(self) -> Surface:
-        """Body of the flow."""
-        return self.flow.body
-
-    def __call__(self, incidences: FloatArray) -> Arrays:
-        """Arrays of results of unit directions (n, 3)."""
-        incidences = np.asarray(incidences, dtype=float)
-        out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
-        if self._fans is None or self._fans.lanes.nbytes > MOST_BYTES:
+    def _begin(self) -> None:
+        if self._fans.lanes.nbytes > MOST_BYTES:
             self._fans = Fans(self.flow, self.request, self._lattice)
-        for level in range(self._lattice.levels):
-            if len(left):
-                left = self._level(self._fans, level, incidences, left, out)
-        if len(left):
-            for name, values in self._direct(incidences[left]).items():
-                out[name][left] = values
-        return out
 
-    def _level(self, fans: Fans, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
-        """Fill the results of those rows that the level gives; returns the others."""
-        cell, places = self._lattice.located(incidences[rows], level)
-        own, which = np.unique(cell, axis=0, return_inverse=True)
-        which = which.reshape(-1)
+    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
+        fans = self._fans
+        own, _, members, places = by_cell(self._lattice, level, incidences[rows])
         six, near = weights(places)[0], corner_weights(places)
         # finer cells have about half as many such rays, and cost a fan each
         allowed = min(SOME, 2.0 / self._lattice.crowded(level))
         passed, again = np.zeros(len(rows), dtype=bool), []
-        order = np.argsort(which, kind="stable")
-        shares = np.split(order, np.cumsum(np.bincount(which))[:-1])
-        for stencil, mine in zip(fans.stencils(level, own), shares, strict=True):
+        for stencil, mine in zip(fans.stencils(level, own), members, strict=True):
             if stencil is None:
                 continue
             error = self._error(fans, stencil)

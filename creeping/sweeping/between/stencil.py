@@ -25,6 +25,14 @@ def offsets(dimensions: int) -> IntArray:
     return np.stack(np.meshgrid(*[NODES] * dimensions, indexing="ij"), axis=-1).reshape(-1, dimensions)
 
 
+def around(own: IntArray) -> IntArray:
+    """Nodes of the stencils of cells (n, 1 + dimensions), face and own number: (n, 6^dimensions, the same)."""
+    steps = offsets(own.shape[1] - 1)
+    nodes = np.repeat(own[:, None], len(steps), axis=1)
+    nodes[..., 1:] += steps
+    return nodes
+
+
 def corners(dimensions: int) -> IntArray:
     """Places of the cell's own corners in the stencil: (2^dimensions,)."""
     inside = np.all((offsets(dimensions) == 0) | (offsets(dimensions) == 1), axis=1)
