@@ -34,9 +34,10 @@ from creeping.field.currents.nodes import TAKEN_OVER, LitNodes, lit_part, nodes_
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
+from creeping.field.marched_sum import marched_sum, marches
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
 from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
-from creeping.field.served import Served
+from creeping.field.served import Served, Words
 from creeping.field.shed_wave import fock_parameter, scales
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
@@ -176,18 +177,30 @@ def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, o
 
 def rays_on(
     fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int, share: FloatArray | None = None
-) -> RaySum:
-    """Creeping rays at points of the body (n, 3); ``share`` (n,) is that of rays that have just left the line."""
+) -> tuple[RaySum, Words]:
+    """Creeping waves at points of the body (n, 3), by modes or by marching, whichever states less, and which it was.
+
+    ``share`` (n,) is that of rays that have just left the line.
+    """
     found = shed_on(fan_strips(fan), fan.body, points)
     waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
+    young = np.zeros(len(found.observer), dtype=bool)
     if share is not None:
         young = fock_parameter(found.rays, k) < TAKEN_OVER
         weight = np.where(young, share[found.observer], 1.0)
         # a wave may be infinite
         waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
-    return ray_sum(
+    by_modes = ray_sum(
         fan, found, len(points), waves, own_error(found.rays, (waves, other), k, kind, order, on=True), k, kind
     )
+    method = np.full(len(points), "rays")
+    if not marches(fan, kind, order, len(points), k):
+        return by_modes, method
+    marched = marched_sum(fan, found, points, share, young, k, kind)
+    ok = marched.status == FieldStatus.OK
+    better = ok & ((by_modes.status != FieldStatus.OK) | (marched.error < by_modes.error))
+    chosen = (np.where(better, its, mine) for its, mine in zip(marched.parts, by_modes.parts, strict=True))
+    return RaySum(*chosen), np.where(better, "march", method)
 
 
 def total_on(
@@ -203,7 +216,7 @@ def total_on(
     ``currents`` are those of the wavenumber and boundary, if they are at hand.
     """
     lit, lit_error, share = _lit_at(fan, points, k, kind, order)
-    rays = rays_on(fan, points, k, kind, order, 1 - share)
+    rays, by = rays_on(fan, points, k, kind, order, 1 - share)
     unit = k if kind.kind == "soft" else 1.0
     left = 0.0
     if np.any(share > 0) and not _convex(fan):
@@ -225,7 +238,7 @@ def total_on(
         error=np.hypot(error, lit_error),
         error_by=np.where(unknown | (status != FieldStatus.OK), "bound", "expansion"),
         status=np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
-        method=np.where(share == 1, "lit", np.where(share > 0, "lit+rays", "rays")),
+        method=np.where(share == 1, "lit", np.where(share > 0, np.char.add("lit+", by), by)),
     )
 
 

@@ -76,6 +76,11 @@ class RaySum:
     status: IntArray
     faded: FloatArray
 
+    @property
+    def parts(self) -> tuple[ComplexArray, FloatArray, IntArray, FloatArray]:
+        """Values, error, status and faded."""
+        return self.values, self.error, self.status, self.faded
+
 
 def ray_sum(
     fan: RayFan,
@@ -91,19 +96,19 @@ def ray_sum(
     size = np.abs(waves)
     values = np.zeros(count, dtype=complex)
     np.add.at(values, observer, waves)
-    strength = _total(size, observer, count)
+    strength = total_of(size, observer, count)
     decay, end = fan_decay(fan, wavenumber, boundary)
     xi = fock_parameter(rays, wavenumber)
     # a wave may be infinite
     with np.errstate(invalid="ignore", over="ignore"):
-        lost = _total(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
-        merging = _merging(shed, size, wavenumber, count)
-        bent = np.minimum(_fold(fan_strips(fan), shed, wavenumber), 1.0)
-        folded = _total(np.where(size > 0, size * bent, 0.0), observer, count)
-        root = _total(np.where(size > 0, size**2 * bent, 0.0), observer, count)
+        lost = total_of(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
+        merging = merging_error(shed, size, wavenumber, count)
+        bent = np.minimum(fold_share(fan_strips(fan), shed, wavenumber), 1.0)
+        folded = total_of(np.where(size > 0, size * bent, 0.0), observer, count)
+        root = total_of(np.where(size > 0, size**2 * bent, 0.0), observer, count)
         narrow = (size > 0) & (tube_share(rays, shed.reach) * fock_scale(wavenumber, rays.curvature[1]) < NARROW)
         caustic = (merging > MERGED * strength) | (folded > FOLDED * strength)
-        error = np.sqrt(_total(own_error, observer, count) ** 2 + root + merging**2 + lost**2)
+        error = np.sqrt(total_of(own_error, observer, count) ** 2 + root + merging**2 + lost**2)
     caustic[observer[narrow]] = True
     ended = np.zeros(count, dtype=bool)
     ended[observer[~rays.alive]] = True
@@ -118,7 +123,7 @@ def ray_sum(
         FieldStatus.OK,
     )
     error = np.where(status == FieldStatus.OK, error, np.fmax(error, strength))
-    return RaySum(values, error, status.astype(np.int64), _total(np.exp(-decay * xi), observer, count))
+    return RaySum(values, error, status.astype(np.int64), total_of(np.exp(-decay * xi), observer, count))
 
 
 def own_error(
@@ -154,7 +159,7 @@ def _mean_across(rays: RayPoints, wavenumber: float) -> FloatArray:
     return np.asarray(np.mean([np.abs(r) / m**2 for r, m in ends], axis=0))
 
 
-def _fold(strips: tuple[Strip, ...], shed: ShedRays, wavenumber: float) -> FloatArray:
+def fold_share(strips: tuple[Strip, ...], shed: ShedRays, wavenumber: float) -> FloatArray:
     """f of each ray (n,)."""
     rays, reach = shed.rays, shed.reach
     slope = np.zeros(len(reach))
@@ -178,13 +183,13 @@ def tube_share(rays: RayPoints, reach: FloatArray) -> FloatArray:
     return np.asarray(np.nan_to_num(share))
 
 
-def _total(values: FloatArray, observer: IntArray, count: int) -> FloatArray:
+def total_of(values: FloatArray, observer: IntArray, count: int) -> FloatArray:
     out = np.zeros(count)
     np.add.at(out, observer, values)
     return out
 
 
-def _merging(shed: ShedRays, size: FloatArray, wavenumber: float, count: int) -> FloatArray:
+def merging_error(shed: ShedRays, size: FloatArray, wavenumber: float, count: int) -> FloatArray:
     """Error of pairs of waves (count,) that have an odd number of caustics between them."""
     rays = shed.rays
     zeros = rays.caustics + (rays.spreading * (rays.spreading + shed.reach * rays.spreading_rate) < 0)

@@ -127,6 +127,11 @@ class Strip:
         lanes, _ = self._splines
         return np.asarray(lanes(np.stack([self.wrap(sigma), s], axis=-1), nu=(1, 0))[:, 6:8])
 
+    def attenuation_slopes(self, sigma: FloatArray, s: FloatArray) -> FloatArray:
+        """Derivative of the integral of κₙ^(2/3) in σ, L^(-2/3): (n,), (n,) -> (n,)."""
+        lanes, _ = self._splines
+        return np.asarray(lanes(np.stack([self.wrap(sigma), s], axis=-1), nu=(1, 0))[:, 14])
+
     def _alive(self, sigma: FloatArray, s: FloatArray) -> BoolArray:
         """Whether both neighbouring rays are creeping there, at the step before."""
         ray = self.nearest(sigma)
@@ -150,15 +155,19 @@ def _interpolating(places: FloatArray, values: FloatArray, degree: int) -> tuple
     return knots, solve_banded((below, above), bands, values.reshape(len(places), -1)).reshape(values.shape)
 
 
+def strip_rows(fan: RayFan) -> list[IntArray]:
+    """Rows of the fan's rays on each of its strips, in their order."""
+    rows = [np.flatnonzero(fan.arc_index == k) for k in range(len(fan.closed_arcs))]
+    return [mine for mine in rows if len(mine)]
+
+
 def strips_of(fan: RayFan) -> tuple[Strip, ...]:
     """One strip for each arc of the fan that has rays; one of a single ray cannot be interpolated."""
     times, everything = ray_points(fan)
     found = []
     lengths = [curve.length for curve in fan.line.curves]
-    for k, closed in enumerate(fan.closed_arcs):
-        mine = np.flatnonzero(fan.arc_index == k)
-        if not len(mine):
-            continue
+    for mine in strip_rows(fan):
+        closed = fan.closed_arcs[fan.arc_index[mine[0]]]
         length = lengths[int(fan.curve_index[mine[0]])]
         positions = np.unwrap(fan.arclength[mine], period=length)
         found.append(Strip(positions, times, everything[mine], length if closed else np.inf))

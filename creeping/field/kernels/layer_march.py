@@ -37,18 +37,18 @@ def minus_times(zr, zi, ar, ai, br, bi):
 
 
 @njit(**options)
-def operator(mats, c, t, k, out):
-    """K of a step in columns: out (nd, BAND) flat, entries (j - 3 + i, j) for i = 0..3; c and t (LANES,).
+def operator(mats, step, out):
+    """K of a step in columns: out (nd, BAND) flat, entries (j - 3 + i, j) for i = 0..3; step (4, LANES).
 
-    ``mats`` (4, nd, 8) are M0, -D0/k^2 and the two brackets above, real and imaginary parts by turns.
+    ``mats`` (6, nd, 8) are M0, -D0/k^2, M1, M2, -2 D1/k^2 and -D2/k^2, real and imaginary parts by turns.
     """
-    a = load(c, 0)
-    z = a - load(t, 0)
-    first = spread(0.25 / (k * k)) * z * z
+    c, e, first, square = load(step[0], 0), load(step[1], 0), load(step[2], 0), load(step[3], 0)
     for j in range(mats.shape[1]):
         for i in range(8):
-            bent = spread(mats[2, j, i]) + a * spread(mats[3, j, i])
-            store(out, j * BAND + i * LANES, first * spread(mats[0, j, i]) + spread(mats[1, j, i]) + a * bent)
+            total = first * spread(mats[0, j, i]) + spread(mats[1, j, i]) + square * spread(mats[4, j, i])
+            total = total + c * (spread(mats[2, j, i]) + c * spread(mats[3, j, i]) + e * spread(mats[6, j, i]))
+            total = total + e * (spread(mats[5, j, i]) + e * spread(mats[7, j, i]))
+            store(out, j * BAND + i * LANES, total)
 
 
 @njit(**options)
@@ -171,14 +171,14 @@ def back_substitute(nd, f, weight, total):
 
 
 @njit(**options)
-def into_step(w, c, heights, rates, scale):
+def into_step(w, step, levels, scale):
     """Replace nodal values and slopes of y by those of w = y/sqrt(h), h = 1 + c m; rates are m'."""
-    a = load(c, 0)
+    c, e = load(step[0], 0), load(step[1], 0)
     one, half = spread(1.0), spread(0.5 * scale)
-    for j in range(len(heights)):
-        h = one + a * spread(heights[j])
+    for j in range(levels.shape[1]):
+        h = one + c * spread(levels[0, j]) + e * spread(levels[2, j])
         f = one / root(h)
-        slope = half * a * spread(rates[j]) / h
+        slope = half * (c * spread(levels[1, j]) + e * spread(levels[3, j])) / h
         at = 2 * j * ROW
         for part in range(0, ROW, LANES):
             u = load(w, at + part)
@@ -187,14 +187,14 @@ def into_step(w, c, heights, rates, scale):
 
 
 @njit(**options)
-def out_of_step(w, c, heights, rates, scale):
+def out_of_step(w, step, levels, scale):
     """Undo `into_step`."""
-    a = load(c, 0)
+    c, e = load(step[0], 0), load(step[1], 0)
     one, half = spread(1.0), spread(0.5 * scale)
-    for j in range(len(heights)):
-        h = one + a * spread(heights[j])
+    for j in range(levels.shape[1]):
+        h = one + c * spread(levels[0, j]) + e * spread(levels[2, j])
         f = root(h)
-        slope = half * a * spread(rates[j]) / h
+        slope = half * (c * spread(levels[1, j]) + e * spread(levels[3, j])) / h
         at = 2 * j * ROW
         for part in range(0, ROW, LANES):
             u = f * load(w, at + part)
@@ -223,7 +223,7 @@ def meet_condition(w, beta, g, scale):
 
 
 @njit(**options)
-def march_block(mats, heights, rates, cut, scale, k, soft, c, t, poles, weights, g, beta, switch, incident, w, out):
+def march_block(mats, levels, cut, scale, k, soft, steps, poles, weights, g, beta, switch, incident, w, out):
     """March one block of rays.
 
     Parameters are C-contiguous: c, t (steps, LANES) at mid steps; poles b_j and weights c_j (steps, p, ROW);
@@ -237,19 +237,19 @@ def march_block(mats, heights, rates, cut, scale, k, soft, c, t, poles, weights,
     rhs = np.empty(nd * ROW)
     for i in range(ROW):
         out[0, 0, i], out[0, 1, i] = w[i], w[ROW + i] / scale
-    for step in range(len(c)):
+    for step in range(len(steps)):
         for lane in range(LANES):
             if switch[lane] == step:
                 switch_to_total(w, incident, cut, lane)
-        into_step(w, c[step], heights, rates, scale)
+        into_step(w, steps[step], levels, scale)
         if not soft:
             meet_condition(w, beta[step], g[step, poles.shape[1]], scale)
-        operator(mats, c[step], t[step], k, K)
+        operator(mats, steps[step], K)
         mass(mats, w, rhs)
         w[:] = 0.0
         for j in range(poles.shape[1]):
             factorise(mats, K, rhs, poles[step, j], soft, g[step, j], beta[step], per, f)
             back_substitute(nd, f, weights[step, j], w)
-        out_of_step(w, c[step], heights, rates, scale)
+        out_of_step(w, steps[step], levels, scale)
         for i in range(ROW):
             out[step + 1, 0, i], out[step + 1, 1, i] = w[i], w[ROW + i] / scale

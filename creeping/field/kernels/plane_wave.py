@@ -67,7 +67,7 @@ def transport(r, k, q, kappa, out):
 
 
 @njit(**options)
-def pole_traces(k, q, kappa, kappa_t, poles, weights, ratio, traces, work):
+def pole_traces(k, q, kappa, first, linear, square, kappa_t, poles, weights, ratio, traces, work):
     """Fill traces (p, 2) with r and r' at n = 0 of each pole; returns how far their sum is from ``ratio``.
 
     ``ratio`` is the wave at the step's end in terms of that at its start; work (5, TERMS) and (p, ROUNDS, 2).
@@ -77,10 +77,9 @@ def pole_traces(k, q, kappa, kappa_t, poles, weights, ratio, traces, work):
     for i in range(TERMS):
         sigma[i] = 0j
         start[i] = 0j
-    bright = 1.0 - q * q
-    sigma[0] = bright - 1.0 + 1j * kappa * q / k + ((kappa - kappa_t) ** 2 - kappa**2) / (4 * k * k)
-    sigma[1] = 2.0 * kappa * bright + 1j * kappa * kappa * q / k
-    sigma[2] = kappa * kappa * bright
+    sigma[0] = -q * q + 1j * kappa * q / k + first - kappa**2 / (4 * k * k)
+    sigma[1] = linear - 2.0 * kappa * q * q + 1j * kappa * kappa * q / k
+    sigma[2] = square - kappa * kappa * q * q
     start[0] = 1.0
     for i in range(1, TERMS):
         start[i] = start[i - 1] * kappa_t * (1.5 - i) / i
@@ -113,7 +112,7 @@ def pole_traces(k, q, kappa, kappa_t, poles, weights, ratio, traces, work):
 def drive(k, soft, driven, mid, edges, eta, poles, weights, lane, g, misfit):
     """Boundary values g of the scattered wave at the poles of a ray's first ``driven`` steps; later ones are left 0.
 
-    mid (steps, 2) holds kappa, kappa_t at mid step; edges (steps + 1, 4) psi, d.x - s, kappa_t and J; eta (steps,);
+    mid (steps, 4) holds kappa_e, c0, a1 and a2 at mid step; edges (steps + 1, 4) d.n, d.x - s, kappa_t and J; eta (steps,);
     g (steps, p + 1, 2 LANES) is filled in a lane, its last row with the condition at the step's start; misfit (steps,)
     gets what was to be shared among the poles.
     """
@@ -122,12 +121,16 @@ def drive(k, soft, driven, mid, edges, eta, poles, weights, lane, g, misfit):
     flat = np.empty((5, TERMS), np.complex128)
     work = (flat[0], flat[1], flat[2], flat[3], flat[4], np.empty((p, ROUNDS, 2), np.complex128))
     for i in range(driven):
-        q0, q1 = np.sin(edges[i, 0]), np.sin(edges[i + 1, 0])
+        q0, q1 = edges[i, 0], edges[i + 1, 0]
         before = np.sqrt(edges[i, 3]) * np.exp(1j * k * edges[i, 1])
         after = np.sqrt(edges[i + 1, 3]) * np.exp(1j * k * edges[i + 1, 1])
         # kappa_t of one place in the amplitude and in the condition
         kt = edges[i, 2]
-        misfit[i] = pole_traces(k, q0, mid[i, 0], kt, poles[i], weights[i], after / before, traces, work)
+        ratio = after / before
+        bend, linear, square = mid[i, 0] + mid[i, 1], 2.0 * mid[i, 0], mid[i, 0] ** 2 + mid[i, 3]
+        misfit[i] = pole_traces(
+            k, q0, bend, mid[i, 2], linear, square, kt, poles[i], weights[i], ratio, traces, work
+        )
         size, missing = 0.0, 0j
         slope = 1j * k * eta[i] - 0.5 * kt
         for j in range(p):

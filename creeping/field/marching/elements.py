@@ -54,6 +54,7 @@ class GridSpec:
     element: float
     first: float
     cap: float
+    twist: float
     wavenumber: float
 
 
@@ -72,7 +73,7 @@ class LayerGrid:
         What the reflected wave is multiplied with at the start, and its slope, 1/L.
     scale : float, L
         Unknown slopes are those of the field times this.
-    matrices : (4, 2 j, 8)
+    matrices : (10, 2 j, 8)
         M0, -D0/k², 2 (M1 - D1/k²), M2 - D2/k²: entries (column - 3 + i, column), real and imaginary parts by turns.
     """
 
@@ -83,6 +84,7 @@ class LayerGrid:
     fade: FloatArray
     scale: float
     matrices: FloatArray
+    levels: FloatArray
 
 
 @lru_cache(KEPT)
@@ -91,10 +93,11 @@ def layer_grid(spec: GridSpec) -> LayerGrid:
     nodes = _nodes(spec)
     scale = float(np.median(np.diff(nodes)))
     heights, rates = _levelled(nodes, spec.cap)
+    twists, twist_rates = _twisting(nodes, spec.twist)
     top = nodes[-1] - spec.height
     cut = _fade(nodes, FADED[0] * spec.height, spec.height + FADED[1] * top) * np.array([1.0, scale])
     fade = _fade(nodes, spec.height, nodes[-1])
-    return LayerGrid(nodes, heights, rates, cut, fade, scale, _matrices(spec, nodes, scale))
+    return LayerGrid(nodes, heights, rates, cut, fade, scale, _matrices(spec, nodes, scale), np.stack([heights, rates, twists, twist_rates]))
 
 
 def _fade(n: FloatArray, begin: float, end: float) -> FloatArray:
@@ -124,6 +127,10 @@ def _levelled(n: FloatArray, cap: float) -> tuple[FloatArray, FloatArray]:
     return np.where(z > 0, kept + (cap - kept) * np.tanh(z), n), 1 / np.cosh(np.minimum(z, 300)) ** 2
 
 
+def _twisting(n: FloatArray, height: float) -> tuple[FloatArray, FloatArray]:
+    return height * np.tanh(n / height), 1 / np.cosh(np.minimum(n / height, 300)) ** 2
+
+
 def _matrices(spec: GridSpec, nodes: FloatArray, scale: float) -> FloatArray:
     x, gauss = np.polynomial.legendre.leggauss(5)
     x, gauss = (x + 1) / 2, gauss / 2
@@ -149,12 +156,13 @@ def _matrices(spec: GridSpec, nodes: FloatArray, scale: float) -> FloatArray:
     t = np.clip((n - spec.height) / (nodes[-1] - spec.height), 0, 1)
     S = 1 + 1j * ABSORPTION * t**2
     m = _levelled(n, spec.cap)[0]
+    t = _twisting(n, spec.twist)[0]
     weight = gauss * length
-    mass = [np.einsum("aeg,beg,eg->eab", v, v, weight * S * m**i) for i in range(3)]
-    slope = [np.einsum("aeg,beg,eg->eab", dv, dv, weight * m**i / S) / spec.wavenumber**2 for i in range(3)]
-    parts = np.stack([mass[0], -slope[0], 2 * (mass[1] - slope[1]), mass[2] - slope[2]])
+    mass = [np.einsum("aeg,beg,eg->eab", v, v, weight * S * f) for f in (1, m, m**2, t**2)]
+    slope = [np.einsum("aeg,beg,eg->eab", dv, dv, weight * f / S) / spec.wavenumber**2 for f in (1, m, m**2, t, m * t, t**2)]
+    parts = np.stack([mass[0], -slope[0], 2 * (mass[1] - slope[1]), mass[2] - slope[2], mass[3], -2 * slope[3], -2 * slope[4], -slope[5]])
     size = 2 * len(nodes)
-    out = np.zeros((4, size, 8))
+    out = np.zeros((len(parts), size, 8))
     for a in range(4):
         for b in range(a, 4):
             # rows a of element e and columns b: places 2e + a and 2e + b

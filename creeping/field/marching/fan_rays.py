@@ -1,22 +1,35 @@
-"""Profiles of the rays of a fan: their curvatures and spreading, and those of the lit ground behind the shadow line.
+"""Profiles of the rays of a fan: curvatures, twist and spreading, and those of the lit ground behind the shadow line.
 
-    kappa_n = p.Hp/|grad F|,   kappa_t = b.Hb/|grad F|,   b = n x p,   J'' + K J = 0,   J(0) = 1,   J'(0) = 0
+    kappa_n = p.Hp/|grad F|,   kappa_t = b.Hb/|grad F|,   tau = b.Hp/|grad F|,   b = n x p
+    J'' + K J = 0,   J(0) = 1,   J'(0) = 0,   V = K/2 + min[(J'/2J)^2, MOST_BENT/a^2],   K = kappa_n kappa_t - tau^2
 
-Rays are traced both ways from the shadow line, beyond detachment too: marching goes on where creeping modes end.
+Lambda = D y/y_s is that of the incident wave where it drives the layer, and of Fock's, which depends on xi alone, behind:
 
-Sources: Derivations, R1 and R3.
+    lit      Lambda = d.b/(d.p - 1)
+    shadow   Lambda = [kappa_n^(-2/3) dA/dsigma_perp + tau_1/kappa_1]/J,   A = int kappa_n^(2/3) ds
+
+Both are tau/kappa_n on the line. It fades out where kappa_n falls below FLAT of that on the line, for good: there no
+single xi tells the wave, and levels off at 1, where J falls to 0. Rays are traced both ways from the shadow line, beyond
+detachment too: marching goes on where creeping modes end.
+
+Sources: Derivations, R1, R3 and F22.
 """
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import FloatArray, IntArray
 from creeping.field.arguments import checked_plain
+from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.profile import RayProfiles
+from creeping.field.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import M11, P, X, pack
+from creeping.geodesics.states import M11, M21, P, X, pack
 from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.surface import size
+from creeping.geometry.evaluators import entries_of
+from creeping.geometry.quadrature import BodyNodes
+from creeping.geometry.surface import Surface, size
 from creeping.rays.fan import RayFan
+from creeping.rays.strips import Strip, strip_rows
 
 TURN = 0.03
 """Radians that the body turns by between two nodes, at the largest curvature along rays."""
@@ -25,6 +38,10 @@ FEWEST, MOST = 40, 2000
 BEHIND = np.radians(80.0)
 """Angle by which rays turn behind the line, in the median: the march starts at 75 degrees at most."""
 RTOL = 1e-10
+FLAT, LEAST_SPREADING = 0.3, 0.1
+"""Share of the first curvature at which Lambda begins to fade, and |J| below which it does not grow like 1/J."""
+MOST_BENT = 6.0
+"""Bound of (J'/2J)^2 in V, in terms of the body's size: near caustics it is the beams that spread."""
 
 
 def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | None = None) -> RayProfiles:
@@ -50,9 +67,10 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
         If the body has a speed, or edges, joints or tips.
     """
     checked_plain(fan.body, smooth="marching along rays of a fan")
-    body, x, p = fan.body, fan.points[:, 0], fan.directions[:, 0]
-    kappa = normal_curvature(body, x, p)
+    body, d = fan.body, fan.line.direction
+    x0, p0 = fan.points[:, 0], fan.directions[:, 0]
     least = 1 / size(body)
+    kappa = normal_curvature(body, x0, p0)
     back = float(np.median(BEHIND / np.maximum(kappa, least))) if behind is None else behind
     ahead = fan.length if length is None else length
     sharpest = max(float(np.max(np.abs(fan.curvature))), least)
@@ -60,20 +78,79 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
     for way, sense in ((back, -1.0), (ahead, 1.0)):
         count = int(np.clip(np.ceil(way * sharpest / TURN), FEWEST, MOST))
         times = np.linspace(0, way, count + 1)
-        states = trace_states(body, pack(x, sense * p, jacobi=True), times, rtol=RTOL)
-        ways.append((sense * times, *_of_states(fan, states)))
-    (s0, *first), (s1, *second) = ways
-    s = np.concatenate([s0[:0:-1], s1])
-    joined = [np.concatenate([a[:, :0:-1], b], axis=1) for a, b in zip(first, second, strict=True)]
-    return RayProfiles(np.tile(s, (len(x), 1)), *joined)
+        states = trace_states(body, pack(x0, sense * p0, jacobi=True), times, rtol=RTOL)
+        ways.append(_along(body, d, x0, sense * times, states, sense))
+    first, second = ways
+    whole = {name: np.concatenate([first[name][:, :0:-1], second[name]], axis=1) for name in first}
+    # the derivative of J in s changes its sign with the sense
+    gauss = whole["curvature"] * whole["transverse"] - whole["torsion"] ** 2
+    bent = (whole["rate"] / (2 * np.maximum(np.abs(whole["spreading"]), 1e-9))) ** 2
+    return RayProfiles(
+        **{name: whole[name] for name in ("s", "curvature", "transverse", "spreading", "torsion", "phase", "climb")},
+        lean=_lean(fan, whole),
+        potential=gauss / 2 + np.minimum(bent, MOST_BENT / size(body) ** 2),
+    )
 
 
-def _of_states(fan: RayFan, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """kappa_n, kappa_t and J (rays, steps)."""
-    x, p = states[..., X].reshape(-1, 3), states[..., P].reshape(-1, 3)
-    gradient = fan.body.gradient(x)
-    n = gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+def _along(
+    body: Surface, d: FloatArray, x0: FloatArray, s: FloatArray, states: FloatArray, sense: float
+) -> dict[str, FloatArray]:
+    """What the states of rays (rays, steps, 10) say, each (rays, steps)."""
     shape = states.shape[:2]
-    along = normal_curvature(fan.body, x, p).reshape(shape)
-    across = normal_curvature(fan.body, x, np.cross(n, p)).reshape(shape)
-    return along, across, states[..., M11]
+    x, p = states[..., X].reshape(-1, 3), sense * states[..., P].reshape(-1, 3)
+    gradient = body.gradient(x)
+    steep = np.linalg.norm(gradient, axis=-1)
+    n = gradient / steep[:, None]
+    b = np.cross(n, p)
+    nodes = BodyNodes(x, n, np.ones(len(x)), entries_of(body.hessian(x) / steep[:, None, None]).T, 0.0)
+    away = x.reshape(*shape, 3) - x0[:, None]
+    found = {
+        "s": np.broadcast_to(s, shape),
+        "curvature": nodes.curvature(p),
+        "transverse": nodes.curvature(b),
+        "torsion": nodes.twist(p),
+        "spreading": states[..., M11],
+        "rate": states[..., M21],
+        "phase": away @ d - s,
+        "climb": n @ d,
+        "aside": b @ d,
+        "forward": p @ d,
+    }
+    return {name: np.asarray(values).reshape(shape) for name, values in found.items()}
+
+
+def _lean(fan: RayFan, whole: dict[str, FloatArray]) -> FloatArray:
+    """Lambda (rays, m)."""
+    s, kappa, J = whole["s"][0], whole["curvature"], whole["spreading"]
+    start = int(np.argmax(s == 0))
+    lit, shadow = s < 0, s > 0
+    on_line = whole["torsion"][:, start] / kappa[:, start]
+    out = np.zeros(kappa.shape)
+    # 1 - d.p without cancellation
+    slope = whole["climb"] ** 2 + whole["aside"] ** 2
+    out[:, lit] = (-whole["aside"] * (1 + whole["forward"]) / np.maximum(slope, 1e-300))[:, lit]
+    out[:, start] = on_line
+    inverse = J / (J**2 + LEAST_SPREADING**2 * np.exp(-((J / LEAST_SPREADING) ** 2)))
+    late = np.repeat(on_line[:, None], np.sum(shadow), axis=1)
+    for strip, mine in zip(fan_strips(fan), wide_rows(fan), strict=True):
+        at = np.minimum(s[shadow], strip.times[-1])
+        change = _attenuation_slopes(strip, at)
+        late[mine] += change / np.maximum(kappa[mine][:, shadow], 1e-9) ** (2 / 3)
+    share = np.minimum.accumulate(smoothstep(kappa[:, shadow] / kappa[:, start, None], 0.0, FLAT), axis=1)
+    out[:, shadow] = late * inverse[:, shadow] * share
+    return np.asarray(out / (1 + out**4) ** 0.25)
+
+
+def wide_rows(fan: RayFan) -> list[IntArray]:
+    """Rows of the fan's rays on each of its strips that have several."""
+    return [mine for mine in strip_rows(fan) if len(mine) > 1]
+
+
+def _attenuation_slopes(strip: Strip, times: FloatArray) -> FloatArray:
+    """dA/dsigma_perp (rays, times) of a strip, sigma_perp along b."""
+    sigma = strip.positions
+    rows, columns = (part.ravel() for part in np.meshgrid(sigma, times, indexing="ij"))
+    slopes = strip.attenuation_slopes(rows, columns).reshape(len(sigma), len(times))
+    along = strip.slopes(sigma, np.zeros(len(sigma)))[0][:, :3]
+    b = np.cross(strip.first_normals(sigma), strip.rays.directions[:, 0])
+    return np.asarray(slopes / np.sum(along * b, axis=1)[:, None])

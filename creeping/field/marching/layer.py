@@ -30,6 +30,8 @@ from creeping.field.marching.plan import MarchPlan, MarchStatus, march_plan
 from creeping.field.marching.profile import RayProfiles
 from creeping.kernels.threads import in_threads
 
+STEPPED = ("curvature", "across", "spreading", "torsion", "lean", "potential")
+"""What steps ask of a profile, in the kernel's order."""
 SECONDS = 6e-9
 """Of one pole, unknown, step and ray."""
 
@@ -113,7 +115,7 @@ class MarchedRays:
 
     def _incident_phase(self, ray: int, at: FloatArray) -> FloatArray:
         """Phase k (d.x - s) of the incident wave at places."""
-        return np.asarray(self.wavenumber * (self.profiles.along(ray, at)[:, 2] - at))
+        return self.wavenumber * self.profiles.value_of("phase", ray, at)
 
 
 def march_rays(profiles: RayProfiles, *, wavenumber: float, boundary: Boundary) -> MarchedRays:
@@ -149,17 +151,19 @@ class _March:
         self.soft = boundary.kind == "soft"
         self.admittance = boundary.admittance if boundary.kind == "impedance" else 0j
         self.varies = boundary.kind == "impedance" and profiles.admittance is not None
-        ways = [self._edges(ray) for ray in range(len(profiles))]
-        self.edges = [np.concatenate([first, second[1:]]) for first, second in ways]
-        self.driven = np.array([len(first) - 1 for first, _ in ways])
+        ends = [self._edges(ray) for ray in range(len(profiles))]
+        self.edges = [np.concatenate([first, second[1:]]) for first, second in ends]
+        self.driven = np.array([len(first) - 1 for first, _ in ends])
         most = max(len(edges) for edges in self.edges)
         self.s = np.stack([np.pad(edges, (0, most - len(edges)), mode="edge") for edges in self.edges])
         self.values = np.zeros(self.s.shape, dtype=complex)
         self.error = np.full(self.s.shape, np.inf)
-        self.misfit = np.zeros(len(ways))
+        self.misfit = np.zeros(len(ends))
         self.status = plan.status.copy()
         self.reliable = plan.reliable.copy()
-        sizes = np.round(k * np.concatenate([np.diff(edges) for edges in self.edges]), 9)
+        shares = [profiles.obliqueness(ray, 0.5 * (edges[1:] + edges[:-1])) for ray, edges in enumerate(self.edges)]
+        ways = [share * np.diff(edges) for share, edges in zip(shares, self.edges, strict=True)]
+        sizes = np.round(k * np.concatenate(ways), 9)
         distinct, which = np.unique(sizes, return_inverse=True)
         self.rational = rational_step(distinct)
         self.which = np.split(which, np.cumsum([len(edges) - 1 for edges in self.edges])[:-1])
@@ -227,7 +231,7 @@ class _March:
             self._load(block[lane] if lane < len(block) else block[0], lane, grid, data)
         out = np.empty((len(data.beta) + 1, 2, 2 * LANES))
         march_block(
-            *(grid.matrices, grid.heights, grid.rates, grid.cut, grid.scale, self.k, self.soft, *data.steps),
+            *(grid.matrices, grid.levels, grid.cut, grid.scale, self.k, self.soft, data.steps),
             *(data.poles, data.weights, data.drive, data.beta, data.switch),
             *(data.incident.ravel(), data.wave.ravel(), out),
         )
@@ -239,23 +243,24 @@ class _March:
         from creeping.field.kernels.ray_load import load_steps, load_waves
 
         profiles, edges, driven = self.profiles, self.edges[ray], int(self.driven[ray])
-        s, curve, start = profiles.s[ray], profiles.curves[ray], float(edges[0])
-        kappa, transverse = profiles.cubics_of("curvature", ray), profiles.cubics_of("transverse", ray)
-        spreading, eta = profiles.cubics_of("spreading", ray), self._admittance(ray)
+        s, start = profiles.s[ray], float(edges[0])
+        of = {name: profiles.cubics_of(name, ray) for name in (*STEPPED, "bend", "phase", "climb")}
+        eta = self._admittance(ray)
         lit = np.empty((driven + 1, 4))
         b, c = (part[self.which[ray]] for part in self.rational)
         self.misfit[ray] = load_steps(
-            *(self.k, self.soft, lane, s, kappa, transverse, spreading, eta, curve, edges, driven, b, c),
-            *(data.steps, data.poles, data.weights, data.drive, data.beta, lit),
+            *(self.k, self.soft, lane, s, *(of[name] for name in STEPPED), eta, of["phase"], of["climb"]),
+            *(edges, driven, b, c, data.steps, data.poles, data.weights, data.drive, data.beta, lit),
         )
         data.switch[lane] = driven
         load_waves(
-            *(self.k, self.soft, lane, s, kappa, transverse, eta, curve, start, self.plan.stop[ray], lit),
-            *(grid.nodes, grid.heights, grid.rates, grid.fade, grid.scale, data.wave, data.incident),
+            *(self.k, self.soft, lane, s, of["bend"], profiles.curves[ray], of["across"], of["lean"], eta),
+            *(start, self.plan.stop[ray], lit),
+            *(grid.nodes, grid.levels, grid.fade, grid.scale, data.wave, data.incident),
         )
         y = np.sqrt(lit[:, 3]) * np.exp(1j * self.k * lit[:, 1])
         # the total is the scattered wave and this, or its slope
-        self.values[ray, : driven + 1] = (1j * self.k * np.sin(lit[:, 0]) + 0.5 * lit[:, 2]) * y if self.soft else y
+        self.values[ray, : driven + 1] = (1j * self.k * lit[:, 0] + 0.5 * lit[:, 2]) * y if self.soft else y
 
     def _admittance(self, ray: int) -> ComplexArray:
         """Cubics of the admittance along a ray."""
@@ -286,7 +291,7 @@ class _BlockData:
     """What the kernel wants of a block: all its arrays, by step and lane, real parts before imaginary ones."""
 
     def __init__(self, steps: int, nodes: int, lanes: int) -> None:
-        self.steps = np.zeros((2, steps, lanes))
+        self.steps = np.zeros((steps, 4, lanes))
         self.poles, self.weights = (np.zeros((steps, ORDER, 2 * lanes)) for _ in range(2))
         self.drive = np.zeros((steps, ORDER + 1, 2 * lanes))
         self.beta = np.zeros((steps, 2 * lanes))

@@ -35,6 +35,7 @@ AWAY = np.radians(100.0)
 STEP, LIT_STEP = 0.12, 0.3
 HEIGHT, FLAT_HEIGHT, FLAT_PATH = 20.0, 14.0, 6.0
 ELEMENT, SLANTED, FIRST = 0.6, 1.3, 0.2
+TWISTED = 8.0
 FLAT = 0.3
 """Share of the curvature at the shadow line below which ground is flat."""
 LEAST_CURVATURE = 0.05
@@ -140,11 +141,12 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
         np.minimum(ELEMENT * _delta(k, reference), SLANTED / (k * np.sin(np.maximum(alpha, 0.3)))), ELEMENTS
     )
     first = _rounded(FIRST * _delta(k, most), HEIGHTS)
+    twist = _rounded(TWISTED * _delta(k, reference), HEIGHTS)
     cap = np.where(lowest < -1e-6 * most, _rounded(CAP / np.maximum(-lowest, 1e-6 * most), CAPS), np.inf)
     status, reliable = _status(k, at, look, start, alpha, cap, served)
     specs = [
-        GridSpec(float(a), float(b), float(c), float(d), float(k))
-        for a, b, c, d in zip(height, element, first, cap, strict=True)
+        GridSpec(float(a), float(b), float(c), float(d), float(e), float(k))
+        for a, b, c, d, e in zip(height, element, first, cap, twist, strict=True)
     ]
     return MarchPlan(start, stop, switch, steps, specs, status, reliable)
 
