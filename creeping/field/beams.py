@@ -8,9 +8,9 @@ caustics. By stationary phase each ray that passes through x has its own wave of
 caustics, folds, cusps and points alike, the sum stays right. k_c, the wavenumber along the surface, is by a factor of
 1 + tau/(2 m^2) more than k for a mode: without it the focus behind a sphere of ka = 30 is off by 6 %, with it by 0.3 %.
 
-eps = WIDTH/a is free; what it changes is an error. Beams of a sigma next to the shadow line are cut at it, so that they do
-not serve points within 2 of their widths w = (a/(WIDTH k))^(1/2) of the line: there rays have not merged yet, and each
-that has come less far than 4 w stands by itself, others by beams.
+eps = WIDTH/a is free; what it changes is an error. Beams are cut off at the shadow line, so that they serve no points
+within 2 of their widths w = (a/(WIDTH k))^(1/2) of it: there rays have not merged yet, and each that has come less far
+than 4 w stands by itself, others by beams.
 
 Sources: [P82], [CPP82]; Derivations, F24.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.marching.fan_waves import FanWaves
+from creeping.field.marching.fan_waves import MOST_TURNED, FanWaves
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.evaluators import entries_of
@@ -41,8 +41,6 @@ REACH = 0.9
 """How far a beam reaches, in terms of a."""
 CUT, YOUNG = 4.0, (2.0, 3.0)
 """Where beams are cut off that of a ray, and up to where rays stand by themselves, in widths w."""
-MOST_TURNED = 0.5
-"""Bound of |k_c/k - 1|."""
 RTOL = 1e-9
 SECONDS = 2e-8
 """Of one beam and one point."""
@@ -118,7 +116,9 @@ def _add_strip(
     steep = np.linalg.norm(gradient, axis=1)
     n = gradient / steep[:, None]
     b = np.cross(n, p.reshape(-1, 3))
-    nodes = BodyNodes(x.reshape(-1, 3), n, steep, entries_of(body.hessian(x.reshape(-1, 3)) / steep[:, None, None]).T, 0)
+    nodes = BodyNodes(
+        x.reshape(-1, 3), n, steep, entries_of(body.hessian(x.reshape(-1, 3)) / steep[:, None, None]).T, 0
+    )
     rows, columns = (part.ravel() for part in np.meshgrid(sigma, times, indexing="ij"))
     y, slope = (part(number, rows, columns).reshape(count, -1) for part in (waves.at, waves.slope))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -132,7 +132,9 @@ def _add_strip(
     weight = np.sqrt(k * eps / (2 * np.pi)) * (high - low) / count * np.abs(first.width)
     logarithm = np.log(np.maximum(np.abs(y), 1e-300)) - 0.5 * np.log(np.abs(q)) + np.log(weight)[:, None]
     logarithm += 0.5 * np.log(np.abs(1 + turned)) + known.real
-    phase = np.unwrap(np.angle(y), axis=1) - 0.5 * np.unwrap(np.angle(q), axis=1) + 0.5 * np.angle(1 + turned) + known.imag
+    phase = (
+        np.unwrap(np.angle(y), axis=1) - 0.5 * np.unwrap(np.angle(q), axis=1) + 0.5 * np.angle(1 + turned) + known.imag
+    )
     S = first.eikonal[:, None] + times
     spans = -(-(len(times) - 1) // SPAN)
     centres, radii = np.empty((count, spans, 3)), np.empty((count, spans))

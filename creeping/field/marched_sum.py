@@ -5,7 +5,8 @@
 u_r is the sum over the rays through the point, u_b that of beams. Both have the error of the marched wave itself; the
 rest of it is, for rays that merge, e_r as of `creeping.field.ray_sums`; for beams
 
-    e_b^2 = sum min(|u_i|, 1.5 |y_i|)^2 (A + B eta)^2 + C^2 |u_b - u_b'|^2,   eta = |d(log y)/dsigma_perp|^2/(2 k eps)
+    e_b^2 = sum min(|u_i|, 1.5 |y_i|)^2 (A + B eta)^2 + A^2 |u_b|^2 + C^2 |u_b - u_b'|^2
+    eta = |d(log y)/dsigma_perp|^2/(2 k eps)
 
 with u_b' by beams of another width: eta is what a beam that varies across itself errs by. What u_r and u_b differ by
 beyond 2 e_b is added to e_r: on the dark side of a caustic rays know nothing of it.
@@ -90,7 +91,7 @@ def marched_sum(
     by_beams, others = (together(beam_sums(fan, waves, points, factor=factor)) for factor in FACTORS)
     by_rays = total_of_complex(own, observer, count)
     e_b = np.sqrt(total_of((size * (LEAST + np.minimum(VARIES * eta, 1.0))) ** 2, observer, count))
-    e_b = np.hypot(e_b, BROADER * np.abs(by_beams - others))
+    e_b = np.linalg.norm([e_b, LEAST * np.abs(by_beams), BROADER * np.abs(by_beams - others)], axis=0)
     bent = np.where(near, 0.0, np.minimum(fold_share(fan_strips(fan), shed, k), 1.0))
     merging = merging_error(shed, np.abs(own), k, count)
     e_r = np.sqrt(total_of(np.abs(own) ** 2 * bent, observer, count) + merging**2)
@@ -102,7 +103,10 @@ def marched_sum(
         part = np.where(np.abs(y) > 0, off / np.abs(y), 0.0)
     values = (1 - beta) * by_rays + beta * by_beams
     bounded = np.where(np.isfinite(part), np.minimum(part, 1.0), 1.0)
-    error = np.hypot(total_of(size * bounded, observer, count), rest)
+    # at a focus more rays come than those that are found
+    strength = total_of(size, observer, count)
+    more = np.maximum(1.0, np.abs(values) / np.maximum(strength, 1e-300))
+    error = np.hypot(more * total_of(size * bounded, observer, count), rest)
     return _judged(fan, shed, size, values, error, ~np.isfinite(part), k, boundary)
 
 

@@ -14,6 +14,8 @@ Sources: [LK59], [CK13]; Derivations, F8, F17 and F20.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
@@ -175,7 +177,8 @@ def _rays_alone_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, or
     d = fan.line.direction
     lit = normal(fan.body, points) @ d < 0
     lit[lit] = ~occluded(fan.body, points[lit], d)
-    return _rays_alone(rays_on(fan, points, k, kind, order), lit)
+    rays, by = rays_on(fan, points, k, kind, order)
+    return replace(_rays_alone(rays, lit), method=by)
 
 
 def _rays_alone(rays: RaySum, lit: BoolArray) -> Served:

@@ -63,6 +63,8 @@ FLAT, ENDS = 2.0, 0.7
 LEFT, UNKNOWN = 2.0, 2.0
 """Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
 reflected wave and its image."""
+AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0}
+"""The factor on dark ground where waves are marched beyond the end of rays."""
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 
 
@@ -219,17 +221,21 @@ def total_on(
     rays, by = rays_on(fan, points, k, kind, order, 1 - share)
     unit = k if kind.kind == "soft" else 1.0
     left = 0.0
-    if np.any(share > 0) and not _convex(fan):
+    if not _convex(fan):
         left = _left_inside(fan, k, kind) if currents is None else currents.extinction
     unknown = (share > 0) & (not np.isfinite(left))
     lit_error = np.hypot(lit_error, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
+    # where rays have ended the march goes on, but waves from elsewhere come to dark ground as well
+    lit_error = np.hypot(
+        lit_error, (by == "march") * (1 - share) * unit * AFAR[kind.kind] * left if np.isfinite(left) else 0.0
+    )
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
     error = np.where(bare, unit, error)
     # on lit ground rays that come from afar have decayed: those that are not to be trusted are left out, and no more
     # than what an axis makes of them, sqrt(2 pi k a)
-    out = (share == 1) & (status != FieldStatus.OK)
     most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
+    out = (share == 1) & ((status != FieldStatus.OK) | (error > most))
     creeping, error = np.where(out, 0.0, creeping), np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
     status = np.where(share == 1, FieldStatus.OK, status)
     return Served(

@@ -184,6 +184,7 @@ def tube_share(rays: RayPoints, reach: FloatArray) -> FloatArray:
 
 
 def total_of(values: FloatArray, observer: IntArray, count: int) -> FloatArray:
+    """Sum of values (m,) by observer: (count,)."""
     out = np.zeros(count)
     np.add.at(out, observer, values)
     return out

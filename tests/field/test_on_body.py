@@ -39,7 +39,8 @@ def test_the_total_field_on_the_sphere(fan, boundary, k):
     assert np.mean(off[u.ok] < u.error[u.ok]) > 0.95
     # largest error as a share of the largest value: that of currents (tests/field/currents/test_lit.py)
     assert np.max(off[u.ok]) < (0.025 if k < 20 else 5e-3) * np.abs(exact).max()
-    assert [*dict.fromkeys(u.method)] == ["lit", "lit+rays", "rays"]
+    by = [*dict.fromkeys(u.method)]
+    assert by[0] == "lit" and by[1] in ("lit+rays", "lit+march") and by[-1] in ("rays", "march")
 
 
 def test_nothing_jumps_in_the_penumbra(fan):

@@ -14,13 +14,15 @@ def dense(bands):
     return out
 
 
-def step(grid, k, soft, c, t, poles, weights, g, beta, y):
-    """One step of one ray: unknowns y (n,) of the next step."""
-    m0, d0, first, second = (dense(part) for part in grid.matrices)
-    operator = (c - t) ** 2 / (4 * k * k) * m0 + d0 + c * first + c * c * second
+def step(grid, k, soft, data, poles, weights, g, beta, y):
+    """One step of one ray with data c, e, c0 and a: unknowns y (n,) of the next step."""
+    c, e, least, twist = data
+    m0, d0, first, second, square, linear, mixed, bent = (dense(part) for part in grid.matrices)
+    operator = least * m0 + d0 + c * first + c * c * second + twist * square + e * (linear + c * mixed + e * bent)
     operator[0, 0] += 0 if soft else beta / k**2
-    h = 1 + c * grid.heights
-    lean = 0.5 * c * grid.rates / h * grid.scale
+    m, slope, t, rate = grid.levels
+    h = 1 + c * m + e * t
+    lean = 0.5 * (c * slope + e * rate) / h * grid.scale
     w = np.empty_like(y)
     w[0::2] = y[0::2] / np.sqrt(h)
     w[1::2] = (y[1::2] - lean * y[0::2]) / np.sqrt(h)
@@ -41,12 +43,12 @@ def step(grid, k, soft, c, t, poles, weights, g, beta, y):
     return out
 
 
-def pole_trace(k, q, kappa, kappa_t, pole, terms, rounds):
+def pole_trace(k, q, kappa, first, linear, square, kappa_a, pole, terms, rounds):
     """Value and slope at n = 0 of the plane wave's part at a pole, after so many rounds of its series."""
     h = np.array([1.0, kappa])
-    square = polynomial.polymul(h, h)
-    sigma = polynomial.polyadd((1 - q * q) * square, 1j * kappa * q / k * h)
-    sigma = polynomial.polyadd(sigma, [-1 + ((kappa - kappa_t) ** 2 - kappa**2) / (4 * k * k)])
+    h2 = polynomial.polymul(h, h)
+    sigma = polynomial.polyadd(-q * q * h2, 1j * kappa * q / k * h)
+    sigma = polynomial.polyadd(sigma, [first - kappa**2 / (4 * k * k), linear, square])
     den = np.zeros(terms, complex)
     den[: len(sigma)] = pole * sigma
     den[0] += 1
@@ -54,14 +56,14 @@ def pole_trace(k, q, kappa, kappa_t, pole, terms, rounds):
     inverse[0] = 1 / den[0]
     for i in range(1, terms):
         inverse[i] = -(den[1 : i + 1] @ inverse[i - 1 :: -1][:i]) / den[0]
-    start = np.cumprod([1.0, *(kappa_t * (1.5 - i) / i for i in range(1, terms))])
+    start = np.cumprod([1.0, *(kappa_a * (1.5 - i) / i for i in range(1, terms))])
     r = polynomial.polymul(start, inverse)[:terms]
     total = r.copy()
     for _ in range(rounds):
         slope = polynomial.polyder(r)
         bend = polynomial.polyder(slope)
         moved = polynomial.polyadd(
-            polynomial.polymul(square, polynomial.polyadd(2j * k * q * slope, bend)),
+            polynomial.polymul(h2, polynomial.polyadd(2j * k * q * slope, bend)),
             kappa * polynomial.polymul(h, slope),
         )
         r = polynomial.polymul(-pole / k**2 * moved, inverse)[:terms]

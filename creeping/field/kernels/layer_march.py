@@ -1,10 +1,12 @@
 """Compiled marching of a boundary layer along blocks of rays, in Hermite elements across it.
 
 A block has LANES rays with one grid of heights; each has its own curvatures, steps and boundary data. With the
-matrices of `creeping.field.marching.elements` and, at mid step, c = kappa_n and t = kappa_t,
+matrices of `creeping.field.marching.elements`, m and t the heights of its potentials, and c = kappa_n, e, c0 and a at
+mid step as of `creeping.field.kernels.ray_load`,
 
-    w = y/sqrt(h),   h = 1 + c m(n)
-    K = (c - t)^2/(4k^2) M0 - D0/k^2 + c [2 M1 - 2 D1/k^2] + c^2 [M2 - D2/k^2]
+    w = y/sqrt(h),   h = 1 + c m(n) + e t(n)
+    K = c0 M0 - D0/k^2 + c [2 M1 - 2 D1/k^2] + c^2 [M2 - D2/k^2]
+        + a M[t^2] - e {2 D[t] + 2c D[m t] + e D[t^2]}/k^2
     (M0 + b_j K_j) w_j = M0 w + b_j g_j/k^2 e_0,   w(s + ds) = sum_j c_j w_j
 
 K_j is K with beta/k^2 at (0, 0), for w' + beta w = g_j on the surface; if soft, w_j = g_j there instead. Matrices are
@@ -40,7 +42,7 @@ def minus_times(zr, zi, ar, ai, br, bi):
 def operator(mats, step, out):
     """K of a step in columns: out (nd, BAND) flat, entries (j - 3 + i, j) for i = 0..3; step (4, LANES).
 
-    ``mats`` (6, nd, 8) are M0, -D0/k^2, M1, M2, -2 D1/k^2 and -D2/k^2, real and imaginary parts by turns.
+    ``mats`` (8, nd, 8) are those of the elements, real and imaginary parts by turns.
     """
     c, e, first, square = load(step[0], 0), load(step[1], 0), load(step[2], 0), load(step[3], 0)
     for j in range(mats.shape[1]):
@@ -226,7 +228,8 @@ def meet_condition(w, beta, g, scale):
 def march_block(mats, levels, cut, scale, k, soft, steps, poles, weights, g, beta, switch, incident, w, out):
     """March one block of rays.
 
-    Parameters are C-contiguous: c, t (steps, LANES) at mid steps; poles b_j and weights c_j (steps, p, ROW);
+    Parameters are C-contiguous: steps (steps, 4, LANES) with c, e, c0 and a at mid steps; levels (4, nodes) with m, m',
+    t and t'; poles b_j and weights c_j (steps, p, ROW);
     g (steps, p + 1, ROW), at the poles and at the start of a step; beta (steps, ROW); switch (LANES,), the step before
     which a lane turns to the total wave; incident (nd ROW,) the wave added there; w (nd ROW,) values and slopes of y,
     slopes times scale, changed in place; out (steps + 1, 2, ROW) gets y and its slope on the surface.

@@ -1,15 +1,16 @@
 """Compiled traces on the surface of a plane wave that passes through each pole of a rational step.
 
-The step acts on the plane wave r_0 e^{ikqn}, r_0 = sqrt(1 + kappa_t n), q = d.n, as on any other; its part at a pole is
+The step acts on the plane wave r_0 e^{ikqn}, r_0 = sqrt(1 + kappa_a n), q = d.n, as on any other; its part at a pole is
 again a slowly varying amplitude r times e^{ikqn}, in powers of n:
 
     (1 + b X)(r e) = r_0 e
-    X(r e) = [sigma r + D r] e,   D r = (h^2 (2ikq r' + r'') + h kappa r')/k^2,   h = 1 + kappa n
-    sigma = h^2 (1 - q^2) - 1 + i h kappa q/k + ((kappa - kappa_t)^2 - kappa^2)/(4k^2)
-    r = sum_i r_i,   (1 + b sigma) r_i = -b D r_(i-1),   (1 + b sigma) r_0 = sqrt(1 + kappa_t n)
+    X(r e) = [sigma r + D r] e,   D r = (h^2 (2ikq r' + r'') + h c r')/k^2,   h = 1 + c n,   c = kappa_n + e
+    sigma = -h^2 q^2 + i h c q/k + c0 - c^2/(4k^2) + 2 kappa_n n + (kappa_n^2 + a) n^2
+    r = sum_i r_i,   (1 + b sigma) r_i = -b D r_(i-1),   (1 + b sigma) r_0 = sqrt(1 + kappa_a n)
 
-It is a series in 1/(k rho), asymptotic only: of its partial sums the one is taken whose sum over the poles is nearest
-to the wave at the step's end, which is known; what is missing there is then shared among the poles.
+e, c0, a and kappa_a are those of `creeping.field.kernels.ray_load`. It is a series in 1/(k rho), asymptotic only: of
+its partial sums the one is taken whose sum over the poles is nearest to the wave at the step's end, which is known;
+what is missing there is then shared among the poles.
 
 Sources: [C93]; Derivations, F22.
 """
@@ -67,10 +68,11 @@ def transport(r, k, q, kappa, out):
 
 
 @njit(**options)
-def pole_traces(k, q, kappa, first, linear, square, kappa_t, poles, weights, ratio, traces, work):
+def pole_traces(k, q, kappa, first, linear, square, kappa_a, poles, weights, ratio, traces, work):
     """Fill traces (p, 2) with r and r' at n = 0 of each pole; returns how far their sum is from ``ratio``.
 
-    ``ratio`` is the wave at the step's end in terms of that at its start; work (5, TERMS) and (p, ROUNDS, 2).
+    ``kappa`` is c, ``first``, ``linear`` and ``square`` are c0, 2 kappa_n and kappa_n^2 + a; ``ratio`` is the wave
+    at the step's end in terms of that at its start; work (5, TERMS) and (p, ROUNDS, 2).
     """
     p = len(poles)
     sigma, den, start, r, moved, sums = work
@@ -82,7 +84,7 @@ def pole_traces(k, q, kappa, first, linear, square, kappa_t, poles, weights, rat
     sigma[2] = square - kappa * kappa * q * q
     start[0] = 1.0
     for i in range(1, TERMS):
-        start[i] = start[i - 1] * kappa_t * (1.5 - i) / i
+        start[i] = start[i - 1] * kappa_a * (1.5 - i) / i
     for j in range(p):
         for i in range(TERMS):
             den[i] = poles[j] * sigma[i]
@@ -112,9 +114,9 @@ def pole_traces(k, q, kappa, first, linear, square, kappa_t, poles, weights, rat
 def drive(k, soft, driven, mid, edges, eta, poles, weights, lane, g, misfit):
     """Boundary values g of the scattered wave at the poles of a ray's first ``driven`` steps; later ones are left 0.
 
-    mid (steps, 4) holds kappa_e, c0, a1 and a2 at mid step; edges (steps + 1, 4) d.n, d.x - s, kappa_t and J; eta (steps,);
-    g (steps, p + 1, 2 LANES) is filled in a lane, its last row with the condition at the step's start; misfit (steps,)
-    gets what was to be shared among the poles.
+    mid (steps, 4) holds kappa_n, e, c0 and a at mid step; edges (steps + 1, 4) q = d.n, d.x - s, kappa_a and J; eta
+    (steps,); g (steps, p + 1, 2 LANES) is filled in a lane, its last row with the condition at the step's start; misfit
+    (steps,) gets what was to be shared among the poles.
     """
     p = poles.shape[1]
     traces = np.empty((p, 2), np.complex128)
@@ -128,9 +130,7 @@ def drive(k, soft, driven, mid, edges, eta, poles, weights, lane, g, misfit):
         kt = edges[i, 2]
         ratio = after / before
         bend, linear, square = mid[i, 0] + mid[i, 1], 2.0 * mid[i, 0], mid[i, 0] ** 2 + mid[i, 3]
-        misfit[i] = pole_traces(
-            k, q0, bend, mid[i, 2], linear, square, kt, poles[i], weights[i], ratio, traces, work
-        )
+        misfit[i] = pole_traces(k, q0, bend, mid[i, 2], linear, square, kt, poles[i], weights[i], ratio, traces, work)
         size, missing = 0.0, 0j
         slope = 1j * k * eta[i] - 0.5 * kt
         for j in range(p):

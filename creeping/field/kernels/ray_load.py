@@ -1,7 +1,7 @@
 """Compiled loading of a ray into a lane of a block: its steps, its boundary data and the waves at its heights.
 
-    at mid step   kappa_n, e = tau Lambda, c0 = [(kappa_n + e - kappa_a)^2/4 + V]/k^2, a = tau (4 kappa_n Lambda - 3 tau),
-                  beta = ik eta + (kappa_n + e - kappa_a)/2,   kappa_a = kappa_t - tau Lambda,   b_j (1 + Lambda^2)
+    at mid step   kappa_n,   e = tau Lambda,   kappa_a = kappa_t - e,   c0 = [(kappa_n + e - kappa_a)^2/4 + V]/k^2,
+                  a = tau (4 kappa_n Lambda - 3 tau),   beta = ik eta + (kappa_n + e - kappa_a)/2,   b_j (1 + Lambda^2)
     incident      y = sqrt(J h_a) e^{ik(d.x - s + q n)},   y_n = (ikq + kappa_a/(2 h_a)) y,   h_a = 1 + kappa_a m(n)
     reflected     y = u sqrt(J h_a) e^{-iks}, by optics, faded out in the absorber
 

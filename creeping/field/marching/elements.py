@@ -3,12 +3,15 @@
 Unknowns are the value and the slope (times a scale) at each height 0 = n_0 < n_1 < ... < N. With S = 1 beneath T,
 
     S = 1 + i ABSORPTION ((n - T)/(N - T))^2 above T
-    m = n up to 0.6 c, then 0.6 c + 0.4 c tanh((n - 0.6 c)/(0.4 c))
-    M_i = int S m^i v w dn,   D_i = int m^i v' w'/S dn
+    m = n up to 0.6 c, then 0.6 c + 0.4 c tanh((n - 0.6 c)/(0.4 c)),   t = c_t tanh(n/c_t)
+    M[f] = int S f v w dn,   D[f] = int f v' w'/S dn,   M_i = M[m^i],   D_i = D[m^i]
 
 The derivative is stretched into the complex and the potential h^2 - 1 stays real: continued as well, it would grow like
 e^{k |kappa| Im n s} over concave ground. There h = 1 + kappa m(n) stays positive, c = 0.85/|kappa| of the deepest
 concave point: above 0.6 c the layer is not the body's any more.
+
+What the torsion of a ray adds holds for low heights only and would turn waves back from above, t instead of n keeps it
+there.
 
 Condition w' = g - beta w on the surface is that of the weak form; w = 0 at the top is a row and column of the unit
 matrix.
@@ -47,6 +50,8 @@ class GridSpec:
         Longest element, and the one on the surface.
     cap : float, L
         c, or infinite on convex ground.
+    twist : float, L
+        c_t.
     wavenumber : float, 1/L
     """
 
@@ -65,26 +70,25 @@ class LayerGrid:
     Attributes
     ----------
     nodes : (j,), L
-    heights, rates : (j,)
-        m and m'.
+    levels : (4, j)
+        m, m', t and t'.
     cut : (j, 2)
         What the total wave is multiplied with when it is first put together, and its slope times the scale.
     fade : (j, 2)
         What the reflected wave is multiplied with at the start, and its slope, 1/L.
     scale : float, L
         Unknown slopes are those of the field times this.
-    matrices : (10, 2 j, 8)
-        M0, -D0/k², 2 (M1 - D1/k²), M2 - D2/k²: entries (column - 3 + i, column), real and imaginary parts by turns.
+    matrices : (8, 2 j, 8)
+        M0, -D0/k², 2 (M1 - D1/k²), M2 - D2/k², M[t²], -2 D[t]/k², -2 D[m t]/k², -D[t²]/k²: entries
+        (column - 3 + i, column), real and imaginary parts by turns.
     """
 
     nodes: FloatArray
-    heights: FloatArray
-    rates: FloatArray
+    levels: FloatArray
     cut: FloatArray
     fade: FloatArray
     scale: float
     matrices: FloatArray
-    levels: FloatArray
 
 
 @lru_cache(KEPT)
@@ -92,12 +96,11 @@ def layer_grid(spec: GridSpec) -> LayerGrid:
     """Grid of a specification."""
     nodes = _nodes(spec)
     scale = float(np.median(np.diff(nodes)))
-    heights, rates = _levelled(nodes, spec.cap)
-    twists, twist_rates = _twisting(nodes, spec.twist)
     top = nodes[-1] - spec.height
     cut = _fade(nodes, FADED[0] * spec.height, spec.height + FADED[1] * top) * np.array([1.0, scale])
     fade = _fade(nodes, spec.height, nodes[-1])
-    return LayerGrid(nodes, heights, rates, cut, fade, scale, _matrices(spec, nodes, scale), np.stack([heights, rates, twists, twist_rates]))
+    levels = np.stack([*_levelled(nodes, spec.cap), *_bounded(nodes, spec.twist)])
+    return LayerGrid(nodes, levels, cut, fade, scale, _matrices(spec, nodes, scale))
 
 
 def _fade(n: FloatArray, begin: float, end: float) -> FloatArray:
@@ -127,7 +130,8 @@ def _levelled(n: FloatArray, cap: float) -> tuple[FloatArray, FloatArray]:
     return np.where(z > 0, kept + (cap - kept) * np.tanh(z), n), 1 / np.cosh(np.minimum(z, 300)) ** 2
 
 
-def _twisting(n: FloatArray, height: float) -> tuple[FloatArray, FloatArray]:
+def _bounded(n: FloatArray, height: float) -> tuple[FloatArray, FloatArray]:
+    """Height t(n) and its derivative."""
     return height * np.tanh(n / height), 1 / np.cosh(np.minimum(n / height, 300)) ** 2
 
 
@@ -153,14 +157,25 @@ def _matrices(spec: GridSpec, nodes: FloatArray, scale: float) -> FloatArray:
             one / scale * (3 * x**2 - 2 * x),
         ]
     )
-    t = np.clip((n - spec.height) / (nodes[-1] - spec.height), 0, 1)
-    S = 1 + 1j * ABSORPTION * t**2
-    m = _levelled(n, spec.cap)[0]
-    t = _twisting(n, spec.twist)[0]
+    S = 1 + 1j * ABSORPTION * np.clip((n - spec.height) / (nodes[-1] - spec.height), 0, 1) ** 2
+    m, t = _levelled(n, spec.cap)[0], _bounded(n, spec.twist)[0]
     weight = gauss * length
     mass = [np.einsum("aeg,beg,eg->eab", v, v, weight * S * f) for f in (1, m, m**2, t**2)]
-    slope = [np.einsum("aeg,beg,eg->eab", dv, dv, weight * f / S) / spec.wavenumber**2 for f in (1, m, m**2, t, m * t, t**2)]
-    parts = np.stack([mass[0], -slope[0], 2 * (mass[1] - slope[1]), mass[2] - slope[2], mass[3], -2 * slope[3], -2 * slope[4], -slope[5]])
+    slope = [
+        np.einsum("aeg,beg,eg->eab", dv, dv, weight * f / S) / spec.wavenumber**2 for f in (1, m, m**2, t, m * t, t**2)
+    ]
+    parts = np.stack(
+        [
+            mass[0],
+            -slope[0],
+            2 * (mass[1] - slope[1]),
+            mass[2] - slope[2],
+            mass[3],
+            -2 * slope[3],
+            -2 * slope[4],
+            -slope[5],
+        ]
+    )
     size = 2 * len(nodes)
     out = np.zeros((len(parts), size, 8))
     for a in range(4):

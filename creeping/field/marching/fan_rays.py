@@ -1,16 +1,16 @@
 """Profiles of the rays of a fan: curvatures, twist and spreading, and those of the lit ground behind the shadow line.
 
     kappa_n = p.Hp/|grad F|,   kappa_t = b.Hb/|grad F|,   tau = b.Hp/|grad F|,   b = n x p
-    J'' + K J = 0,   J(0) = 1,   J'(0) = 0,   V = K/2 + min[(J'/2J)^2, MOST_BENT/a^2],   K = kappa_n kappa_t - tau^2
+    J'' + K J = 0,   J(0) = 1,   J'(0) = 0,   V = K/2 (+ (J'/2J)^2 on lit ground),   K = kappa_n kappa_t - tau^2
 
-Lambda = D y/y_s is that of the incident wave where it drives the layer, and of Fock's, which depends on xi alone, behind:
+Lambda = D y/y_s is that of the incident wave where it drives the layer, behind that of Fock's, a function of xi alone:
 
     lit      Lambda = d.b/(d.p - 1)
     shadow   Lambda = [kappa_n^(-2/3) dA/dsigma_perp + tau_1/kappa_1]/J,   A = int kappa_n^(2/3) ds
 
 Both are tau/kappa_n on the line. It fades out where kappa_n falls below FLAT of that on the line, for good: there no
-single xi tells the wave, and levels off at 1, where J falls to 0. Rays are traced both ways from the shadow line, beyond
-detachment too: marching goes on where creeping modes end.
+single xi tells the wave; and it levels off at 1, where J falls to 0. Rays are traced both ways from the shadow line,
+beyond detachment too: marching goes on where creeping modes end.
 
 Sources: Derivations, R1, R3 and F22.
 """
@@ -41,7 +41,7 @@ RTOL = 1e-10
 FLAT, LEAST_SPREADING = 0.3, 0.1
 """Share of the first curvature at which Lambda begins to fade, and |J| below which it does not grow like 1/J."""
 MOST_BENT = 6.0
-"""Bound of (J'/2J)^2 in V, in terms of the body's size: near caustics it is the beams that spread."""
+"""Bound of (J'/2J)^2 in V, in terms of the body's size; in the shadow it belongs to the spreading of beams."""
 
 
 def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | None = None) -> RayProfiles:
@@ -85,10 +85,11 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
     # the derivative of J in s changes its sign with the sense
     gauss = whole["curvature"] * whole["transverse"] - whole["torsion"] ** 2
     bent = (whole["rate"] / (2 * np.maximum(np.abs(whole["spreading"]), 1e-9))) ** 2
+    bent = np.where(whole["s"] < 0, np.minimum(bent, MOST_BENT / size(body) ** 2), 0.0)
     return RayProfiles(
         **{name: whole[name] for name in ("s", "curvature", "transverse", "spreading", "torsion", "phase", "climb")},
         lean=_lean(fan, whole),
-        potential=gauss / 2 + np.minimum(bent, MOST_BENT / size(body) ** 2),
+        potential=gauss / 2 + bent,
     )
 
 

@@ -2,8 +2,10 @@
 
     u = y(sigma, s) |J|^(-1/2) e^{ik(d.x0 + s) - i pi N/2},   k_c = k - i y_s/y
 
-y varies slowly and has no poles on caustics nor an end where creeping modes have theirs: cubic splines between rays and
-steps. k_c is the wavenumber that the wave has along the surface.
+y varies slowly, has no poles on caustics, and no end where creeping modes have theirs: cubic splines between rays and
+steps. It is that of the march and that of creeping modes of second order, in inverse proportion to the squares of their
+errors: the march takes over where curvature varies, twists or changes its sign, and hands back to modes where they have
+decayed below what the top of its layer lets through. k_c is the wavenumber that the wave has along the surface.
 
 Source: Derivations, F22.
 """
@@ -13,12 +15,13 @@ from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.far_geometry import fan_strips
-from creeping.field.marching.fan_rays import fan_profiles, wide_rows
+from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.ray_sums import own_error
@@ -33,6 +36,10 @@ KEPT = 2
 """Marches kept with a fan, of so many wavenumbers and boundaries."""
 FEWEST = 64
 """Steps at least that are kept of a ray."""
+TWISTED = 0.4
+"""Error of y, as a share of it, by the root of what the twist adds to its phase."""
+MOST_TURNED = 0.5
+"""Bound of |k_c/k - 1|."""
 _WAVES: "WeakKeyDictionary[RayFan, dict[tuple[float, Boundary], FanWaves]]" = WeakKeyDictionary()
 
 
@@ -82,43 +89,62 @@ class FanWaves:
 
     def error(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
         """Error of y at places (n,) of a strip, that of the next ray; infinite where that has no wave: (n,)."""
-        ray = self.rows[strip][self.strips[strip].nearest(sigma)]
-        return self._errors[ray, np.clip(np.searchsorted(self.times, s), 0, len(self.times) - 1)]
+        ray = self.strips[strip].nearest(sigma)
+        return np.asarray(self._tables[strip][1][ray, np.clip(np.searchsorted(self.times, s), 0, len(self.times) - 1)])
 
     @cached_property
-    def _errors(self) -> FloatArray:
-        """Error of y (rays, steps)."""
-        m = self.marched
-        found = np.stack([np.interp(self.times, m.s[ray], m.error[ray]) for ray in range(len(m))])
-        late = self.times[None, :] > m.reliable[:, None]
-        found = np.where(late, np.maximum(found, np.max(np.abs(m.values), axis=1)[:, None]), found)
+    def _tables(self) -> list[tuple[ComplexArray, FloatArray]]:
+        """Y and its error (rays, steps) of each strip, by marching and by modes."""
+        found = []
         for strip, rows in zip(self.strips, self.rows, strict=True):
-            by_modes = ~self.served[rows]
-            found[rows[by_modes]] = self._modes(strip, by_modes)[1]
+            y, error = self._by_marching(rows)
+            modes, other = self._by_modes(strip)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                # of infinite errors neither wave counts
+                share = 1 / (1 + (other / error) ** 2)
+                share = np.where(np.isfinite(error), np.where(np.isfinite(other), share, 0.0), np.isfinite(other))
+                # both err in the same direction more often than not
+                both = np.where(share < 1, (1 - share) * error, 0.0) + np.where(share > 0, share * other, 0.0)
+            none = ~np.isfinite(error) & ~np.isfinite(other)
+            found.append((np.where(none, 0.0, (1 - share) * y + share * modes), np.where(none, np.inf, both)))
         return found
 
-    @cached_property
-    def served(self) -> BoolArray:
-        """Whether a ray has a wave (rays,)."""
-        return ~np.isin(self.marched.status, (MarchStatus.UNLIT, MarchStatus.UNSTABLE))
+    def _by_marching(self, rows: IntArray) -> tuple[ComplexArray, FloatArray]:
+        """Y and its error on rays (rows, steps), infinite where nothing could be marched."""
+        m = self.marched
+        y = np.stack([m.at(ray, self.times) for ray in rows])
+        error = np.stack([np.interp(self.times, m.s[ray], m.error[ray]) for ray in rows])
+        late = self.times[None, :] > m.reliable[rows, None]
+        error = np.where(late, np.maximum(error, np.max(np.abs(m.values[rows]), axis=1)[:, None]), error)
+        # in space what is left out goes like the next power of what the twist adds
+        error = error + TWISTED * np.sqrt(self._twist(rows, y)) * np.abs(y)
+        lacking = np.isin(m.status[rows], (MarchStatus.UNLIT, MarchStatus.UNSTABLE))
+        return y, np.where(lacking[:, None], np.inf, error)
+
+    def _twist(self, rows: IntArray, y: ComplexArray) -> FloatArray:
+        """(k/2) int |k_c/k - 1|^2 (Lambda^2 + tau^2/kappa_n^2) ds of rays (rows, steps)."""
+        profiles, k = self.marched.profiles, self.wavenumber
+        lean, torsion, kappa = (
+            np.stack([profiles.value_of(name, ray, self.times) for ray in rows])
+            for name in ("lean", "torsion", "curvature")
+        )
+        bent = np.maximum(kappa, FLAT * kappa[:, :1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = np.gradient(y, self.times, axis=1)
+            turned = np.minimum(np.nan_to_num(np.abs(slope / (k * y))), MOST_TURNED)
+        density = 0.5 * k * turned**2 * (lean**2 + (torsion / bent) ** 2)
+        return np.asarray(cumulative_trapezoid(density, self.times, axis=1, initial=0))
 
     @cached_property
     def _splines(self) -> list[tuple[RectBivariateSpline, RectBivariateSpline]]:
         """Splines of the real and the imaginary part of y on each strip."""
         found = []
-        for strip, rows in zip(self.strips, self.rows, strict=True):
-            values = np.stack([self.marched.at(ray, self.times) for ray in rows])
-            values[~self.served[rows]] = self._modes(strip, ~self.served[rows])[0]
-            places, values = _around(strip, values)
+        for strip, (table, _) in zip(self.strips, self._tables, strict=True):
+            places, values = _around(strip, table)
             degree = min(3, len(places) - 1)
-            found.append(
-                (
-                    RectBivariateSpline(places, self.times, values.real, kx=degree),
-                    RectBivariateSpline(places, self.times, values.imag, kx=degree),
-                )
-            )
+            parts = (RectBivariateSpline(places, self.times, part, kx=degree) for part in (values.real, values.imag))
+            found.append(tuple(parts))
         return found
-
 
     def lean(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
         """Lambda at places (n,) of a strip: (n,)."""
@@ -134,21 +160,19 @@ class FanWaves:
             found.append(RectBivariateSpline(places, self.times, values, kx=min(3, len(places) - 1)))
         return found
 
-    def _modes(self, strip: Strip, chosen: BoolArray) -> tuple[ComplexArray, FloatArray]:
-        """Y of creeping modes on rays that are not marched, 0 where they have ended, and its error (chosen, steps)."""
-        rays = strip.rays[chosen]
-        if not len(rays.time):
-            return np.zeros((0, len(self.times)), dtype=complex), np.zeros((0, len(self.times)))
+    def _by_modes(self, strip: Strip) -> tuple[ComplexArray, FloatArray]:
+        """Y of creeping modes on a strip's rays and its error (rays, steps), infinite where they have ended."""
+        rays, k, kind = strip.rays, self.wavenumber, self.boundary
         lanes = rays.lanes.copy()
+        # without their tube
         lanes[..., 6:9] = 1.0, 0.0, 0.0
-        k, kind = self.wavenumber, self.boundary
         plain = RayPoints(lanes, rays.starts, rays.time, rays.alive, rays.scale)
         waves = surface_waves(plain, k, kind, 2), surface_waves(plain, k, kind, 1)
         error = np.where(rays.alive, own_error(plain, waves, k, kind, 2, on=True), np.inf)
         y = make_interp_spline(strip.times, waves[0] * np.exp(-1j * k * rays.eikonal), k=3, axis=1)(self.times)
-        # the step before tells
-        at = np.clip(np.searchsorted(strip.times, self.times), 0, len(strip.times) - 1)
-        return np.asarray(y), error[:, at]
+        # the larger of the steps about a place tells
+        at = np.clip(np.searchsorted(strip.times, self.times), 1, len(strip.times) - 1)
+        return np.asarray(y), np.maximum(error[:, at], error[:, at - 1])
 
 
 def _around(strip: Strip, values: Any) -> tuple[FloatArray, Any]:
@@ -169,6 +193,6 @@ def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves
         while len(kept) >= KEPT:
             kept.pop(next(iter(kept)))
         marched = march_rays(fan_profiles(fan), wavenumber=wavenumber, boundary=boundary)
-        steps = int(np.max(np.sum(np.diff(marched.s, axis=1)[:, :] > 0, axis=1), initial=FEWEST))
-        kept[key] = FanWaves(fan_strips(fan), wide_rows(fan), marched, np.linspace(0.0, fan.length, steps + 1), boundary)
+        times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=FEWEST)) + 1)
+        kept[key] = FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary)
     return kept[key]

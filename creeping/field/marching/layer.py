@@ -115,7 +115,7 @@ class MarchedRays:
 
     def _incident_phase(self, ray: int, at: FloatArray) -> FloatArray:
         """Phase k (d.x - s) of the incident wave at places."""
-        return self.wavenumber * self.profiles.value_of("phase", ray, at)
+        return np.asarray(self.wavenumber * self.profiles.value_of("phase", ray, at))
 
 
 def march_rays(profiles: RayProfiles, *, wavenumber: float, boundary: Boundary) -> MarchedRays:
@@ -211,6 +211,8 @@ class _March:
             marks = [low, *jumps[(jumps > low + 1e-9 * step) & (jumps < high - 1e-9 * step)], high]
             parts = [np.array([low])]
             for a, b in pairwise(marks):
+                if b <= a:
+                    continue
                 parts.append(np.linspace(a, b, max(1, int(np.ceil((b - a) / step))) + 1)[1:])
             ways.append(np.concatenate(parts))
         return ways[0], ways[1]

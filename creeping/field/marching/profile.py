@@ -7,8 +7,8 @@ how it varies along and across the ray:
     V = K/2 + (J'/2J)^2
 
 Where the ray leaves the line Lambda = tau/kappa_n; on a cylinder that the wave meets at an angle it stays so, and
-cos^2 = 1/(1 + Lambda^2) is that of the ray's angle to the circle. Waves are traced on the plane curve with the curvature
-kappa_n sqrt(1 + Lambda^2), that circle's.
+cos^2 = 1/(1 + Lambda^2) is that of the ray's angle to the circle. Waves are traced on the plane curve with that
+circle's curvature, kappa_n sqrt(1 + Lambda^2) by the ray's length.
 
 Source: Derivations, F22.
 """

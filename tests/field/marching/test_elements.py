@@ -11,7 +11,7 @@ K = 20.0
 
 @pytest.fixture(scope="module")
 def grid():
-    return layer_grid(GridSpec(height=1.0, element=0.06, first=0.02, cap=np.inf, wavenumber=K))
+    return layer_grid(GridSpec(height=1.0, element=0.06, first=0.02, cap=np.inf, twist=0.5, wavenumber=K))
 
 
 def nodal(grid, f, slope):
@@ -27,7 +27,7 @@ def test_matrices_integrate_cubics(grid):
     v = nodal(grid, lambda n: n**2 - n, lambda n: 2 * n - 1)
     w = nodal(grid, lambda n: n**3, lambda n: 3 * n**2)
     some = np.repeat(inside, 2)
-    m0, d0, first, second = (dense(part)[np.ix_(some, some)] for part in grid.matrices)
+    m0, d0, first, second, *twist = (dense(part)[np.ix_(some, some)] for part in grid.matrices)
     # the last kept node has an element of the absorber above it: take its share off by a function that vanishes there
     bell, rate = lambda n: (1 - n) ** 2 * n, lambda n: (1 - n) ** 2 - 2 * n * (1 - n)
     u = nodal(grid, bell, rate)[some]
@@ -43,6 +43,13 @@ def test_matrices_integrate_cubics(grid):
     assert u @ d0 @ v == pytest.approx(expected[1], rel=1e-10)
     assert u @ first @ v == pytest.approx(2 * integral(n * p * q) - 2 * integral(n * p.deriv() * q.deriv()) / K**2)
     assert u @ second @ v == pytest.approx(integral(n**2 * p * q) - integral(n**2 * p.deriv() * q.deriv()) / K**2)
+    # t = 0.5 tanh(n/0.5) is no polynomial: by Gauss' rule on many points
+    x, weight = np.polynomial.legendre.leggauss(200)
+    x, weight = (x + 1) / 2, weight / 2
+    t, bend = 0.5 * np.tanh(2 * x), p.deriv()(x) * q.deriv()(x)
+    slopes = (-2 * t, -2 * x * t, -(t**2))
+    expected = [weight @ (t**2 * p(x) * q(x)), *(weight @ (f * bend) / K**2 for f in slopes)]
+    np.testing.assert_allclose([u @ part @ v for part in twist], expected, rtol=1e-6)
     assert w.shape == (2 * len(grid.nodes),)
 
 
@@ -56,9 +63,10 @@ def test_top_is_held_and_absorbs(grid):
 
 
 def test_heights_level_off_over_concave_ground():
-    grid = layer_grid(GridSpec(height=1.0, element=0.06, first=0.02, cap=0.4, wavenumber=K))
+    grid = layer_grid(GridSpec(height=1.0, element=0.06, first=0.02, cap=0.4, twist=0.5, wavenumber=K))
     kept = grid.nodes < 0.6 * 0.4
-    np.testing.assert_array_equal(grid.heights[kept], grid.nodes[kept])
-    assert np.max(grid.heights) <= 0.4
-    between = np.diff(grid.heights) / np.diff(grid.nodes)
-    assert np.all((between >= np.minimum(grid.rates[1:], grid.rates[:-1]) - 1e-12) & (between <= 1 + 1e-12))
+    heights, rates, *_ = grid.levels
+    np.testing.assert_array_equal(heights[kept], grid.nodes[kept])
+    assert np.max(heights) <= 0.4
+    between = np.diff(heights) / np.diff(grid.nodes)
+    assert np.all((between >= np.minimum(rates[1:], rates[:-1]) - 1e-12) & (between <= 1 + 1e-12))

@@ -19,13 +19,15 @@ K = 20.0
 @pytest.mark.parametrize("soft", [True, False])
 def test_march_equals_numpy_twin(soft):
     rng = np.random.default_rng(5)
-    grid = layer_grid(GridSpec(height=0.5, element=0.06, first=0.03, cap=0.8, wavenumber=K))
+    grid = layer_grid(GridSpec(height=0.5, element=0.06, first=0.03, cap=0.8, twist=0.3, wavenumber=K))
     n, steps = 2 * len(grid.nodes), 3
 
     def noise(*shape):
         return rng.normal(size=shape) + 1j * rng.normal(size=shape)
 
-    c, t = rng.uniform(-0.4, 1, (steps, LANES)), rng.uniform(-0.5, 0.5, (steps, LANES))
+    data = np.stack(
+        [rng.uniform(*ends, (steps, LANES)) for ends in ((-0.4, 1), (-0.2, 0.2), (0, 1e-3), (-1, 1))], axis=1
+    )
     b, weight = rational_step(rng.uniform(0.5, 3, steps * LANES))
     b, weight = b.reshape(steps, LANES, ORDER), weight.reshape(steps, LANES, ORDER)
     g, beta = noise(steps, LANES, ORDER + 1), noise(steps, LANES)
@@ -40,7 +42,7 @@ def test_march_equals_numpy_twin(soft):
 
     w, out = flat(y).ravel(), np.empty((steps + 1, 2, ROW))
     march_block(
-        *(grid.matrices, grid.heights, grid.rates, grid.cut, grid.scale, K, soft, c, t),
+        *(grid.matrices, grid.levels, grid.cut, grid.scale, K, soft, data),
         *(flat(b), flat(weight), flat(g), flat(beta), switch.astype(np.int64), flat(incident).ravel(), w, out),
     )
     for lane in range(LANES):
@@ -51,22 +53,22 @@ def test_march_equals_numpy_twin(soft):
                 here = np.empty_like(total)
                 here[0::2] = total[0::2] * grid.cut[:, 0]
                 here[1::2] = total[1::2] * grid.cut[:, 0] + total[0::2] * grid.cut[:, 1]
-            data = (c[i, lane], t[i, lane], b[i, lane], weight[i, lane], g[i, lane], beta[i, lane])
-            here = step(grid, K, soft, *data, here)
+            rest = (b[i, lane], weight[i, lane], g[i, lane], beta[i, lane])
+            here = step(grid, K, soft, data[i, :, lane], *rest, here)
             found = out[i + 1, :, lane] + 1j * out[i + 1, :, LANES + lane]
             np.testing.assert_allclose(found, [here[0], here[1] / grid.scale], rtol=1e-8)
 
 
 def test_traces_equal_numpy_twin():
     poles, weights = (part[0] for part in rational_step(np.array([1.2])))
-    q, kappa, kappa_t = -0.6, 0.9, 0.4
+    q, layer = -0.6, (0.9, 0.002, 1.5, 0.7, 0.4)
     traces = np.empty((ORDER, 2), complex)
     flat = np.empty((5, TERMS), complex)
     work = (*flat, np.empty((ORDER, ROUNDS, 2), complex))
     # the wave at the step's end that the last partial sum gives makes it the best one
-    expected = [pole_trace(K, q, kappa, kappa_t, pole, TERMS, ROUNDS - 1) for pole in poles]
+    expected = [pole_trace(K, q, *layer, pole, TERMS, ROUNDS - 1) for pole in poles]
     ratio = sum(w * value for w, (value, _) in zip(weights, expected, strict=True))
-    misfit = pole_traces(K, q, kappa, kappa_t, poles, weights, ratio, traces, work)
+    misfit = pole_traces(K, q, *layer, poles, weights, ratio, traces, work)
     np.testing.assert_allclose(traces, expected, rtol=1e-12)
     assert misfit < 1e-12
 

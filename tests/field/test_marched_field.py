@@ -1,0 +1,103 @@
+"""The field on the body where rays merge and beyond where they end: against series and fundamental solutions."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field import on_body
+from creeping.field.beams import beam_sums
+from creeping.field.boundary import HARD
+from creeping.field.marching.fan_waves import fan_waves
+from creeping.geometry.surface import normal
+from creeping.rays.shedding import shed_on
+from studies.reference import clouds, fundamental, sphere
+
+
+def fan_of(body, direction, length, n_rays=96):
+    line = cr.shadow_line(body, direction=direction)
+    return cr.launch(cr.DirectFlow(body, rtol=1e-9), line, length=length, n_rays=n_rays)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return fan_of(sc.Sphere(), (0, 0, 1), 4.0, 48)
+
+
+@pytest.mark.parametrize(("k", "limit"), [(10.0, 2.5), (30.0, 1.0), (100.0, 0.4)])
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
+def test_focus_behind_a_sphere(ball, k, limit, boundary):
+    """Per cent of the field at the focus, up to 30 degrees from it: rays alone are infinite there."""
+    theta = np.radians([0.0, 0.1, 0.5, 2.0, 5.0, 10.0, 20.0, 30.0])
+    points = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
+    exact = (sphere.surface_derivative if boundary == "soft" else sphere.surface_field)(k, 1.0, points[:, 2], boundary)
+    found = cr.surface_field(ball, points, wavenumber=k, boundary=boundary)
+    error = np.abs(np.asarray(found) - exact)
+    assert 100 * np.max(error) < limit * np.max(np.abs(exact))
+    assert np.mean(error <= found.error) > 0.85
+    assert set(found.method) <= {"march", "rays"}
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
+def test_cusped_caustic_of_an_ellipsoid(boundary):
+    """Points of the whole shadow of a body that nothing here was set on, none left out; modes are infinite between."""
+    axes, k, d = (0.9, 0.7, 1.0), 16.0, np.array([0.5, 0.4, 0.77])
+    d /= np.linalg.norm(d)
+    body = sc.Ellipsoid(*axes)
+    fan = fan_of(body, d, 3.4)
+    points = clouds.ellipsoid(*axes).spread(0.13).points
+    points = points[normal(body, points) @ d > 0.25]
+    normals = normal(body, points)
+    solution = fundamental.scatter(clouds.ellipsoid(*axes), k, d[None], boundary, depth=0.14, per_wavelength=6.0)
+    exact = (solution.normal_derivative(points, normals) if boundary == "soft" else solution.total(points))[:, 0]
+    found = cr.surface_field(fan, points, wavenumber=k, boundary=boundary)
+    error, top = np.abs(np.asarray(found) - exact), np.median(np.abs(exact))
+    assert np.median(error) < 0.035 * top and np.max(error) < 0.3 * top
+    assert np.mean(error <= found.error) > 0.93 and np.mean(found.ok) > 0.97
+
+
+def test_where_rays_have_ended(monkeypatch):
+    """On the twisted ellipsoid marching goes on past detachment, where modes have nothing."""
+    body, k = sc.TwistedEllipsoid(), 30.0
+    d = np.array([0.273, -0.755, -0.596])
+    fan = fan_of(body, d, 2.5, 128)
+    d = fan.line.direction
+    rays = np.flatnonzero(fan.status == cr.RayStatus.DETACHED)
+    assert len(rays) > 3
+    times = fan.travel_time
+    past = [(ray, step) for ray in rays for step in np.flatnonzero(times > fan.detachment[ray])[:12:4]]
+    points = np.array([fan.points[ray, step] for ray, step in past if times[step] < 1.2])
+    reference = fundamental.scatter(clouds.twisted_ellipsoid(), k, d[None], "hard", depth=0.12, per_wavelength=5.0)
+    exact = reference.total(points)[:, 0]
+    found = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
+    monkeypatch.setattr(on_body, "marches", lambda *_: False)
+    modes = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
+    size = np.maximum(np.abs(exact), 0.3 * np.median(np.abs(exact)))
+    error, before = (np.median(np.abs(np.asarray(v) - exact) / size) for v in (found, modes))
+    assert error < 0.25 and error < 0.5 * before
+    assert not np.any(modes.ok) and np.mean(found.ok) > 0.5
+
+
+def test_beams_give_back_rays_that_stand_alone(ball):
+    """Away from the axis their sum is that over the two rays through a point, whatever their width."""
+    k = 60.0
+    waves = fan_waves(ball, wavenumber=k, boundary=HARD)
+    theta = np.radians([35.0, 45.0, 55.0])
+    points = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
+    found = shed_on(waves.strips, ball.body, points)
+    y = waves.at(0, found.sigma, found.rays.time)
+    own = y / np.sqrt(np.abs(found.rays.spreading))
+    own = own * np.exp(1j * (k * found.rays.eikonal - 0.5 * np.pi * found.rays.caustics))
+    rays = np.array([own[found.observer == i].sum() for i in range(3)])
+    for factor in (0.6, 1.0, 1.8):
+        sums = beam_sums(ball, waves, points, factor=factor)
+        np.testing.assert_allclose(sums.early + sums.late, rays, rtol=0.02)
+
+
+def test_waves_on_closed_strips_wrap(ball):
+    waves = fan_waves(ball, wavenumber=20.0, boundary=HARD)
+    strip = waves.strips[0]
+    s = np.array([0.7, 0.7])
+    one, other = waves.at(0, np.array([0.3, 0.3 + strip.period]), s)
+    assert one == pytest.approx(other)
+    assert fan_waves(ball, wavenumber=20.0, boundary=HARD) is waves
