@@ -35,8 +35,8 @@ DORMAND_PRINCE_8 = Method(0, 12)
 """The order-8 pair, the only one that estimates errors and has dense output."""
 RUNGE_KUTTA_4 = Method(16, 4)
 """The classical method of order 4, the integrator of the burn-in."""
-THIRD, FIFTH = 21, 22
-"""Rows of the two error estimates."""
+SOLUTION, THIRD, FIFTH = 12, 21, 22
+"""Rows of the order-8 pair: its solution and the two error estimates."""
 STAGES = 16
 """Stages of the order-8 pair with y1 and those of the dense output."""
 
@@ -64,7 +64,7 @@ def runge_kutta_4() -> Tableau:
 def _stage_weights() -> list[list[float]]:
     pair, classical = dormand_prince_8(), runge_kutta_4()
     out = np.zeros((23, STAGES))
-    out[:12, :12], out[12, :12], out[13:16] = pair.a, pair.b, _pair().A_EXTRA
+    out[:12, :12], out[SOLUTION, :12], out[13:16] = pair.a, pair.b, _pair().A_EXTRA
     out[16:20, :4], out[20, :4] = classical.a, classical.b
     out[THIRD, :13], out[FIFTH, :13] = pair.e3, pair.e5
     return out.tolist()
@@ -85,7 +85,7 @@ def dense_weights() -> FloatArray:
     The interpolant is sum_i F_i phi_i, phi = theta, theta (1 - theta), theta^2 (1 - theta), ..., alternately, with
     F_0 = y1 - y, F_1 = h k_0 - F_0, F_2 = 2 F_0 - h (k_0 + k_12) and four rows of weights more.
     """
-    difference, begins, ends = np.array(STAGE_WEIGHTS()[12]), np.eye(STAGES)[0], np.eye(STAGES)[12]
+    difference, begins, ends = np.array(STAGE_WEIGHTS()[SOLUTION]), np.eye(STAGES)[0], np.eye(STAGES)[12]
     parts = np.vstack([difference, begins - difference, 2 * difference - begins - ends, _pair().D])
     basis, out = np.poly1d([1.0]), np.zeros((7, STAGES))
     for i, part in enumerate(parts):

@@ -8,11 +8,12 @@ from tolerances import JACOBI_DIFFERENCE, TRACE, TWIN
 
 import creeping as cr
 import scatterers as sc
+from creeping.geodesics import integrator
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import vector_field
-from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.integrator import counted_states, trace_states
 from creeping.geodesics.states import pack
-from creeping.geodesics.tableaus import dormand_prince_8
+from creeping.geodesics.tableaus import RUNGE_KUTTA_4, dormand_prince_8
 from creeping.geometry.speed import speed_values
 from creeping.geometry.surface import normal
 
@@ -110,6 +111,41 @@ def test_shapes_follow_points_and_times():
     assert cr.trace(sc.Sphere(), points, [0, 1, 0], [0.0, 0.5])[1].shape == (2, 5, 2, 3)
     assert cr.trace(sc.Sphere(), [1, 0, 0], [0, 1, 0], 0.5)[0].shape == (3,)
     assert cr.trace(sc.Sphere(), np.zeros((0, 3)), np.zeros((0, 3)), 0.5)[0].shape == (0, 3)
+
+
+@pytest.mark.parametrize("jacobi", [False, True])
+def test_no_bit_depends_on_where_the_kernel_comes_up(jacobi, rng, monkeypatch):
+    body, times = sc.TwistedEllipsoid(), np.sort(np.r_[0.0, 0.0, rng.uniform(0, 2, 30), 5.0, 5.0])
+    states = pack(*random_bundle_points(body, 200, rng=rng), jacobi=jacobi)
+    for options in ({"rtol": 1e-5}, {"rtol": 1e-9}, {"rtol": 0.0, "step": 0.07}):
+        whole = trace_states(body, states, times, **options)
+        # blocks of 64 rays are what a result depends on
+        np.testing.assert_array_equal(trace_states(body, states[64:128], times, **options), whole[64:128])
+        calls = []
+        with monkeypatch.context() as patch:
+            patch.setattr(integrator, "BUDGET", 3)
+            patch.setattr(integrator, "pause", lambda calls=calls: calls.append(1))
+            np.testing.assert_array_equal(trace_states(body, states, times, **options), whole)
+        assert len(calls) > 20
+
+
+def test_outputs_do_not_cost_steps():
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(7)))
+    ends, between = np.array([8.0]), np.linspace(0.01, 8, 800)
+    one, many = (counted_states(body, states, times, rtol=1e-8)[1] for times in (ends, between))
+    assert abs(one - many) <= 0.1 * one
+
+
+def test_estimates_are_those_of_one_method():
+    states = pack(*random_bundle_points(sc.Sphere(), 3, rng=np.random.default_rng(0)))
+    with pytest.raises(cr.CreepingError, match="equal steps"):
+        trace_states(sc.Sphere(), states, np.array([1.0]), rtol=1e-6, method=RUNGE_KUTTA_4)
+
+
+def test_no_times_are_no_outputs():
+    states = pack(*random_bundle_points(sc.Sphere(), 3, rng=np.random.default_rng(0)))
+    assert trace_states(sc.Sphere(), states, np.empty(0)).shape == (3, 0, 6)
 
 
 def test_step_far_too_large_is_an_error_not_a_nan():

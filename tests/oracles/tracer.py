@@ -6,7 +6,7 @@ from scipy.integrate import DOP853
 from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.equations import vector_field
 from creeping.geodesics.integrator import MAX_STEPS, error_scale
-from creeping.geodesics.kernels.integrator import LANDING
+from creeping.geodesics.kernels.integrator import LANDING, STRETCHED
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.speed import speed_hessian, speed_of, speed_values
 
@@ -55,7 +55,7 @@ def trace(body, states, times, method, *, rtol, step):
                 return out
             left, goal, used = float(times[m]) - goal, float(times[m]), 0
             equal = max(1, int(np.ceil(left / step - 1e-9)))
-        trial = left / (np.ceil(left / h) if rtol > 0 else equal - used)
+        trial = left / (np.ceil(left / (STRETCHED * h)) if rtol > 0 else equal - used)
         ahead = left + (float(times[-1]) - goal)
         if rtol > 0 and y.shape[1] <= 10 and trial < LANDING * h:
             trial = min(h, ahead)

@@ -7,10 +7,10 @@ units of the tolerance a step is accepted where e < 1, and the next one is
 
 Half the usual exponent: which ray is the worst changes all the time, and a step that follows each of them is refused
 again and again, and costs a third more at equal error than equal steps do; this one costs a tenth more at most.
-An output ends a step where that is no shorter for it than LANDING of what it may be: a step costs less than a longer
-one with three stages more, and errs less. Other outputs are read from the step's polynomial of order 7 and put onto
-T1Q. Where A is carried all outputs end steps: A' has a kink where kappa_n passes 0, and errors of the polynomial there
-are a hundred times those of the steps.
+An output ends a step, or two equal ones or more, where that costs little: a step is then from LANDING to STRETCHED of
+what it may be, has three stages less, and errs less. Other outputs are read from the step's polynomial of order 7 and
+put onto T1Q. Where A is carried all outputs end steps: A' has a kink where kappa_n passes 0, and errors of the
+polynomial there are a hundred times those of the steps.
 
 Sources: [HNW93, sec. II.4 to II.6 and II.10]; Derivations, R3.
 """
@@ -21,35 +21,42 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.flow_derivative import derivative, project_block
-from creeping.geodesics.tableaus import FIFTH, STAGE_WEIGHTS, STAGES, THIRD
+from creeping.geodesics.tableaus import FIFTH, SOLUTION, STAGE_WEIGHTS, STAGES, THIRD
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.vectors import LANES, larger, load, magnitude, pointer, root, spread, store
 from creeping.kernels.weighted_sum import stage_sum, stage_sums
 
 sum_stages = stage_sums(STAGE_WEIGHTS)
-_third, _fifth = stage_sum(STAGE_WEIGHTS, THIRD), stage_sum(STAGE_WEIGHTS, FIFTH)
+_solution, _third, _fifth = (stage_sum(STAGE_WEIGHTS, row) for row in (SOLUTION, THIRD, FIFTH))
 
-LANDING = 0.5
-"""Two outputs and more in a step are read from its polynomial: measured on ellipsoids, one is cheaper by a step."""
+LANDING, STRETCHED = 0.6, 1.1
+"""Shares of the step that adapts: outputs end no shorter steps, and longer ones only to end there."""
 
 
 @njit(**options)
-def ray_errors(k, y, z, scale, rtol, h, errors):
-    """Error of each ray in units of the tolerance, by the pair of estimates of [HNW93, sec. II.10], into (BLOCK,).
+def solution(k, y, z, scale, rtol, h, errors):
+    """State at the end of a step of the order-8 pair from y to z, and the error of each ray in units of the tolerance.
 
-    The stages k, the states y and z at both ends of the step, and the errors are given by their addresses.
+    By the pair of estimates of [HNW93, sec. II.10]; what they and the solution take of the stages is read once. The
+    stages k, y, z and the errors (BLOCK,) are given by their addresses. Lanes of x and p are never larger than their
+    ``scale``; the attenuation is passed over.
     """
     lanes, size = scale.shape[0], scale.shape[0] * BLOCK
     for i in range(0, BLOCK, LANES):
         third, fifth = spread(1e-300), spread(0.0)
         for lane in range(lanes):
             place = lane * BLOCK + i
-            most = larger(spread(scale[lane]), larger(magnitude(load(y, place)), magnitude(load(z, place))))
-            inverse = spread(1.0) / (spread(rtol) * most)
+            start = load(y, place)
+            end = start + spread(h) * _solution(k, size, place)
+            inverse = spread(1.0 / scale[lane])
+            if lane >= 6:
+                inverse = spread(1.0) / larger(spread(scale[lane]), larger(magnitude(start), magnitude(end)))
             d3, d5 = _third(k, size, place) * inverse, _fifth(k, size, place) * inverse
+            store(z, place, end)
             third += d3 * d3
             fifth += d5 * d5
-        store(errors, i, spread(abs(h)) * fifth / root((fifth + spread(0.01) * third) * spread(float(lanes))))
+        factor = spread(abs(h) / (rtol * math.sqrt(lanes)))
+        store(errors, i, factor * fifth / root(fifth + spread(0.01) * third))
 
 
 @njit(**options)
@@ -180,8 +187,7 @@ def integrate(
             if goal < times[last]:
                 ahead += times[last] - goal
             if rtol > 0.0:
-                count = math.ceil(left / h)
-                trial = left / count
+                trial = left / math.ceil(left / (STRETCHED * h))
                 if dense_too and trial < LANDING * h:
                     trial = min(h, ahead)
             error, inside = 0.0, trial > left
@@ -189,13 +195,13 @@ def integrate(
                 _copy(y, z, size)
             # one place for all stages: each takes time to compile
             for s in range(1 if known else 0, STAGES):
-                if s > 0:
-                    sum_stages(first + s, trial, k, size, y, z)
                 if s == stages and rtol > 0.0:
-                    ray_errors(k, y, z, scale, rtol, trial, errors)
+                    solution(k, y, z, scale, rtol, trial, errors)
                     error = _worst(errors)
                     if not error < 1.0:
                         break
+                elif s > 0:
+                    sum_stages(first + s, trial, k, size, y, z)
                 level(points, values, gradients, hessians, level_par)
                 if weighted:
                     speed(points, speeds, slopes, bends, speed_par)

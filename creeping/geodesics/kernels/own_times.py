@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.flow_derivative import derivative, project_block
-from creeping.geodesics.kernels.integrator import ray_errors, sum_stages
+from creeping.geodesics.kernels.integrator import solution, sum_stages
 from creeping.geodesics.tableaus import DORMAND_PRINCE_8
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.vectors import LANES, load, pointer, store
@@ -69,7 +69,9 @@ def integrate_own(
                 _scaled(f0, size, steps, k)
             # one place for all stages: each takes time to compile
             for s in range(1 if known else 0, _STAGES + 1):
-                if s > 0:
+                if s == _STAGES:
+                    solution(k, y, z, scale, rtol, 1.0, pointer(steps, BLOCK))
+                elif s > 0:
                     sum_stages(s, 1.0, k, size, y, z)
                 level(points, values, gradients, hessians, level_par)
                 if weighted:
@@ -78,7 +80,6 @@ def integrate_own(
                 _scaled(f1, size, steps, pointer(k, s * size))
                 if s == 0:
                     slope[:] = last
-            ray_errors(k, y, z, scale, rtol, 1.0, pointer(steps, BLOCK))
             project_block(z, lanes, g, new)
             known = True
             for i in range(BLOCK):
