@@ -118,6 +118,30 @@ def load(typing: Any, array: Any, start: Any) -> Any:
     return VECTOR(array, start), codegen
 
 
+def loads(count: int, stride: int) -> Any:
+    """Make ``f(array, start)`` for kernels: a tuple of ``count`` vectors, the next ``stride`` elements behind the last.
+
+    A kernel compiles in less time with one call than with several.
+    """
+
+    @intrinsic
+    def vectors(typing: Any, array: Any, start: Any) -> Any:
+        kind = types.UniTuple(VECTOR, count)
+
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            index = context.cast(builder, args[1], sig.args[1], types.intp)
+            values = []
+            for row in range(count):
+                at = builder.add(index, ir.Constant(ir.IntType(64), row * stride))
+                values.append(builder.load(_place(context, builder, sig.args[0], args[0], at)))
+                values[-1].align = 8
+            return context.make_tuple(builder, kind, values)
+
+        return kind(array, start), codegen
+
+    return vectors
+
+
 @intrinsic
 def store(typing: Any, array: Any, start: Any, value: Any) -> Any:
     """Put a vector into a flat contiguous array of floats, or behind its address, from an element on."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from creeping.kernels.vectors import LANES, larger, load, magnitude, pointer, root, spread, store
+from creeping.kernels.vectors import LANES, larger, load, loads, magnitude, pointer, root, spread, store
 from creeping.kernels.weighted_sum import stage_sum, stage_sums
 
 
@@ -78,6 +78,21 @@ def test_addresses_count_elements():
     a, out = np.arange(30.0), np.zeros(LANES + 1)
     by_address(a, out)
     np.testing.assert_array_equal(out, np.r_[0.0, a[LANES + 3 : 2 * LANES + 3]])
+
+
+_pair = loads(2, 11)
+
+
+@njit
+def apart(a, out):
+    x, y = _pair(pointer(a, 1), 2)
+    store(out, 0, x - y)
+
+
+def test_vectors_of_one_call_are_a_stride_apart():
+    a, out = np.random.default_rng(7).normal(size=30), np.zeros(LANES)
+    apart(a, out)
+    np.testing.assert_array_equal(out, a[3 : 3 + LANES] - a[14 : 14 + LANES])
 
 
 _WEIGHTS = np.array([[0.0, 0, 0], [0.5, 0, -2], [0, 0, 0], [1, 2, 3]])

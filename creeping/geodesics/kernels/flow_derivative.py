@@ -18,7 +18,9 @@ from numba import carray, njit
 
 from creeping.kernels.block import BLOCK, options
 from creeping.kernels.curvature import adjugate_form, second_form
-from creeping.kernels.vectors import LANES, load, pointer, root, spread, store
+from creeping.kernels.vectors import LANES, load, loads, pointer, root, spread, store
+
+_three, _four, _six = (loads(rows, BLOCK) for rows in (3, 4, 6))
 
 
 @njit(**options)
@@ -29,10 +31,9 @@ def derivative(weighted, lanes, y, g, w, k):
     them, ten rows; from w on those of the speed, if it is weighted.
     """
     for i in range(0, BLOCK, LANES):
-        px, py, pz = load(y, 3 * BLOCK + i), load(y, 4 * BLOCK + i), load(y, 5 * BLOCK + i)
-        gx, gy, gz = load(g, BLOCK + i), load(g, 2 * BLOCK + i), load(g, 3 * BLOCK + i)
-        xx, yy, zz = load(g, 4 * BLOCK + i), load(g, 5 * BLOCK + i), load(g, 6 * BLOCK + i)
-        yz, xz, xy = load(g, 7 * BLOCK + i), load(g, 8 * BLOCK + i), load(g, 9 * BLOCK + i)
+        px, py, pz = _three(y, 3 * BLOCK + i)
+        gx, gy, gz = _three(g, BLOCK + i)
+        xx, yy, zz, yz, xz, xy = _six(g, 4 * BLOCK + i)
         turn = -second_form(px, py, pz, xx, yy, zz, yz, xz, xy) / (gx * gx + gy * gy + gz * gz)
         _store_three(k, i, px, py, pz)
         _store_three(k, 3 * BLOCK + i, turn * gx, turn * gy, turn * gz)
@@ -45,10 +46,9 @@ def derivative(weighted, lanes, y, g, w, k):
     if lanes > 6:
         for i in range(0, BLOCK, LANES):
             curvature = load(k, 7 * BLOCK + i)
-            store(k, 6 * BLOCK + i, load(y, 7 * BLOCK + i))
-            store(k, 7 * BLOCK + i, -curvature * load(y, 6 * BLOCK + i))
-            store(k, 8 * BLOCK + i, load(y, 9 * BLOCK + i))
-            store(k, 9 * BLOCK + i, -curvature * load(y, 8 * BLOCK + i))
+            m11, m21, m12, m22 = _four(y, 6 * BLOCK + i)
+            _store_three(k, 6 * BLOCK + i, m21, -curvature * m11, m22)
+            store(k, 9 * BLOCK + i, -curvature * m12)
 
 
 @njit(**options)
@@ -62,9 +62,8 @@ def _store_three(k, at, x, y, z):
 def _gaussian_curvature(g, k):
     """Put K = (grad F.adj(H) grad F)/|grad F|^4 into row 7 of k, which is free until the Jacobi lanes are filled."""
     for i in range(0, BLOCK, LANES):
-        gx, gy, gz = load(g, BLOCK + i), load(g, 2 * BLOCK + i), load(g, 3 * BLOCK + i)
-        xx, yy, zz = load(g, 4 * BLOCK + i), load(g, 5 * BLOCK + i), load(g, 6 * BLOCK + i)
-        yz, xz, xy = load(g, 7 * BLOCK + i), load(g, 8 * BLOCK + i), load(g, 9 * BLOCK + i)
+        gx, gy, gz = _three(g, BLOCK + i)
+        xx, yy, zz, yz, xz, xy = _six(g, 4 * BLOCK + i)
         square = gx * gx + gy * gy + gz * gz
         store(k, 7 * BLOCK + i, adjugate_form(gx, gy, gz, xx, yy, zz, yz, xz, xy) / (square * square))
 
@@ -73,10 +72,9 @@ def _gaussian_curvature(g, k):
 def _attenuation_rate(g, k):
     """Put max(kappa_n, 0)^(2/3) into row 10 of k; p' = -kappa_n n is in rows 3 to 5."""
     for i in range(0, BLOCK, LANES):
-        gx, gy, gz = load(g, BLOCK + i), load(g, 2 * BLOCK + i), load(g, 3 * BLOCK + i)
-        turned = 3 * BLOCK + i
-        inward = load(k, turned) * gx + load(k, turned + BLOCK) * gy + load(k, turned + 2 * BLOCK) * gz
-        store(k, 10 * BLOCK + i, -inward / root(gx * gx + gy * gy + gz * gz))
+        gx, gy, gz = _three(g, BLOCK + i)
+        kx, ky, kz = _three(k, 3 * BLOCK + i)
+        store(k, 10 * BLOCK + i, -(kx * gx + ky * gy + kz * gz) / root(gx * gx + gy * gy + gz * gz))
     two_thirds(carray(pointer(k, 10 * BLOCK), (BLOCK,)), 1.0)
 
 
@@ -107,16 +105,17 @@ def two_thirds(values, factor):
 def _add_weight(y, k, g, w, lanes):
     """Turn the plain derivative into that of the weighted flow."""
     for i in range(0, BLOCK, LANES):
-        px, py, pz = load(y, 3 * BLOCK + i), load(y, 4 * BLOCK + i), load(y, 5 * BLOCK + i)
-        gx, gy, gz = load(g, BLOCK + i), load(g, 2 * BLOCK + i), load(g, 3 * BLOCK + i)
+        px, py, pz = _three(y, 3 * BLOCK + i)
+        gx, gy, gz = _three(g, BLOCK + i)
         inverse = spread(1.0) / root(gx * gx + gy * gy + gz * gz)
         nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
-        c, cx, cy, cz = load(w, i), load(w, BLOCK + i), load(w, 2 * BLOCK + i), load(w, 3 * BLOCK + i)
+        cx, cy, cz = _three(w, BLOCK + i)
+        c = load(w, i)
         along_n = cx * nx + cy * ny + cz * nz
         along_p = cx * px + cy * py + cz * pz
         _store_three(k, i, c * px, c * py, c * pz)
         turned = 3 * BLOCK + i
-        kx, ky, kz = load(k, turned), load(k, turned + BLOCK), load(k, turned + 2 * BLOCK)
+        kx, ky, kz = _three(k, turned)
         _store_three(
             k,
             turned,
@@ -125,11 +124,9 @@ def _add_weight(y, k, g, w, lanes):
             c * kz - cz + along_n * nz + along_p * pz,
         )
         if lanes > 6:
-            xx, yy, zz = load(g, 4 * BLOCK + i), load(g, 5 * BLOCK + i), load(g, 6 * BLOCK + i)
-            yz, xz, xy = load(g, 7 * BLOCK + i), load(g, 8 * BLOCK + i), load(g, 9 * BLOCK + i)
+            xx, yy, zz, yz, xz, xy = _six(g, 4 * BLOCK + i)
             nhn = second_form(nx, ny, nz, xx, yy, zz, yz, xz, xy)
-            cxx, cyy, czz = load(w, 4 * BLOCK + i), load(w, 5 * BLOCK + i), load(w, 6 * BLOCK + i)
-            cyz, cxz, cxy = load(w, 7 * BLOCK + i), load(w, 8 * BLOCK + i), load(w, 9 * BLOCK + i)
+            cxx, cyy, czz, cyz, cxz, cxy = _six(w, 4 * BLOCK + i)
             nsn = second_form(nx, ny, nz, cxx, cyy, czz, cyz, cxz, cxy)
             laplacian = cxx + cyy + czz - nsn - (xx + yy + zz - nhn) * inverse * along_n
             tangential = cx * cx + cy * cy + cz * cz - along_n * along_n
@@ -146,16 +143,15 @@ def project_block(z, lanes, g, y):
     With d the distance from F = 0 in body sizes, errors of d^2 are left of both: grad F is carried along by H.
     """
     for i in range(0, BLOCK, LANES):
-        gx, gy, gz = load(g, BLOCK + i), load(g, 2 * BLOCK + i), load(g, 3 * BLOCK + i)
-        xx, yy, zz = load(g, 4 * BLOCK + i), load(g, 5 * BLOCK + i), load(g, 6 * BLOCK + i)
-        yz, xz, xy = load(g, 7 * BLOCK + i), load(g, 8 * BLOCK + i), load(g, 9 * BLOCK + i)
+        gx, gy, gz = _three(g, BLOCK + i)
+        xx, yy, zz, yz, xz, xy = _six(g, 4 * BLOCK + i)
         step = load(g, i) / (gx * gx + gy * gy + gz * gz)
-        x1, x2, x3 = load(z, i) - step * gx, load(z, BLOCK + i) - step * gy, load(z, 2 * BLOCK + i) - step * gz
-        _store_three(y, i, x1, x2, x3)
+        x1, x2, x3 = _three(z, i)
+        _store_three(y, i, x1 - step * gx, x2 - step * gy, x3 - step * gz)
         nx = gx - step * (xx * gx + xy * gy + xz * gz)
         ny = gy - step * (xy * gx + yy * gy + yz * gz)
         nz = gz - step * (xz * gx + yz * gy + zz * gz)
-        px, py, pz = load(z, 3 * BLOCK + i), load(z, 4 * BLOCK + i), load(z, 5 * BLOCK + i)
+        px, py, pz = _three(z, 3 * BLOCK + i)
         lean = (px * nx + py * ny + pz * nz) / (nx * nx + ny * ny + nz * nz)
         px, py, pz = px - lean * nx, py - lean * ny, pz - lean * nz
         norm = spread(1.0) / root(px * px + py * py + pz * pz)
