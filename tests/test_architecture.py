@@ -43,7 +43,12 @@ AT_ROOT = (
 
 
 # modules outside `kernels` folders whose constants (names in capitals) kernels share; types and errors are not compiled
-SHARED_CONSTANTS = ("creeping.geodesics.hermite", "creeping.rays.quantities", "creeping.shadow.status")
+SHARED_CONSTANTS = (
+    "creeping.geodesics.hermite",
+    "creeping.geodesics.tableaus",
+    "creeping.rays.quantities",
+    "creeping.shadow.status",
+)
 NOT_COMPILED = ("creeping._typing", "creeping.errors", "platformdirs")
 
 

@@ -18,8 +18,9 @@ from creeping.field.arguments import checked
 from creeping.field.creeping_modes import fock_scale
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import sharpest_curvature
-from creeping.geodesics.integrator import runge_kutta_4, trace_states
+from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import ATTENUATION, P, X, pack
+from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.arguments import one_of
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.surface import Surface, normal
@@ -114,7 +115,7 @@ def validities(
     # equal steps: a ray comes out the same in whatever company
     steps = max(8, int(np.ceil(until * sharpest_curvature(body) / TURN)))
     times: FloatArray = until * np.arange(steps + 1, dtype=float) / steps
-    states = trace_states(body, starts, times, rtol=0.0, step=times[1], tableau=runge_kutta_4())
+    states = trace_states(body, starts, times, rtol=0.0, step=times[1], method=RUNGE_KUTTA_4)
     early = np.cbrt(min(wavenumbers) / 2) * states[..., ATTENUATION] < EARLY
     row, step = np.nonzero(early)
     some = states[row, step]

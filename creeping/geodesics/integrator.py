@@ -1,21 +1,21 @@
 """Direct integration of the geodesic flow by the order-8 Runge-Kutta pair of Dormand and Prince [HNW93, sec. II.10].
 
-Blocks of rays advance with one step for the block, and each accepted step is put back on T1Q.
+Blocks of rays advance with one step for the block. Each accepted step is put back on T1Q, and so are outputs between
+the ends of a step, of the step's polynomial of order 7.
 """
 
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import ArrayLike, FloatArray, IntArray
+from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import IntegrationError, InvalidInputError
 from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.states import unpack
+from creeping.geodesics.tableaus import DORMAND_PRINCE_8, Method, dense_weights
 from creeping.geometry.arguments import checked_body, number_between, real_array
 from creeping.geometry.creased import checked_smooth
 from creeping.geometry.evaluators import evaluators
@@ -25,7 +25,7 @@ from creeping.kernels.threads import CHUNK, in_threads, pause
 MAX_STEPS = 100_000
 """Steps between two outputs after which a block of rays is given up."""
 BUDGET = 4000
-"""Steps of blocks after which the kernel comes up for signals: 0.03 s of a closed form, 0.2 s of a spline."""
+"""Steps of blocks after which the kernel comes up for signals: 0.01 s of a closed form, 0.2 s of a spline."""
 
 
 @dataclass(frozen=True)
@@ -49,44 +49,6 @@ class ErrorEstimate:
     rms: float
     max: float
     samples: int
-
-
-class Tableau(NamedTuple):
-    """Explicit Runge-Kutta method: stage matrix a, weights b, error weights e3 and e5 (zero: no estimate)."""
-
-    a: FloatArray
-    b: FloatArray
-    e3: FloatArray
-    e5: FloatArray
-
-    def packed(self) -> tuple[IntArray, IntArray, FloatArray]:
-        """Nonzero weights row by row, for the compiled tracer: numbers of them, their places, themselves.
-
-        Rows are those of a, then b, e3 and e5; a zero makes the number of each even and positive.
-        """
-        stages = len(self.b)
-        rows = [*self.a, self.b, self.e3, self.e5]
-        terms = np.array([max(2, 2 * ((np.count_nonzero(row) + 1) // 2)) for row in rows])
-        index, weights = np.zeros((len(rows), stages + 2), dtype=np.int64), np.zeros((len(rows), stages + 2))
-        for number, row in enumerate(rows):
-            places = np.flatnonzero(row)
-            index[number, : len(places)], weights[number, : len(places)] = places, row[places]
-        return terms, index, weights
-
-
-@cache
-def dormand_prince_8() -> Tableau:
-    """The order-8 pair with its error estimates of order 3 and 5, as scipy keeps it."""
-    from scipy.integrate import DOP853
-
-    return Tableau(*(np.ascontiguousarray(v, dtype=float) for v in (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5)))
-
-
-@cache
-def runge_kutta_4() -> Tableau:
-    """The classical method of order 4, the integrator of the burn-in."""
-    a = np.array([[0.0, 0, 0, 0], [0.5, 0, 0, 0], [0, 0.5, 0, 0], [0, 0, 1, 0]])
-    return Tableau(a, np.array([1, 2, 2, 1]) / 6, np.zeros(5), np.zeros(5))
 
 
 def as_times(times: ArrayLike) -> tuple[FloatArray, bool]:
@@ -160,19 +122,22 @@ def trace_states(
     *,
     rtol: float = 1e-10,
     step: float | None = None,
-    tableau: Tableau | None = None,
+    method: Method = DORMAND_PRINCE_8,
 ) -> FloatArray:
     """Trace states (n, 6, 10 or 11) to the ascending times (m,): (n, m, the same).
 
-    ``rtol = 0`` takes equal steps of at most ``step``. Lanes 6 to 9 are the columns of the Jacobi matrix of
-    the metric ds/c, lane 10 the attenuation integral; see `creeping.geodesics.kernels.integrator`.
+    ``rtol = 0`` takes equal steps of at most ``step`` between outputs, by any ``method``; else it is the first.
+    Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c, lane 10 the attenuation integral; see
+    `creeping.geodesics.kernels.integrator`.
 
     Raises
     ------
+    InvalidInputError
+        On more lanes, or on a tolerance for a method that estimates no errors.
     IntegrationError
         If a ray does not reach its end; ``failed`` lists the rays.
     """
-    return counted_states(body, states, times, rtol=rtol, step=step, tableau=tableau)[0]
+    return counted_states(body, states, times, rtol=rtol, step=step, method=method)[0]
 
 
 def counted_states(
@@ -182,12 +147,13 @@ def counted_states(
     *,
     rtol: float = 1e-10,
     step: float | None = None,
-    tableau: Tableau | None = None,
+    method: Method = DORMAND_PRINCE_8,
 ) -> tuple[FloatArray, int]:
     """Do what `trace_states` does, and count the steps of all blocks of rays, refused ones too."""
     if states.shape[1] > 11:
         raise InvalidInputError(f"states of {states.shape[1]} lanes; at most 11 are traced, see `attenuation`")
-    method = tableau or dormand_prince_8()
+    if rtol > 0 and method != DORMAND_PRINCE_8:
+        raise InvalidInputError("only the order-8 pair estimates its error; take equal steps, rtol=0")
     if step is None:
         step = 0.05 * size(body)
     from creeping.geodesics.kernels.integrator import integrate
@@ -196,16 +162,15 @@ def counted_states(
     states = np.ascontiguousarray(states, dtype=float)
     scale = error_scale(body, states.shape[1])
     ends = np.asarray(times, dtype=float)
-    tableau_parts = method.packed()
     taken: list[int] = []
     controls = scale, float(rtol), float(step), MAX_STEPS, BUDGET
     with evaluators(body) as parts:
 
         def run(part: slice) -> None:
-            at, kept = np.zeros(7), np.empty((2, states.shape[1], CHUNK))
-            while not integrate(*parts, states[part], ends, *tableau_parts, *controls, at, kept, out[part]):
+            at, kept = np.zeros(8), np.empty((2, states.shape[1] * CHUNK))
+            while not integrate(*parts, states[part], ends, method, dense_weights(), *controls, at, kept, out[part]):
                 pause()
-            taken.append(int(at[6]))
+            taken.append(int(at[7]))
 
         in_threads(run, len(states), seconds=None)
     failed = np.flatnonzero(~np.all(np.isfinite(out), axis=(1, 2)))
@@ -226,7 +191,9 @@ def counted_states(
 def error_scale(body: Surface, lanes: int) -> FloatArray:
     """Magnitude below which a lane's error counts absolutely: lengths for x and M12, 1 for the others.
 
-    The attenuation does not steer the steps: where kappa_n passes 0 it has kinks, at which 64 rays would wait in turn.
+    No x of the body, nor a p, is larger. The attenuation does not steer the steps: where kappa_n passes 0 it has
+    kinks, at which 64 rays would wait in turn.
     """
     length = size(body)
-    return np.array([length] * 3 + [1.0] * 3 + [1.0, 1 / length, length, 1.0, np.inf][: lanes - 6])
+    reach = np.maximum(length, np.abs(body.bounds).max(axis=0))
+    return np.array([*reach, 1.0, 1.0, 1.0, 1.0, 1 / length, length, 1.0, np.inf][:lanes])

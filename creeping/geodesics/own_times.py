@@ -6,14 +6,12 @@ the ray detaches. Where kappa_n <= 0 at the start, the ray detaches there.
 Sources: Derivations, R3 and R13.
 """
 
-from functools import cache
-
 import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import IntegrationError
 from creeping.geodesics.attenuation import DIP, curvature_values, with_attenuation
-from creeping.geodesics.integrator import dormand_prince_8, error_scale
+from creeping.geodesics.integrator import error_scale
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import size
@@ -21,11 +19,6 @@ from creeping.kernels.threads import CHUNK, in_slices
 
 STEPS = 500
 """Steps after which a ray is given up: an interval takes a few, next to a tip some tens."""
-
-
-@cache
-def _packed() -> Any:
-    return dormand_prince_8().packed()
 
 
 def trace_own(body: Any, states: FloatArray, times: FloatArray, *, rtol: float) -> FloatArray:
@@ -64,7 +57,7 @@ def _traced(body: Any, states: FloatArray, times: FloatArray, rtol: float) -> Fl
     controls = error_scale(body, states.shape[1]), rtol, 0.05 * size(body), STEPS
     with evaluators(body) as parts, np.errstate(all="ignore"):
         in_slices(
-            lambda some: integrate_own(*parts, states[some], times[some], *_packed(), *controls, out[some]),
+            lambda some: integrate_own(*parts, states[some], times[some], *controls, out[some]),
             len(states),
             seconds=1e-5,
             multiple=CHUNK,

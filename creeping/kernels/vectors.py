@@ -63,15 +63,51 @@ for _symbol, _instruction in (
     _define(_symbol, _instruction)
 
 
+class _Unary(AbstractTemplate):  # type: ignore[misc]
+    def generic(self, args: Any, keywords: Any) -> Any:
+        return signature(VECTOR, VECTOR) if len(args) == 1 and isinstance(args[0], Vector) else None
+
+
+infer_global(operator.neg)(_Unary)
+
+
+@lower_builtin(operator.neg, Vector)
+def _negative(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.fneg(args[0])
+
+
+POINTER = types.CPointer(types.float64)
+"""The type of the address of an array in compiled code; what is handed on so is not counted as in use."""
+
+
+@intrinsic
+def pointer(typing: Any, array: Any, start: Any) -> Any:
+    """Address of an element of a flat contiguous array of floats, or that many elements behind another address.
+
+    Functions that are given arrays count their users, around every call, and that takes as long as the arithmetic of a
+    block. An address does not keep the array: its owner has to.
+    """
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        index = context.cast(builder, args[1], sig.args[1], types.intp)
+        return builder.gep(_data(context, builder, sig.args[0], args[0]), [index])
+
+    return POINTER(array, start), codegen
+
+
+def _data(context: Any, builder: Any, kind: Any, array: Any) -> Any:
+    return array if isinstance(kind, types.CPointer) else context.make_array(kind)(context, builder, array).data
+
+
 def _place(context: Any, builder: Any, kind: Any, array: Any, start: Any) -> Any:
-    """Pointer to the vector that begins at an element of a flat array."""
-    data = context.make_array(kind)(context, builder, array).data
+    """Pointer to the vector that begins at an element of a flat array or behind an address."""
+    data = _data(context, builder, kind, array)
     return builder.bitcast(builder.gep(data, [start]), _DOUBLES.as_pointer())
 
 
 @intrinsic
 def load(typing: Any, array: Any, start: Any) -> Any:
-    """Elements start .. start + LANES of a flat contiguous array of floats."""
+    """Elements start .. start + LANES of a flat contiguous array of floats, or behind the address of one."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         index = context.cast(builder, args[1], sig.args[1], types.intp)
@@ -82,9 +118,33 @@ def load(typing: Any, array: Any, start: Any) -> Any:
     return VECTOR(array, start), codegen
 
 
+def loads(count: int, stride: int) -> Any:
+    """Make ``f(array, start)`` for kernels: a tuple of ``count`` vectors, the next ``stride`` elements behind the last.
+
+    A kernel compiles in less time with one call than with several.
+    """
+
+    @intrinsic
+    def vectors(typing: Any, array: Any, start: Any) -> Any:
+        kind = types.UniTuple(VECTOR, count)
+
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            index = context.cast(builder, args[1], sig.args[1], types.intp)
+            values = []
+            for row in range(count):
+                at = builder.add(index, ir.Constant(ir.IntType(64), row * stride))
+                values.append(builder.load(_place(context, builder, sig.args[0], args[0], at)))
+                values[-1].align = 8
+            return context.make_tuple(builder, kind, values)
+
+        return kind(array, start), codegen
+
+    return vectors
+
+
 @intrinsic
 def store(typing: Any, array: Any, start: Any, value: Any) -> Any:
-    """Put a vector into a flat contiguous array of floats from an element on."""
+    """Put a vector into a flat contiguous array of floats, or behind its address, from an element on."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         index = context.cast(builder, args[1], sig.args[1], types.intp)
@@ -115,3 +175,24 @@ def root(typing: Any, value: Any) -> Any:
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{LANES}f64"), args)
 
     return VECTOR(value), codegen
+
+
+@intrinsic
+def magnitude(typing: Any, value: Any) -> Any:
+    """Absolute values of a vector."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.FunctionType(_DOUBLES, [_DOUBLES])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.fabs.v{LANES}f64"), args)
+
+    return VECTOR(value), codegen
+
+
+@intrinsic
+def larger(typing: Any, one: Any, other: Any) -> Any:
+    """The larger of each two lanes; the other's where one of them is no number."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(">", *args), *args)
+
+    return VECTOR(one, other), codegen

@@ -1,12 +1,15 @@
-"""Sums z = y + sum_r w_r k_r over the stages of a Runge-Kutta method, in explicit vector instructions.
+"""Sums over the stages of a Runge-Kutta method with constant weights, in explicit vector instructions.
 
-A row of the tableau has few nonzero weights, and one pass over memory that keeps the sum in a register is bounded by
-the loads of the k_r. A compiler does not find this from a loop over stages: it stores and reloads z once a stage.
+    z = y + h sum_j w_j k_j,   sum_j w_j k_j at one vector
+
+A row of the tableau has few nonzero weights; they and the places of the k_j are part of the code, and one pass over
+memory that keeps the sum in registers is bounded by the loads of the k_j. A compiler does not find this from a loop
+over stages: it stores and reloads z once a stage.
 
 Sources: [HNW93].
 """
 
-from functools import cache
+from collections.abc import Callable, Sequence
 
 from llvmlite import ir
 from numba import types
@@ -14,68 +17,90 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from creeping._typing import Any
+from creeping.kernels.vectors import LANES, POINTER, VECTOR
 
-WIDTH = 8
-"""Values of one vector."""
 UNROLL = 4
-"""Vectors summed at a time, to hide the latency of a multiply-add; blocks are multiples of WIDTH * UNROLL values."""
+"""Vectors summed at a time, to hide the latency of a multiply-add; arrays are multiples of LANES * UNROLL numbers."""
+
+_INTEGER = ir.IntType(64)
+_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
+
+Rows = Callable[[], Sequence[Sequence[float]]]
+"""Gives weights by rows, when the code is generated: what is loaded from a cache does not need them."""
 
 
-@cache
-def combination(terms: int) -> Any:
-    """Make ``f(weights, index, k, y, z)`` for kernels: z = y + sum over ``terms`` of weights[r] k[index[r]].
+def stage_sums(rows: Rows) -> Any:
+    """Make ``f(row, h, k, size, y, z)`` for kernels: z = y + h sum_j w[row][j] k[j].
 
-    ``k`` (stages, lanes, block) is C-contiguous, ``y`` and ``z`` (lanes, block) too, float64.
+    Arrays are given by their addresses: y, z (size,), k (stages, size). Nothing is done for a row without weights.
     """
-    vector = ir.VectorType(ir.DoubleType(), WIDTH)
 
     @intrinsic
-    def combine(typing: Any, weights: Any, index: Any, k: Any, y: Any, z: Any) -> Any:
-        signature = types.void(weights, index, k, y, z)
-
+    def combine(typing: Any, row: Any, h: Any, k: Any, size: Any, y: Any, z: Any) -> Any:
         def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
-            arrays = [
-                context.make_array(kind)(context, builder, value) for kind, value in zip(sig.args, args, strict=True)
-            ]
-            size = arrays[3].nitems
-            integer = ir.IntType(64)
-
-            def loaded(pointer: Any, offset: Any) -> Any:
-                return builder.load(builder.gep(pointer, [offset]))
-
-            def spread(value: Any) -> Any:
-                single = builder.insert_element(
-                    ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)
-                )
-                mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-                return builder.shuffle_vector(single, ir.Constant(vector, ir.Undefined), mask)
-
-            factors, rows = [], []
-            for r in range(terms):
-                place = ir.Constant(integer, r)
-                factors.append(spread(loaded(arrays[0].data, place)))
-                rows.append(builder.gep(arrays[2].data, [builder.mul(loaded(arrays[1].data, place), size)]))
-            with cgutils.for_range(builder, builder.udiv(size, ir.Constant(integer, UNROLL * WIDTH))) as loop:
-                first = builder.mul(loop.index, ir.Constant(integer, UNROLL * WIDTH))
-                starts = [builder.add(first, ir.Constant(integer, WIDTH * u)) for u in range(UNROLL)]
-
-                def at(pointer: Any, start: Any) -> Any:
-                    return builder.bitcast(builder.gep(pointer, [start]), vector.as_pointer())
-
-                def vector_at(pointer: Any, start: Any) -> Any:
-                    value = builder.load(at(pointer, start))
-                    value.align = 8
-                    return value
-
-                totals = [vector_at(arrays[3].data, start) for start in starts]
-                for factor, row in zip(factors, rows, strict=True):
-                    for u, start in enumerate(starts):
-                        product = builder.fmul(factor, vector_at(row, start), flags=("contract",))
-                        totals[u] = builder.fadd(totals[u], product, flags=("contract",))
-                for total, start in zip(totals, starts, strict=True):
-                    builder.store(total, at(arrays[4].data, start)).align = 8
+            number, step, stages, size, start, target = args
+            step = _spread(builder, step)
+            done = builder.append_basic_block("done")
+            choice = builder.switch(number, done)
+            for case, weights in enumerate(rows()):
+                if not any(weights):
+                    continue
+                block = builder.append_basic_block(f"row{case}")
+                choice.add_case(ir.Constant(_INTEGER, case), block)
+                builder.position_at_end(block)
+                with cgutils.for_range(builder, builder.udiv(size, ir.Constant(_INTEGER, UNROLL * LANES))) as loop:
+                    first = builder.mul(loop.index, ir.Constant(_INTEGER, UNROLL * LANES))
+                    places = [builder.add(first, ir.Constant(_INTEGER, LANES * u)) for u in range(UNROLL)]
+                    sums = [_sum(builder, weights, stages, size, place) for place in places]
+                    for place, total in zip(places, sums, strict=True):
+                        product = builder.fmul(step, total, flags=("contract",))
+                        value = builder.fadd(_load(builder, start, place), product, flags=("contract",))
+                        builder.store(value, _at(builder, target, place)).align = 8
+                builder.branch(done)
+            builder.position_at_end(done)
             return context.get_dummy_value()
 
-        return signature, codegen
+        return types.void(types.int64, types.float64, POINTER, types.int64, POINTER, POINTER), codegen
 
     return combine
+
+
+def stage_sum(rows: Rows, number: int) -> Any:
+    """Make ``f(k, size, place)`` for kernels: the vector of sum_j w[number][j] k[j] from a place on; k an address."""
+
+    @intrinsic
+    def combine(typing: Any, k: Any, size: Any, place: Any) -> Any:
+        def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
+            return _sum(builder, rows()[number], *args)
+
+        return VECTOR(POINTER, types.int64, types.int64), codegen
+
+    return combine
+
+
+def _sum(builder: ir.IRBuilder, weights: Sequence[float], stages: Any, size: Any, place: Any) -> Any:
+    """Vector of the weighted sum at a place of each stage."""
+    total = None
+    for j, weight in enumerate(weights):
+        if weight == 0:
+            continue
+        value = _load(builder, stages, builder.add(builder.mul(size, ir.Constant(_INTEGER, j)), place))
+        product = builder.fmul(ir.Constant(_DOUBLES, [float(weight)] * LANES), value, flags=("contract",))
+        total = product if total is None else builder.fadd(total, product, flags=("contract",))
+    return total
+
+
+def _at(builder: ir.IRBuilder, pointer: Any, place: Any) -> Any:
+    return builder.bitcast(builder.gep(pointer, [place]), _DOUBLES.as_pointer())
+
+
+def _load(builder: ir.IRBuilder, pointer: Any, place: Any) -> Any:
+    value = builder.load(_at(builder, pointer, place))
+    value.align = 8
+    return value
+
+
+def _spread(builder: ir.IRBuilder, number: Any) -> Any:
+    nothing = ir.Constant(_DOUBLES, ir.Undefined)
+    first = builder.insert_element(nothing, number, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))

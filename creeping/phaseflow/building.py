@@ -16,8 +16,9 @@ from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import NODES, chebyshev_times, curvature_values
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.integrator import ErrorEstimate, runge_kutta_4, trace_states
+from creeping.geodesics.integrator import ErrorEstimate, trace_states
 from creeping.geodesics.states import pack
+from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.checks import check_surface
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.ambient import AmbientModel
@@ -144,7 +145,7 @@ def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: 
     nodes = nodes_of(model, grid)
     states = pack(nodes[:, :3], nodes[:, 3:], jacobi=True)
     progress(f"burn-in of {len(nodes)} nodes by tau = {time_step:g}")
-    reached = trace_states(body, states, np.array([time_step]), rtol=0.0, step=time_step, tableau=runge_kutta_4())
+    reached = trace_states(body, states, np.array([time_step]), rtol=0.0, step=time_step, method=RUNGE_KUTTA_4)
     leaps: list[Leap] = []
     for level in range(stages + 1):
         if level:

@@ -8,10 +8,12 @@ from tolerances import JACOBI_DIFFERENCE, TRACE, TWIN
 
 import creeping as cr
 import scatterers as sc
+from creeping.geodesics import integrator
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import vector_field
-from creeping.geodesics.integrator import dormand_prince_8, trace_states
+from creeping.geodesics.integrator import counted_states, trace_states
 from creeping.geodesics.states import pack
+from creeping.geodesics.tableaus import RUNGE_KUTTA_4, dormand_prince_8
 from creeping.geometry.speed import speed_values
 from creeping.geometry.surface import normal
 
@@ -22,6 +24,56 @@ def test_compiled_equals_numpy(body, rng):
     times = np.array([0.0, 0.3, 0.3, 1.1])
     twin = oracle(body, states, times, dormand_prince_8(), rtol=1e-12, step=0.05)
     np.testing.assert_allclose(trace_states(body, states, times, rtol=1e-12, step=0.05), twin, atol=TWIN)
+
+
+@pytest.mark.parametrize("jacobi", [False, True])
+def test_outputs_of_one_step_equal_numpy(body, rng, jacobi):
+    # several outputs a step, some equal, some at once after the start, one next to the end
+    times = np.array([0.0, 0.0, 1e-9, 0.1, 0.11, 0.11, 0.4, 0.9, 1.3 - 1e-13, 1.3, 1.3])
+    states = pack(*random_bundle_points(body, 3, rng=rng), jacobi=jacobi)
+    twin = oracle(body, states, times, dormand_prince_8(), rtol=1e-9, step=0.2)
+    np.testing.assert_allclose(trace_states(body, states, times, rtol=1e-9, step=0.2), twin, atol=TWIN)
+
+
+def test_outputs_between_steps_are_where_steps_go(body, rng):
+    states = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True)
+    times = np.sort(np.r_[0.0, rng.uniform(0, 3, 40), 3.0])
+    exact = trace_states(body, states, times, rtol=0.0, step=0.02)
+    for rtol in (1e-6, 1e-8, 1e-10):
+        found = trace_states(body, states, times, rtol=rtol)
+        growth = 1 + np.abs(exact[..., 6:]).max(axis=-1)
+        assert np.max(np.abs(found - exact).max(axis=-1) / growth) < 100 * rtol
+        x, p = found[..., :3], found[..., 3:6]
+        n = normal(body, x)
+        slope = np.linalg.norm(body.gradient(x), axis=-1)
+        assert np.max(np.abs(body.level(x)) / slope) < 1e-14 + 10 * rtol**2
+        np.testing.assert_allclose(np.linalg.norm(p, axis=-1), 1, atol=1e-15)
+        np.testing.assert_allclose(np.sum(n * p, axis=-1), 0, atol=1e-14 + 10 * rtol**2)
+
+
+def test_order_of_the_polynomial():
+    body = sc.Ellipsoid(1.2, 0.8, 0.8)
+    states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(4)), jacobi=True)
+    steps, parts = np.array([0.5, 0.4, 0.32, 0.25]), np.array([0.15, 0.4, 0.5, 0.75])
+    errors = []
+    for h in steps:
+        # so loose that the first step is taken as it is: errors are those of one polynomial
+        found = trace_states(body, states, h * np.r_[parts, 1.0], rtol=1e-2, step=h)[:, :-1]
+        errors.append(np.sqrt(np.mean((found - trace_states(body, states, h * parts, rtol=1e-13)) ** 2)))
+    # of order 7: the error within a step is like h^8
+    slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert errors[-1] > 1e-13 and slope == pytest.approx(8, abs=0.6)
+
+
+def test_attenuation_ends_steps_at_outputs():
+    # its rate has a kink where a ray leaves the outer half of a torus for the inner one
+    body, times = sc.Torus(), np.linspace(0.1, 4, 40)
+    states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(5)), jacobi=True)
+    states = np.concatenate([states, np.zeros((64, 1))], axis=1)
+    twin = oracle(body, states, times[:5], dormand_prince_8(), rtol=1e-8, step=0.1)
+    np.testing.assert_allclose(trace_states(body, states, times[:5], rtol=1e-8, step=0.1), twin, atol=TWIN)
+    alone = np.stack([trace_states(body, states, times[: k + 1], rtol=1e-8)[:, -1] for k in range(5)], axis=1)
+    np.testing.assert_array_equal(trace_states(body, states, times, rtol=1e-8)[:, :5], alone)
 
 
 def test_against_scipy(body, rng):
@@ -59,6 +111,41 @@ def test_shapes_follow_points_and_times():
     assert cr.trace(sc.Sphere(), points, [0, 1, 0], [0.0, 0.5])[1].shape == (2, 5, 2, 3)
     assert cr.trace(sc.Sphere(), [1, 0, 0], [0, 1, 0], 0.5)[0].shape == (3,)
     assert cr.trace(sc.Sphere(), np.zeros((0, 3)), np.zeros((0, 3)), 0.5)[0].shape == (0, 3)
+
+
+@pytest.mark.parametrize("jacobi", [False, True])
+def test_no_bit_depends_on_where_the_kernel_comes_up(jacobi, rng, monkeypatch):
+    body, times = sc.TwistedEllipsoid(), np.sort(np.r_[0.0, 0.0, rng.uniform(0, 2, 30), 5.0, 5.0])
+    states = pack(*random_bundle_points(body, 200, rng=rng), jacobi=jacobi)
+    for options in ({"rtol": 1e-5}, {"rtol": 1e-9}, {"rtol": 0.0, "step": 0.07}):
+        whole = trace_states(body, states, times, **options)
+        # blocks of 64 rays are what a result depends on
+        np.testing.assert_array_equal(trace_states(body, states[64:128], times, **options), whole[64:128])
+        calls = []
+        with monkeypatch.context() as patch:
+            patch.setattr(integrator, "BUDGET", 3)
+            patch.setattr(integrator, "pause", lambda calls=calls: calls.append(1))
+            np.testing.assert_array_equal(trace_states(body, states, times, **options), whole)
+        assert len(calls) > 20
+
+
+def test_outputs_do_not_cost_steps():
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(7)))
+    ends, between = np.array([8.0]), np.linspace(0.01, 8, 800)
+    one, many = (counted_states(body, states, times, rtol=1e-8)[1] for times in (ends, between))
+    assert abs(one - many) <= 0.1 * one
+
+
+def test_estimates_are_those_of_one_method():
+    states = pack(*random_bundle_points(sc.Sphere(), 3, rng=np.random.default_rng(0)))
+    with pytest.raises(cr.CreepingError, match="equal steps"):
+        trace_states(sc.Sphere(), states, np.array([1.0]), rtol=1e-6, method=RUNGE_KUTTA_4)
+
+
+def test_no_times_are_no_outputs():
+    states = pack(*random_bundle_points(sc.Sphere(), 3, rng=np.random.default_rng(0)))
+    assert trace_states(sc.Sphere(), states, np.empty(0)).shape == (3, 0, 6)
 
 
 def test_step_far_too_large_is_an_error_not_a_nan():

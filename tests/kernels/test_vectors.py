@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from creeping.kernels.vectors import LANES, load, root, spread, store
+from creeping.kernels.vectors import LANES, larger, load, loads, magnitude, pointer, root, spread, store
+from creeping.kernels.weighted_sum import stage_sum, stage_sums
 
 
 @njit
@@ -48,6 +49,72 @@ def test_vectors_live_through_loops_and_calls():
     a = np.arange(1.0, LANES + 1)
     recurrence(a, 3)
     np.testing.assert_array_equal(a, np.arange(1, LANES + 1) / 8)
+
+
+@njit
+def compared(a, b, out):
+    x, y = load(a, 0), load(b, 0)
+    store(out, 0, -x)
+    store(out, LANES, magnitude(x))
+    store(out, 2 * LANES, larger(x, y))
+
+
+def test_signs_and_sizes_are_those_of_numpy():
+    rng = np.random.default_rng(5)
+    a, b, out = rng.normal(size=LANES), rng.normal(size=LANES), np.zeros(3 * LANES)
+    a[0], b[1] = np.nan, np.nan
+    compared(a, b, out)
+    expected = [-a, np.abs(a), np.where(a > b, a, b)]
+    np.testing.assert_array_equal(out.reshape(3, LANES), expected)
+
+
+@njit
+def by_address(a, out):
+    """The second of two vectors behind the third number, written one number on."""
+    store(pointer(out, 1), 0, load(pointer(pointer(a, 1), 2), LANES))
+
+
+def test_addresses_count_elements():
+    a, out = np.arange(30.0), np.zeros(LANES + 1)
+    by_address(a, out)
+    np.testing.assert_array_equal(out, np.r_[0.0, a[LANES + 3 : 2 * LANES + 3]])
+
+
+_pair = loads(2, 11)
+
+
+@njit
+def apart(a, out):
+    x, y = _pair(pointer(a, 1), 2)
+    store(out, 0, x - y)
+
+
+def test_vectors_of_one_call_are_a_stride_apart():
+    a, out = np.random.default_rng(7).normal(size=30), np.zeros(LANES)
+    apart(a, out)
+    np.testing.assert_array_equal(out, a[3 : 3 + LANES] - a[14 : 14 + LANES])
+
+
+_WEIGHTS = np.array([[0.0, 0, 0], [0.5, 0, -2], [0, 0, 0], [1, 2, 3]])
+_sums, _third_row = stage_sums(lambda: _WEIGHTS), stage_sum(lambda: _WEIGHTS, 3)
+
+
+@njit
+def summed(row, h, k, y, z, one):
+    _sums(row, h, pointer(k, 0), y.shape[0], pointer(y, 0), pointer(z, 0))
+    store(one, 0, _third_row(pointer(k, 0), y.shape[0], LANES))
+
+
+def test_sums_over_stages_are_those_of_numpy():
+    rng = np.random.default_rng(6)
+    k, y = rng.normal(size=(3, 64)), rng.normal(size=64)
+    for row in range(5):
+        z, one = np.full(64, 7.0), np.zeros(LANES)
+        summed(row, 0.3, k.reshape(-1), y, z, one)
+        # rows without weights, and those that are not there, leave z alone
+        expected = y + 0.3 * _WEIGHTS[row] @ k if row in (1, 3) else np.full(64, 7.0)
+        np.testing.assert_allclose(z, expected, rtol=1e-14, atol=1e-15)
+        np.testing.assert_allclose(one, (_WEIGHTS[3] @ k)[LANES : 2 * LANES], rtol=1e-14, atol=1e-15)
 
 
 def test_numbers_are_no_vectors():

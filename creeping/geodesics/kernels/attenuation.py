@@ -9,9 +9,10 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.hermite import NEAREST
-from creeping.geodesics.kernels.integrator import right_hand_side, two_thirds
+from creeping.geodesics.kernels.flow_derivative import derivative, two_thirds
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.curvature import second_form
+from creeping.kernels.vectors import pointer
 
 SAMPLES = 23
 """Rows of work space of `extend`: twelve Gauss points, both ends, the least of them, eight Chebyshev times."""
@@ -160,7 +161,15 @@ def extend_along(
     points, weights, nodes, searching, refined, refined_weights, dip = rules
     gauss, intervals = points.shape[0], first.shape[0]
     traced = 10 if states.shape[2] >= 10 else 0
-    y, k, geometry, weight = aligned(6, BLOCK), aligned(6, BLOCK), aligned(10, BLOCK), aligned(10, BLOCK)
+    states_rows, slopes_rows, geometry, weight = (
+        aligned(6, BLOCK),
+        aligned(6, BLOCK),
+        aligned(10, BLOCK),
+        aligned(10, BLOCK),
+    )
+    y, k, g, w = states_rows.reshape(-1), slopes_rows.reshape(-1), geometry.reshape(-1), weight.reshape(-1)
+    x, values, gradients, hessians = states_rows[:3], geometry[0], geometry[1:4], geometry[4:]
+    speeds, slopes, bends = weight[0], weight[1:4], weight[4:]
     # of the jets only those in use are kept
     jets, bent = aligned(NEAREST * 9, BLOCK).reshape(NEAREST, 9, BLOCK), aligned(intervals + 1, BLOCK)
     a, sampled, work = aligned(2, BLOCK), aligned(gauss + 2, BLOCK), aligned(4, BLOCK)
@@ -183,11 +192,14 @@ def extend_along(
             while known <= knots[first[m] + NEAREST - 1]:
                 for i in range(BLOCK):
                     for lane in range(6):
-                        y[lane, i] = states[start + min(i, count - 1), known, lane]
-                right_hand_side(level, level_par, speed, speed_par, weighted, y, k, geometry, weight)
-                _curvature(y, geometry, weight, weighted, bent[known])
+                        y[lane * BLOCK + i] = states[start + min(i, count - 1), known, lane]
+                level(x, values, gradients, hessians, level_par)
+                if weighted:
+                    speed(x, speeds, slopes, bends, speed_par)
+                derivative(weighted, 6, pointer(y, 0), pointer(g, 0), pointer(w, 0), pointer(k, 0))
+                _curvature(y, g, w, weighted, bent[known])
                 # what is no knot is overwritten by the next
-                _jet(y, k, weight, weighted, jets[seen % NEAREST])
+                _jet(y, k, w, weighted, jets[seen % NEAREST])
                 if known == knots[seen]:
                     seen += 1
                 known += 1
@@ -197,10 +209,10 @@ def extend_along(
             time = times[m + 1] - times[m]
             for q in range(gauss):
                 _between(position[m, q], velocity[m, q], jets, first[m], y)
-                level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+                level(x, values, gradients, hessians, level_par)
                 if weighted:
-                    speed(y[:3], weight[0], weight[1:4], weight[4:], speed_par)
-                _curvature(y, geometry, weight, weighted, sampled[q + 1])
+                    speed(x, speeds, slopes, bends, speed_par)
+                _curvature(y, g, w, weighted, sampled[q + 1])
                 for i in range(BLOCK):
                     power[i] = sampled[q + 1, i]
                     least[i], most[i] = min(least[i], power[i]), max(most[i], power[i])
@@ -212,11 +224,11 @@ def extend_along(
                     if least[i] > dip * most[i]:
                         a[0, i] += grown[i]
                         continue
-                    values = sampled[:, i].copy()
-                    if _reaches_zero(values, searching):
-                        _detach(values, searching, points, weights, nodes, time, times[m], a, i)
+                    along = sampled[:, i].copy()
+                    if _reaches_zero(along, searching):
+                        _detach(along, searching, points, weights, nodes, time, times[m], a, i)
                     else:
-                        a[0, i] += time * _refined(values, refined, refined_weights)
+                        a[0, i] += time * _refined(along, refined, refined_weights)
 
 
 @njit(**options)
@@ -254,9 +266,8 @@ def _any_infinite(values):
 
 
 @njit(**options)
-def _curvature(y, geometry, weight, weighted, out):
-    """c^(3/2) kappa_n along y[3:], of any length, into out (BLOCK,)."""
-    yf, g = y.reshape(-1), geometry.reshape(-1)
+def _curvature(yf, g, w, weighted, out):
+    """c^(3/2) kappa_n along the directions of a block of states, of any length, into out (BLOCK,)."""
     for i in range(BLOCK):
         px, py, pz = yf[3 * BLOCK + i], yf[4 * BLOCK + i], yf[5 * BLOCK + i]
         gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
@@ -265,13 +276,13 @@ def _curvature(y, geometry, weight, weighted, out):
         out[i] = bent / ((px * px + py * py + pz * pz) * math.sqrt(gx * gx + gy * gy + gz * gz))
     if weighted:
         for i in range(BLOCK):
-            out[i] *= weight[0, i] * math.sqrt(weight[0, i])
+            out[i] *= w[i] * math.sqrt(w[i])
 
 
 @njit(**options)
-def _jet(y, k, weight, weighted, jet):
-    """(x, x', x'') of the block into jet (9, BLOCK), from its derivative k; see `attenuation.jets`."""
-    yf, kf, jf, w = y.reshape(-1), k.reshape(-1), jet.reshape(-1), weight.reshape(-1)
+def _jet(yf, kf, w, weighted, jet):
+    """(x, x', x'') of the block into jet (9, BLOCK), from its derivative; see `attenuation.jets`."""
+    jf = jet.reshape(-1)
     for i in range(3 * BLOCK):
         jf[i], jf[3 * BLOCK + i], jf[6 * BLOCK + i] = yf[i], kf[i], kf[3 * BLOCK + i]
     if weighted:
@@ -283,9 +294,8 @@ def _jet(y, k, weight, weighted, jet):
 
 
 @njit(**options)
-def _between(position, velocity, jets, first, y):
-    """(x, x') into y at the point to which the weights (3 NEAREST,) belong."""
-    yf = y.reshape(-1)
+def _between(position, velocity, jets, first, yf):
+    """(x, x') into yf at the point to which the weights (3 NEAREST,) belong."""
     for pair in range(0, NEAREST, 2):
         one, two = jets[(first + pair) % NEAREST].reshape(-1), jets[(first + pair + 1) % NEAREST].reshape(-1)
         p, v = position[3 * pair :], velocity[3 * pair :]

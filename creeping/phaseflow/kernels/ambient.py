@@ -9,10 +9,11 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.geodesics.kernels.integrator import project_block
+from creeping.geodesics.kernels.flow_derivative import project_block
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.contraction import contraction
 from creeping.kernels.splines import cells_and_fractions, weights
+from creeping.kernels.vectors import pointer
 
 _state_3, _state_5 = contraction(3, 8), contraction(5, 8)
 _jacobi_3, _jacobi_5 = contraction(3, 4), contraction(5, 4)
@@ -57,6 +58,8 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
             for lane in range(6):
                 y[lane, i] = states[start + min(i, count - 1), lane]
         off = math.inf
+        # y and geometry are in use until the end, as their addresses must be
+        here, normals = pointer(y.reshape(-1), 0), pointer(geometry.reshape(-1), 0)
         for _ in range(leaps):
             # else the last evaluation was within the tolerance of where the rays are
             if not off <= tolerance:
@@ -97,7 +100,7 @@ def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, ce
                 for i in range(BLOCK):
                     slope = math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
                     off = max(off, abs(geometry[0, i]) / slope)
-                project_block(y, geometry)
+                project_block(here, 6, normals, here)
                 if off <= tolerance:
                     break
         for i in range(count):

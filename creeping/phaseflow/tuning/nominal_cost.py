@@ -36,11 +36,11 @@ CLOSED_FORM = 50.0
 """Operations of a level that does not tell."""
 CALLED_BACK = 1.1e-6
 """Seconds of a point of F by numpy methods, in blocks of 64: a twisted ellipsoid, and 0.9 of it the calls."""
-ARITHMETIC, WITH_JACOBI, WEIGHTED = 5e-9, 2e-9, 8e-9
+ARITHMETIC, WITH_JACOBI, WEIGHTED = 1.2e-9, 1.8e-9, 1.8e-9
 """Seconds of a stage of a ray besides F: of (x, p), more with the Jacobi matrix, more of either with a speed."""
-ADAPTING = 1.2e-9
+ADAPTING = 5e-10
 """Seconds more of a stage where the step adapts."""
-SAMPLE = 2e-8
+SAMPLE = 1e-8
 """Seconds of a point of a ray at which the attenuation is sampled, besides F."""
 NODE, DOUBLING = 6e-7, 4e-7
 """Seconds that a node takes of a build besides tracing, and of a doubling."""
