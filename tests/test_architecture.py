@@ -114,7 +114,7 @@ def test_kernels_import_what_their_cache_watches():
 
 
 def test_kernels_that_python_calls_are_not_inlined():
-    """Into the wrapper that numba makes of them: they would be compiled twice; `aligned` is both, and short."""
+    """Into the wrapper that numba makes of them: they would be compiled twice."""
     called = {
         (module.replace(".", "/") + ".py", name)
         for file, tree in PRODUCT.items()
@@ -129,7 +129,7 @@ def test_kernels_that_python_calls_are_not_inlined():
         and "njit(**options)" in map(ast.unparse, node.decorator_list)
         and "strict_options as options" not in TEXTS[file]
     }
-    assert called & inlined == {("creeping/kernels/block.py", "aligned")}
+    assert inlined and not called & inlined
 
 
 def test_root_is_closed():

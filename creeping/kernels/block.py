@@ -10,9 +10,11 @@ from numba import njit
 
 from creeping._typing import Any
 from creeping.kernels.cache import discard_stale
+from creeping.kernels.first_use import watch
 from creeping.kernels.private_cache import keep_private
 
-keep_private(Path(__file__).parents[1], discard_stale(Path(__file__).parents[1]))
+_digest = discard_stale(Path(__file__).parents[1])
+keep_private(Path(__file__).parents[1], _digest)
 
 BLOCK = 64
 
@@ -29,7 +31,8 @@ options = entry_options | {"forceinline": True}
 strict_options = _common
 
 
-@njit(**options)
+# numba would compile it for each pair of constants
+@njit("float64[:, ::1](int64, int64)", **options)
 def aligned(rows, columns):
     """Uninitialised array whose rows of whole vectors do not straddle cache lines."""
     flat = np.empty(rows * columns + 8)
@@ -42,3 +45,6 @@ def copy(source, target):
     """Copy source (n,) to target, which is as long; not by slices, whose message on shapes takes seconds to compile."""
     for i in range(source.shape[0]):
         target[i] = source[i]
+
+
+watch(Path(aligned.stats.cache_path), _digest)
