@@ -118,6 +118,27 @@ def test_kernels_import_what_their_cache_watches():
     assert not strangers
 
 
+def test_kernels_that_python_calls_are_not_inlined():
+    """Into the wrapper that numba makes of them: they would be compiled twice."""
+    called = {
+        (module.replace(".", "/") + ".py", name)
+        for file, tree in PRODUCT.items()
+        if file not in KERNELS
+        for module, name in imports(tree)
+    }
+    inlined = {
+        (file, node.name)
+        for file, tree in KERNELS.items()
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef)
+        and "njit(**options)" in map(ast.unparse, node.decorator_list)
+        and "strict_options as options" not in TEXTS[file]
+    }
+    # the integrators would compile no sooner, and are slower by some per cent
+    integrators = {file for file in KERNELS if Path(file).stem in ("integrator", "own_times")}
+    assert not {(file, name) for file, name in called & inlined if file not in integrators}
+
+
 def test_root_is_closed():
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode != 0:

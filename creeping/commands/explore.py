@@ -126,7 +126,7 @@ def _serve(flow: Any, request: Any, port: int, name: str, browser: bool, progres
 
     from creeping.explorer.page import Explorer
 
-    progress("preparing the page; kernels are compiled once, which takes about a minute")
+    progress("preparing the page")
     page = Explorer(flow, request, port=port, name=name)
     try:
         if page.server.get_port() != port:

@@ -20,7 +20,6 @@ from creeping.commands import explore as _explore_command
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
 from creeping.commands.body import AS_IT_IS, Body, FileOptions, SpeedOption, parse_body, title_of
-from creeping.commands.compiling import told_of_compilation
 
 app = App(
     name="creeping",
@@ -144,7 +143,7 @@ def run(
     wave: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": sound_speed}
     wave |= {"polarisation": polarisation, "weighted": speed is not None}
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
-    with _Progress(quiet=json_) as progress, told_of_compilation(progress):
+    with _Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
         if job:
             job = job.fitted(shape)

@@ -10,7 +10,6 @@ import creeping as cr
 import scatterers as sc
 from creeping.commands import run_field
 from creeping.commands.body import title_of
-from creeping.commands.compiling import told_of_compilation
 from creeping.commands.main import main
 from creeping.errors import InvalidInputError
 from creeping.field.lobes import lobe_step
@@ -137,15 +136,3 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
 def test_names_of_bodies_in_titles():
     assert title_of("/home/someone/hull.stl") == "hull.stl"
     assert title_of("sphere:radius=2") == "sphere:radius=2" and len(title_of("x + " * 40)) == 60
-
-
-def test_compilation_is_told_once():
-    from numba import njit
-
-    said = []
-    with told_of_compilation(said.append):
-        njit(lambda x: x + 1)(1.0)
-        njit(lambda x: x + 2)(1.0)
-    assert len(said) == 1 and "compiling" in said[0]
-    njit(lambda x: x + 3)(1.0)
-    assert len(said) == 1

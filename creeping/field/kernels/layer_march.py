@@ -18,7 +18,7 @@ Sources: [C93]; Derivations, F22.
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import options
+from creeping.kernels.block import entry_options, options
 from creeping.kernels.vectors import LANES, load, root, spread, store
 
 ROW = 2 * LANES
@@ -224,7 +224,7 @@ def meet_condition(w, beta, g, scale):
     store(w, ROW + LANES, spread(scale) * (load(g, LANES) - v))
 
 
-@njit(**options)
+@njit(**entry_options)
 def march_block(mats, levels, cut, scale, k, soft, steps, poles, weights, g, beta, switch, incident, w, out):
     """March one block of rays.
 

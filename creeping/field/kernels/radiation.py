@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import options
+from creeping.kernels.block import entry_options, options
 
 _S = np.array([(-1.0) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(10)])
 _C = np.array([(-1.0) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(11)])
@@ -37,7 +37,7 @@ def cosine_sine(turns):
     return 1.0 - 2.0 * s * s, 2.0 * s * c
 
 
-@njit(**options)
+@njit(**entry_options)
 def distant(turns, real, imaginary, r, out):
     """Fill out (m, 2 C), real parts of the C sums before their imaginary parts.
 
@@ -63,7 +63,7 @@ def distant(turns, real, imaginary, r, out):
                 out[j, columns + column] += q
 
 
-@njit(**options)
+@njit(**entry_options)
 def near(x, normals, single, double, k, y, out):
     """Fill out (m, 2), real and imaginary part of u at points y (m, 3).
 
@@ -86,7 +86,7 @@ def near(x, normals, single, double, k, y, out):
         out[j, 0], out[j, 1] = p, q
 
 
-@njit(**options)
+@njit(**entry_options)
 def curl(x, real, imaginary, k, y, out):
     """Fill out (m, 6), real and imaginary parts of H at points y (m, 3); real and imaginary (3, n) are those of J."""
     n = x.shape[1]

@@ -10,7 +10,7 @@ from numba import njit
 
 from creeping.geodesics.hermite import NEAREST
 from creeping.geodesics.kernels.flow_derivative import derivative, two_thirds
-from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.curvature import second_form
 from creeping.kernels.vectors import pointer
 
@@ -18,7 +18,7 @@ SAMPLES = 23
 """Rows of work space of `extend`: twelve Gauss points, both ends, the least of them, eight Chebyshev times."""
 
 
-@njit(**options)
+@njit(**entry_options)
 def curvatures(level, level_par, speed, speed_par, weighted, states, out):
     """c^(3/2) kappa_n of states (n, 6 or more) into out (n,)."""
     n = states.shape[0]
@@ -148,7 +148,7 @@ def _polynomial(c, nodes, t):
     return total
 
 
-@njit(**options)
+@njit(**entry_options)
 def extend_along(
     level, level_par, speed, speed_par, weighted, states, times, knots, first, position, velocity, rules, place, out
 ):

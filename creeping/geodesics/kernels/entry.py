@@ -4,13 +4,13 @@ import math
 
 from numba import njit
 
-from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.block import BLOCK, aligned, entry_options
 
 STEPS = 8
 """Most Newton steps onto the body, as of `geometry.surface.project`."""
 
 
-@njit(**options)
+@njit(**entry_options)
 def enter(level, level_par, points, directions, off, close, least, out):
     """States (n, 6) of points and directions (n, 3); returns how many of them cannot be taken.
 

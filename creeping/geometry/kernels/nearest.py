@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import BLOCK, aligned, strict_options
+from creeping.kernels.block import BLOCK, aligned, copy, strict_options
 from creeping.kernels.curvature import adjugate_form, second_form
 
 
@@ -30,7 +30,7 @@ def nearest(level, level_par, y, steps, close, x, n, shape, height):
     for start in range(0, y.shape[1], BLOCK):
         count = min(BLOCK, y.shape[1] - start)
         for axis in range(3):
-            points[axis, :count] = y[axis, start : start + count]
+            copy(y[axis, start : start + count], points[axis, :count])
             points[axis, count:] = y[axis, start + count - 1]
         largest = math.inf
         for step in range(steps + 1):

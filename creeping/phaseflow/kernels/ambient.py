@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.flow_derivative import project_block
-from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.contraction import contraction
 from creeping.kernels.splines import cells_and_fractions, weights
 from creeping.kernels.vectors import pointer
@@ -35,7 +35,7 @@ def _stencil(table, jacobi, carry_jacobi, degree, first, wu, wv, wa, ray, out):
             _jacobi_5(jacobi, 4 * first, 4 * plane, 4 * row, wu, wv, wa, ray, BLOCK, out, 8)
 
 
-@njit(**options)
+@njit(**entry_options)
 def leap(locate, locate_par, level, level_par, table, jacobi, degree, origin, cells, horizon, leaps, tolerance, states):
     """Compose the map ``leaps`` times on states (n, 6 or 10), in place.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.attenuation import SAMPLES
-from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.phaseflow.kernels.composition import (
     INTERPOLATED,
     WORK,
@@ -22,7 +22,7 @@ from creeping.phaseflow.kernels.composition import (
 )
 
 
-@njit(**options)
+@njit(**entry_options)
 def flow_ordered(
     kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts,
     budget, reached, ray, carried, bucket, ends, out

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.attenuation import SAMPLES, extend
-from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.splines import cells_and_fractions, weights
 from creeping.phaseflow.kernels import angles as _angles
 from creeping.phaseflow.kernels import rotation as _rotations
@@ -169,7 +169,7 @@ def _carry_jacobi(d, matrix, m):
         m[2 * BLOCK + i], m[3 * BLOCK + i] = m11 * i2 + m12 * j2, m21 * i2 + m22 * j2
 
 
-@njit(**options)
+@njit(**entry_options)
 def flow(
     kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts,
     budget, reached, kept, out
@@ -200,7 +200,12 @@ def flow(
         now, first = 0.0, 0
         if again:
             first, now = int(reached[1]), reached[3]
-            r[:], m[:] = kept[:4], kept[4:]
+            # not by slices: what numba says of shapes that differ takes longer to compile than all of this
+            for i in range(BLOCK):
+                for k in range(4):
+                    r[k, i] = kept[k, i]
+                for k in range(6):
+                    m[k, i] = kept[4 + k, i]
         else:
             for i in range(BLOCK):
                 source = start + min(i, count - 1)
@@ -216,7 +221,11 @@ def flow(
             for number in range(done, counts[output]):
                 if spent >= budget:
                     reached[0], reached[1], reached[2], reached[3], reached[4] = start, output, number, now, 1.0
-                    kept[:4], kept[4:] = r, m
+                    for i in range(BLOCK):
+                        for k in range(4):
+                            kept[k, i] = r[k, i]
+                        for k in range(6):
+                            kept[4 + k, i] = m[k, i]
                     return False
                 spent += 1
                 place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)

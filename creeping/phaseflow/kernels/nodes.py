@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import BLOCK, aligned, options
+from creeping.kernels.block import BLOCK, aligned, entry_options
 from creeping.phaseflow.kernels.composition import (
     ANGLES,
     INTERPOLATED,
@@ -18,7 +18,7 @@ from creeping.phaseflow.kernels.composition import (
 )
 
 
-@njit(**options)
+@njit(**entry_options)
 def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curvatures):
     """Displacement (n, 4), Jacobi matrix (n or 0, 4) and curvatures (n or 0, 16) of two leaps from the nodes (n, 4).
 
@@ -56,7 +56,7 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
                     matrices[start + i, k] = m[k, i]
 
 
-@njit(**options)
+@njit(**entry_options)
 def to_body(kind, surface_table, there, there_par, model, out):
     """States (n, 6) of model coordinates (n, 4)."""
     x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
@@ -72,7 +72,7 @@ def to_body(kind, surface_table, there, there_par, model, out):
                 out[start + i, k], out[start + i, 3 + k] = x[k, i], p[k, i]
 
 
-@njit(**options)
+@njit(**entry_options)
 def displacements(kind, surface_table, there, there_par, back, back_par, nodes, traced, out):
     """Displacement (n, 4) from nodes (n, 4) along traced states (n, m, lanes), followed continuously.
 

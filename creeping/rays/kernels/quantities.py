@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
+from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
 from creeping.kernels.curvature import second_form
 from creeping.rays.quantities import GAUSS, GUARD, SHARPEST
@@ -124,7 +125,7 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
     angles[0] = math.atan2(-scale * ray[GUARD, 7], ray[GUARD, 6])
     for k in range(known):
         i = k + GUARD
-        totals[k + 1] = totals[k]
+        copy(totals[k], totals[k + 1])
         positive = good[k]
         # where the creeping ray has ended, the integrals stay
         for q in range(GAUSS if positive else 0):
@@ -214,7 +215,7 @@ def quantities_at(
         for axis in range(3):
             starts[row, 6 + axis] = normals[axis, GUARD]
         for point in range(row, end):
-            starts[point, 2:] = starts[row, 2:]
+            copy(starts[row, 2:], starts[point, 2:])
             last = min(max(int(times[point] / step), 0), K - 2 * GUARD - 1)
             part = times[point] / step - last
             i = last + GUARD
@@ -230,7 +231,7 @@ def quantities_at(
                 continue
             lanes[point, 8] = _turned(angles[last], lanes[point, 6], lanes[point, 7], scale)
             positive = good[last]
-            total[:] = totals[last]
+            copy(totals[last], total)
             for q in range(GAUSS if part > 0.0 and positive else 0):
                 _weights(matrix, part * nodes[q], step, w)
                 curved = _applied(w, 0, kappa, i)

@@ -15,6 +15,7 @@ import math
 import numpy as np
 from numba import njit
 
+from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
 from creeping.kernels.curvature import adjugate_form, second_form
 
@@ -320,11 +321,11 @@ def seek_all(
                 return -1, -1
             for k in range(a):
                 found[total + k, 0] = row * many + o
-                found[total + k, 1:] = cells[k]
-                places[total + k] = inside[k]
+                copy(cells[k], found[total + k, 1:])
+                copy(inside[k], places[total + k])
             for k in range(b):
                 crossed[passed + k, 0], crossed[passed + k, 1] = row * many + o, ray_of[k]
-                crossed[passed + k, 2:] = at[k]
+                copy(at[k], crossed[passed + k, 2:])
             total += a
             passed += b
     return total, passed

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import BLOCK
+from creeping.kernels.block import BLOCK, copy
 from creeping.kernels.block import strict_options as options
 
 FAILED = 1e300
@@ -45,15 +45,15 @@ def newton(level, level_par, d, x, reach, work, tangents, curvature):
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for axis in range(3):
-            points[axis, :count] = x[axis, start : start + count]
+            copy(x[axis, start : start + count], points[axis, :count])
             # the last block is filled up with its last point
             points[axis, count:] = x[axis, start + count - 1]
         level(points, values[0], values[1:4], values[4:], level_par)
         worst = max(worst, _steps(points.reshape(-1), values.reshape(-1), out.reshape(-1), d, reach))
         for axis in range(3):
-            x[axis, start : start + count] = points[axis, :count]
-            tangents[axis, start : start + count] = out[axis, :count]
-        curvature[start : start + count] = out[3, :count]
+            copy(points[axis, :count], x[axis, start : start + count])
+            copy(out[axis, :count], tangents[axis, start : start + count])
+        copy(out[3, :count], curvature[start : start + count])
     return worst if worst < FAILED else FAILED
 
 
@@ -186,7 +186,7 @@ def resample(x, tangents, kept, first, count, length, out, place, number):
 def _padded(rows, first, number, out):
     """Copy one component of rows (3, n) into out (3, number + 2 HALF), HALF nodes from the other end on either side."""
     for axis in range(3):
-        out[axis, HALF : number + HALF] = rows[axis, first : first + number]
+        copy(rows[axis, first : first + number], out[axis, HALF : number + HALF])
         for k in range(HALF):
             out[axis, k] = rows[axis, first + number - HALF + k]
             out[axis, number + HALF + k] = rows[axis, first + k]

@@ -269,7 +269,8 @@ def finish(
         summary[SHARES + state[k]] += (arcs[k, 1] - arcs[k, 0]) * spacing[owner[k]] / summary[LENGTH]
     if every:
         whole, bearing, open_ = np.zeros((components, 2)), np.arange(components), np.full(components, ATTACHED)
-        whole[:, 1] = number
+        for c in range(components):
+            whole[c, 1] = number[c]
         filled = _share(whole, bearing, open_, components, starts, spacing, x, launched, places)
     else:
         filled = _share(arcs, owner, state, total, starts, spacing, x, launched, places)

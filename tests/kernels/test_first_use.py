@@ -1,0 +1,121 @@
+"""First use of kernels: told once, compiled ahead by a process that ends with its parent, garbage left for later."""
+
+import gc
+import logging
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from numba import njit
+
+from creeping.commands import compile_ahead
+from creeping.kernels import first_use
+
+ROOT = Path(__file__).parents[2]
+
+
+class Event:
+    """As of numba, of a function of a module."""
+
+    def __init__(self, module):
+        function = type("Function", (), {"__module__": module})
+        self.data = {"dispatcher": type("Dispatcher", (), {"py_func": function})}
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """Modules for which a process would have been started."""
+    modules = []
+    monkeypatch.setattr(first_use, "may_start", lambda *_: True)
+    monkeypatch.setattr(first_use, "start", lambda first, *_: modules.append(first))
+    monkeypatch.delitem(sys.modules, first_use.AHEAD, raising=False)
+    return modules
+
+
+def test_compilation_is_told_once_and_compiled_ahead(started, caplog, tmp_path):
+    listener = first_use._FirstUse(tmp_path, "")
+    usual = gc.get_threshold()
+    for module in ("scipy.other", "creeping.kernels.block", "creeping.shadow.kernels.trace"):
+        listener.on_start(Event(module))
+        assert gc.get_threshold() == first_use.PATIENT
+        listener.on_start(Event(module))
+        listener.on_end(Event(module))
+        assert gc.get_threshold() == first_use.PATIENT
+        listener.on_end(Event(module))
+        assert gc.get_threshold() == usual
+    assert [record.levelno for record in caplog.records] == [logging.WARNING]
+    assert "compiling kernels, once" in caplog.text
+    assert started == ["creeping.kernels.block"]
+
+
+def test_code_of_others_is_not_told(started, caplog):
+    njit(lambda x: x + 1)(1.0)
+    assert not started and not caplog.records
+
+
+def test_nothing_is_compiled_ahead_without_need(monkeypatch, tmp_path):
+    assert not first_use.may_start(tmp_path, "abc")
+    monkeypatch.delitem(sys.modules, "pytest")
+    monkeypatch.setenv("CREEPING_THREADS", "2")
+    assert first_use.may_start(tmp_path / "later", "abc")
+    (tmp_path / first_use.STAMP).write_text("abc")
+    assert first_use.may_start(tmp_path, "abd") and not first_use.may_start(tmp_path, "abc")
+    monkeypatch.setattr(sys, "executable", "/opt/modeller/modeller")
+    assert not first_use.may_start(tmp_path, "abd")
+    monkeypatch.undo()
+    monkeypatch.delitem(sys.modules, "pytest")
+    monkeypatch.setenv("CREEPING_THREADS", "1")
+    assert not first_use.may_start(tmp_path, "abd")
+
+
+def test_it_ends_with_its_parent(tmp_path):
+    # the parent is killed, and can tell nobody
+    code = f"""
+import os, pathlib, signal, time
+from creeping.kernels import first_use
+first_use.AHEAD = "slow"
+first_use.start("first", pathlib.Path({str(tmp_path)!r}), "abc")
+while not pathlib.Path({str(tmp_path / "pid")!r}).exists():
+    time.sleep(0.01)
+os.kill(os.getpid(), getattr(signal, "SIGKILL", signal.SIGTERM))
+"""
+    (tmp_path / "slow.py").write_text(f"""
+import os, pathlib, threading, time
+from creeping.commands.compile_ahead import _end_with_parent
+def main(*given):
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    pathlib.Path({str(tmp_path / "part")!r}).write_text(str(os.getpid()))
+    os.replace({str(tmp_path / "part")!r}, {str(tmp_path / "pid")!r})
+    time.sleep(60)
+""")
+    paths = {"PYTHONPATH": os.pathsep.join((str(ROOT), str(tmp_path)))}
+    subprocess.run([sys.executable, "-c", code], env=os.environ | paths, timeout=60, check=False)
+    pid = int((tmp_path / "pid").read_text())
+    for _ in range(200):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+    pytest.fail("it goes on")
+
+
+def test_what_is_compiled_ahead_is_noted_once(monkeypatch, tmp_path):
+    ran = []
+    monkeypatch.setattr(compile_ahead, "steps", lambda first: [lambda: ran.append(first)])
+    monkeypatch.setattr(compile_ahead, "_end_with_parent", lambda: None)
+    try:
+        for _ in range(2):
+            compile_ahead.main("creeping.shadow.kernels.trace", str(tmp_path / "new"), "abc")
+    finally:
+        gc.enable()
+    assert ran == ["creeping.shadow.kernels.trace"] and first_use.is_done(tmp_path / "new", "abc")
+
+
+@pytest.mark.parametrize("first", ["creeping.shadow.kernels.newton", "creeping.geodesics.kernels.integrator"])
+def test_the_job_runs(first):
+    for step in compile_ahead.steps(first):
+        step()
