@@ -107,7 +107,7 @@ def marched_sum(
     strength = total_of(size, observer, count)
     more = np.maximum(1.0, np.abs(values) / np.maximum(strength, 1e-300))
     error = np.hypot(more * total_of(size * bounded, observer, count), rest)
-    return _judged(fan, shed, size, values, error, ~np.isfinite(part), k, boundary)
+    return _judged(fan, shed, size, values, error, part >= 1, k, boundary)
 
 
 def _on_rays(waves: FanWaves, shed: ShedRays) -> tuple[ComplexArray, ComplexArray, FloatArray]:
@@ -146,8 +146,10 @@ def _judged(
     xi = fock_parameter(shed.rays, k)
     strength = total_of(size, observer, count)
     lost = total_of(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
-    unknown = np.zeros(count, dtype=bool)
-    unknown[observer[lacking]] = True
+    # a ray without a wave, or with one that errs by its size
+    none = np.zeros(count, dtype=bool)
+    none[observer[lacking & (size == 0)]] = True
+    unknown = none | (total_of(np.where(lacking, size, 0.0), observer, count) > LOST * strength)
     status = np.select(
         [unknown, strength == 0, lost > LOST * strength],
         [

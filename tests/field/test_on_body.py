@@ -5,6 +5,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
+from creeping.field import on_body
 from creeping.field.point_result import FieldStatus
 from studies.reference import clouds, fundamental, sphere
 
@@ -66,7 +67,9 @@ def test_each_ray_has_its_own_status():
     assert np.all(np.isfinite(u.error[u.ok])) and np.all(np.isfinite(u[u.ok]))
 
 
-def test_ground_without_rays_is_not_zero_in_silence():
+def test_ground_without_rays_is_not_zero_in_silence(monkeypatch):
+    """By modes: what is marched goes on there (tests/field/test_marched_field.py)."""
+    monkeypatch.setattr(on_body, "marches", lambda *_: False)
     peanut = sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.9**4")
     line = cr.shadow_line(peanut, (1, 0.05, 0.02))
     fan = cr.launch(cr.DirectFlow(peanut), line, length=3.0, n_rays=48)
