@@ -11,7 +11,7 @@ Sources: [F65], [L59]; Derivations, F1.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.special import ai_zeros, airy, airye
@@ -28,8 +28,11 @@ FARTHEST = 500.0
 """and |z| beyond which it is used everywhere, for library routines give up."""
 SMALLEST = 1e-9
 """Step in q below which roots are taken as they are: q lies on a branch point, where two of them are one."""
-MANY, CHEBYSHEV = 500, 40
-"""Number of q above which constants are interpolated, from so many nodes."""
+CHEBYSHEV, SMOOTH = 24, 1e-10
+"""Nodes of a table of constants over an octave of |q|, and its error, as a share of the largest, up to which it serves."""
+LOWEST, OCTAVES = -10, 512
+"""Octave of |q| below which there are no tables, and how many are kept."""
+CONSTANTS = ("tau", "residue", "m0", "q_m0", "surface")
 FIRST, RATIO = 0.05, 1.02
 """Least |q|, and ratio of neighbours, at which roots are kept; Newton goes on from the node below."""
 
@@ -160,52 +163,62 @@ def impedance_modes(q: ArrayLike, n: int = MODES) -> Modes:
     array([0.997899+1.319562j, 1.853539+2.974507j])
     """
     q = np.asarray(q, dtype=complex)
-    if q.size > MANY:
-        modes = _interpolated(q, n)
-        if modes is not None:
-            return modes
-    return _at(q, n)
+    flat = q.ravel()
+    table = np.empty((len(flat), len(CONSTANTS), n), dtype=complex)
+    octave = np.floor(np.log2(np.maximum(np.abs(flat), 2.0 ** (LOWEST - 1)))).astype(int)
+    # tables of fixed octaves, so that a value depends on its own q alone
+    for number in np.unique(octave):
+        mine = octave == number
+        series = _octave(_argument(flat), int(number), n) if number >= LOWEST else None
+        if series is None:
+            table[mine] = _stacked(_at(flat[mine], _argument(flat), n))
+        else:
+            place = 2 * (np.log2(np.abs(flat[mine])) - number) - 1
+            table[mine] = np.polynomial.chebyshev.chebval(place, series).T.reshape(-1, len(CONSTANTS), n)
+    table = table.reshape(*q.shape, len(CONSTANTS), n)
+    return Modes(*(table[..., k, :] for k in range(len(CONSTANTS))))
 
 
-def _interpolated(q: ComplexArray, n: int) -> Modes | None:
-    """Constants from Chebyshev nodes in log |q|, or None where they are not smooth enough, beside a branch point."""
-    amounts = np.abs(q)
-    low, high = np.log(max(amounts.min(), 1e-12)), np.log(amounts.max())
-    phase = q.ravel()[np.argmax(amounts)] / amounts.max()
-    fields = ("tau", "residue", "m0", "q_m0", "surface")
-    if high - low < 1e-9:
-        # one q, as on a sphere
-        modes = _at(np.array(np.exp(0.5 * (low + high)) * phase), n)
-        return Modes(*(np.broadcast_to(getattr(modes, name), (*q.shape, n)) for name in fields))
+@lru_cache(OCTAVES)
+def _octave(phase: complex, number: int, n: int) -> ComplexArray | None:
+    """Chebyshev series in log |q| from 2^number to twice that, or None beside a branch point, where it is not smooth."""
     unit = np.cos(np.pi * (np.arange(CHEBYSHEV) + 0.5) / CHEBYSHEV)
 
     def exact(at: FloatArray) -> ComplexArray:
-        modes = _at(np.exp(low + (high - low) * (at + 1) / 2) * phase, n)
-        return np.stack([getattr(modes, name) for name in fields], axis=1)
+        return _stacked(_at(2.0 ** (number + (at + 1) / 2) * phase, phase, n))
 
     values = exact(unit)
     series = np.polynomial.chebyshev.chebfit(unit, values.reshape(CHEBYSHEV, -1), CHEBYSHEV - 1)
     probes = np.linspace(-0.97, 0.93, 9)
-    found = np.polynomial.chebyshev.chebval(probes, series).T.reshape(len(probes), len(fields), n)
-    if np.max(np.abs(found - exact(probes)) / np.max(np.abs(values), axis=0)) > 1e-8:
-        return None
-    at = np.clip(2 * (np.log(np.maximum(amounts, 1e-12)).ravel() - low) / (high - low) - 1, -1, 1)
-    table = np.polynomial.chebyshev.chebval(at, series).T.reshape(*q.shape, len(fields), n)
-    return Modes(*(table[..., k, :] for k in range(len(fields))))
+    found = np.polynomial.chebyshev.chebval(probes, series).T.reshape(len(probes), len(CONSTANTS), n)
+    # residues of a bound surface wave underflow to 0
+    largest = np.maximum(np.max(np.abs(values), axis=0), 1e-300)
+    return np.asarray(series) if np.max(np.abs(found - exact(probes)) / largest) < SMOOTH else None
 
 
-def _at(q: ComplexArray, n: int) -> Modes:
-    flat = q.ravel()
-    if not flat.size:
-        return _constants(np.zeros((*q.shape, n), dtype=complex), soft=False)
-    amounts = np.abs(flat)
-    # one key for all q of a boundary: the argument without its rounding
-    phase = complex(np.round(np.exp(1j * np.angle(flat[np.argmax(amounts)])), 12))
-    nodes, roots = _branch(phase / abs(phase), n, int(np.ceil(np.log(max(amounts.max() / FIRST, 1)) / np.log(RATIO))))
+def _stacked(modes: Modes) -> ComplexArray:
+    """All constants of modes (m, n): (m, constants, n)."""
+    return np.stack([getattr(modes, name) for name in CONSTANTS], axis=1)
+
+
+def _argument(q: ComplexArray) -> complex:
+    """Argument e^{iα} of all q (m,) of a boundary, without its rounding: one key for all of them."""
+    if not q.size:
+        return 1.0 + 0j
+    phase = complex(np.round(np.exp(1j * np.angle(q[np.argmax(np.abs(q))])), 12))
+    return phase / abs(phase)
+
+
+def _at(q: ComplexArray, phase: complex, n: int) -> Modes:
+    """Constants of q (m,) of one argument, exactly: (m, n)."""
+    if not q.size:
+        return _constants(np.zeros((0, n), dtype=complex), soft=False)
+    amounts = np.abs(q)
+    nodes, roots = _branch(phase, n, int(np.ceil(np.log(max(amounts.max() / FIRST, 1)) / np.log(RATIO))))
     nearest = np.searchsorted(np.abs(nodes), amounts, side="right") - 1
     start, at = roots[nearest], nodes[nearest][:, None]
-    tau = _newton(start + (flat[:, None] - at) / (start - at * at), flat[:, None])
-    return _constants(tau.reshape(*q.shape, n), soft=False)
+    tau = _newton(start + (q[:, None] - at) / (start - at * at), q[:, None])
+    return _constants(tau, soft=False)
 
 
 _BRANCHES: dict[tuple[complex, int], tuple[list[complex], list[ComplexArray]]] = {}
@@ -260,15 +273,18 @@ def _newton(tau: ComplexArray, q: complex | ComplexArray) -> ComplexArray:
 
     dr/dτ = τ - r² by Airy's equation.
     """
+    done = np.zeros(np.shape(tau), dtype=bool)
     for _ in range(12):
         value, slope, _ = scaled_ai(tau * TURN)
         slope = slope * TURN
         with np.errstate(divide="ignore", invalid="ignore"):
             r, inverse = slope / value, value / slope
             move = np.where(np.abs(r) < 1, (r - q) / (tau - r * r), (inverse - 1 / q) / (1 - tau * inverse * inverse))
-        tau = tau - move
+        # each root stops by itself, whatever goes with it
+        tau = np.where(done, tau, tau - move)
         # convergence is quadratic: the next move would be below rounding
-        if np.max(np.abs(move) / np.maximum(1.0, np.abs(tau))) < 1e-9:
+        done |= np.abs(move) < 1e-9 * np.maximum(1.0, np.abs(tau))
+        if np.all(done):
             break
     return tau
 

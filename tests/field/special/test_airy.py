@@ -5,7 +5,7 @@ import pytest
 from scipy.special import ai_zeros, airy
 from tolerances import MODE, PRINTED
 
-from creeping.field.special.airy import hard_modes, impedance_modes, soft_modes, w1
+from creeping.field.special.airy import CONSTANTS, hard_modes, impedance_modes, soft_modes, w1
 
 TURN = np.exp(1j * np.pi / 3)
 # FORMULAS, section 3: the first three roots
@@ -118,3 +118,19 @@ def test_roots_stay_apart_beside_a_branch_point(degrees, amount):
         tau = impedance_modes(amount * np.exp(1j * np.radians(degrees))).tau
     assert np.all(np.isfinite(tau))
     assert np.min(np.abs(tau[:, None] - tau) + 9 * np.eye(10)) > 0.01
+
+
+@pytest.mark.parametrize("eta", [0.7, 0.3 - 0.4j, 0.1 + 0.3j, 0.05])
+def test_constants_depend_on_their_own_q_alone(eta):
+    """2026-11: tables spanned all q of a call, and Newton stopped for all roots together: the last digits differed."""
+    m = np.exp(np.random.default_rng(4).uniform(np.log(0.05), np.log(60), 700))
+    q = 1j * eta * m
+    together = impedance_modes(q)
+    for some in (slice(3, 4), slice(10, 60), slice(None, None, 7)):
+        alone = impedance_modes(q[some])
+        for name in CONSTANTS:
+            np.testing.assert_array_equal(getattr(together, name)[some], getattr(alone, name))
+    # the root's own equation, by the library's Airy functions
+    value, slope = w1(together.tau[m < 5])
+    off = np.abs(slope - q[m < 5, None] * value) / (np.abs(slope) + np.abs(q[m < 5, None] * value))
+    assert np.max(off) < 1e-8

@@ -1,0 +1,23 @@
+"""An incidence has the same results in whatever company it is computed, impedances included."""
+
+import numpy as np
+
+import creeping as cr
+import scatterers as sc
+
+
+def test_impedances_know_nothing_of_their_company():
+    flow = cr.DirectFlow(sc.TwistedEllipsoid(), rtol=1e-8)
+    d = np.random.default_rng(3).normal(size=(12, 3))
+    options = {
+        "quantity": "bistatic",
+        "observation": [[0, 0, 1], [0.6, 0, 0.8]],
+        "wavenumbers": [15.0, 30.0],
+        "boundary": [cr.ImpedanceBoundary(0.5 - 0.2j), "hard"],
+        "n_rays": 96,
+    }
+    together = cr.sweep_directions(flow, d, **options)
+    for some in (slice(7, 8), slice(None, None, 3)):
+        alone = cr.sweep_directions(flow, d[some], **options)
+        for name in ("creeping", "reflected", "forward", "error"):
+            np.testing.assert_array_equal(together[name].isel(incidence=some), alone[name])
