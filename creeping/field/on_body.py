@@ -200,7 +200,10 @@ def rays_on(
         return by_modes, method
     marched = marched_sum(fan, found, points, share, young, k, kind)
     ok = marched.status == FieldStatus.OK
-    better = ok & ((by_modes.status != FieldStatus.OK) | (marched.error < by_modes.error))
+    # where neither is to be trusted the march knows of more waves
+    gone = (by_modes.status == FieldStatus.DETACHED) & (marched.status == FieldStatus.DETACHED)
+    gone &= True if share is None else share > 0
+    better = gone | (ok & ((by_modes.status != FieldStatus.OK) | (marched.error < by_modes.error)))
     chosen = (np.where(better, its, mine) for its, mine in zip(marched.parts, by_modes.parts, strict=True))
     return RaySum(*chosen), np.where(better, "march", method)
 

@@ -1,4 +1,4 @@
-"""An incidence has the same results in whatever company it is computed, impedances included."""
+"""What an incidence has does not depend on its company, with an impedance neither: by direct rays to rounding."""
 
 import numpy as np
 
@@ -20,4 +20,5 @@ def test_impedances_know_nothing_of_their_company():
     for some in (slice(7, 8), slice(None, None, 3)):
         alone = cr.sweep_directions(flow, d[some], **options)
         for name in ("creeping", "reflected", "forward", "error"):
-            np.testing.assert_array_equal(together[name].isel(incidence=some), alone[name])
+            one, other = together[name].isel(incidence=some).values, alone[name].values
+            np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-14)

@@ -38,6 +38,8 @@ FEWEST = 64
 """Steps at least that are kept of a ray."""
 TWISTED = 0.4
 """Error of y, as a share of it, by the root of what the twist adds to its phase."""
+FAVOUR = 2.0
+"""How much more the error of modes counts: they know no torsion."""
 MOST_TURNED = 0.5
 """Bound of |k_c/k - 1|."""
 _WAVES: "WeakKeyDictionary[RayFan, dict[tuple[float, Boundary], FanWaves]]" = WeakKeyDictionary()
@@ -101,7 +103,7 @@ class FanWaves:
             modes, other = self._by_modes(strip)
             with np.errstate(invalid="ignore", divide="ignore"):
                 # of infinite errors neither wave counts
-                share = 1 / (1 + (other / error) ** 2)
+                share = 1 / (1 + (FAVOUR * other / error) ** 2)
                 share = np.where(np.isfinite(error), np.where(np.isfinite(other), share, 0.0), np.isfinite(other))
                 # both err in the same direction more often than not
                 both = np.where(share < 1, (1 - share) * error, 0.0) + np.where(share > 0, share * other, 0.0)

@@ -181,7 +181,7 @@ def impedance_modes(q: ArrayLike, n: int = MODES) -> Modes:
 
 @lru_cache(OCTAVES)
 def _octave(phase: complex, number: int, n: int) -> ComplexArray | None:
-    """Chebyshev series in log |q| from 2^number to twice that, or None beside a branch point, where it is not smooth."""
+    """Chebyshev series in log |q| from 2^number on, an octave; None where it is not smooth, beside a branch point."""
     unit = np.cos(np.pi * (np.arange(CHEBYSHEV) + 0.5) / CHEBYSHEV)
 
     def exact(at: FloatArray) -> ComplexArray:
