@@ -29,7 +29,8 @@ FARTHEST = 500.0
 SMALLEST = 1e-9
 """Step in q below which roots are taken as they are: q lies on a branch point, where two of them are one."""
 CHEBYSHEV, SMOOTH = 24, 1e-10
-"""Nodes of a table of constants over an octave of |q|, and its error, as a share of the largest, up to which it serves."""
+"""Nodes of a table of constants over an octave of |q|, and its error, as a share of the largest, up to which it
+serves."""
 LOWEST, OCTAVES = -10, 512
 """Octave of |q| below which there are no tables, and how many are kept."""
 CONSTANTS = ("tau", "residue", "m0", "q_m0", "surface")
@@ -185,7 +186,7 @@ def _octave(phase: complex, number: int, n: int) -> ComplexArray | None:
     unit = np.cos(np.pi * (np.arange(CHEBYSHEV) + 0.5) / CHEBYSHEV)
 
     def exact(at: FloatArray) -> ComplexArray:
-        return _stacked(_at(2.0 ** (number + (at + 1) / 2) * phase, phase, n))
+        return _stacked(_at(np.asarray(2.0 ** (number + (at + 1) / 2) * phase, dtype=complex), phase, n))
 
     values = exact(unit)
     series = np.polynomial.chebyshev.chebfit(unit, values.reshape(CHEBYSHEV, -1), CHEBYSHEV - 1)
