@@ -92,7 +92,8 @@ def surface_field(
     SurfaceField
         Of shape (rays, steps): each ray's own contribution, infinite at its caustics (status CAUSTIC) and 0 where it
         has ended (DETACHED) or was never launched by the wave (NO_RAY). With points (...): the total field; all rays
-        through each of them summed in the shadow, 0 where none passes (NO_RAY or TRUNCATED).
+        through each of them summed in the shadow, 0 where none passes (NO_RAY or TRUNCATED); by creeping modes or by
+        marching and beams (``method``), whichever errs less: these go on across caustics and where rays have ended.
 
     Raises
     ------
@@ -112,7 +113,7 @@ def surface_field(
     (True, True)
     >>> u = cr.surface_field(fan, [(0, 0, -1), (0, 0.8, 0.6)], wavenumber=30.0, boundary="hard")
     >>> np.abs(u).round(1).tolist(), u.method.tolist(), bool(u.error.max() < 0.05)
-    ([2.0, 0.5], ['lit', 'rays'], True)
+    ([2.0, 0.5], ['lit', 'march'], True)
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)

@@ -168,7 +168,7 @@ class NearField(PointField):
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
         As of every field at points; ``method`` is "currents", "layer" between them and the
-        body, or "rays"; on the body "lit", "rays", "lit+rays", or "boundary", where u = 0.
+        body, or "rays"; on the body "lit", "rays", "march" and both with "lit+", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
         Parts, whose sum the values are: where currents or lit ground served, the incident wave and the rest; where rays
         did, the sum over them, which in the shadow is the whole field.
@@ -198,7 +198,8 @@ class SurfaceField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; ``method`` is "lit", "rays" or, in the penumbra, "lit+rays".
+        As of every field at points; ``method`` is "lit", "rays" (creeping modes), "march" (waves
+        marched along rays, and beams where these merge) or, in the penumbra, "lit+rays" or "lit+march".
     lit, creeping : (...) complex
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
 
@@ -211,7 +212,7 @@ class SurfaceField(PointField):
     >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
     >>> u = cr.surface_field(fan, [(0, 0.6, 0.8), (0, 0, -1)], wavenumber=30.0, boundary="hard")
     >>> u.method.tolist(), u.status_counts, bool(abs(abs(u[1]) - 2) < 0.01)         # twice the wave on a mirror
-    (['rays', 'lit'], {'OK': 2}, True)
+    (['march', 'lit'], {'OK': 2}, True)
     """
 
     lit: ComplexArray

@@ -7,7 +7,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.field.boundary import HARD
 from creeping.field.far_geometry import fan_strips
-from creeping.field.ray_sums import MERGING, _fold, _merging, fan_decay, ray_sum, tube_share
+from creeping.field.ray_sums import MERGING, fan_decay, fold_share, merging_error, ray_sum, tube_share
 from creeping.rays.shedding import shed_near, shed_on
 
 K = 30.0
@@ -24,7 +24,7 @@ def test_next_term_at_a_fold_is_that_of_airys_function(fan):
     rng = np.random.default_rng(0)
     y = fan.line.direction * rng.uniform(1.5, 3, (3000, 1)) + 0.25 * rng.normal(size=(3000, 3))
     shed = shed_near(fan_strips(fan), fan.body, y[fan.body.level(y) > 0])
-    bend = _fold(fan_strips(fan), shed, K)
+    bend = fold_share(fan_strips(fan), shed, K)
     width = tube_share(shed.rays, shed.reach)
     length = shed.rays.eikonal + shed.reach
     ratios = []
@@ -48,7 +48,7 @@ def test_pairs_are_those_with_a_caustic_between_them():
     found = shed_on(fan_strips(fan), ball, y)
     pair = np.sort(found.rays.eikonal)
     assert np.diff(pair)[0] == pytest.approx(2 * theta, rel=1e-6)
-    error = _merging(found, np.ones(2), K, 1)
+    error = merging_error(found, np.ones(2), K, 1)
     assert error[0] == pytest.approx(2 * MERGING / (K * 2 * theta), rel=1e-6)
 
 

@@ -211,7 +211,8 @@ class _March:
             marks = [low, *jumps[(jumps > low + 1e-9 * step) & (jumps < high - 1e-9 * step)], high]
             parts = [np.array([low])]
             for a, b in pairwise(marks):
-                if b <= a:
+                # marks that differ by their rounding make no step
+                if b - a <= 1e-6 * step:
                     continue
                 parts.append(np.linspace(a, b, max(1, int(np.ceil((b - a) / step))) + 1)[1:])
             ways.append(np.concatenate(parts))

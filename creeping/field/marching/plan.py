@@ -136,13 +136,13 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
     flat = np.mean((at >= 0) & (kappa < FLAT * reference[:, None]), axis=1) * (ends[:, 1] - ends[:, 0])
     height = HEIGHT * _delta(k, reference)
     wide = np.minimum(FLAT_HEIGHT * _delta(k, np.maximum(least, 0.2 * floor)), FLAT_PATH * np.sqrt(flat / k))
-    height = _rounded(np.maximum(height, wide), HEIGHTS, up=True)
+    height = _rounded(np.maximum(height, wide), k, HEIGHTS, up=True)
     element = _rounded(
-        np.minimum(ELEMENT * _delta(k, reference), SLANTED / (k * np.sin(np.maximum(alpha, 0.3)))), ELEMENTS
+        np.minimum(ELEMENT * _delta(k, reference), SLANTED / (k * np.sin(np.maximum(alpha, 0.3)))), k, ELEMENTS
     )
-    first = _rounded(FIRST * _delta(k, most), HEIGHTS)
-    twist = _rounded(TWISTED * _delta(k, reference), HEIGHTS)
-    cap = np.where(lowest < -1e-6 * most, _rounded(CAP / np.maximum(-lowest, 1e-6 * most), CAPS), np.inf)
+    first = _rounded(FIRST * _delta(k, most), k, HEIGHTS)
+    twist = _rounded(TWISTED * _delta(k, reference), k, HEIGHTS)
+    cap = np.where(lowest < -1e-6 * most, _rounded(CAP / np.maximum(-lowest, 1e-6 * most), k, CAPS), np.inf)
     status, reliable = _status(k, at, look, start, alpha, cap, served)
     specs = [
         GridSpec(float(a), float(b), float(c), float(d), float(e), float(k))
@@ -155,9 +155,10 @@ def _delta(k: float, kappa: FloatArray) -> FloatArray:
     return (2 * k * k * kappa) ** (-1 / 3)
 
 
-def _rounded(length: FloatArray, lattice: float, *, up: bool = False) -> FloatArray:
-    steps = np.log(length) / np.log(lattice)
-    return np.asarray(lattice ** (np.ceil(steps) if up else np.floor(steps)))
+def _rounded(length: FloatArray, k: float, lattice: float, *, up: bool = False) -> FloatArray:
+    """Lengths (rays,) on a lattice that does not depend on their unit."""
+    steps = np.log(k * length) / np.log(lattice)
+    return np.asarray(lattice ** (np.ceil(steps) if up else np.floor(steps)) / k)
 
 
 def _at_last(at: FloatArray, mask: BoolArray) -> FloatArray:
