@@ -6,7 +6,7 @@
 (s, n) are the foot of x on the ray and its distance from there, and arg q runs on from 0, which is the index of the
 caustics. By stationary phase each ray that passes through x has its own wave of `creeping.field.marching.fan_waves`; on
 caustics, folds, cusps and points alike, the sum stays right. k_c, the wavenumber along the surface, is by a factor of
-1 + tau/(2 m^2) more than k for a mode: without it the focus behind a sphere of ka = 30 is off by 6 %, with it by 0.3 %.
+1 + tau/(2 m^2) more than k for a mode: without it the focus behind a sphere of ka = 30 is off by 6 %, with it by 0.6 %.
 
 eps = WIDTH/a is free; what it changes is an error. Beams are cut off at the shadow line, so that they serve no points
 within 2 of their widths w = (a/(WIDTH k))^(1/2) of it: there rays have not merged yet, and each that has come less far
@@ -21,12 +21,11 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from creeping._typing import ComplexArray, FloatArray
+from creeping.field.currents.nodes import nodes_at
 from creeping.field.marching.fan_waves import MOST_TURNED, FanWaves
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
-from creeping.geometry.evaluators import entries_of
-from creeping.geometry.quadrature import BodyNodes
-from creeping.geometry.surface import project, size
+from creeping.geometry.surface import normal, project, size
 from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
 from creeping.rays.strips import Strip
@@ -85,73 +84,69 @@ def seconds(fan: RayFan, strips: tuple[Strip, ...], wavenumber: float, count: in
     return 2 * (summing + MAKING * sum(beams * steps for beams, steps in sizes))
 
 
-def beam_sums(fan: RayFan, waves: FanWaves, points: FloatArray, *, factor: float = 1.0) -> BeamSums:
-    """Beams of eps = ``factor`` WIDTH/a at points of the body (n, 3), L."""
-    early, late = np.zeros((2, len(points)), dtype=complex)
-    eps = WIDTH / length_scale(fan) * factor
+def beam_sums(fan: RayFan, waves: FanWaves, points: FloatArray, factors: tuple[float, ...] = (1.0,)) -> list[BeamSums]:
+    """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L."""
+    found = [BeamSums(*np.zeros((2, len(points)), dtype=complex)) for _ in factors]
     for number, strip in enumerate(waves.strips):
         (low, high), (count, steps) = strip.span, _counts(strip, fan.length, waves.wavenumber)
         sigma = low + (high - low) * (np.arange(count) + 0.5) / count
         times = np.linspace(0.0, fan.length, steps + 1)
         some = max(1, AT_ONCE // len(times))
         for first in range(0, count, some):
-            part = sigma[first : first + some]
-            _add_beams(fan, waves, number, part, (high - low) / count, times, points, eps, early, late)
-    return BeamSums(early, late)
+            beams = _Beams(fan, waves, number, sigma[first : first + some], (high - low) / count, times)
+            for sums, factor in zip(found, factors, strict=True):
+                beams.add(points, WIDTH / beams.a * factor, sums)
+    return found
 
 
-def _add_beams(
-    fan: RayFan,
-    waves: FanWaves,
-    number: int,
-    sigma: FloatArray,
-    apart: float,
-    times: FloatArray,
-    points: FloatArray,
-    eps: float,
-    early: ComplexArray,
-    late: ComplexArray,
-) -> None:
-    """Add the beams of places sigma (n,) of a strip, ``apart`` from each other, in steps that end at times (m,)."""
-    from creeping.field.kernels.beams import SPAN, add_beams, spans_of
+class _Beams:
+    """Beams of places sigma (m,) of a strip, ``apart`` from each other, in steps between ``times`` (steps,)."""
 
-    body, k, a = fan.body, waves.wavenumber, length_scale(fan)
-    count = len(sigma)
-    first = waves.strips[number].at(sigma, np.zeros(count))
-    states = trace_states(body, pack(project(body, first.points), first.directions, jacobi=True), times, rtol=RTOL)
-    x, p = (np.ascontiguousarray(states[..., part]) for part in (X, P))
-    gradient = body.gradient(x.reshape(-1, 3))
-    steep = np.linalg.norm(gradient, axis=1)
-    n = gradient / steep[:, None]
-    b = np.cross(n, p.reshape(-1, 3))
-    nodes = BodyNodes(
-        x.reshape(-1, 3), n, steep, entries_of(body.hessian(x.reshape(-1, 3)) / steep[:, None, None]).T, 0
-    )
-    rows, columns = (part.ravel() for part in np.meshgrid(sigma, times, indexing="ij"))
-    y, slope = (part(number, rows, columns).reshape(count, -1) for part in (waves.at, waves.slope))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turned = np.nan_to_num(-1j * slope / (k * y))
-    turned /= np.maximum(1.0, np.abs(turned) / MOST_TURNED)
-    # what varies across beams their sum brings in itself
-    known = (waves.lean(number, rows, columns).reshape(count, -1) * turned) ** 2
-    known = 0.5j * k * cumulative_trapezoid(known, times, axis=1, initial=0)
-    q = states[..., M11] + 1j * eps * states[..., M12]
-    rate = states[..., M21] + 1j * eps * states[..., M22]
-    weight = np.sqrt(k * eps / (2 * np.pi)) * apart * np.abs(first.width)
-    logarithm = np.log(np.maximum(np.abs(y), 1e-300)) - 0.5 * np.log(np.abs(q)) + np.log(weight)[:, None]
-    logarithm += 0.5 * np.log(np.abs(1 + turned)) + known.real
-    phase = (
-        np.unwrap(np.angle(y), axis=1) - 0.5 * np.unwrap(np.angle(q), axis=1) + 0.5 * np.angle(1 + turned) + known.imag
-    )
-    S = first.eikonal[:, None] + times
-    spans = -(-(len(times) - 1) // SPAN)
-    centres, radii = np.empty((count, spans, 3)), np.empty((count, spans))
-    spans_of(x, centres, radii)
-    cut = int(np.searchsorted(times, CUT * width(fan, k)))
-    shape = S.shape
-    table = (x, p, b.reshape(x.shape), nodes.curvature(b).reshape(shape), S, logarithm, phase, rate / q * (1 + turned))
+    def __init__(
+        self, fan: RayFan, waves: FanWaves, number: int, sigma: FloatArray, apart: float, times: FloatArray
+    ) -> None:
+        from creeping.field.kernels.beams import SPAN, spans_of
 
-    def add(part: slice) -> None:
-        add_beams(points[part], *table, k, cut, REACH * a, centres, radii, early[part], late[part])
+        body, count = fan.body, len(sigma)
+        self.k, self.a = waves.wavenumber, length_scale(fan)
+        first = waves.strips[number].at(sigma, np.zeros(count))
+        launched = pack(project(body, first.points), first.directions, jacobi=True)
+        self.states = trace_states(body, launched, times, rtol=RTOL)
+        x, p = (np.ascontiguousarray(self.states[..., part]) for part in (X, P))
+        flat = x.reshape(-1, 3)
+        nodes = nodes_at(body, flat, normal(body, flat))
+        b = np.cross(nodes.normals, p.reshape(-1, 3))
+        rows, columns = (part.ravel() for part in np.meshgrid(sigma, times, indexing="ij"))
+        y, slope = (part(number, rows, columns).reshape(count, -1) for part in (waves.at, waves.slope))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turned = np.nan_to_num(-1j * slope / (self.k * y))
+        turned /= np.maximum(1.0, np.abs(turned) / MOST_TURNED)
+        # what varies across beams their sum brings in itself
+        known = (waves.lean(number, rows, columns).reshape(count, -1) * turned) ** 2
+        known = 0.5j * self.k * cumulative_trapezoid(known, times, axis=1, initial=0)
+        self.turned = 1 + turned
+        self.weight = apart * np.abs(first.width)
+        self.size = np.log(np.maximum(np.abs(y), 1e-300)) + 0.5 * np.log(np.abs(self.turned)) + known.real
+        self.phase = np.unwrap(np.angle(y), axis=1) + 0.5 * np.angle(self.turned) + known.imag
+        S = first.eikonal[:, None] + times
+        self.rays = (x, p, b.reshape(x.shape), nodes.curvature(b).reshape(S.shape), S)
+        spans = -(-(len(times) - 1) // SPAN)
+        self.balls = np.empty((count, spans, 3)), np.empty((count, spans))
+        spans_of(x, *self.balls)
+        self.cut = int(np.searchsorted(times, CUT * width(fan, self.k)))
 
-    in_threads(add, len(points), least=64, multiple=1, seconds=SECONDS * count * spans)
+    def add(self, points: FloatArray, eps: float, sums: BeamSums) -> None:
+        """Add the beams of ``eps``, 1/L, at points (n, 3)."""
+        from creeping.field.kernels.beams import add_beams
+
+        q = self.states[..., M11] + 1j * eps * self.states[..., M12]
+        rate = self.states[..., M21] + 1j * eps * self.states[..., M22]
+        weight = np.sqrt(self.k * eps / (2 * np.pi)) * self.weight
+        size = self.size - 0.5 * np.log(np.abs(q)) + np.log(weight)[:, None]
+        phase = self.phase - 0.5 * np.unwrap(np.angle(q), axis=1)
+        table = (*self.rays, size, phase, rate / q * self.turned, self.k, self.cut, REACH * self.a, *self.balls)
+
+        def work(part: slice) -> None:
+            add_beams(points[part], *table, sums.early[part], sums.late[part])
+
+        in_threads(work, len(points), least=64, multiple=1, seconds=SECONDS * self.balls[1].size)

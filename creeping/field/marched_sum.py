@@ -16,7 +16,7 @@ Sources: [P82]; Derivations, F22 and F24. A to C were set on the triaxial and th
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.beams import CUT, WIDTH, YOUNG, BeamSums, beam_sums, length_scale, width
 from creeping.field.boundary import Boundary
 from creeping.field.far_geometry import fan_strips
@@ -83,13 +83,13 @@ def marched_sum(
     own = own * np.where(young, share[observer], 1.0)
     size = np.minimum(np.abs(own), STRONG * np.abs(y))
     near, clear = _apart_from_line(fan, shed, k, count)
-    alone = total_of_complex(np.where(near, own, 0.0), observer, count)
+    alone = total_of(np.where(near, own, 0.0), observer, count)
 
     def together(sums: BeamSums) -> ComplexArray:
         return np.asarray(clear * (share * sums.early + sums.late) + (1 - clear) * (alone + sums.late))
 
-    by_beams, others = (together(beam_sums(fan, waves, points, factor=factor)) for factor in FACTORS)
-    by_rays = total_of_complex(own, observer, count)
+    by_beams, others = (together(sums) for sums in beam_sums(fan, waves, points, FACTORS))
+    by_rays = total_of(own, observer, count)
     e_b = np.sqrt(total_of((size * (LEAST + np.minimum(VARIES * eta, 1.0))) ** 2, observer, count))
     e_b = np.linalg.norm([e_b, LEAST * np.abs(by_beams), BROADER * np.abs(by_beams - others)], axis=0)
     bent = np.where(near, 0.0, np.minimum(fold_share(fan_strips(fan), shed, k), 1.0))
@@ -162,10 +162,3 @@ def _judged(
     error = np.hypot(error, lost)
     error = np.where(status == FieldStatus.OK, error, np.fmax(error, strength))
     return RaySum(values, error, status.astype(np.int64), total_of(np.exp(-decay * xi), observer, count))
-
-
-def total_of_complex(values: Any, observer: Any, count: int) -> ComplexArray:
-    """Sum of complex values (m,) by observer: (count,)."""
-    out = np.zeros(count, dtype=complex)
-    np.add.at(out, observer, values)
-    return out

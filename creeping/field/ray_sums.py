@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.far_geometry import fan_strips
@@ -94,8 +94,7 @@ def ray_sum(
     """Sum over the rays found (m,) of their waves, each with its own error, at ``count`` points."""
     rays, observer = shed.rays, shed.observer
     size = np.abs(waves)
-    values = np.zeros(count, dtype=complex)
-    np.add.at(values, observer, waves)
+    values = total_of(waves, observer, count)
     strength = total_of(size, observer, count)
     decay, end = fan_decay(fan, wavenumber, boundary)
     xi = fock_parameter(rays, wavenumber)
@@ -183,9 +182,9 @@ def tube_share(rays: RayPoints, reach: FloatArray) -> FloatArray:
     return np.asarray(np.nan_to_num(share))
 
 
-def total_of(values: FloatArray, observer: IntArray, count: int) -> FloatArray:
-    """Sum of values (m,) by observer: (count,)."""
-    out = np.zeros(count)
+def total_of(values: Any, observer: IntArray, count: int) -> Any:
+    """Sum of real or complex values (m,) by observer: (count,)."""
+    out = np.zeros(count, dtype=np.result_type(values, float))
     np.add.at(out, observer, values)
     return out
 

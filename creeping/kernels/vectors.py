@@ -166,26 +166,24 @@ def spread(typing: Any, number: Any) -> Any:
     return VECTOR(types.float64), codegen
 
 
-@intrinsic
-def root(typing: Any, value: Any) -> Any:
-    """Square roots of a vector."""
+def _each(name: str) -> Any:
+    """Make a function of every lane, by the compiler's name for it."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        kind = ir.FunctionType(_DOUBLES, [_DOUBLES])
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{LANES}f64"), args)
+    @intrinsic
+    def function(typing: Any, value: Any) -> Any:
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            kind = ir.FunctionType(_DOUBLES, [_DOUBLES])
+            return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
 
-    return VECTOR(value), codegen
+        return VECTOR(value), codegen
+
+    return function
 
 
-@intrinsic
-def magnitude(typing: Any, value: Any) -> Any:
-    """Absolute values of a vector."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        kind = ir.FunctionType(_DOUBLES, [_DOUBLES])
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.fabs.v{LANES}f64"), args)
-
-    return VECTOR(value), codegen
+root = _each("sqrt")
+"""Square roots of a vector."""
+magnitude = _each("fabs")
+"""Absolute values of a vector."""
 
 
 @intrinsic

@@ -19,15 +19,14 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from creeping.field.arguments import checked_plain
+from creeping.field.currents.nodes import nodes_at
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.profile import RayProfiles
 from creeping.field.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M21, P, X, pack
 from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.evaluators import entries_of
-from creeping.geometry.quadrature import BodyNodes
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.strips import Strip, strip_rows
 
@@ -82,7 +81,6 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
         ways.append(_along(body, d, x0, sense * times, states, sense))
     first, second = ways
     whole = {name: np.concatenate([first[name][:, :0:-1], second[name]], axis=1) for name in first}
-    # the derivative of J in s changes its sign with the sense
     gauss = whole["curvature"] * whole["transverse"] - whole["torsion"] ** 2
     bent = (whole["rate"] / (2 * np.maximum(np.abs(whole["spreading"]), 1e-9))) ** 2
     bent = np.where(whole["s"] < 0, np.minimum(bent, MOST_BENT / size(body) ** 2), 0.0)
@@ -99,11 +97,8 @@ def _along(
     """What the states of rays (rays, steps, 10) say, each (rays, steps)."""
     shape = states.shape[:2]
     x, p = states[..., X].reshape(-1, 3), sense * states[..., P].reshape(-1, 3)
-    gradient = body.gradient(x)
-    steep = np.linalg.norm(gradient, axis=-1)
-    n = gradient / steep[:, None]
-    b = np.cross(n, p)
-    nodes = BodyNodes(x, n, np.ones(len(x)), entries_of(body.hessian(x) / steep[:, None, None]).T, 0.0)
+    nodes = nodes_at(body, x, normal(body, x))
+    b = np.cross(nodes.normals, p)
     away = x.reshape(*shape, 3) - x0[:, None]
     found = {
         "s": np.broadcast_to(s, shape),
@@ -113,7 +108,7 @@ def _along(
         "spreading": states[..., M11],
         "rate": states[..., M21],
         "phase": away @ d - s,
-        "climb": n @ d,
+        "climb": nodes.normals @ d,
         "aside": b @ d,
         "forward": p @ d,
     }
