@@ -21,10 +21,10 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.currents.nodes import nodes_at
 from creeping.field.marching.fan_waves import MOST_TURNED, FanWaves
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
+from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal, project, size
 from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan

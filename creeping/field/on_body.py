@@ -30,7 +30,7 @@ from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, b
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.lit import lit_currents
-from creeping.field.currents.nodes import TAKEN_OVER, LitNodes, lit_part, nodes_at
+from creeping.field.currents.nodes import TAKEN_OVER, LitNodes, lit_part
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
@@ -43,6 +43,7 @@ from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
+from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal, size
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan

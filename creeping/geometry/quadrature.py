@@ -22,7 +22,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.geometry.curvature import adjugate_form, principal_curvature_bound, second_form
-from creeping.geometry.evaluators import evaluators
+from creeping.geometry.evaluators import entries_of, evaluators
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import quadrilaterals
@@ -239,6 +239,13 @@ def _nodes(body: Surface, mesh: tuple[FloatArray, IntArray], points: int) -> Bod
     folded = not np.all(stretch > 0.1) or not np.all(np.isfinite(weights))
     error = np.inf if folded else float(np.linalg.norm(weights @ n)) / whole
     return BodyNodes(x, n, weights, hessians, error)
+
+
+def nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:
+    """Points (n, 3) of the body, L, as nodes of weight 1."""
+    g, h = body.gradient(points), body.hessian(points)
+    entries = entries_of(h / np.linalg.norm(g, axis=-1)[:, None, None]).T
+    return BodyNodes(points, normals, np.ones(len(points)), entries, 0.0)
 
 
 def nearest_points(body: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

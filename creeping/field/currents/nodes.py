@@ -17,8 +17,7 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.shed_wave import smoothstep
-from creeping.geometry.evaluators import entries_of
-from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points
+from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
@@ -204,13 +203,6 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     there = rays.alive & np.isfinite(weights) & (weights > 0)
     rays, normals, weights = rays[there], normals[there], weights[there]
     return RayNodes(rays, normals, weights, nodes_at(fan.body, rays.points, normals).twist(rays.directions))
-
-
-def nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:
-    """Points (n, 3) of the body, L, as nodes of weight 1."""
-    g, h = body.gradient(points), body.hessian(points)
-    entries = entries_of(h / np.linalg.norm(g, axis=-1)[:, None, None]).T
-    return BodyNodes(points, normals, np.ones(len(points)), entries, 0.0)
 
 
 def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:

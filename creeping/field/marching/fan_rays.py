@@ -19,13 +19,13 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from creeping.field.arguments import checked_plain
-from creeping.field.currents.nodes import nodes_at
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.profile import RayProfiles
 from creeping.field.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M21, P, X, pack
 from creeping.geometry.curvature import normal_curvature
+from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.strips import Strip, strip_rows
