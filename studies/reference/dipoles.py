@@ -68,13 +68,15 @@ class ConductorSolution:
             E = np.einsum("mnc,mne->mcne", along, s)
             E += np.einsum("mn,ce->mcne", g * (k * k - near), np.eye(3))
             turned = (g * (k * k + 1j * k / distance))[:, :, None] * s
-            H = np.einsum("mnb,cbe->mcne", turned, _LEVI_CIVITA)
+            H = np.einsum("mnb,bec->mcne", turned, _LEVI_CIVITA)
             parts.append([(part.reshape(3 * len(some), -1) @ q).reshape(shape) for part in (E, H)])
         scattered = (np.concatenate(part) for part in zip(*parts, strict=True))
         return tuple(wave * one + its for one, its in zip((e0, h0), scattered, strict=True))  # type: ignore[return-value]
 
 
-_LEVI_CIVITA = np.array([[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]])
+_LEVI_CIVITA = np.array(
+    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
+)
 
 
 def frames(directions: ArrayLike) -> FloatArray:

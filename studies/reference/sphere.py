@@ -18,7 +18,7 @@ Perfect conductor [Bohren and Huffman, section 4.4, with e^{-iωt}]: psi = x j�
 
 With M and N the vector harmonics of hₙ and ρ = kr, the wave along z and E0 along x,
 
-    E_s = Σ iⁿ (2n+1)/(n(n+1)) (i a N_e − b M_o),    H_s = Σ iⁿ (2n+1)/(n(n+1)) (i b N_o + a M_e)
+    E_s = Σ iⁿ (2n+1)/(n(n+1)) (i a N_e - b M_o),    H_s = Σ iⁿ (2n+1)/(n(n+1)) (i b N_o + a M_e)
 
 E_s ~ f E_inc e^{ikR}/R for E across and in the plane of scattering, e∥ = e⊥ x d before, e⊥ x r after. Bohren and
 Huffman's e∥ is the opposite on both sides, so the amplitudes are the same. In the specular region
