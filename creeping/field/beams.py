@@ -15,16 +15,17 @@ than 4 w stands by itself, others by beams.
 Sources: [P82], [CPP82]; Derivations, F24.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.marching.fan_waves import MOST_TURNED, FanWaves
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
-from creeping.geometry.quadrature import nodes_at
+from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import normal, project, size
 from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
@@ -45,6 +46,28 @@ SECONDS, MAKING = 2e-8, 3e-6
 """Of a beam's block of steps at one point, and of making one step."""
 AT_ONCE = 200_000
 """Steps of beams that are held at once: 60 MB."""
+MOST_TURNED = 0.5
+"""Bound of |k_c/k - 1|."""
+
+
+class StripWaves(Protocol):
+    """Waves on the strips of a fan: y, its derivative y_s, and Lambda where y knows what it varies by across rays."""
+
+    @property
+    def strips(self) -> tuple[Strip, ...]: ...  # noqa: D102
+
+    @property
+    def wavenumber(self) -> float: ...  # noqa: D102
+
+    def at(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray: ...  # noqa: D102
+
+    def slope(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray: ...  # noqa: D102
+
+    def lean(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray: ...  # noqa: D102
+
+
+Components = Callable[[int, FloatArray, FloatArray, BodyNodes, FloatArray], tuple[ComplexArray, ComplexArray]]
+"""V and V' (n, c) of a vector's beams at places sigma, s (n,) of a strip, points of the body and tangents (n, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +76,7 @@ class BeamSums:
 
     Attributes
     ----------
-    early, late : (n,) complex
+    early, late : (n,) complex, (n, c) of a vector
     """
 
     early: ComplexArray
@@ -84,26 +107,40 @@ def seconds(fan: RayFan, strips: tuple[Strip, ...], wavenumber: float, count: in
     return 2 * (summing + MAKING * sum(beams * steps for beams, steps in sizes))
 
 
-def beam_sums(fan: RayFan, waves: FanWaves, points: FloatArray, factors: tuple[float, ...] = (1.0,)) -> list[BeamSums]:
-    """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L."""
-    found = [BeamSums(*np.zeros((2, len(points)), dtype=complex)) for _ in factors]
+def beam_sums(
+    fan: RayFan,
+    waves: StripWaves,
+    points: FloatArray,
+    factors: tuple[float, ...] = (1.0,),
+    components: Components | None = None,
+) -> list[BeamSums]:
+    """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L; those of a vector have ``components``."""
+    sums: list[list[ComplexArray]] = [[] for _ in factors]
     for number, strip in enumerate(waves.strips):
         (low, high), (count, steps) = strip.span, _counts(strip, fan.length, waves.wavenumber)
         sigma = low + (high - low) * (np.arange(count) + 0.5) / count
         times = np.linspace(0.0, fan.length, steps + 1)
         some = max(1, AT_ONCE // len(times))
         for first in range(0, count, some):
-            beams = _Beams(fan, waves, number, sigma[first : first + some], (high - low) / count, times)
-            for sums, factor in zip(found, factors, strict=True):
-                beams.add(points, WIDTH / beams.a * factor, sums)
-    return found
+            beams = _Beams(fan, waves, number, sigma[first : first + some], (high - low) / count, times, components)
+            for mine, factor in zip(sums, factors, strict=True):
+                mine.append(beams.at(points, WIDTH / beams.a * factor))
+    both = [np.sum(mine, axis=0) if mine else np.zeros((2, len(points), 1), dtype=complex) for mine in sums]
+    return [BeamSums(*(one[..., 0] if components is None else one)) for one in both]
 
 
 class _Beams:
     """Beams of places sigma (m,) of a strip, ``apart`` from each other, in steps between ``times`` (steps,)."""
 
     def __init__(
-        self, fan: RayFan, waves: FanWaves, number: int, sigma: FloatArray, apart: float, times: FloatArray
+        self,
+        fan: RayFan,
+        waves: StripWaves,
+        number: int,
+        sigma: FloatArray,
+        apart: float,
+        times: FloatArray,
+        components: Components | None,
     ) -> None:
         from creeping.field.kernels.beams import SPAN, spans_of
 
@@ -135,8 +172,13 @@ class _Beams:
         spans_of(x, *self.balls)
         self.cut = int(np.searchsorted(times, CUT * width(fan, self.k)))
 
-    def add(self, points: FloatArray, eps: float, sums: BeamSums) -> None:
-        """Add the beams of ``eps``, 1/L, at points (n, 3)."""
+        self.V, self.lean = np.ones((1, 1, 1), dtype=complex), np.zeros((1, 1, 1), dtype=complex)
+        if components is not None:
+            found = components(number, rows, columns, nodes, p.reshape(-1, 3))
+            self.V, self.lean = (np.ascontiguousarray(part.reshape(*S.shape, -1), dtype=complex) for part in found)
+
+    def at(self, points: FloatArray, eps: float) -> ComplexArray:
+        """Sums of the beams of ``eps``, 1/L, at points (n, 3), early and late ones: (2, n, c)."""
         from creeping.field.kernels.beams import add_beams
 
         q = self.states[..., M11] + 1j * eps * self.states[..., M12]
@@ -145,8 +187,10 @@ class _Beams:
         size = self.size - 0.5 * np.log(np.abs(q)) + np.log(weight)[:, None]
         phase = self.phase - 0.5 * np.unwrap(np.angle(q), axis=1)
         table = (*self.rays, size, phase, rate / q * self.turned, self.k, self.cut, REACH * self.a, *self.balls)
+        out = np.zeros((2, len(points), self.V.shape[2]), dtype=complex)
 
         def work(part: slice) -> None:
-            add_beams(points[part], *table, sums.early[part], sums.late[part])
+            add_beams(points[part], *table, self.V, self.lean, out[0, part], out[1, part])
 
         in_threads(work, len(points), least=64, multiple=1, seconds=SECONDS * self.balls[1].size)
+        return out

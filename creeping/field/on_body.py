@@ -3,19 +3,9 @@
     u = (1 - W) e^{ikd.x} u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
 
 with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
-w_i of rays that come from afar. The error of lit ground, as a share of u1 and with u2 of second order, is
+w_i of rays that come from afar. `creeping.field.lit_ground` says how far it is off.
 
-    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
-    E = F max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
-
-E is for ground that is flat by the measure of the body's size a: the second order kappa_a/(2kc^3) of optics knows
-nothing there of the curvature at its end, which on a closed body is 1/a in the mean. Where rays end or the body hides
-part of its line, 2 epsilon more: waves that come to lit ground from elsewhere on the body are left out, and what
-currents leave inside (`creeping.field.currents.whole_body`) tells how large they are; where that cannot be measured the
-error is a bound.
-
-Sources: [F46], [LK59]; Derivations, F9, F16 and F20. The factors were set on four bodies (`studies.near_coverage`), F
-on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
+Sources: [F46], [LK59]; Derivations, F9, F16 and F20.
 """
 
 # help() shows names of types instead of what they stand for
@@ -27,13 +17,13 @@ from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
-from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.lit import lit_currents
-from creeping.field.currents.nodes import TAKEN_OVER, LitNodes, lit_part
+from creeping.field.currents.nodes import TAKEN_OVER, lit_part
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
+from creeping.field.lit_ground import composed, convex, lit_error
 from creeping.field.marched_sum import marched_sum, marches
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
 from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
@@ -48,24 +38,8 @@ from creeping.geometry.surface import normal, size
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_on
-from creeping.rays.status import RayStatus
 from creeping.rays.tracer import ray_points
 
-SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
-"""Factor A of the error on lit ground, by boundary."""
-LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
-"""B."""
-VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
-"""C; an impedance leaves curvature that varies out of its second order."""
-ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
-"""D."""
-FLAT, ENDS = 2.0, 0.7
-"""1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
-LEFT, UNKNOWN = 2.0, 2.0
-"""Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
-reflected wave and its image."""
-AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0}
-"""The factor on dark ground where waves are marched beyond the end of rays."""
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 
 
@@ -222,40 +196,13 @@ def total_on(
 
     ``currents`` are those of the wavenumber and boundary, if they are at hand.
     """
-    lit, lit_error, share = _lit_at(fan, points, k, kind, order)
-    rays, by = rays_on(fan, points, k, kind, order, 1 - share)
-    unit = k if kind.kind == "soft" else 1.0
+    lit = _lit_at(fan, points, k, kind, order)
+    rays, by = rays_on(fan, points, k, kind, order, 1 - lit[2])
     left = 0.0
-    if not _convex(fan):
+    if not convex(fan):
         left = _left_inside(fan, k, kind) if currents is None else currents.extinction
-    unknown = (share > 0) & (not np.isfinite(left))
-    lit_error = np.hypot(lit_error, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
-    # where rays have ended the march goes on, but waves from elsewhere come to dark ground as well
-    lit_error = np.hypot(
-        lit_error, (by == "march") * (1 - share) * unit * AFAR[kind.kind] * left if np.isfinite(left) else 0.0
-    )
-    creeping, error, status = rays.values, rays.error, rays.status
-    bare = (status != FieldStatus.OK) & (error == 0)
-    error = np.where(bare, unit, error)
-    # on lit ground rays that come from afar have decayed: those that are not to be trusted are left out, and no more
-    # than what an axis makes of them, sqrt(2 pi k a)
-    most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
-    out = (share == 1) & ((status != FieldStatus.OK) | (error > most))
-    creeping, error = np.where(out, 0.0, creeping), np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
-    status = np.where(share == 1, FieldStatus.OK, status)
-    return Served(
-        wave=lit,
-        creeping=creeping,
-        error=np.hypot(error, lit_error),
-        error_by=np.where(unknown | (status != FieldStatus.OK), "bound", "expansion"),
-        status=np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
-        method=np.where(share == 1, "lit", np.where(share > 0, np.char.add("lit+", by), by)),
-    )
-
-
-def _convex(fan: RayFan) -> bool:
-    """Whether nothing on the rays or along the line says that the body may reflect onto itself."""
-    return fan.line.fractions["attached"] == 1.0 and bool(np.all(fan.status == RayStatus.OK))
+    unit = k if kind.kind == "soft" else 1.0
+    return composed(fan, lit, rays, by, left, k, kind, unit)
 
 
 def _left_inside(fan: RayFan, k: float, kind: Boundary) -> float:
@@ -279,32 +226,5 @@ def _lit_at(
     values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))
     share[at] = part.weights
     values[at] = part.weights * u * np.exp(1j * k * (part.points @ d))
-    error[at] = part.weights * _lit_error(part, u, other, k, kind, order, size(body))
+    error[at] = part.weights * lit_error(part, np.abs(u), np.abs(u - other), k, kind, order, size(body))
     return values, error, share
-
-
-def _lit_error(
-    part: LitNodes, u: ComplexArray, other: ComplexArray, k: float, kind: Boundary, order: int, extent: float
-) -> FloatArray:
-    """Error of the lit side's expansion (n,) on a body of size ``extent``, L."""
-    size, change = np.abs(u), np.abs(u - other)
-    m = fock_scale(k, part.along)
-    # grazing a flat or concave place m is infinite, and optics alone stands there
-    with np.errstate(divide="ignore", invalid="ignore"):
-        across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
-    terms = (
-        SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
-        LEAST[kind.kind] / m**4,
-        VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
-        ACROSS[kind.kind] * across**2,
-        _flat_error(part, k, extent),
-    )
-    share = np.linalg.norm(terms, axis=0)
-    return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
-
-
-def _flat_error(part: LitNodes, k: float, extent: float) -> FloatArray:
-    """E (n,): what the curvature at the end of flat ground is worth on it."""
-    flatness = np.maximum(0.0, 1 - FLAT * np.maximum(part.along, 0.0) * extent)
-    least = np.cbrt(2 / (k * extent))
-    return np.asarray(ENDS * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))

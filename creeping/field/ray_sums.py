@@ -61,7 +61,7 @@ class RaySum:
 
     Attributes
     ----------
-    values : (n,) complex
+    values : (n,) or (n, 3) complex
         Infinite on a caustic.
     error : (n,)
         The whole of the waves, in magnitude, where the status is not OK; 0 where no ray comes.
@@ -91,9 +91,9 @@ def ray_sum(
     wavenumber: float,
     boundary: Boundary,
 ) -> RaySum:
-    """Sum over the rays found (m,) of their waves, each with its own error, at ``count`` points."""
+    """Sum over the rays found (m,) of their waves (m,) or (m, 3), each with its own error, at ``count`` points."""
     rays, observer = shed.rays, shed.observer
-    size = np.abs(waves)
+    size = magnitude(waves, rays.time)
     values = total_of(waves, observer, count)
     strength = total_of(size, observer, count)
     decay, end = fan_decay(fan, wavenumber, boundary)
@@ -134,11 +134,14 @@ def own_error(
     *,
     on: bool,
 ) -> FloatArray:
-    """Error of each ray's own wave (...), on the body or off it, from the wave in this and in the other order."""
-    size = np.abs(waves[0])
+    """Error of each ray's own wave (...), on the body or off it, from the wave in this and in the other order.
+
+    Waves may have components beyond the axes of the rays.
+    """
+    size = magnitude(waves[0], rays.time)
     # a wave may be infinite
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        change = np.abs(waves[0] - waves[1])
+        change = magnitude(waves[0] - waves[1], rays.time)
         ends = zip(scales(rays, wavenumber), rays.radius_rate, rays.radius_bend, strict=True)
         small, varying = np.mean([[m**-2, (np.abs(bend) + rate**2) / m**2] for m, rate, bend in ends], axis=0)
         if on:
@@ -150,6 +153,12 @@ def own_error(
             share = np.hypot(CLOSE * small, VARIES_NEAR[boundary.kind] * varying)
         error = size * np.minimum(share, 1.0) + (change if order == 1 else 0.0)
     return np.asarray(np.where(size > 0, error, 0.0))
+
+
+def magnitude(values: ComplexArray, like: Any) -> FloatArray:
+    """|values| of the shape of ``like``: over axes beyond it, components, the root of the sum of squares."""
+    size = np.abs(values)
+    return np.asarray(size if size.ndim == np.ndim(like) else np.sqrt(np.sum(size**2, axis=-1)))
 
 
 def _mean_across(rays: RayPoints, wavenumber: float) -> FloatArray:
@@ -183,8 +192,8 @@ def tube_share(rays: RayPoints, reach: FloatArray) -> FloatArray:
 
 
 def total_of(values: Any, observer: IntArray, count: int) -> Any:
-    """Sum of real or complex values (m,) by observer: (count,)."""
-    out = np.zeros(count, dtype=np.result_type(values, float))
+    """Sum of real or complex values (m, ...) by observer: (count, ...)."""
+    out = np.zeros((count, *np.shape(values)[1:]), dtype=np.result_type(values, float))
     np.add.at(out, observer, values)
     return out
 

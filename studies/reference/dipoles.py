@@ -3,6 +3,7 @@
 Two dipoles p, across the normal, stand at each y = x - depth n; with R = |x - y| and s = (x - y)/R
 
     E = {[k² - (1/R² - ik/R)] p + [3 (1/R² - ik/R) - k²] s (s.p)} e^{ikR}/R,    f = k² [p - r (r.p)] e^{-ik r.y}
+    H = (k² + ik/R) s x p e^{ikR}/R
 
 and n x (E + E_inc) = 0 is met in least squares, as in `studies.reference.fundamental`: with m mirrors g there are 2^m
 parity classes, whose dipoles at g y have the moments chi(g) g p. The residual, on points of its own, bounds the error.
@@ -45,6 +46,37 @@ class ConductorSolution:
         phases = k * k * np.exp(-1j * k * (r @ self.sources.T))
         sums = (phases @ self.moments.reshape(len(self.sources), -1)).reshape(len(r), *self.moments.shape[1:])
         return np.asarray(np.einsum("moc,mcdi->mdoi", frames(r), sums))
+
+    def total(self, x: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """Total E and H at points on and off the body, for theta and phi incident: (m, 3) -> (m, 3, d, 2) each."""
+        x = np.asarray(x, dtype=float)
+        k, shape = self.wavenumber, (-1, 3, len(self.directions), 2)
+        wave = np.exp(1j * k * (x @ self.directions.T))[:, None, :, None]
+        e0 = np.moveaxis(frames(self.directions), 2, 0)
+        h0 = np.moveaxis(np.cross(self.directions[:, None], frames(self.directions)), 2, 0)
+        q = self.moments.reshape(3 * len(self.sources), -1)
+        step = max(1, BLOCK // (9 * len(self.sources)))
+        parts = []
+        for first in range(0, len(x), step):
+            some = x[first : first + step]
+            away = some[:, None] - self.sources
+            distance = np.linalg.norm(away, axis=2)
+            s = away / distance[:, :, None]
+            g, near = np.exp(1j * k * distance) / distance, 1 / distance**2 - 1j * k / distance
+            along = (g * (3 * near - k * k))[:, :, None] * s
+            # (m, 3, n, 3): components of the field, then of the moments
+            E = np.einsum("mnc,mne->mcne", along, s)
+            E += np.einsum("mn,ce->mcne", g * (k * k - near), np.eye(3))
+            turned = (g * (k * k + 1j * k / distance))[:, :, None] * s
+            H = np.einsum("mnb,bec->mcne", turned, _LEVI_CIVITA)
+            parts.append([(part.reshape(3 * len(some), -1) @ q).reshape(shape) for part in (E, H)])
+        scattered = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return tuple(wave * one + its for one, its in zip((e0, h0), scattered, strict=True))  # type: ignore[return-value]
+
+
+_LEVI_CIVITA = np.array(
+    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
+)
 
 
 def frames(directions: ArrayLike) -> FloatArray:

@@ -16,6 +16,10 @@ Perfect conductor [Bohren and Huffman, section 4.4, with e^{-iωt}]: psi = x j�
     S1 = Σ (2n+1)/(n(n+1)) (a πₙ + b tauₙ),    S2 = Σ (2n+1)/(n(n+1)) (a tauₙ + b πₙ)
     f⊥ = (i/k) S1,    f∥ = (i/k) S2
 
+With M and N the vector harmonics of hₙ and ρ = kr, the wave along z and E0 along x,
+
+    E_s = Σ iⁿ (2n+1)/(n(n+1)) (i a N_e - b M_o),    H_s = Σ iⁿ (2n+1)/(n(n+1)) (i b N_o + a M_e)
+
 E_s ~ f E_inc e^{ikR}/R for E across and in the plane of scattering, e∥ = e⊥ x d before, e⊥ x r after. Bohren and
 Huffman's e∥ is the opposite on both sides, so the amplitudes are the same. In the specular region
 f⊥ → -(a/2) e^{-2i ka sin(θ/2)} and f∥ → +(a/2) e^{-2i ka sin(θ/2)}, as R = -1 soft and +1 hard.
@@ -210,3 +214,60 @@ def pec_surface_field(wavenumber: float, radius: float, cos_theta: ArrayLike) ->
         second += weight * (1j * tau / slope - pi / xi)
         before, pi = pi, ((2 * m + 1) * c * pi - (m + 1) * before) / m
     return first, second
+
+
+def pec_total_field(
+    wavenumber: float, radius: float, points: ArrayLike, direction: ArrayLike, electric: ArrayLike
+) -> tuple[ComplexArray, ComplexArray]:
+    """Total E and H on and outside a perfectly conducting sphere about the origin: (n, 3), (n, 3).
+
+    Parameters
+    ----------
+    wavenumber, radius : float
+        k, 1/L, and a, L.
+    points : (n, 3), L
+    direction, electric : (3,)
+        d and E0, both of unit length; H is in units of that of the incident wave.
+    """
+    positive(wavenumber=wavenumber, radius=radius)
+    x, d, e = (np.asarray(v, dtype=float) for v in (points, direction, electric))
+    h = np.cross(d, e)
+    r = np.linalg.norm(x, axis=-1)
+    c, phi = np.clip(x @ d / r, -1, 1), np.arctan2(x @ h, x @ e)
+    sine, cosine = np.sin(phi), np.cos(phi)
+    order, j, dj, h_n, dh = _radial(wavenumber * radius)
+    ka, rho = wavenumber * radius, wavenumber * r
+    a, b = (j + ka * dj) / (h_n + ka * dh), j / h_n
+    electric_parts, magnetic_parts = np.zeros((2, 3, len(x)), dtype=complex)
+    before, pi, last = np.zeros_like(c), np.ones_like(c), None
+    across = np.sqrt(1 - c**2)
+    for m, z in zip(order, _hankel(rho, len(order)), strict=True):
+        if m > 0:
+            tau = m * c * pi - (m + 1) * before
+            slope = last - m * z / rho  # (ρ z)'/ρ
+            out = m * (m + 1) * across * pi * z / rho
+            weight = 1j ** (m % 4) * (2 * m + 1) / (m * (m + 1))
+            ia, ib = 1j * a[int(m)], 1j * b[int(m)]
+            electric_parts += weight * np.stack(
+                [
+                    ia * cosine * out,
+                    cosine * (ia * tau * slope + 1j * ib * pi * z),
+                    -sine * (ia * pi * slope + 1j * ib * tau * z),
+                ]
+            )
+            magnetic_parts += weight * np.stack(
+                [
+                    ib * sine * out,
+                    sine * (ib * tau * slope + 1j * ia * pi * z),
+                    cosine * (ib * pi * slope + 1j * ia * tau * z),
+                ]
+            )
+            before, pi = pi, ((2 * m + 1) * c * pi - (m + 1) * before) / m
+        last = z
+    aside = cosine[:, None] * e + sine[:, None] * h
+    frame = np.stack(
+        [x / r[:, None], c[:, None] * aside - across[:, None] * d, -sine[:, None] * e + cosine[:, None] * h]
+    )
+    wave = np.exp(1j * wavenumber * (x @ d))[:, None]
+    total = [np.einsum("in,inc->nc", parts, frame) for parts in (electric_parts, magnetic_parts)]
+    return wave * e + total[0], wave * h + total[1]

@@ -5,6 +5,7 @@ With G = e^{ikR}/(4 pi R), u and du/dn on the whole body, and J = n x H on a con
     f(r) = -(1/4 pi) int (du/dn + ik (r.n) u) e^{-ikr.x} dS
     u_s(y) = int (u dG/dn_x - du/dn G) dS
     f(r) = (ik/4 pi) int [J - r (r.J)] e^{-ikr.x} dS,   H_s(y) = int grad_y G x J dS
+    E_s(y) = ik int [J + grad_y grad_y.J/k^2] G dS
 
 Directions r are taken one by one, or for a map of many by a nonuniform fast Fourier transform of the third kind
 [BMK19], good to 1e-9 of the largest value, whichever costs less.
@@ -14,6 +15,8 @@ error of the currents that radiates: if nothing were left, nothing would be wron
 
 Sources: [CK13, sec. 2.2 and 6.2], [BMK19]; Derivations, F16 and F17.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -142,16 +145,32 @@ def magnetic_field_of_vector(
     """Scattered H (m, 3, ...) at points off the body, in the unit of the incident one, of J dS (n, 3, ...)."""
     from creeping.field.kernels.radiation import curl
 
+    return _vector_sums(curl, points, currents, at, wavenumber)
+
+
+def electric_field_of_vector(
+    points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
+) -> ComplexArray:
+    """Scattered E (m, 3, ...) at points off the body, in the unit of the incident one, of J dS (n, 3, ...)."""
+    from creeping.field.kernels.radiation import electric
+
+    return _vector_sums(electric, points, currents, at, wavenumber)
+
+
+def _vector_sums(
+    kernel: Callable[..., None], points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
+) -> ComplexArray:
+    """A kernel's vectors (m, 3, ...) at points of J dS (n, 3, ...)."""
     if currents.ndim > 2:
         each = np.moveaxis(currents.reshape(*currents.shape[:2], -1), -1, 0)
-        fields = [magnetic_field_of_vector(points, one, at, wavenumber) for one in each]
+        fields = [_vector_sums(kernel, points, one, at, wavenumber) for one in each]
         return np.stack(fields, axis=-1).reshape(len(at), 3, *currents.shape[2:])
     J = currents.T / (4 * np.pi)
     real, imaginary = np.ascontiguousarray(J.real), np.ascontiguousarray(J.imag)
     out = np.empty((len(at), 6))
     columns, at = np.ascontiguousarray(points.T), np.ascontiguousarray(at)
     in_threads(
-        lambda part: curl(columns, real, imaginary, wavenumber, at[part], out[part]),
+        lambda part: kernel(columns, real, imaginary, wavenumber, at[part], out[part]),
         len(at),
         seconds=EACH * len(points),
         **SHARES,

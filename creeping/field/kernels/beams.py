@@ -3,9 +3,10 @@
 A point belongs to a ray's beam at each foot of it: there g = (y - x).p falls through 0. The foot is found between two
 steps, n = (y - x).b with the arc for its chord, and
 
-    exp{log B + ik [S + (M/2) n^2]}
+    (V + M n V') exp{log B + ik [S + (M/2) n^2]}
 
-is added, log B, S and M linear between the steps. Points are reached from blocks of SPAN steps only if those are near.
+is added to each component, log B, S, M, V and V' linear between the steps. Points are reached from blocks of SPAN
+steps only if those are near.
 """
 
 import math
@@ -37,16 +38,19 @@ def spans_of(points, centres, radii):
 
 
 @njit(**strict_options)
-def add_beams(at, points, tangents, sides, bend, S, amplitude, phase, M, k, cut, reach, centres, radii, early, late):
-    """Add beams at the points ``at`` (n, 3) to ``early`` and ``late`` (n,), by their feet before and behind ``cut``.
+def add_beams(
+    at, points, tangents, sides, bend, S, amplitude, phase, M, k, cut, reach, centres, radii, V, lean, early, late
+):
+    """Add beams at the points ``at`` (n, 3) to ``early`` and ``late`` (n, c), by their feet before and behind ``cut``.
 
     points, tangents p and sides b (rays, steps, 3); bend = kappa_t, S, amplitude and phase of B (rays, steps) and the
-    complex M with them; ``cut`` is a step. Beams reach as far as ``reach``.
+    complex M with them; V and lean = V' (rays, steps, c) or (1, 1, c) if all are the same; ``cut`` is a step. Beams
+    reach as far as ``reach``.
     """
     rays, steps = S.shape
+    same = V.shape[0] == 1 and V.shape[1] == 1
     for j in range(at.shape[0]):
         x, y, z = at[j, 0], at[j, 1], at[j, 2]
-        first, second = 0j, 0j
         for ray in range(rays):
             for span in range(centres.shape[1]):
                 a, b, c = x - centres[ray, span, 0], y - centres[ray, span, 1], z - centres[ray, span, 2]
@@ -70,10 +74,15 @@ def add_beams(at, points, tangents, sides, bend, S, amplitude, phase, M, k, cut,
                         turn = phase[ray, o] + t * (phase[ray, i] - phase[ray, o])
                         way = S[ray, o] + t * (S[ray, i] - S[ray, o])
                         beam = np.exp(size + 1j * turn + 1j * k * (way + 0.5 * curve * n * n))
-                        if o < cut:
-                            first += beam
-                        else:
-                            second += beam
+                        first, row, then = ray, o, i
+                        if same:
+                            first, row, then = 0, 0, 0
+                        for e in range(V.shape[2]):
+                            value = V[first, row, e] + t * (V[first, then, e] - V[first, row, e])
+                            aside = lean[first, row, e] + t * (lean[first, then, e] - lean[first, row, e])
+                            part = beam * (value + curve * n * aside)
+                            if o < cut:
+                                early[j, e] += part
+                            else:
+                                late[j, e] += part
                     before = g
-        early[j] += first
-        late[j] += second

@@ -3,6 +3,8 @@
     distant   S_c(r) = sum_n w_cn e^{-ik r.x_n}
     near      u(y) = sum_n [a_n + b_n n_n.(y - x_n) (1/R - ik)/R] e^{ikR}/R,   R = |y - x_n|
     curl      H(y) = sum_n (ik - 1/R) e^{ikR}/R^2 (y - x_n) x J_n
+    electric  E(y) = sum_n (ik - 1/R + w) e^{ikR}/R J_n - (ik - 3/R + 3w) e^{ikR}/R^3 (y - x_n) (y - x_n).J_n
+              w = 1/(ik R^2) = -i/(k R^2)
 
 Phases are taken in turns and reduced to t of -1/2..1/2; cos 2 pi t = 1 - 2 s^2 and sin 2 pi t = 2 s c with
 s = sin(pi t) and c = cos(pi t) by their Taylor polynomials, good to rounding there, since libm's do not vectorise.
@@ -107,3 +109,30 @@ def curl(x, real, imaginary, k, y, out):
             hx, hy, hz = hx + dy * pz - dz * py, hy + dz * px - dx * pz, hz + dx * py - dy * px
             gx, gy, gz = gx + dy * qz - dz * qy, gy + dz * qx - dx * qz, gz + dx * qy - dy * qx
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = hx, hy, hz, gx, gy, gz
+
+
+@njit(**entry_options)
+def electric(x, real, imaginary, k, y, out):
+    """Fill out (m, 6), real and imaginary parts of E at points y (m, 3); real and imaginary (3, n) are those of J."""
+    n = x.shape[1]
+    per = k / (2 * math.pi)
+    for j in range(y.shape[0]):
+        ex, ey, ez, fx, fy, fz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            dx, dy, dz = y[j, 0] - x[0, i], y[j, 1] - x[1, i], y[j, 2] - x[2, i]
+            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+            c, s = cosine_sine(per / inverse)
+            c, s = c * inverse, s * inverse
+            turn = k - inverse * inverse / k
+            lean = (k - 3.0 * inverse * inverse / k) * inverse * inverse
+            square = inverse * inverse * inverse
+            # (ik - 1/R + w) e^{ikR}/R and -(ik - 3/R + 3w) e^{ikR}/R^3
+            u, v = -turn * s - inverse * c, turn * c - inverse * s
+            p, q = lean * s + 3.0 * square * c, 3.0 * square * s - lean * c
+            ax, ay, az = real[0, i], real[1, i], real[2, i]
+            bx, by, bz = imaginary[0, i], imaginary[1, i], imaginary[2, i]
+            a, b = dx * ax + dy * ay + dz * az, dx * bx + dy * by + dz * bz
+            g, h = p * a - q * b, p * b + q * a
+            ex, ey, ez = ex + u * ax - v * bx + g * dx, ey + u * ay - v * by + g * dy, ez + u * az - v * bz + g * dz
+            fx, fy, fz = fx + u * bx + v * ax + h * dx, fy + u * by + v * ay + h * dy, fz + u * bz + v * az + h * dz
+        out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = ex, ey, ez, fx, fy, fz

@@ -16,22 +16,19 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import RectBivariateSpline, make_interp_spline
+from scipy.interpolate import RectBivariateSpline
 
-from creeping._typing import Any, ComplexArray, FloatArray, IntArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.field.beams import MOST_TURNED
 from creeping.field.boundary import Boundary
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
-from creeping.field.ray_sums import own_error
-from creeping.field.surface import surface_waves
+from creeping.field.strip_waves import StripTable, around, modes_on_strip
 from creeping.rays.fan import RayFan
-from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip
 
-WRAPPED = 6
-"""Rays of a closed strip beyond either end that its splines go through."""
 KEPT = 2
 """Marches kept with a fan, of so many wavenumbers and boundaries."""
 FEWEST = 64
@@ -40,8 +37,6 @@ TWISTED = 0.4
 """Error of y, as a share of it, by the root of what the twist adds to its phase."""
 FAVOUR = 2.0
 """How much more the error of modes counts: they know no torsion."""
-MOST_TURNED = 0.5
-"""Bound of |k_c/k - 1|."""
 _WAVES: "WeakKeyDictionary[RayFan, dict[tuple[float, Boundary], FanWaves]]" = WeakKeyDictionary()
 
 
@@ -73,21 +68,15 @@ class FanWaves:
 
     def at(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
         """Y at places (n,) of a strip: (n,)."""
-        real, imaginary = self._splines[strip]
-        sigma = self.strips[strip].wrap(sigma)
-        return np.asarray(real.ev(sigma, s) + 1j * imaginary.ev(sigma, s))
+        return self._table.at(strip, sigma, s)
 
     def slope(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
         """Its derivative y_s, 1/L times its unit, at places (n,) of a strip: (n,)."""
-        real, imaginary = self._splines[strip]
-        sigma = self.strips[strip].wrap(sigma)
-        return np.asarray(real.ev(sigma, s, dy=1) + 1j * imaginary.ev(sigma, s, dy=1))
+        return self._table.at(strip, sigma, s, ds=1)
 
     def across(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
         """Its derivative in sigma at places (n,) of a strip: (n,)."""
-        real, imaginary = self._splines[strip]
-        sigma = self.strips[strip].wrap(sigma)
-        return np.asarray(real.ev(sigma, s, dx=1) + 1j * imaginary.ev(sigma, s, dx=1))
+        return self._table.at(strip, sigma, s, dsigma=1)
 
     def error(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
         """Error of y at places (n,) of a strip, that of the next ray; infinite where that has no wave: (n,)."""
@@ -100,7 +89,7 @@ class FanWaves:
         found = []
         for strip, rows in zip(self.strips, self.rows, strict=True):
             y, error = self._by_marching(rows)
-            modes, other = self._by_modes(strip)
+            modes, other = modes_on_strip(strip, self.times, self.wavenumber, self.boundary)
             with np.errstate(invalid="ignore", divide="ignore"):
                 # of infinite errors neither wave counts
                 share = 1 / (1 + (FAVOUR * other / error) ** 2)
@@ -138,15 +127,8 @@ class FanWaves:
         return np.asarray(cumulative_trapezoid(density, self.times, axis=1, initial=0))
 
     @cached_property
-    def _splines(self) -> list[tuple[RectBivariateSpline, RectBivariateSpline]]:
-        """Splines of the real and the imaginary part of y on each strip."""
-        found = []
-        for strip, (table, _) in zip(self.strips, self._tables, strict=True):
-            places, values = _around(strip, table)
-            degree = min(3, len(places) - 1)
-            parts = (RectBivariateSpline(places, self.times, part, kx=degree) for part in (values.real, values.imag))
-            found.append(tuple(parts))
-        return found
+    def _table(self) -> StripTable:
+        return StripTable(self.strips, self.times, [y for y, _ in self._tables])
 
     def lean(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
         """Lambda at places (n,) of a strip: (n,)."""
@@ -158,33 +140,9 @@ class FanWaves:
         profiles, found = self.marched.profiles, []
         for strip, rows in zip(self.strips, self.rows, strict=True):
             values = np.stack([profiles.value_of("lean", ray, self.times) for ray in rows])
-            places, values = _around(strip, values)
+            places, values = around(strip, values)
             found.append(RectBivariateSpline(places, self.times, values, kx=min(3, len(places) - 1)))
         return found
-
-    def _by_modes(self, strip: Strip) -> tuple[ComplexArray, FloatArray]:
-        """Y of creeping modes on a strip's rays and its error (rays, steps), infinite where they have ended."""
-        rays, k, kind = strip.rays, self.wavenumber, self.boundary
-        lanes = rays.lanes.copy()
-        # without their tube
-        lanes[..., 6:9] = 1.0, 0.0, 0.0
-        plain = RayPoints(lanes, rays.starts, rays.time, rays.alive, rays.scale)
-        waves = surface_waves(plain, k, kind, 2), surface_waves(plain, k, kind, 1)
-        error = np.where(rays.alive, own_error(plain, waves, k, kind, 2, on=True), np.inf)
-        y = make_interp_spline(strip.times, waves[0] * np.exp(-1j * k * rays.eikonal), k=3, axis=1)(self.times)
-        # the larger of the steps about a place tells
-        at = np.clip(np.searchsorted(strip.times, self.times), 1, len(strip.times) - 1)
-        return np.asarray(y), np.maximum(error[:, at], error[:, at - 1])
-
-
-def _around(strip: Strip, values: Any) -> tuple[FloatArray, Any]:
-    """Places of a strip's rays and values (rays, ...) there, with some beyond either end of a closed one."""
-    places = strip.positions
-    if not strip.closed:
-        return places, values
-    count = len(places)
-    around = np.arange(-min(WRAPPED, count), count + min(WRAPPED, count))
-    return places[around % count] + strip.period * (around // count), values[around % count]
 
 
 def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves:

@@ -1,0 +1,121 @@
+"""The field on lit ground put together with the rays that come there, and how far the lit side's expansion is off.
+
+The error of lit ground, as a share of u1 and with u2 of second order, is
+
+    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
+    E = F max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
+
+E is for ground that is flat by the measure of the body's size a: the second order kappa_a/(2kc^3) of optics knows
+nothing there of the curvature at its end, which on a closed body is 1/a in the mean. Where rays end or the body hides
+part of its line, 2 epsilon more: waves that come to lit ground from elsewhere on the body are left out, and what
+currents leave inside (`creeping.field.currents.whole_body`) tells how large they are; where that cannot be measured the
+error is a bound.
+
+Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies (`studies.near_coverage`), F on
+x^4 + y^4 + z^4 = 1 at k = 8 and 14.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.boundary import Boundary
+from creeping.field.creeping_modes import fock_scale
+from creeping.field.currents.nodes import LitNodes
+from creeping.field.point_result import FieldStatus
+from creeping.field.ray_sums import RaySum
+from creeping.field.served import Served, Words
+from creeping.geometry.surface import size
+from creeping.rays.fan import RayFan
+from creeping.rays.status import RayStatus
+
+SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
+"""Factor A of the error on lit ground, by boundary."""
+LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
+"""B."""
+VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
+"""C; an impedance leaves curvature that varies out of its second order."""
+ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
+"""D."""
+FLAT, ENDS = 2.0, 0.7
+"""1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
+LEFT, UNKNOWN = 2.0, 2.0
+"""Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
+reflected wave and its image."""
+AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0}
+"""The factor on dark ground where waves are marched beyond the end of rays."""
+
+
+def convex(fan: RayFan) -> bool:
+    """Whether nothing on the rays or along the line says that the body may reflect onto itself."""
+    return fan.line.fractions["attached"] == 1.0 and bool(np.all(fan.status == RayStatus.OK))
+
+
+def composed(
+    fan: RayFan,
+    lit: tuple[ComplexArray, FloatArray, FloatArray],
+    rays: RaySum,
+    by: Words,
+    left: float,
+    k: float,
+    kind: Boundary,
+    unit: float,
+) -> Served:
+    """Total field at points of the body (n,), of one or three components.
+
+    ``lit`` are the lit side's part of it, its error and its share; ``rays`` came ``by`` some method; ``left`` is what
+    currents leave inside of the incident wave, of size ``unit``.
+    """
+    wave, lit_off, share = lit
+    unknown = (share > 0) & (not np.isfinite(left))
+    lit_off = np.hypot(lit_off, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
+    # where rays have ended the march goes on, but waves from elsewhere come to dark ground as well
+    lit_off = np.hypot(
+        lit_off, (by == "march") * (1 - share) * unit * AFAR[kind.kind] * left if np.isfinite(left) else 0.0
+    )
+    creeping, error, status = rays.values, rays.error, rays.status
+    bare = (status != FieldStatus.OK) & (error == 0)
+    error = np.where(bare, unit, error)
+    # on lit ground rays that come from afar have decayed: those that are not to be trusted are left out, and no more
+    # than what an axis makes of them, sqrt(2 pi k a)
+    most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
+    out = (share == 1) & ((status != FieldStatus.OK) | (error > most))
+    creeping = np.where(out.reshape(-1, *(1,) * (creeping.ndim - 1)), 0.0, creeping)
+    error = np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
+    status = np.where(share == 1, FieldStatus.OK, status)
+    return Served(
+        wave=wave,
+        creeping=creeping,
+        error=np.hypot(error, lit_off),
+        error_by=np.where(unknown | (status != FieldStatus.OK), "bound", "expansion"),
+        status=np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
+        method=np.where(share == 1, "lit", np.where(share > 0, np.char.add("lit+", by), by)),
+    )
+
+
+def lit_error(
+    part: LitNodes, size: FloatArray, change: FloatArray, k: float, kind: Boundary, order: int, extent: float
+) -> FloatArray:
+    """Error (n,) of the lit side's expansion, large as ``size`` and changed so much by the second order (n,).
+
+    The body is of size ``extent``, L.
+    """
+    m = fock_scale(k, part.along)
+    # grazing a flat or concave place m is infinite, and optics alone stands there
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
+    terms = (
+        SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
+        LEAST[kind.kind] / m**4,
+        VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
+        ACROSS[kind.kind] * across**2,
+        _flat_error(part, k, extent),
+    )
+    share = np.linalg.norm(terms, axis=0)
+    return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
+
+
+def _flat_error(part: LitNodes, k: float, extent: float) -> FloatArray:
+    """E (n,): what the curvature at the end of flat ground is worth on it."""
+    flatness = np.maximum(0.0, 1 - FLAT * np.maximum(part.along, 0.0) * extent)
+    least = np.cbrt(2 / (k * extent))
+    return np.asarray(ENDS * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))
