@@ -3,6 +3,7 @@
 from scatterers.almond import Almond
 from scatterers.cad import Cad
 from scatterers.capsule import Capsule
+from scatterers.coating import Coating
 from scatterers.cone import Cone
 from scatterers.cone_sphere import ConeSphere
 from scatterers.cylinder import Cylinder
@@ -21,6 +22,7 @@ __all__ = [
     "Almond",
     "Cad",
     "Capsule",
+    "Coating",
     "Cone",
     "ConeSphere",
     "Cylinder",

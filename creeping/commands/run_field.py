@@ -267,9 +267,11 @@ def _components(polarisation: str | None, boundary: BoundaryLike) -> tuple[str, 
 
 
 def _boundary(text: str) -> BoundaryLike:
+    from scatterers import Coating
+
     try:
-        return parse_boundary(text)
-    except InvalidInputError as error:
+        return parse_boundary(text, coating=Coating)
+    except (InvalidInputError, ValueError) as error:
         named = str(error).startswith("boundary")
         raise InvalidInputError(f"--{error}" if named else f"--boundary {text!r}: {error}") from error
 

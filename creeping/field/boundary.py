@@ -5,14 +5,16 @@
     impedance   du/dn + i k eta u = 0
     conductor   "electric soft" for E along b, "electric hard" for E along n
 
+An admittance may vary over the body: then it is a function of points, and there are no modes.
+
 Of the Airy functions of a mode (`creeping.field.creeping_modes`), q is i m eta: infinite if soft, 0 if hard.
 
 Sources: [F65] for q, [PBM80] for the conductor; Derivations, F1 and F14.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,14 +24,56 @@ from creeping.geometry.arguments import one_of, shown
 
 
 @dataclass(frozen=True)
+class Coating:
+    """An admittance that varies over the body: a function of points (n, 3), or an object whose ``value`` is one."""
+
+    given: Any
+
+    def value(self, points: FloatArray) -> ComplexArray:
+        """Eta (n,) at points (n, 3), L.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is not one finite number a point, or its real part is negative somewhere.
+        """
+        function = getattr(self.given, "value", self.given)
+        eta = np.asarray(function(np.asarray(points)))
+        if eta.dtype.kind not in "fciu" or eta.shape not in ((), (len(points),)):
+            raise InvalidInputError(
+                f"admittance {shown(self.given)} gives {eta.dtype} of shape {eta.shape} for points {np.shape(points)}; "
+                "it is to give one number for each row"
+            )
+        eta = np.broadcast_to(eta, (len(points),)).astype(complex)
+        off = ~np.isfinite(eta)
+        if np.any(off):
+            raise InvalidInputError(
+                f"admittance {shown(self.given)} is not finite at {off.sum()} of {len(eta)} points (first: "
+                f"{points[np.argmax(off)]})"
+            )
+        worst = int(np.argmin(eta.real)) if len(eta) else 0
+        if len(eta) and eta[worst].real < 0:
+            raise InvalidInputError(
+                f"admittance {shown(self.given)} gives energy off at {np.sum(eta.real < 0)} of {len(eta)} points "
+                f"(worst: {eta[worst]:.3g} at {points[worst]}); give one with a real part >= 0"
+            )
+        return eta
+
+    def __str__(self) -> str:
+        return str(getattr(self.given, "fingerprint", getattr(self.given, "__qualname__", type(self.given).__name__)))
+
+
+@dataclass(frozen=True)
 class ImpedanceBoundary:
     """Impedance boundary du/dn + i k eta u = 0.
 
     Parameters
     ----------
-    admittance : complex
+    admittance : complex or callable
         Relative admittance eta, without unit: 0 is hard, infinite is soft, 1 absorbs at normal incidence; passive
-        if the real part is not negative.
+        if the real part is not negative. One that varies smoothly over the body is a function of points (n, 3), L, or
+        an object whose method ``value`` is one, such as ``scatterers.Coating("0.3 + 0.1*z")``. By currents and marched
+        waves, which are those of points and of the far field of one incidence.
 
     Raises
     ------
@@ -41,12 +85,24 @@ class ImpedanceBoundary:
     >>> import creeping as cr
     >>> cr.ImpedanceBoundary(0.5 + 0.2j)
     ImpedanceBoundary(admittance=(0.5+0.2j))
+    >>> cr.ImpedanceBoundary(lambda points: 0.3 + 0.1 * points[:, 2]).varies
+    True
     """
 
-    admittance: complex
+    admittance: Any
+
+    @property
+    def varies(self) -> bool:
+        """Whether the admittance varies over the body."""
+        return isinstance(self.admittance, Coating)
 
     def __post_init__(self) -> None:
         given = self.admittance
+        if isinstance(given, Coating):
+            return
+        if callable(given) or callable(getattr(given, "value", None)):
+            object.__setattr__(self, "admittance", Coating(given))
+            return
         try:
             # Python makes numbers of texts and flags
             if isinstance(given, (Iterable, bool)) or np.asarray(given).dtype.kind in "bSUmM":
@@ -68,10 +124,38 @@ BoundaryLike = Literal["soft", "hard", "pec"] | ImpedanceBoundary
 
 @dataclass(frozen=True)
 class Boundary:
-    """One scalar boundary: ``kind`` is "soft", "hard", "impedance", "electric soft", "electric hard" or "conductor"."""
+    """One scalar boundary: ``kind`` is "soft", "hard", "impedance", "electric soft", "electric hard" or "conductor".
+
+    The admittance is a number, or with points at hand (`at`) one for each, with its rate ``drift``, 1/L, along a vector
+    there; with a ``coating`` it is known at points alone.
+    """
 
     kind: str
-    admittance: complex = 0j
+    admittance: complex | ComplexArray = 0j
+    coating: Coating | None = None
+    drift: complex | ComplexArray = 0j
+
+    @property
+    def varies(self) -> bool:
+        """Whether the admittance varies over the body."""
+        return self.coating is not None
+
+    def at(self, points: FloatArray, along: FloatArray | None = None, step: float = 0.0) -> "Boundary":
+        """The boundary at points (n, 3), L, of a body, and its drift, by steps of length ``step`` times ``along``."""
+        if self.coating is None:
+            return self
+        eta = self.coating.value(points)
+        if along is None:
+            return Boundary(self.kind, eta)
+        ahead, behind = (self.coating.value(points + sense * step * along) for sense in (1, -1))
+        return Boundary(self.kind, eta, drift=(ahead - behind) / (2 * step))
+
+    def part(self, index: Any) -> "Boundary":
+        """The boundary at some of the points."""
+        if np.ndim(self.admittance) == 0:
+            return self
+        drift = self.drift[index] if isinstance(self.drift, np.ndarray) else self.drift
+        return Boundary(self.kind, np.asarray(self.admittance)[index], drift=drift)
 
     @property
     def sign(self) -> float:
@@ -80,6 +164,11 @@ class Boundary:
 
     def q(self, m: FloatArray) -> ComplexArray | float | None:
         """Parameter q of the Airy functions at a Fock scale m (...): None if soft, 0 if hard, else (...)."""
+        if self.coating is not None:
+            raise InvalidInputError(
+                f"the admittance {self.coating} varies, and creeping modes are those of a constant one; fields at "
+                "points, and far_field of one incidence by method='currents' (or 'auto') do without them"
+            )
         if self.kind == "impedance":
             return np.asarray(1j * m * self.admittance)
         return None if self.kind.endswith("soft") else 0.0
@@ -100,6 +189,8 @@ def scalar_boundaries(boundary: BoundaryLike) -> tuple[Boundary, ...]:
         If it is none of those known.
     """
     if isinstance(boundary, ImpedanceBoundary):
+        if boundary.varies:
+            return (Boundary("impedance", np.nan, boundary.admittance),)
         if boundary.admittance == 0:
             return (HARD,)
         return (Boundary("impedance", boundary.admittance),)
@@ -125,7 +216,7 @@ def meant(given: object, known: Iterable[str]) -> str:
 
 
 def boundary_name(boundary: BoundaryLike) -> str:
-    """Text of a boundary, from which `parse_boundary` makes it again.
+    """Text of a boundary, from which `parse_boundary` makes it again, unless it varies.
 
     Examples
     --------
@@ -136,12 +227,16 @@ def boundary_name(boundary: BoundaryLike) -> str:
         return boundary
     one_of(boundary, "boundary", ImpedanceBoundary, "creeping.ImpedanceBoundary; or give 'soft', 'hard' or 'pec'")
     eta = boundary.admittance
+    if boundary.varies:
+        return f"impedance:{eta}"
     number = repr(eta.real) if eta.imag == 0 else repr(eta).strip("()")
     return f"impedance:{number}"
 
 
-def parse_boundary(text: str) -> BoundaryLike:
+def parse_boundary(text: str, *, coating: Callable[[str], Any] | None = None) -> BoundaryLike:
     """Boundary of ``soft``, ``hard``, ``pec`` or ``impedance:ETA``.
+
+    ``coating`` makes an admittance that varies of a text that is no number.
 
     Raises
     ------
@@ -159,6 +254,8 @@ def parse_boundary(text: str) -> BoundaryLike:
     try:
         admittance = complex(number.replace(" ", ""))
     except ValueError:
+        if coating is not None:
+            return ImpedanceBoundary(coating(number))
         raise InvalidInputError(
             f"boundary {text!r}: {number!r} is not a complex number such as 1 or 0.5+0.2j"
         ) from None

@@ -39,6 +39,13 @@ def fock_scale(wavenumber: float, curvature: FloatArray) -> FloatArray:
         return np.asarray(np.cbrt(wavenumber / (2 * np.maximum(curvature, 0.0))))
 
 
+def slowest_decay(boundary: Boundary, m: FloatArray, points: FloatArray) -> float:
+    """Least Im tau of the modes at a Fock scale m (1,); of an admittance that varies, over points (n, 3), L."""
+    if boundary.varies:
+        boundary, m = boundary.at(points), np.repeat(m, len(points))
+    return float(np.min(modes_of(boundary, m).tau.imag))
+
+
 def modes_of(boundary: Boundary, m: FloatArray, n: int = MODES) -> Modes:
     """Modes at Fock scales m (...): (n,) for soft and hard, (..., n) for an impedance."""
     return boundary_modes(boundary.q(m), n)

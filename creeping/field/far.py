@@ -93,12 +93,14 @@ def far_field(
         return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
-    if method == "currents" or cheap:
+    # there are no modes of an admittance that varies
+    must = method == "currents" or (method == "auto" and kinds[0].varies)
+    if must or cheap:
         try:
             far = _by_currents(kept_currents(fan, k, boundary), r, boundary)
             return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
         except SurfaceError:
-            if method == "currents":
+            if must:
                 raise
     geometry = far_geometry(fan, r)
     far = field_of(geometry, k, boundary, order)

@@ -34,6 +34,8 @@ LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
 """B."""
 VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
 """C; an impedance leaves curvature that varies out of its second order."""
+COATED = 1.5
+"""By how much more an admittance that varies is off."""
 ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
 """D."""
 FLAT, ENDS = 2.0, 0.7
@@ -110,7 +112,7 @@ def lit_error(
         ACROSS[kind.kind] * across**2,
         _flat_error(part, k, extent),
     )
-    share = np.linalg.norm(terms, axis=0)
+    share = np.linalg.norm(terms, axis=0) * (COATED if kind.varies else 1.0)
     return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
 
 

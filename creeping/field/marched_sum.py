@@ -11,14 +11,11 @@ from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import Boundary
 from creeping.field.far_geometry import fan_strips
-from creeping.field.marching.fan_waves import FanWaves, fan_waves
+from creeping.field.marching.fan_waves import FanWaves, fan_waves, marchable
 from creeping.field.ray_sums import RaySum
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays
-from creeping.rays.status import RayStatus
 
-FEWEST = 8
-"""Rays of a strip from which waves are interpolated between them."""
 LONGEST = 60.0
 """Seconds that beams may take."""
 
@@ -27,17 +24,7 @@ def marches(fan: RayFan, boundary: Boundary, order: int, count: int, wavenumber:
     """Whether the waves of a fan can be marched, and cost little enough at ``count`` points."""
     from creeping.field.beams import seconds
 
-    strips = fan_strips(fan)
-    rays = sum(len(strip.positions) for strip in strips)
-    return (
-        order == 2
-        and boundary.kind in ("soft", "hard", "impedance")
-        and len(strips) > 0
-        and rays == len(fan.status)
-        and min(len(strip.positions) for strip in strips) >= FEWEST
-        and bool(np.all(np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED))))
-        and seconds(fan, strips, wavenumber, count) < LONGEST
-    )
+    return marchable(fan, boundary, order) and seconds(fan, fan_strips(fan), wavenumber, count) < LONGEST
 
 
 def marched_sum(

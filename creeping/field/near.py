@@ -112,14 +112,17 @@ def near_field(
     dark = np.zeros(len(flat), dtype=bool)
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
     field = zero_field(len(flat), "boundary")
-    if len(off):
+    if len(off) and kind.varies:
+        field = field.put(off, _no_rays(~dark[off]))
+    elif len(off):
         field = field.put(off, _rays_off(fan, flat[off], ~dark[off], k, kind, order))
     if len(at) and kind.kind != "soft":
         parts = _rays_alone_on if method == "rays" else total_on
         field = field.put(at, parts(fan, flat[at], k, kind, order))
     asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents")))
     if method != "rays" and order == 2 and len(asked):
-        field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=method == "currents")
+        must = method == "currents" or kind.varies
+        field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=must)
     return _result(field, fan, y, k, boundary, order)
 
 
@@ -170,6 +173,20 @@ def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: B
     waves, other = (shed_waves(shed.rays, shed.reach, k, kind, o) for o in (order, 3 - order))
     error = own_error(shed.rays, (waves, other), k, kind, order, on=False)
     return _rays_alone(ray_sum(fan, shed, len(points), waves, error, k, kind), lit)
+
+
+def _no_rays(lit: BoolArray) -> Served:
+    """The field where creeping modes are not known (n,)."""
+    nothing = np.zeros(len(lit), dtype=complex)
+    status = np.where(lit, FieldStatus.LIT, FieldStatus.NO_RAY)
+    return Served(
+        wave=nothing,
+        creeping=nothing,
+        error=np.where(lit, MISSING, 1.0),
+        error_by=np.full(len(lit), "bound"),
+        status=status.astype(np.int64),
+        method=np.full(len(lit), "rays"),
+    )
 
 
 def _rays_alone_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int) -> Served:

@@ -52,7 +52,7 @@ def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind
     surface = total_on(fan, foot[at], k, kind, 2, currents)
     good = surface.status == FieldStatus.OK
     at, surface = at[good], surface[good]
-    known, errors = _on_body(surface.values, surface.error, k, kind)
+    known, errors = _on_body(surface.values, surface.error, k, kind.at(foot[at]))
     for top in tops:
         incident, scattered, its = total_at(currents, top[at], occluded(body, top[at], d))
         known.append(incident + scattered)

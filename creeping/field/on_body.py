@@ -18,8 +18,8 @@ from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
-from creeping.field.currents.lit import lit_currents
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
+from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
@@ -161,10 +161,17 @@ def rays_on(
     ``share`` (n,) is that of rays that have just left the line.
     """
     found = shed_on(fan_strips(fan), fan.body, points)
-    waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
     young = np.zeros(len(found.observer), dtype=bool)
     if share is not None:
         young = fock_parameter(found.rays, k) < TAKEN_OVER
+    if kind.varies:
+        if marches(fan, kind, order, len(points), k):
+            return marched_sum(fan, found, points, share, young, k, kind), np.full(len(points), "march")
+        nothing = np.zeros(len(points))
+        none = RaySum(nothing.astype(complex), nothing, np.full(len(points), int(FieldStatus.NO_RAY)), nothing)
+        return none, np.full(len(points), "rays")
+    waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
+    if share is not None:
         weight = np.where(young, share[found.observer], 1.0)
         # a wave may be infinite
         waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
@@ -207,7 +214,8 @@ def total_on(
 
 def _left_inside(fan: RayFan, k: float, kind: Boundary) -> float:
     """What currents leave of the wave inside the body; NaN if they cost too much or it is not to be measured."""
-    boundary: BoundaryLike = ImpedanceBoundary(kind.admittance) if kind.kind == "impedance" else SCALAR[kind.kind]
+    impedance = kind.kind == "impedance"
+    boundary = ImpedanceBoundary(kind.coating or kind.admittance) if impedance else SCALAR[kind.kind]
     try:
         # as many points as it is measured at
         return kept_currents(fan, k, boundary).extinction if affordable(fan, INNER, k) else np.nan
@@ -221,10 +229,9 @@ def _lit_at(
     """The lit side's part of the field at points of the body (n, 3), its error, and its share: (n,) each."""
     body, d = fan.body, fan.line.direction
     at, part = lit_part(body, fan.line, nodes_at(body, points, normal(body, points)), k)
-    geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
-    u, other = (lit_currents(*geometry, k, kind, o) for o in (order, 3 - order))
+    u, other = lit_waves(part, d, size(body), k, kind)[:: 1 if order == 2 else -1]
     values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))
     share[at] = part.weights
-    values[at] = part.weights * u * np.exp(1j * k * (part.points @ d))
+    values[at] = part.weights * u
     error[at] = part.weights * lit_error(part, np.abs(u), np.abs(u - other), k, kind, order, size(body))
     return values, error, share

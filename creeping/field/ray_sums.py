@@ -22,7 +22,7 @@ import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.field.far_geometry import fan_strips
 from creeping.field.point_result import FieldStatus
 from creeping.field.shed_wave import fock_parameter, scales, transverse_ratios
@@ -227,5 +227,5 @@ def fan_decay(fan: RayFan, wavenumber: float, boundary: Boundary) -> tuple[float
     if not np.any(whole):
         return 1.0, np.inf
     curvature = np.array(np.median(np.maximum(fan.curvature[whole, 0], 0.0)))
-    decay = float(np.min(modes_of(boundary, fock_scale(wavenumber, curvature)).tau.imag))
+    decay = slowest_decay(boundary, fock_scale(wavenumber, curvature[None]), fan.points[whole, 0])
     return decay, float(np.cbrt(wavenumber / 2) * np.quantile(fan.attenuation[whole, -1], SHORT))

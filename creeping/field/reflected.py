@@ -57,7 +57,7 @@ def reflection(
             wave = (1 - 0.25 * across[curved] / along[curved] / m[curved] ** 2 * change) * wave
         out[curved] = -np.sqrt(-4 / xi) * np.exp(1j * xi**3 / 12) * wave
     if order == 2 and boundary.kind == "impedance":
-        out = out + _admittance_term(cosine, along, across, wavenumber, boundary.admittance)
+        out = out + _admittance_term(cosine, along, across, wavenumber, complex(boundary.admittance))
     return out
 
 

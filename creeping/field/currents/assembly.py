@@ -5,15 +5,15 @@ Sources: Derivations, F16 to F18.
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import FloatArray
 from creeping.field.arguments import checked, checked_plain
-from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
-from creeping.field.currents.lit import lit_currents
-from creeping.field.currents.nodes import LitNodes, RayNodes, lit_nodes, ray_nodes
+from creeping.field.currents.nodes import lit_nodes, ray_nodes
+from creeping.field.currents.waves import lit_waves, ray_waves
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.surface import surface_waves
 from creeping.geometry.arguments import one_of
+from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
 
@@ -59,10 +59,14 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
     make: type[SurfaceCurrents]
     if len(kinds) == 2:
         make, kind = ConductorCurrents, CONDUCTOR
+        shadow = shadow[shadow.rays.alive]
         values, first = (conductor_waves(lit, shadow, fan.line.direction, k, order) for order in (2, 1))
+        change = values - first
     else:
         make, kind = SurfaceCurrents, kinds[0]
-        values, first = (_waves(lit, shadow, fan.line.direction, k, kind, order) for order in (2, 1))
+        bright, first = lit_waves(lit, fan.line.direction, size(fan.body), k, kind)
+        dark, second = ray_waves(shadow, k, kind)
+        values, change = np.concatenate([bright, dark]), np.concatenate([bright - first, second])
     return make(
         body=fan.body,
         direction=fan.line.direction,
@@ -71,7 +75,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         weights=np.concatenate([lit.weights, shadow.weights]),
         travel=np.concatenate([np.broadcast_to(fan.line.direction, lit.points.shape), shadow.rays.directions]),
         values=values,
-        change=values - first,
+        change=change,
         lit=np.arange(len(values)) < len(lit.points),
         rim=_rim(fan.line, k),
         rim_length=fan.line.length,
@@ -89,14 +93,3 @@ def _rim(line: ShadowLine, wavenumber: float) -> FloatArray:
         count = max(64, int(np.ceil(curve.length / apart)))
         parts.append(curve.at(curve.length * (np.arange(count) + 0.5) / count))
     return np.concatenate(parts)
-
-
-def _waves(
-    lit: LitNodes, shadow: RayNodes, direction: FloatArray, k: float, kind: Boundary, order: int
-) -> ComplexArray:
-    """Currents of a scalar boundary at the nodes of the lit side, then at those of the rays (n,)."""
-    wave = np.exp(1j * k * (lit.points @ direction))
-    bright = wave * lit_currents(lit.cosine, lit.along, lit.across, lit.twist, lit.rate, lit.bend, k, kind, order)
-    dark = surface_waves(shadow.rays, k, kind, order)
-    # on a caustic of the body the current is infinite and its weight 0
-    return np.concatenate([bright, np.where(np.isfinite(dark), dark, 0.0)])

@@ -4,10 +4,10 @@ With c = -n.d, kappa_a and kappa_b the normal curvatures along and across the pl
 rho = 1/kappa_a along it, t the entry of the shape operator between both directions, m = (k rho/2)^(1/3), xi = -m c,
 r = kappa_b/kappa_a, T = (t rho)^2 and an admittance eta (0 hard), all times e^{ikd.x}:
 
-    optics    u = 2c/(c + eta) + [R (kappa_a/c^2 + e kappa_b) - kappa_a (1 - c^2) R'/c]/(ik(c + eta)),
-              R = (c - eta)/(c + eta), R' = 2 eta/(c + eta)^2
+    optics    u = 2c/(c + eta) + [R (kappa_a/c^2 + e kappa_b) - kappa_a (1 - c^2) R'/c]/(ik(c + eta))
+              - 2 d.grad eta/(ik (c + eta)^3),   R = (c - eta)/(c + eta), R' = 2 eta/(c + eta)^2
               soft  du/dn = -2ikc [1 + i (kappa_a/c^2 + e kappa_b)/(2kc)]
-    Fock      u = e^{i xi^3/3} [g + (rho'/m) E + D/m^2],   soft  du/dn = (k/m) times the same with F in place of g
+    Fock      u = e^{i xi^3/3} [g + (rho'/m) E + D/m^2 + G],   soft  du/dn = (k/m) times the same with F in place of g
               E = -i (xi^4/12) g - i (xi^2/6) Dg - (xi/6) g - (i/12) D^2 g - (q/6)[xi g_q + i g + i q g_q]
               D = i (3/20) xi^5 g + i (xi^3/6) Dg + i (xi/60) D^2 g - Dg/30 - g_q/10 - (2/15) q (Dg)_q
                   + (r/4)(xi^2 g + Dg - e g_q)
@@ -15,6 +15,7 @@ r = kappa_b/kappa_a, T = (t rho)^2 and an admittance eta (0 hard), all times e^{
                   + rho'^2 [(-xi^8/288 + i (11/360) xi^5 + xi^2/72) g + (-xi^6/72 + i (5/108) xi^3) Dg
                             + (-xi^4/48 + i (17/1080) xi) D^2 g - (xi^2/72) D^3 g - D^4 g/288 + (13/540) Dg - g_q/90]
                   + T [-i (xi^5/20) g + i (xi^3/18) Dg - (xi^2/12) g + i (19 xi/180) D^2 g - (53/180) Dg + (7/60) g_q]
+              G = rho (d.grad eta) [g + 2 q g_q + (q^2 g_qq - D g_qq)/2]
               soft  Dg times 1/10, -1/60, 7/180 and -7/60 for -1/30, 1/180, 13/540 and -53/180, xi^2 g/4 in T, nothing
                     that has g_q; of a conductor - (r/2) g(xi; 0)
 
@@ -23,9 +24,9 @@ it with t^n under its integral, g_q = dg/dq. Optics is the series of Luneburg an
 reflected eikonal, Lap psi = 2 kappa_a/c + 2 c kappa_b there. Fock's current is that of the shadow
 (`creeping.field.surface`) with the arclength behind the line replaced by c, and its |J|^(-1/2) by 1 + r xi^2/(4m^2). E
 and D must then fall off towards the light, where D/m^2 becomes the term of optics in kappa_b, which gives the factors
-of Dg and g_q that the shadow leaves open; the term in T is what the circular cylinder asks for, met obliquely. So it
-holds wherever kappa_a > 0; optics alone stands elsewhere. Of an impedance the terms in rho'', rho'^2 and T are left
-out.
+of Dg and g_q that the shadow leaves open; the term in T is what the circular cylinder asks for, met obliquely. G is
+what the layer under an admittance that varies remembers of what it has passed. So it holds wherever kappa_a > 0; optics
+alone stands elsewhere. Of an impedance the terms in rho'', rho'^2 and T are left out.
 
 Sources: [KLS56], [F46]; Derivations, F16.
 """
@@ -47,6 +48,8 @@ BOUND = 0.5
 """Bound of the second order, as a share of the first: beyond a third of it the expansion fails."""
 LEAST_SCALE = 0.7
 """m below which nothing is expanded in 1/m^2."""
+NEXT = 1e-3
+"""Step in q of its derivatives, as a share of it."""
 STEEPEST = 20.0
 """Bound of |kappa_b/kappa_a| in the second order."""
 
@@ -87,10 +90,10 @@ def lit_currents(
     curved = (along > 0) & (xi > -OPTICS[1])
     out = np.empty(cosine.shape, dtype=complex)
     flat = ~curved
-    out[flat] = _optics(cosine[flat], along[flat], across[flat], wavenumber, boundary, order)
+    out[flat] = _optics(cosine[flat], along[flat], across[flat], wavenumber, boundary.part(flat), order)
     at = np.flatnonzero(curved)
     local = _Local(*(v[at] for v in (cosine, along, across, twist, rate, bend, m, xi)))
-    out[at] = _near_grazing(local, wavenumber, boundary, order)
+    out[at] = _near_grazing(local, wavenumber, boundary.part(at), order)
     return out
 
 
@@ -105,6 +108,7 @@ def _optics(
     eta = boundary.admittance
     R, slope = plane_reflection(c, boundary), 2 * eta / (c + eta) ** 2
     second = (R * (along / c**2 + boundary.sign * across) - along * (1 - c * c) * slope / c) / (2j * k * c)
+    second = second + 1j * boundary.drift / (k * c * (c + eta) ** 2)
     return np.asarray(2 * c / (c + eta) * (1 + (order == 2) * limited(second, BOUND)))
 
 
@@ -134,7 +138,7 @@ def _near_grazing(at: _Local, wavenumber: float, boundary: Boundary, order: int)
     out = out * scale
     far = smoothstep(-xi, *OPTICS)
     beyond = far > 0
-    ray = _optics(at.cosine[beyond], at.along[beyond], at.across[beyond], wavenumber, boundary, order)
+    ray = _optics(at.cosine[beyond], at.along[beyond], at.across[beyond], wavenumber, boundary.part(beyond), order)
     out[beyond] = (1 - far[beyond]) * out[beyond] + far[beyond] * ray
     return np.asarray(out)
 
@@ -179,4 +183,15 @@ def _corrections(at: _Local, q: ComplexArray | float | None, g: ComplexArray, bo
         curved = curved + (varies - 0.1 - 0.25 * boundary.sign * r) * slope
         if not constant:
             curved = curved - 2 / 15 * q * surface_slope(xi, q, 1)
-    return np.asarray(rate / m * varying + curved / m**2)
+    change = np.asarray(rate / m * varying + curved / m**2)
+    if q is not None and np.any(boundary.drift):
+        change = change + _memory(at, np.asarray(q), g, boundary)
+    return change
+
+
+def _memory(at: _Local, q: ComplexArray, g: ComplexArray, boundary: Boundary) -> ComplexArray:
+    """G (n,)."""
+    slope = surface_slope(at.xi, q)
+    pairs = [[surface_slope(at.xi, q * (1 + sense * NEXT), n) for sense in (1, -1)] for n in (0, 1)]
+    bend, turned = ((ahead - behind) / (2 * NEXT * q) for ahead, behind in pairs)
+    return np.asarray(boundary.drift / at.along * (g + 2 * q * slope + (q**2 * bend - turned) / 2))

@@ -15,7 +15,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.field.shed_wave import smoothstep
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size
@@ -82,6 +82,10 @@ class RayNodes:
 
     Attributes
     ----------
+    fan : RayFan
+        The rays.
+    rows : (n,) of int
+        Of each node's ray in it.
     rays : RayPoints
         (n,)
     normals : (n, 3)
@@ -91,10 +95,17 @@ class RayNodes:
         Entry of the shape operator between p and n x p, the torsion of the rays.
     """
 
+    fan: RayFan
+    rows: IntArray
     rays: RayPoints
     normals: FloatArray
     weights: FloatArray
     twist: FloatArray
+
+    def __getitem__(self, index: BoolArray) -> "RayNodes":
+        """Some of the nodes."""
+        parts = (self.rows[index], self.rays[index], self.normals[index], self.weights[index], self.twist[index])
+        return RayNodes(self.fan, *parts)
 
 
 def plane_of_incidence(nodes: BodyNodes, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -200,9 +211,11 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     points = rays.points.reshape(-1, 3)
     normals = normal(fan.body, points).reshape(*shape, 3)
     weights = weights * _share_of_rays(fan.body, rays, normals, fan.line.direction, wavenumber)
-    there = rays.alive & np.isfinite(weights) & (weights > 0)
+    # marched waves go on where creeping modes have ended
+    there = (rays.alive | (boundary.varies & dense.launched[:, None])) & np.isfinite(weights) & (weights > 0)
     rays, normals, weights = rays[there], normals[there], weights[there]
-    return RayNodes(rays, normals, weights, nodes_at(fan.body, rays.points, normals).twist(rays.directions))
+    twist = nodes_at(fan.body, rays.points, normals).twist(rays.directions)
+    return RayNodes(dense, np.nonzero(there)[0], rays, normals, weights, twist)
 
 
 def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
@@ -210,7 +223,7 @@ def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
     typical = fan.curvature[:, 0]
     # a boundary's own mode may be slower than the hard one's, by which rays are long by default
     m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
-    slowest = float(np.min(modes_of(boundary, m).tau.imag)) if np.all(np.isfinite(m)) else 0.0
+    slowest = slowest_decay(boundary, m, fan.points[:, 0]) if np.all(np.isfinite(m)) else 0.0
     return ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, SLOWEST))
 
 

@@ -262,4 +262,4 @@ class SurfaceCurrents:
             return None, strength
         if self.boundary.kind == "hard":
             return strength, None
-        return strength, np.asarray(-1j * self.wavenumber * self.boundary.admittance * strength)
+        return strength, np.asarray(-1j * self.wavenumber * self.boundary.at(self.points).admittance * strength)

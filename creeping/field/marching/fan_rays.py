@@ -17,8 +17,9 @@ Sources: Derivations, R1, R3 and F22.
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.field.arguments import checked_plain
+from creeping.field.boundary import HARD, Boundary
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.profile import RayProfiles
 from creeping.field.shed_wave import smoothstep
@@ -43,7 +44,9 @@ MOST_BENT = 6.0
 """Bound of (J'/2J)^2 in V, in terms of the body's size; in the shadow it belongs to the spreading of beams."""
 
 
-def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | None = None) -> RayProfiles:
+def fan_profiles(
+    fan: RayFan, *, length: float | None = None, behind: float | None = None, boundary: Boundary = HARD
+) -> RayProfiles:
     """Profiles of all rays of a fan.
 
     Parameters
@@ -54,6 +57,8 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
         Of the rays; that of the fan if not given.
     behind : float, L, optional
         How far the profiles go back on lit ground.
+    boundary : Boundary, optional
+        Whose admittance is taken along, if it varies.
 
     Returns
     -------
@@ -78,7 +83,7 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
         count = int(np.clip(np.ceil(way * sharpest / TURN), FEWEST, MOST))
         times = np.linspace(0, way, count + 1)
         states = trace_states(body, pack(x0, sense * p0, jacobi=True), times, rtol=RTOL)
-        ways.append(_along(body, d, x0, sense * times, states, sense))
+        ways.append(_along(body, d, x0, sense * times, states, sense, boundary))
     first, second = ways
     whole = {name: np.concatenate([first[name][:, :0:-1], second[name]], axis=1) for name in first}
     gauss = whole["curvature"] * whole["transverse"] - whole["torsion"] ** 2
@@ -86,21 +91,28 @@ def fan_profiles(fan: RayFan, *, length: float | None = None, behind: float | No
     bent = np.where(whole["s"] < 0, np.minimum(bent, MOST_BENT / size(body) ** 2), 0.0)
     return RayProfiles(
         **{name: whole[name] for name in ("s", "curvature", "transverse", "spreading", "torsion", "phase", "climb")},
+        admittance=whole.get("admittance"),
         lean=_lean(fan, whole),
         potential=gauss / 2 + bent,
     )
 
 
 def _along(
-    body: Surface, d: FloatArray, x0: FloatArray, s: FloatArray, states: FloatArray, sense: float
-) -> dict[str, FloatArray]:
+    body: Surface,
+    d: FloatArray,
+    x0: FloatArray,
+    s: FloatArray,
+    states: FloatArray,
+    sense: float,
+    boundary: Boundary,
+) -> dict[str, Any]:
     """What the states of rays (rays, steps, 10) say, each (rays, steps)."""
     shape = states.shape[:2]
     x, p = states[..., X].reshape(-1, 3), sense * states[..., P].reshape(-1, 3)
     nodes = nodes_at(body, x, normal(body, x))
     b = np.cross(nodes.normals, p)
     away = x.reshape(*shape, 3) - x0[:, None]
-    found = {
+    found: dict[str, Any] = {
         "s": np.broadcast_to(s, shape),
         "curvature": nodes.curvature(p),
         "transverse": nodes.curvature(b),
@@ -112,10 +124,12 @@ def _along(
         "aside": b @ d,
         "forward": p @ d,
     }
+    if boundary.varies:
+        found["admittance"] = boundary.at(x).admittance
     return {name: np.asarray(values).reshape(shape) for name, values in found.items()}
 
 
-def _lean(fan: RayFan, whole: dict[str, FloatArray]) -> FloatArray:
+def _lean(fan: RayFan, whole: dict[str, Any]) -> FloatArray:
     """Lambda (rays, m)."""
     s, kappa, J = whole["s"][0], whole["curvature"], whole["spreading"]
     start = int(np.argmax(s == 0))

@@ -27,12 +27,15 @@ from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.strip_waves import StripTable, around, modes_on_strip
 from creeping.rays.fan import RayFan
+from creeping.rays.status import RayStatus
 from creeping.rays.strips import Strip
 
 KEPT = 2
 """Marches kept with a fan, of so many wavenumbers and boundaries."""
 FEWEST = 64
 """Steps at least that are kept of a ray."""
+FEWEST_RAYS = 8
+"""Rays of a strip from which waves are interpolated between them."""
 TWISTED = 0.4
 """Error of y, as a share of it, by the root of what the twist adds to its phase."""
 FAVOUR = 2.0
@@ -89,6 +92,9 @@ class FanWaves:
         found = []
         for strip, rows in zip(self.strips, self.rows, strict=True):
             y, error = self._by_marching(rows)
+            if self.boundary.varies:
+                found.append((np.where(np.isfinite(error), y, 0.0), error))
+                continue
             modes, other = modes_on_strip(strip, self.times, self.wavenumber, self.boundary)
             with np.errstate(invalid="ignore", divide="ignore"):
                 # of infinite errors neither wave counts
@@ -145,6 +151,19 @@ class FanWaves:
         return found
 
 
+def marchable(fan: RayFan, boundary: Boundary, order: int) -> bool:
+    """Whether the waves of a fan can be marched."""
+    strips = fan_strips(fan)
+    return (
+        order == 2
+        and boundary.kind in ("soft", "hard", "impedance")
+        and len(strips) > 0
+        and sum(len(strip.positions) for strip in strips) == len(fan.status)
+        and min(len(strip.positions) for strip in strips) >= FEWEST_RAYS
+        and bool(np.all(np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED))))
+    )
+
+
 def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves:
     """Marched waves of a fan, made once for each of the last wavenumbers and boundaries."""
     kept = _WAVES.setdefault(fan, {})
@@ -152,7 +171,7 @@ def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves
     if key not in kept:
         while len(kept) >= KEPT:
             kept.pop(next(iter(kept)))
-        marched = march_rays(fan_profiles(fan), wavenumber=wavenumber, boundary=boundary)
+        marched = march_rays(fan_profiles(fan, boundary=boundary), wavenumber=wavenumber, boundary=boundary)
         times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=FEWEST)) + 1)
         kept[key] = FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary)
     return kept[key]

@@ -172,9 +172,15 @@ def _evaluate(which: str, xi: FloatArray, q: ComplexArray | float | None, power:
     full_xi, full_q = np.broadcast_arrays(xi, np.asarray(q, dtype=complex))
     shape, full_xi, full_q = full_xi.shape, full_xi.ravel(), full_q.ravel()
     # the far field keeps to one way, whatever the number of rays that go together
-    if len(full_q) < MANY or not which.startswith("surface"):
+    if len(full_q) < MANY or not which.startswith("surface") or not _of_one_argument(full_q):
         return _direct(which, full_xi, full_q, power).reshape(shape)
     return _between_tables(which, full_xi, full_q, power).reshape(shape)
+
+
+def _of_one_argument(q: ComplexArray) -> bool:
+    """Whether numbers (n,) are multiples of one by positive factors, to rounding."""
+    largest = q[np.argmax(np.abs(q))]
+    return bool(np.all(np.abs((q * np.conj(largest)).imag) <= 1e-9 * np.abs(q) * np.abs(largest)))
 
 
 def _between_tables(which: str, xi: FloatArray, q: ComplexArray, power: int) -> ComplexArray:

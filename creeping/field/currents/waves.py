@@ -1,0 +1,64 @@
+"""The wave of a scalar boundary at nodes of the lit side and of creeping rays.
+
+On rays it is the sum of creeping modes, or, where the admittance varies and there are none, the marched wave
+
+    u = y |J|^(-1/2) e^{ik(d.x0 + s) - i pi N/2}
+
+of `creeping.field.marching.fan_waves`; then what is of second order has u's phase and the size of its error.
+
+Source: Derivations, F16 and F22.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import Boundary
+from creeping.field.currents.lit import lit_currents
+from creeping.field.currents.nodes import STEP, LitNodes, RayNodes
+from creeping.field.marching.fan_waves import fan_waves, marchable
+from creeping.field.surface import surface_waves
+
+
+def lit_waves(
+    part: LitNodes, direction: FloatArray, extent: float, k: float, kind: Boundary
+) -> tuple[ComplexArray, ComplexArray]:
+    """Wave at nodes of the lit side of a body of size ``extent``, L, by second and by first order (n,)."""
+    along = direction + part.cosine[:, None] * part.normals
+    here = kind.at(part.points, along, STEP * extent)
+    geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
+    wave = np.exp(1j * k * (part.points @ direction))
+    second, first = (wave * lit_currents(*geometry, k, here, order) for order in (2, 1))
+    return second, first
+
+
+def ray_waves(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, ComplexArray]:
+    """Wave at nodes of rays, 0 where there is none, and what of it is of second order (n,)."""
+    if kind.varies:
+        return _marched(nodes, k, kind)
+    waves, first = (surface_waves(nodes.rays, k, kind, order) for order in (2, 1))
+    # on a caustic of the body the current is infinite and its weight 0
+    ok = np.isfinite(waves) & np.isfinite(first)
+    return np.where(ok, waves, 0.0), np.where(ok, waves - first, 0.0)
+
+
+def _marched(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, ComplexArray]:
+    if not marchable(nodes.fan, kind, 2):
+        raise InvalidInputError(
+            f"the admittance {kind.coating} varies, and of {len(nodes.fan.status)} rays of this incidence some stand "
+            "alone, where no wave can be marched; give a constant admittance, or another incidence"
+        )
+    marched = fan_waves(nodes.fan, wavenumber=k, boundary=kind)
+    values, change = np.zeros((2, len(nodes.rows)), dtype=complex)
+    for number, rows in enumerate(marched.rows):
+        order = np.full(len(nodes.fan.status), -1)
+        order[rows] = np.arange(len(rows))
+        mine = np.flatnonzero(order[nodes.rows] >= 0)
+        sigma, rays = marched.strips[number].positions[order[nodes.rows[mine]]], nodes.rays[mine]
+        y, error = (part(number, sigma, rays.time) for part in (marched.at, marched.error))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            wave = y / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * (k * rays.eikonal - 0.5 * np.pi * rays.caustics))
+            off = wave * np.minimum(error / np.abs(y), 1.0)
+        known = np.isfinite(error) & np.isfinite(wave) & np.isfinite(off)
+        values[mine], change[mine] = np.where(known, wave, 0.0), np.where(known, off, 0.0)
+    return values, change

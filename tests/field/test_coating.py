@@ -1,0 +1,104 @@
+"""Admittances that vary over the body: against an exact sphere, a constant one, and dumb inputs."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.special.fock import surface_function
+from studies.reference import coated_sphere, sphere
+
+K = 25.0
+ETA = (0.4 + 0.1j, 0.25)
+D = np.array([0.48, -0.6, 0.64])
+
+
+def coated(points):
+    return ETA[0] + ETA[1] * points[:, 2]
+
+
+def spread(count):
+    i = np.arange(count) + 0.5
+    z, angle = 1 - 2 * i / count, np.pi * (1 + np.sqrt(5)) * i
+    return np.stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z], axis=1)
+
+
+@pytest.fixture(scope="module")
+def fan():
+    ball = sc.Sphere()
+    return cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, direction=D), length=3.3, n_rays=48)
+
+
+def test_reference_is_the_series_of_a_constant_admittance():
+    points = spread(60)
+    found = coated_sphere.surface_field(8.0, 1.0, D, (0.7, 0.0), points)
+    assert np.allclose(found, sphere.surface_field(8.0, 1.0, points @ D, 0.7), atol=1e-12)
+
+
+def test_field_on_the_body_is_that_of_the_exact_sphere(fan):
+    points = spread(400)
+    found = cr.surface_field(fan, points, wavenumber=K, boundary=cr.ImpedanceBoundary(coated))
+    exact = coated_sphere.surface_field(K, 1.0, D, ETA, points)
+    off = np.abs(found.values - exact)
+    assert np.max(off[found.ok]) < 0.02  # of the incident wave; 0.03 asked for
+    assert np.mean(off <= found.error) > 0.9
+    assert set(found.method) <= {"lit", "march", "lit+march"}
+
+
+def test_far_and_near_fields_are_those_of_the_exact_sphere(fan):
+    boundary = cr.ImpedanceBoundary(coated)
+    r = spread(200)
+    far = cr.far_field(fan, r, wavenumber=K, boundary=boundary)
+    exact = coated_sphere.far_field(K, 1.0, D, ETA, r)
+    assert np.max(np.abs(far.total - exact)) < 0.005 * np.max(np.abs(exact))
+    assert np.mean(np.abs(far.total - exact) <= far.error) > 0.95
+    # far away the field near the body is the far field
+    near = cr.near_field(fan, 2e4 * r[:20], wavenumber=K, boundary=boundary)
+    scattered = near.values - np.exp(1j * K * 2e4 * (r[:20] @ D))
+    assert np.allclose(scattered * 2e4 * np.exp(-2e4j * K), far.total[:20], atol=2e-3 * np.max(np.abs(exact)))
+
+
+def test_a_function_that_is_constant_is_a_constant(fan):
+    points = spread(60)
+    lit = points @ D < -0.4
+    constant = cr.surface_field(fan, points, wavenumber=K, boundary=cr.ImpedanceBoundary(0.4))
+    varying = cr.surface_field(fan, points, wavenumber=K, boundary=cr.ImpedanceBoundary(lambda x: 0.4 + 0 * x[:, 0]))
+    assert np.allclose(varying.values[lit], constant.values[lit], rtol=1e-9)
+    assert np.all(np.abs(varying.values - constant.values) <= varying.error + constant.error)
+
+
+def test_expressions_and_functions_agree():
+    points = spread(20)
+    text = sc.Coating("0.3 + 0.1*z", "0.2*x")
+    assert np.allclose(text.value(points), 0.3 + 0.1 * points[:, 2] + 0.2j * points[:, 0], rtol=1e-15)
+    assert cr.ImpedanceBoundary(text) == cr.ImpedanceBoundary(sc.Coating("0.3 + 0.1*z", "0.2*x"))
+    with pytest.raises(ValueError, match="contains"):
+        sc.Coating("__import__('os')")
+
+
+def test_fock_functions_take_parameters_of_many_arguments():
+    q = 2.0 * np.exp(1j * np.linspace(0.2, 1.4, 400))
+    xi = np.linspace(-2.0, 2.0, 400)
+    together = surface_function(xi, q)
+    alone = [surface_function(xi[i : i + 1], q[i : i + 1])[0] for i in range(0, 400, 50)]
+    assert np.allclose(together[::50], alone, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (lambda x: -0.1 + 0 * x[:, 0], "gives energy off at"),
+        (lambda x: np.nan * x[:, 0], "is not finite at"),
+        (lambda x: x, "one number for each row"),
+    ],
+)
+def test_bad_coatings_are_named(fan, given, told):
+    with pytest.raises(cr.InvalidInputError, match=told):
+        cr.surface_field(fan, [(0.0, 0.0, 1.0)], wavenumber=K, boundary=cr.ImpedanceBoundary(given))
+
+
+def test_what_goes_by_modes_says_what_does_not(fan):
+    with pytest.raises(cr.InvalidInputError, match="method='currents'"):
+        cr.far_field(fan, [(0, 0, 1)], wavenumber=K, boundary=cr.ImpedanceBoundary(coated), method="rays")
+    with pytest.raises(cr.InvalidInputError, match="varies"):
+        cr.surface_field(fan, wavenumber=K, boundary=cr.ImpedanceBoundary(coated))
