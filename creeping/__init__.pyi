@@ -23,6 +23,8 @@ from .field.point_result import NearField as NearField
 from .field.point_result import SurfaceField as SurfaceField
 from .field.slant_range import RangeProfile as RangeProfile
 from .field.slant_range import range_profile as range_profile
+from .field.source_pattern import SourcePattern as SourcePattern
+from .field.source_pattern import source_pattern as source_pattern
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty
 from .field.validity_range import Validity as Validity
 from .field.validity_range import validity as validity

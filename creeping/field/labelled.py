@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any
+from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import azimuth_elevation_of
 from creeping.storage.extras import required
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from creeping.field.far_result import FarField
     from creeping.field.point_result import PointField
+    from creeping.field.source_pattern import SourcePattern
 
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
@@ -38,23 +39,24 @@ def power(unit: str, exponent: int) -> str:
     return f"{unit}{exponent}" if unit == "m" else f"1/{unit}"
 
 
+def _directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str, Any]:
+    """Coordinates of results by direction (m, 3)."""
+    azimuth, elevation = azimuth_elevation_of(directions)
+    return {
+        "vector": (("direction", "axis"), directions, {"units": "1", "long_name": "unit direction to the observer"}),
+        "azimuth": (("direction",), np.degrees(azimuth), {"units": "degree"}),
+        "elevation": (("direction",), np.degrees(elevation), {"units": "degree"}),
+        "axis": (("axis",), ["x", "y", "z"]),
+        "wavenumber": ((), wavenumber, {"units": power(unit, -1), "long_name": "k"}),
+    }
+
+
 def far_dataset(far: "FarField") -> "xarray.Dataset":
     """A far field, its parts, error and cross section, by direction: see `FarField.to_xarray`."""
     library = required("xarray", use="labelled results need", extra="sweep")
     unit = far.unit
     dims = ("direction", "scattered", "incident")[: far.total.ndim]
-    azimuth, elevation = azimuth_elevation_of(far.directions)
-    coordinates: dict[str, Any] = {
-        "vector": (
-            ("direction", "axis"),
-            far.directions,
-            {"units": "1", "long_name": "unit direction to the observer"},
-        ),
-        "azimuth": (("direction",), np.degrees(azimuth), {"units": "degree"}),
-        "elevation": (("direction",), np.degrees(elevation), {"units": "degree"}),
-        "axis": (("axis",), ["x", "y", "z"]),
-        "wavenumber": ((), far.wavenumber, {"units": power(unit, -1), "long_name": "k"}),
-    }
+    coordinates = _directed(far.directions, far.wavenumber, unit)
     if far.total.ndim == 3:
         coordinates |= {name: ((name,), list(COMPONENTS)) for name in dims[1:]}
     names = {"total": "far-field amplitude f", **{name: f"{name} part of f" for name in PARTS}}
@@ -89,5 +91,25 @@ def point_dataset(field: "PointField", parts: tuple[str, ...]) -> "xarray.Datase
     for name in ("error_by", "status", "method"):
         variables[name] = (("point",), np.reshape(getattr(field, name), -1), {})
     words = {"boundary": field.boundary, "order": field.order, "conventions": "time factor exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+    return found
+
+
+def pattern_dataset(pattern: "SourcePattern") -> "xarray.Dataset":
+    """Far fields of sources with their error and status, by direction and source: see `SourcePattern.to_xarray`."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    unit, dims = pattern.length_unit, ("direction", "source")
+    coordinates = _directed(pattern.directions, pattern.wavenumber, unit)
+    coordinates |= {
+        f"source_{name}": (("source",), pattern.sources[:, i], {"units": unit}) for i, name in enumerate("xyz")
+    }
+    told = {"units": "1", "long_name": "far field over that of the source with no body"}
+    variables: dict[str, Any] = {
+        "pattern": (dims, pattern.values, told),
+        "error": (dims, pattern.error, {"units": "1"}),
+    }
+    for name in ("error_by", "status", "method"):
+        variables[name] = (dims, getattr(pattern, name), {})
+    words = {"boundary": pattern.boundary, "conventions": "time factor exp(-i omega t)"}
     found: xarray.Dataset = library.Dataset(variables, coordinates, words)
     return found
