@@ -10,6 +10,9 @@ from .errors import ToleranceError as ToleranceError
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
 from .field.comparison import Comparison as Comparison
 from .field.comparison import compare as compare
+from .field.coupling import coupling as coupling
+from .field.coupling_result import Coupling as Coupling
+from .field.coupling_result import CouplingPaths as CouplingPaths
 from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.echo import Echo as Echo
