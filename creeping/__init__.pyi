@@ -10,7 +10,6 @@ from .errors import ToleranceError as ToleranceError
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
 from .field.comparison import Comparison as Comparison
 from .field.comparison import compare as compare
-from .field.coupling import coupling as coupling
 from .field.coupling_result import Coupling as Coupling
 from .field.coupling_result import CouplingPaths as CouplingPaths
 from .field.currents.assembly import surface_currents as surface_currents
@@ -24,6 +23,7 @@ from .field.on_body import surface_field as surface_field
 from .field.point_result import FieldStatus as FieldStatus
 from .field.point_result import NearField as NearField
 from .field.point_result import SurfaceField as SurfaceField
+from .field.port_coupling import coupling as coupling
 from .field.slant_range import RangeProfile as RangeProfile
 from .field.slant_range import range_profile as range_profile
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty

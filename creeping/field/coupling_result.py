@@ -45,6 +45,14 @@ class CouplingPaths:
         Zeros of J2 passed.
     wave : (m,) complex, 1/L
         What each contributes; infinite on its caustic.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> paths = cr.coupling(sc.Sphere(), [(0, 0, 1), (1, 0, 0)], wavenumber=30.0).paths(0, 1)
+    >>> len(paths), (paths.departure[0].round(6) + 0.0).tolist(), paths.spreading.round(3).tolist()
+    (2, [1.0, 0.0, 0.0], [1.0, -1.0])
     """
 
     arclength: FloatArray

@@ -4,28 +4,29 @@
 
 y is the wave of `creeping.field.port_waves` without its J2, (s, n) the foot of x on the ray of angle θ and its distance
 from there. arg q runs on from -π/2. By stationary phase each geodesic through x has its own wave again, and the term g²
-of its second order: it is left out of y. ε = WIDTH/a is free; what it changes tells the error.
+of its second order: it is left out of y. ε = WIDTH a, a length, is free; what it changes tells the error.
 
 Sources: [P82], [CPP82]; Derivations, F24 and F25.
 """
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.port_waves import PathTerms
 from creeping.geodesics.equations import sharpest_curvature
-from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.port_rays import TURN, traced_fans
 
 WIDTH, OTHER = 2.5, 0.6
-"""ε a, and the factor of the other ε."""
-APART, STEP = 0.35, 0.08
-"""Angle between beams, in that which a beam's width at its port is worth, and steps, in a/(ka)^(1/3)."""
+"""ε/a, and the factor of the other ε."""
+APART, STEP = 0.22, 0.08
+"""Angle between beams, in (ka)^(-1/2), and steps, in a/(ka)^(1/3)."""
 FEWEST = 128
 REACH = 0.9
 """How far a beam reaches, in terms of a."""
+EVERY, NOTHING = 4, -690.0
+"""Steps between those at which waves are found, and the logarithm of none."""
 MOST_TURNED = 0.5
 """Bound of |k_c/k - 1|."""
 
@@ -36,8 +37,8 @@ def beam_length(body: Surface) -> float:
 
 
 def beam_width(body: Surface, wavenumber: float) -> float:
-    """Width of beams at their port, L."""
-    return float(np.sqrt(beam_length(body) / (WIDTH * wavenumber)))
+    """(a/k)^(1/2), about the width of beams at their port, L."""
+    return float(np.sqrt(beam_length(body) / wavenumber))
 
 
 class PortBeams:
@@ -72,19 +73,17 @@ class PortBeams:
         lanes = lanes[:, lane.BEHIND :]
         count = lanes.shape[1]
         S = np.broadcast_to(self.step * np.arange(count), (rays, count))
-        y = self._waves(lanes, S, last, order)
-        slope = np.gradient(y, self.step, axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turned = np.nan_to_num(-1j * slope / (self.k * y))
+        logarithm, slope = self._waves(lanes, S, last, order)
+        turned = -1j * slope / self.k
         turned /= np.maximum(1.0, np.abs(turned) / MOST_TURNED)
         self.turned = 1 + turned
-        self.size = np.log(np.maximum(np.abs(y), 1e-300)) + 0.5 * np.log(np.abs(self.turned))
-        self.phase = np.unwrap(np.angle(y), axis=1) + 0.5 * np.angle(self.turned)
+        ended = np.arange(count) > last[:, None]
+        self.size = np.where(ended, NOTHING, logarithm.real) + 0.5 * np.log(np.abs(self.turned))
+        self.phase = logarithm.imag + 0.5 * np.angle(self.turned)
         x, p = (np.ascontiguousarray(lanes[..., part]) for part in (slice(0, 3), slice(3, 6)))
         flat = x.reshape(-1, 3)
         b = np.cross(normal(body, flat), p.reshape(-1, 3))
-        bend = normal_curvature(body, flat, b).reshape(S.shape)
-        self.rays = (x, p, b.reshape(x.shape), bend, np.ascontiguousarray(S))
+        self.rays = (x, p, b.reshape(x.shape), np.ascontiguousarray(lanes[..., lane.ACROSS]), np.ascontiguousarray(S))
         self.states, self.apart = states[:, :count], 2 * np.pi / rays
         spans = -(-(count - 1) // SPAN)
         self.balls = np.empty((rays, spans, 3)), np.empty((rays, spans))
@@ -94,23 +93,35 @@ class PortBeams:
         """Largest angle, radians, by which a ray turns along a length a."""
         return self.a * sharpest_curvature(body)
 
-    def _waves(self, lanes: FloatArray, S: FloatArray, last: FloatArray, order: int) -> ComplexArray:
-        """Wave y along all rays (rays, steps), 1/L^(1/2); 0 where they have ended."""
+    def _waves(self, lanes: FloatArray, S: FloatArray, last: IntArray, order: int) -> tuple[ComplexArray, ComplexArray]:
+        """Logarithm of y, in 1/L^(1/2), along all rays and its slope, 1/L: (rays, steps), (rays, steps).
+
+        By cubic splines of log y √s through every EVERY-th step; behind the end of a ray they stay.
+        """
+        from scipy.interpolate import CubicSpline
+
         from creeping.rays.kernels import port_fans as lane
 
-        def ends(of: int) -> FloatArray:
-            start = np.broadcast_to(lanes[:, :1, of], S.shape)
-            return np.stack([start.ravel(), lanes[..., of].ravel()], axis=1)
+        count = S.shape[1]
+        steps = np.append(np.arange(1, count - 1, EVERY), count - 1)
+        # rays of kappa_n <= 0 at their ports have no wave at all
+        known = np.take_along_axis(lanes, np.clip(steps, 1, np.maximum(last, 1)[:, None])[..., None], axis=1)
+        known = np.where((last > 0)[:, None, None], known, 1.0)
+        s = self.step * np.clip(steps, 1, np.maximum(last, 1)[:, None]).ravel()
 
-        alive = ((S > 0) & (np.arange(S.shape[1]) <= last[:, None])).ravel()
-        known = [ends(of)[alive] for of in (lane.CURVATURE, lane.TORSION, lane.BEND)]
-        integrals = lanes[..., lane.INTEGRALS : lane.INTEGRALS + 4].reshape(-1, 4)[alive]
-        y = np.zeros(S.size, dtype=complex)
-        y[alive] = PathTerms(self.k, S.ravel()[alive], known[0], known[1], known[2], integrals).wave(order)
-        y = y.reshape(S.shape)
+        def ends(of: int) -> FloatArray:
+            start = np.broadcast_to(lanes[:, :1, of], known.shape[:2])
+            return np.stack([start.ravel(), known[..., of].ravel()], axis=1)
+
+        curvature = np.abs(ends(lane.CURVATURE))
+        integrals = known[..., lane.INTEGRALS : lane.INTEGRALS + 4].reshape(-1, 4)
+        y = PathTerms(self.k, s, curvature, ends(lane.TORSION), ends(lane.BEND), integrals).wave(order)
+        y = (np.where(np.abs(y) > 0, y, 1e-300) * np.sqrt(s)).reshape(known.shape[:2])
+        smooth = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y), axis=1)
+        curve = CubicSpline(steps * self.step, smooth, axis=1)
         # at the port itself y is infinite; beams begin behind it
-        y[:, 0] = y[:, 1]
-        return y
+        at = self.step * np.maximum(np.arange(count), 1)
+        return curve(at) - 0.5 * np.log(at), curve(at, 1) - 0.5 / at
 
     def sums(self, points: FloatArray, beyond: float) -> tuple[ComplexArray, ComplexArray]:
         """Sums at points (n, 3) by feet farther along than ``beyond``, L, for both ε: (n,), (n,), 1/L."""
@@ -118,7 +129,7 @@ class PortBeams:
 
         found = []
         for factor in (1.0, OTHER):
-            eps = WIDTH / self.a * factor
+            eps = WIDTH * self.a * factor
             q = self.states[..., 8] - 1j * eps * self.states[..., 6]
             rate = self.states[..., 9] - 1j * eps * self.states[..., 7]
             weight = 0.5 * np.log(self.k * eps / (2 * np.pi)) + np.log(self.apart)

@@ -26,12 +26,14 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.shed_wave import SECOND_ORDER, limited, smoothstep
-from creeping.field.special.airy import hard_modes
+from creeping.field.special.airy import MODES, hard_modes
 from creeping.field.special.coupling_function import coupling_function
 from creeping.rays.port_rays import PortRays
 
 LIMIT = 0.5
 """Bound of what second order adds at small ξ, and along the body, as a share of the wave."""
+DEEP, FEW = 2.5, 4
+"""ξ beyond which so few modes do, to 1e-6."""
 
 
 class PathTerms:
@@ -77,7 +79,8 @@ class PathTerms:
         early, late = np.flatnonzero(weight < 1), np.flatnonzero(weight > 0)
         change = np.zeros_like(plain)
         change[early] = (1 - weight[early]) * limited(self._early(early, plain[early]), LIMIT * np.abs(plain[early]))
-        change[late] += weight[late] * self._late(late)
+        for some, count in ((late[self.xi[late] <= DEEP], MODES), (late[self.xi[late] > DEEP], FEW)):
+            change[some] += weight[some] * self._late(some, count)
         return np.asarray(self.factor * (plain + change))
 
     def _early(self, some: IntArray, plain: ComplexArray) -> ComplexArray:
@@ -86,9 +89,9 @@ class PathTerms:
         total = 1j * E * coupling_function(xi, 2) + L * coupling_function(xi, 1) + 1j * P / xi * plain
         return np.asarray(total - H / xi * coupling_function(xi, squared=True))
 
-    def _late(self, some: IntArray) -> ComplexArray:
-        """What second order adds, by modes."""
-        tau = hard_modes().tau
+    def _late(self, some: IntArray, count: int) -> ComplexArray:
+        """What second order adds, by so many modes."""
+        tau = hard_modes(count).tau
         xi, E, H, L, P = (values[some, None] for values in (self.xi, self.E, self.H, self.L, self.P))
         leading = 1j * xi * tau
         small = 1 / self.square[some, None]

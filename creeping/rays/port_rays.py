@@ -64,8 +64,8 @@ class PortRays:
     error : (m,), L
         Of the arclength, by polynomials of lower degree.
     folds, ended : (n, n), L^(1/3)
-        Least A at which rays merge close to a port, and of rays that pass close to it after kappa_n has fallen to 0, from
-        the lower number; inf where none do.
+        Least A at which rays merge close to a port, and of rays that pass close to it after kappa_n has fallen to 0,
+        from the lower number; inf where none do.
     """
 
     body: Surface
@@ -178,7 +178,9 @@ def traced_fans(body: Surface, ports: FloatArray, normals: FloatArray, rays: int
 def _boxes(ports: FloatArray) -> tuple[IntArray, FloatArray, float, IntArray, IntArray]:
     """Boxes of ports: numbers along the axes, a corner, the edge, the first member of each, and the members."""
     low, high = ports.min(axis=0), ports.max(axis=0)
-    edge = max(float(np.max(high - low)) / max(1.0, np.sqrt(len(ports) / 2)), 1e-9 * float(np.max(np.abs(high))), 1e-300)
+    edge = max(
+        float(np.max(high - low)) / max(1.0, np.sqrt(len(ports) / 2)), 1e-9 * float(np.max(np.abs(high))), 1e-300
+    )
     grid = np.maximum(1, np.floor((high - low) / edge).astype(np.int64) + 1)
     place = np.minimum(np.floor((ports - low) / edge).astype(np.int64), grid - 1)
     box = (place[:, 0] * grid[1] + place[:, 1]) * grid[2] + place[:, 2]

@@ -2,7 +2,8 @@
 
 On a sphere of radius a, at angle s from the source, by partial waves
 
-    u = -(1/4πka²) Σ (2n+1) hₙ/hₙ' Pₙ(cos s),   hₙ/hₙ' -> -ka/(n+1),   Σ (2n+1)/(n+1) Pₙ = 1/S - log(1 + 1/S),  S = sin(s/2)
+    u = -(1/4πka²) Σ (2n+1) hₙ/hₙ' Pₙ(cos s),   hₙ/hₙ' -> -ka/(n+1)
+    Σ (2n+1)/(n+1) Pₙ = 1/S - log(1 + 1/S),   S = sin(s/2)
 
 the limit summed in closed form, the rest with its terms faded out; hₙ/hₙ₋₁ is climbed by its recurrence.
 
@@ -149,7 +150,7 @@ def _fitted(
     waves = np.stack([_boundary_kernel(Cloud(fit.points * g, fit.normals * g), z, k, 0.0, 1.0) for g in group])
     classes = []
     for signs in characters:
-        matrix = np.asarray(sum(sign * block for sign, block in zip(signs, blocks, strict=True)))
+        matrix = np.tensordot(signs.astype(complex), np.stack(blocks), axes=1)
         classes.append(least_squares(matrix, -np.tensordot(signs, waves, axes=1) / len(group)))
     strengths = np.concatenate([np.tensordot(signs, np.stack(classes), axes=1) for signs in characters.T])
     return strengths, np.concatenate([y * g for g in group]), group

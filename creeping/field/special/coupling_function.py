@@ -3,7 +3,7 @@
     V(ξ) = (1/2) e^{-iπ/4} √(ξ/π) ∫ R e^{iξt} dt = e^{iπ/4} √(πξ) Σ_p e^{iξτ_p}/τ_p,   R = w₁/w₁',   V(0) = 1
     powers n of t under the integral, (-i d/dξ)^n,   and R² in the place of R
 
-By R' = 1 - tR², R = t^(-1/2) Σ a_n t^(-3n/2), and term by term, since ∫ t^(-μ) e^{iξt} dt = 2π e^{iπ(μ-1)/2} ξ^(μ-1)/Γ(μ),
+By R' = 1 - tR², R = t^(-1/2) Σ a_n t^(-3n/2), and term by term, by Hankel's integral for 1/Γ,
 
     V_n = √π e^{-iπ/4} Σ_j a_j e^{iπμ/2} ξ^(μ-1/2)/Γ(μ),   μ = 1/2 + 3j/2 - n
 
@@ -22,8 +22,8 @@ from creeping.field.special.airy import hard_modes
 
 SERIES, TERMS = 1.5, 40
 """ξ up to which the series in powers of ξ^(3/2) serves, and its terms: good to 1e-13 there."""
-MODES = 16
-"""Modes summed beyond: good to 1e-10."""
+MODES, DEEP, FEW = 16, 4.0, 5
+"""Modes summed beyond, to 1e-10, and from DEEP on."""
 
 
 @cache
@@ -51,7 +51,7 @@ def coupling_function(xi: FloatArray, power: int = 0, *, squared: bool = False) 
     Examples
     --------
     >>> complex(coupling_function(np.array(1.0)).round(6))
-    (0.567303+0.319567j)
+    (0.699914+0.213383j)
     """
     xi = np.asarray(xi, dtype=float)
     out = np.empty(xi.shape, dtype=complex)
@@ -59,8 +59,10 @@ def coupling_function(xi: FloatArray, power: int = 0, *, squared: bool = False) 
     near = xi[small]
     shift = np.sqrt(near) if squared else near ** (-float(power))
     out[small] = shift * np.polynomial.polynomial.polyval(near**1.5, _series_terms(power, squared))
-    far, tau = xi[~small, None], hard_modes(MODES).tau
-    residues = (1j * far - 1 / tau) / tau**2 if squared else tau ** (power - 1)
-    total = np.sum(residues * np.exp(1j * far * tau), axis=-1)
-    out[~small] = np.exp(0.25j * np.pi) * np.sqrt(np.pi * xi[~small]) * total
+    deep = xi > DEEP
+    for some, count in ((~small & ~deep, MODES), (deep, FEW)):
+        far, tau = xi[some, None], hard_modes(count).tau
+        residues = (1j * far - 1 / tau) / tau**2 if squared else tau ** (power - 1)
+        total = np.sum(residues * np.exp(1j * far * tau), axis=-1)
+        out[some] = np.exp(0.25j * np.pi) * np.sqrt(np.pi * xi[some]) * total
     return out

@@ -1,9 +1,10 @@
 """Compiled fans of geodesics from ports: what is carried along them, and where they pass other ports.
 
-Rays m = 0 ... R - 1 leave at angles 2 pi m/R and are known at arclengths s = k h, k = -BEHIND ... Behind its port a ray is
-the opposite one, run backwards. Between the nodes everything is a polynomial of degree 5 in angle and in s.
+Rays m = 0 ... R - 1 leave at angles 2 pi m/R and are known at arclengths s = k h, k = -BEHIND ... Behind its port a
+ray is the opposite one, run backwards. Between the nodes everything is a polynomial of degree 5 in angle and in s.
 
-    A = int kappa^(2/3) ds,   A_theta = int (2/3) kappa^(-1/3) (J2 T' + 2 J2' T) ds,   g = kappa^(1/3) A_theta/J2
+    A = int kappa^(2/3) ds,   A_theta = int (2/3) kappa^(-1/3) (J2 T' + 2 J2' T) ds
+    g = kappa^(1/3) A_theta/J2
     int kappa^(4/3) [1/60 - (2/45) B - rho^2 (g^2/4 - (2/3) g T + (2/5) T^2)] ds
     int kappa^(4/3) [1/10 + r/4 - B/60 - (3/20) rho^2 T^2] ds
     int kappa^(2/3) [-1/12 + r/3 - (5/18) rho^2 T^2] ds
@@ -27,9 +28,9 @@ BEHIND, AHEAD = 2, 3
 """Nodes that polynomials take before and behind an interval."""
 GUARD = 7
 """Steps traced beyond the last interval: three for its polynomial, one for each integral, two for derivatives."""
-X, SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS = 0, 6, 7, 8, 9, 10, 11, 12, 13
-"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, and four integrals."""
-LANES = 17
+SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS, ACROSS = 6, 7, 8, 9, 10, 11, 12, 13, 17
+"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, four integrals, kappa_t."""
+LANES = 18
 START = 3
 """Of the port itself: kappa, T and B."""
 STEEPEST, SHARPEST, TURNED = 4.0, 20.0, 1.5
@@ -80,7 +81,9 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
         line = lanes[ray]
         last[ray] = count - 1
         for k in range(count + 2):
-            _rates(kappa[ray], kappa[opposite], across[ray], torsion[ray], torsion[opposite], states[ray], step, k, rates)
+            _rates(
+                kappa[ray], kappa[opposite], across[ray], torsion[ray], torsion[opposite], states[ray], step, k, rates
+            )
             if not kappa[ray, k] > 0.0 and k <= last[ray]:
                 last[ray] = k - 1
         leaning[0] = 0.0
@@ -96,7 +99,12 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             turned = math.atan2(to[SPREADING], scale * to[RATE])
             before = line[BEHIND + k - 1, ANGLE] if k > 0 else 0.0
             to[ANGLE] = turned + 2 * math.pi * math.floor((before - turned) / (2 * math.pi) + 0.5)
-            to[CURVATURE], to[TORSION], to[BEND] = kappa[ray, k], torsion[ray, k], rates[3, k]
+            to[CURVATURE], to[TORSION], to[BEND], to[ACROSS] = (
+                kappa[ray, k],
+                torsion[ray, k],
+                rates[3, k],
+                across[ray, k],
+            )
             for q in range(4):
                 row = (0, 1, 2, 4)[q]
                 so_far = line[BEHIND + k - 1, INTEGRALS + q] if k > 0 else 0.0
@@ -248,8 +256,8 @@ def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, 
         Least A at which rays merge close to each port, and of those that pass close to it where they have ended; inf at
         first.
     owner, found : (most,), (most, LANES + START + 3)
-        Number of the port, and of each passage the angle in rays, s in steps, the lanes there, those of the port itself,
-        and how far polynomials of degree 3 differ in x, L; past ``most`` only counted.
+        Number of the port, and of each passage the angle in rays, s in steps, the lanes there, those of the port
+        itself, and how far polynomials of degree 3 differ in x, L; past ``most`` only counted.
     """
     rays, count = lanes.shape[0], lanes.shape[1]
     most, total = len(owner), 0
@@ -275,8 +283,8 @@ def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, 
             reach = PAD * radius
             wide = reach + pad if folded and not dead else reach
             for axis in range(3):
-                low[axis] = max(int(math.floor((middle[axis] - wide - origin[axis]) / edge)), 0)
-                high[axis] = min(int(math.floor((middle[axis] + wide - origin[axis]) / edge)), grid[axis] - 1)
+                low[axis] = max(math.floor((middle[axis] - wide - origin[axis]) / edge), 0)
+                high[axis] = min(math.floor((middle[axis] + wide - origin[axis]) / edge), grid[axis] - 1)
             for bx in range(low[0], high[0] + 1):
                 for by in range(low[1], high[1] + 1):
                     for bz in range(low[2], high[2] + 1):
