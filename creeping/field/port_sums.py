@@ -100,7 +100,10 @@ def port_sums(rays: PortRays, k: float, order: int) -> PortSums:
     fine = status == FieldStatus.OK
     with np.errstate(invalid="ignore"):
         status[fine & ~(error <= UNRESOLVED * np.abs(values))] = FieldStatus.UNRESOLVED
-    return PortSums(*(one.reshape(n, n) for one in (values, error, status, method)), waves=waves)
+    shape = n, n
+    return PortSums(
+        values.reshape(shape), error.reshape(shape), status.reshape(shape), np.reshape(method, shape), waves
+    )
 
 
 def _sums(pair: IntArray, waves: ComplexArray, count: int) -> ComplexArray:

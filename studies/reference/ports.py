@@ -150,8 +150,9 @@ def _fitted(
     waves = np.stack([_boundary_kernel(Cloud(fit.points * g, fit.normals * g), z, k, 0.0, 1.0) for g in group])
     classes = []
     for signs in characters:
-        matrix = np.tensordot(signs.astype(complex), np.stack(blocks), axes=1)
-        classes.append(least_squares(matrix, -np.tensordot(signs, waves, axes=1) / len(group)))
+        matrix = np.asarray(sum(sign * block for sign, block in zip(signs, blocks, strict=True)), dtype=complex)
+        right = np.asarray(-np.tensordot(signs, waves, axes=1) / len(group), dtype=complex)
+        classes.append(least_squares(matrix, right))
     strengths = np.concatenate([np.tensordot(signs, np.stack(classes), axes=1) for signs in characters.T])
     return strengths, np.concatenate([y * g for g in group]), group
 

@@ -173,7 +173,7 @@ def test_touchstone_comes_back(count, tmp_path):
 
 
 def test_ellipsoid_against_fundamental_solutions():
-    """Curvature that varies, torsion and r from 0.4 to 2.8; the reference errs by about 1 % at most where it is used."""
+    """Curvature that varies, torsion, r that is not 1; the reference errs by about 1 % at most where it is used."""
     rng, k = np.random.default_rng(7), 14.0
     sources, points = rng.normal(size=(3, 3)), rng.normal(size=(60, 3))
     sources, points = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (sources, points))
