@@ -58,7 +58,7 @@ def ellipsoid_rows(
     found = cr.coupling(sc.Ellipsoid(*axes), np.concatenate([exact.ports, exact.points]), wavenumber=k)
     part = slice(0, sources), slice(sources, None)
     size, off = np.abs(exact.values), np.abs(found.values[part].T - exact.values)
-    error, method, ok = (one[part].T for one in (found.error, found.method, found.ok))
+    error, method, ok = found.error[part].T, found.method[part].T, found.ok[part].T
     known = (exact.spread < GOOD * size) & ok
     rows = []
     for name in ("rays", "beams"):
