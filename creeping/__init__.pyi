@@ -10,6 +10,8 @@ from .errors import ToleranceError as ToleranceError
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
 from .field.comparison import Comparison as Comparison
 from .field.comparison import compare as compare
+from .field.coupling_result import Coupling as Coupling
+from .field.coupling_result import CouplingPaths as CouplingPaths
 from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.echo import Echo as Echo
@@ -21,6 +23,7 @@ from .field.on_body import surface_field as surface_field
 from .field.point_result import FieldStatus as FieldStatus
 from .field.point_result import NearField as NearField
 from .field.point_result import SurfaceField as SurfaceField
+from .field.port_coupling import coupling as coupling
 from .field.slant_range import RangeProfile as RangeProfile
 from .field.slant_range import range_profile as range_profile
 from .field.source_pattern import SourcePattern as SourcePattern

@@ -12,3 +12,4 @@ from .stk import write_stk as write_stk
 from .tables import write_csv as write_csv
 from .tables import write_text as write_text
 from .tables import write_vtp as write_vtp
+from .touchstone import write_touchstone as write_touchstone

@@ -1,0 +1,207 @@
+"""What the coupling of ports is: a matrix of complex values with their error, and the geodesics that gave them.
+
+Sources: Derivations, F25.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._presenting import Shown, brief
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.field.array_result import ArrayResult
+from creeping.field.labelled import power
+from creeping.field.point_result import FieldStatus
+from creeping.geometry.surface import Surface
+from creeping.storage.extras import required
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from creeping.rays.port_rays import PortRays
+
+
+@dataclass(frozen=True, eq=False)
+class CouplingPaths:
+    """Geodesics (m,) from one port to another, the shortest first.
+
+    Attributes
+    ----------
+    arclength : (m,), L
+    departure, arrival : (m, 3)
+        Unit tangents at both ends, along the path.
+    spreading : (m,), L
+        Reduced length J2: by how much geodesics part for an angle at the source; negative beyond an odd number of
+        caustics.
+    fock_parameter : (m,)
+        xi = (k/2)^(1/3) int kappa_n^(2/3) ds.
+    caustics : (m,)
+        Zeros of J2 passed.
+    wave : (m,) complex, 1/L
+        What each contributes; infinite on its caustic.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> paths = cr.coupling(sc.Sphere(), [(0, 0, 1), (1, 0, 0)], wavenumber=30.0).paths(0, 1)
+    >>> len(paths), (paths.departure[0].round(6) + 0.0).tolist(), paths.spreading.round(3).tolist()
+    (2, [1.0, 0.0, 0.0], [1.0, -1.0])
+    """
+
+    arclength: FloatArray
+    departure: FloatArray
+    arrival: FloatArray
+    spreading: FloatArray
+    fock_parameter: FloatArray
+    caustics: IntArray
+    wave: ComplexArray
+
+    def __len__(self) -> int:
+        """Number of geodesics."""
+        return len(self.arclength)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Coupling(ArrayResult, Shown):
+    """Fields between ports on a body, u at port j of a unit source e^{ikr}/(4 pi r) at port i; acts as their matrix.
+
+    Attributes
+    ----------
+    body : Surface
+    ports, normals : (n, 3), L and 1
+    values : (n, n) complex, 1/L
+        Symmetric; infinite on the diagonal, where source and receiver are one.
+    error : (n, n), 1/L
+        Of the values, meant to hold for 95 of 100 whose status is OK; at others a bound.
+    status : (n, n) of int
+        Codes of `FieldStatus`.
+    method : (n, n) of str
+        "rays", or "beams" where these merge; "none" on the diagonal.
+    wavenumber : float, 1/L
+    boundary : str
+    order : int
+    length : float, L
+        Up to which geodesics were followed.
+    length_unit : str
+        "m" where the body knows it, else "L".
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> found = cr.coupling(sc.Sphere(), [(0, 0, 1), (1, 0, 0), (0, 0.6, -0.8)], wavenumber=30.0)
+    >>> found.shape, bool(found[0, 1] == found[1, 0]), found.status_counts
+    ((3, 3), True, {'OK': 6, 'CAUSTIC': 3})
+    >>> paths = found.paths(0, 1)                               # a quarter of a great circle, and the way round
+    >>> paths.arclength.round(3).tolist(), paths.caustics.tolist()
+    ([1.571, 4.712], [0, 1])
+    """
+
+    body: Surface
+    ports: FloatArray
+    normals: FloatArray
+    values: ComplexArray
+    error: FloatArray
+    status: IntArray
+    method: np.ndarray[Any, np.dtype[np.str_]]
+    wavenumber: float
+    boundary: str
+    order: int
+    length: float
+    length_unit: str
+    _rays: PortRays
+    _waves: ComplexArray
+
+    @property
+    def ok(self) -> BoolArray:
+        """Where the status is OK (n, n)."""
+        return np.asarray(self.status == FieldStatus.OK)
+
+    @property
+    def status_counts(self) -> dict[str, int]:
+        """Number of entries of each status that occurs, by name."""
+        return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
+
+    def paths(self, source: int, receiver: int) -> CouplingPaths:
+        """Geodesics from one port to another, and what each contributes.
+
+        Parameters
+        ----------
+        source, receiver : int
+            Numbers of the ports.
+
+        Returns
+        -------
+        CouplingPaths
+            Of lengths in L and unit directions; empty for a port and itself.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no such port.
+        """
+        count = len(self.ports)
+        for number in (source, receiver):
+            if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < count:
+                raise InvalidInputError(f"port {number!r} is not one of the ports 0 to {count - 1}")
+        rays, one, other = self._rays, min(source, receiver), max(source, receiver)
+        begin, end = np.searchsorted(rays.first * count + rays.second, [one * count + other, one * count + other + 1])
+        mine = slice(int(begin), int(end))
+        departure, arrival = rays.directions[mine, 0], rays.directions[mine, 1]
+        if source > receiver:
+            departure, arrival = -arrival, -departure
+        return CouplingPaths(
+            arclength=rays.arclength[mine],
+            departure=departure,
+            arrival=arrival,
+            spreading=rays.spreading[mine],
+            fock_parameter=np.cbrt(self.wavenumber / 2) * rays.integrals[mine, 0],
+            caustics=rays.caustics[mine],
+            wave=self._waves[mine],
+        )
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Values, error, status and method with names, by source and receiver: an ``xarray.Dataset``."""
+        library = required("xarray", use="labelled results need", extra="sweep")
+        dims = ("source", "receiver")
+        inverse = {"units": power(self.length_unit, -1)}
+        coordinates: dict[str, Any] = {name: ((name,), np.arange(len(self.ports))) for name in dims}
+        coordinates["axis"] = (("axis",), ["x", "y", "z"])
+        coordinates["wavenumber"] = ((), self.wavenumber, {**inverse, "long_name": "k"})
+        variables: dict[str, Any] = {
+            "total": (dims, self.values, {**inverse, "long_name": "u of a unit source e^{ikr}/(4 pi r)"}),
+            "error": (dims, self.error, inverse),
+            "status": (dims, self.status, {"long_name": "code of FieldStatus"}),
+            "method": (dims, self.method, {"long_name": "what served"}),
+            "port": (("source", "axis"), self.ports, {"units": self.length_unit}),
+        }
+        words = {"boundary": self.boundary, "order": self.order, "conventions": "time factor exp(-i omega t)"}
+        found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+        return found
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """The same as a ``pandas.DataFrame``, one row an entry."""
+        return self.to_xarray().drop_vars("port").drop_dims("axis", errors="ignore").to_dataframe()
+
+    def __repr__(self) -> str:
+        names, counts = np.unique(self.method[~np.eye(len(self.ports), dtype=bool)], return_counts=True)
+        served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
+        states = ", ".join(f"{n} {name}" for name, n in self.status_counts.items())
+        good = self.ok & np.isfinite(self.values)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = self.error[good] / np.abs(self.values[good])
+        error = f", error {np.median(share):.2g} of it in the median" if share.size else ""
+        return (
+            f"Coupling({len(self.ports)} ports, k = {self.wavenumber:g}, {self.boundary}, order {self.order}, "
+            f"on {brief(self.body)})\n"
+            f"  {served or 'none'}; {states or 'no status'}\n"
+            f"  {len(self._rays)} geodesics up to {self.length:.4g} {self.length_unit}; where OK up to "
+            f"{np.max(np.abs(self.values[good]), initial=0.0):.4g} {power(self.length_unit, -1)}{error}"
+        )

@@ -1,0 +1,96 @@
+"""Couplings of ports over frequency as a Touchstone file, for programs that read N-port data.
+
+    h_ij = 2 pi r0 u_ij,   u of a source e^{ikr}/(4 pi r) on the body
+
+the field at port i of a source at port j, in units of what that source gives at a distance r0 along a hard plane, that
+is 1/(2 pi r0). It is written as S_ij: a transfer ratio without unit, not a scattering parameter: nothing is known
+of what ports reflect, S_ii is 0, and columns are not bounded by 1. Numbers are conjugated, for e^{+jwt}.
+
+Sources: Derivations, F25.
+"""
+
+import os
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from creeping._typing import ComplexArray
+from creeping.errors import InvalidInputError
+from creeping.field.coupling_result import Coupling
+from creeping.field.frequency import frequency
+from creeping.geometry.arguments import positive_number
+from creeping.storage.atomic import written_aside
+
+ACROSS = 4
+"""Pairs of numbers on a line, as the format asks for."""
+
+
+def write_touchstone(
+    path: str | os.PathLike[str],
+    couplings: Sequence[Coupling],
+    *,
+    reference_distance: float,
+    sound_speed: float | None = None,
+) -> None:
+    """Write couplings of the same ports at ascending wavenumbers as Touchstone, version 1.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write, by custom of suffix .sNp for N ports; replaced at once when complete.
+    couplings : sequence of Coupling
+        One for each wavenumber.
+    reference_distance : float, L
+        r0 of the transfer ratio.
+    sound_speed : float, optional, m/s
+        For the frequency of a wavenumber; that of light if not given.
+
+    Raises
+    ------
+    InvalidInputError
+        If couplings are of different ports or not in order.
+    CreepingError
+        If the file cannot be written.
+    """
+    unit = positive_number(reference_distance, "reference_distance")
+    given = list(couplings)
+    if not given or not all(isinstance(one, Coupling) for one in given):
+        raise InvalidInputError(
+            "couplings has none in it, or more than results of creeping.coupling; give a list of them"
+        )
+    ports = given[0].ports
+    strangers = [n for n, one in enumerate(given) if one.ports.shape != ports.shape or np.any(one.ports != ports)]
+    if strangers:
+        raise InvalidInputError(
+            f"{len(strangers)} of {len(given)} couplings are of other ports (first: number {strangers[0]}); write one "
+            "file for each set"
+        )
+    k = np.array([one.wavenumber for one in given])
+    if np.any(np.diff(k) <= 0):
+        raise InvalidInputError(f"wavenumbers {k.tolist()} do not ascend; sort the couplings by them")
+    hertz = frequency(k, sound_speed=sound_speed)
+    with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+        stream.write(f"! creeping: couplings of {len(ports)} ports on a hard body, as transfer ratios 2 pi r0 u\n")
+        stream.write(
+            f"! r0 = {unit!r} {given[0].length_unit}; no scattering parameters: S_ii is not known, and 0 here\n"
+        )
+        for number, port in enumerate(ports.tolist()):
+            stream.write(f"! port {number + 1} at {' '.join(map(repr, port))} {given[0].length_unit}\n")
+        bad = sum(int(np.sum(np.triu(~one.ok, 1))) for one in given)
+        if bad:
+            stream.write(f"! {bad} pairs of ports at some frequency have a status that is not OK\n")
+        stream.write("# HZ S RI R 1\n")
+        for at, one in zip(np.asarray(hertz).tolist(), given, strict=True):
+            stream.writelines(_lines(at, 2 * np.pi * unit, one.values))
+
+
+def _lines(hertz: float, factor: float, values: ComplexArray) -> Iterable[str]:
+    """Lines of one frequency; of two ports, column by column on one line, as version 1 has it."""
+    h = factor * np.conj(np.where(np.isfinite(values), values, 0.0))
+    rows = [h.T.ravel()] if len(h) == 2 else list(h)
+    first = True
+    for row in rows:
+        for begin in range(0, len(row), ACROSS):
+            pairs = " ".join(f"{z.real!r} {z.imag!r}" for z in row[begin : begin + ACROSS].tolist())
+            yield f"{hertz!r} {pairs}\n" if first else f"  {pairs}\n"
+            first = False

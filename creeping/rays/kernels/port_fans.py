@@ -1,0 +1,366 @@
+"""Compiled fans of geodesics from ports: what is carried along them, and where they pass other ports.
+
+Rays m = 0 ... R - 1 leave at angles 2 pi m/R and are known at arclengths s = k h, k = -BEHIND ... Behind its port a
+ray is the opposite one, run backwards. Between the nodes everything is a polynomial of degree 5 in angle and in s.
+
+    A = int kappa^(2/3) ds,   A_theta = int (2/3) kappa^(-1/3) (J2 T' + 2 J2' T) ds
+    g = kappa^(1/3) A_theta/J2
+    int kappa^(4/3) [1/60 - (2/45) B - rho^2 (g^2/4 - (2/3) g T + (2/5) T^2)] ds
+    int kappa^(4/3) [1/10 + r/4 - B/60 - (3/20) rho^2 T^2] ds
+    int kappa^(2/3) [-1/12 + r/3 - (5/18) rho^2 T^2] ds
+
+with T = b.Hp/|grad F|, b = n x p, r = rho kappa_t, B = rho rho'' - (2/3) rho'^2. A_theta is the change of A with the
+direction of launch; T' = d/ds T is by Codazzi the change of kappa across the ray.
+
+Sources: [C76]; Derivations, R1 and F25.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from creeping.kernels.block import copy
+from creeping.kernels.block import strict_options as options
+from creeping.kernels.curvature import second_form
+
+BEHIND, AHEAD = 2, 3
+"""Nodes that polynomials take before and behind an interval."""
+GUARD = 7
+"""Steps traced beyond the last interval: three for its polynomial, one for each integral, two for derivatives."""
+SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS, ACROSS = 6, 7, 8, 9, 10, 11, 12, 13, 17
+"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, four integrals, kappa_t."""
+LANES = 18
+START = 3
+"""Of the port itself: kappa, T and B."""
+STEEPEST, SHARPEST, TURNED = 4.0, 20.0, 1.5
+"""Bounds of |rho'|, of |rho rho''| and |B|, and of rho |g|: beyond, the expansion has no meaning."""
+NODES = BEHIND + AHEAD + 1
+TRIES, CLOSE = 12, 1e-11
+"""Newton steps, and the last one of them in cells."""
+PAD = 1.3
+"""Radius of a cell, in those of the ball through its corners."""
+
+
+@njit(**options)
+def port_fan(level, level_par, step, scale, squares, states, lanes, last):
+    """Fill lanes (R, K, LANES) of a port's fan, and the last node (R,) up to which kappa > 0 on each ray.
+
+    Parameters
+    ----------
+    step, scale : float, L
+        h, and the unit of length in the angle phi.
+    squares : float
+        Factor of the term in g^2: 1, or 0 where sums over neighbouring rays bring it in.
+    states : (R, J, 10)
+        x, p and M of each ray at s = 0, h, 2h ...; R is even, and K = J + BEHIND - 4.
+    """
+    rays, J = states.shape[0], states.shape[1]
+    half, count = rays // 2, J - 4
+    x, g = np.empty((3, J)), np.empty((10, J))
+    kappa, across, torsion = np.empty((rays, J)), np.empty((rays, J)), np.empty((rays, J))
+    for ray in range(rays):
+        for k in range(J):
+            for axis in range(3):
+                x[axis, k] = states[ray, k, axis]
+        level(x, g[0], g[1:4], g[4:], level_par)
+        for k in range(J):
+            px, py, pz = states[ray, k, 3], states[ray, k, 4], states[ray, k, 5]
+            inverse = 1.0 / math.sqrt(g[1, k] ** 2 + g[2, k] ** 2 + g[3, k] ** 2)
+            nx, ny, nz = g[1, k] * inverse, g[2, k] * inverse, g[3, k] * inverse
+            bx, by, bz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
+            xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
+            kappa[ray, k] = second_form(px, py, pz, xx, yy, zz, yz, xz, xy) * inverse
+            across[ray, k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
+            hx, hy, hz = xx * px + xy * py + xz * pz, xy * px + yy * py + yz * pz, xz * px + yz * py + zz * pz
+            torsion[ray, k] = (hx * bx + hy * by + hz * bz) * inverse
+    rates = np.empty((5, J))
+    leaning = np.empty(J)
+    for ray in range(rays):
+        opposite = (ray + half) % rays
+        line = lanes[ray]
+        last[ray] = count - 1
+        for k in range(count + 2):
+            _rates(
+                kappa[ray], kappa[opposite], across[ray], torsion[ray], torsion[opposite], states[ray], step, k, rates
+            )
+            if not kappa[ray, k] > 0.0 and k <= last[ray]:
+                last[ray] = k - 1
+        leaning[0] = 0.0
+        for k in range(count):
+            leaning[k + 1] = leaning[k] + _stretch(rates, 4, k, step, k > 0)
+        for k in range(count + 1):
+            _add_torsion(kappa[ray, k], torsion[ray, k], leaning[k], states[ray, k, 8], squares, k, rates)
+        for k in range(count):
+            to = line[BEHIND + k]
+            for axis in range(6):
+                to[axis] = states[ray, k, axis]
+            to[SPREADING], to[RATE], to[BACK] = states[ray, k, 8], states[ray, k, 9], states[ray, k, 6]
+            turned = math.atan2(to[SPREADING], scale * to[RATE])
+            before = line[BEHIND + k - 1, ANGLE] if k > 0 else 0.0
+            to[ANGLE] = turned + 2 * math.pi * math.floor((before - turned) / (2 * math.pi) + 0.5)
+            to[CURVATURE], to[TORSION], to[BEND], to[ACROSS] = (
+                kappa[ray, k],
+                torsion[ray, k],
+                rates[3, k],
+                across[ray, k],
+            )
+            for q in range(4):
+                row = (0, 1, 2, 4)[q]
+                so_far = line[BEHIND + k - 1, INTEGRALS + q] if k > 0 else 0.0
+                to[INTEGRALS + q] = so_far + (_stretch(rates, row, k - 1, step, k > 1) if k > 0 else 0.0)
+    for ray in range(rays):
+        opposite = lanes[(ray + half) % rays]
+        for k in range(1, BEHIND + 1):
+            to, source = lanes[ray, BEHIND - k], opposite[BEHIND + k]
+            copy(source, to)
+            for lane in range(3, 6):
+                to[lane] = -source[lane]
+            to[SPREADING], to[ANGLE] = -source[SPREADING], -source[ANGLE]
+            for q in range(4):
+                to[INTEGRALS + q] = -source[INTEGRALS + q]
+
+
+@njit(**options)
+def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, rates):
+    """Integrands at node k: of A, of both exponents without g, B, and of A_theta in row 4."""
+    before, behind = kappa[k - 1] if k > 0 else kappa_back[1], kappa[k - 2] if k > 1 else kappa_back[2 - k]
+    slope = (8 * (kappa[k + 1] - before) - (kappa[k + 2] - behind)) / (12 * step)
+    bend = (16 * (kappa[k + 1] + before) - 30 * kappa[k] - kappa[k + 2] - behind) / (12 * step * step)
+    before, behind = torsion[k - 1] if k > 0 else torsion_back[1], torsion[k - 2] if k > 1 else torsion_back[2 - k]
+    twist = (8 * (torsion[k + 1] - before) - (torsion[k + 2] - behind)) / (12 * step)
+    if not kappa[k] > 0.0:
+        for row in range(5):
+            rates[row, k] = 0.0
+        return
+    rho = 1.0 / kappa[k]
+    rate = min(max(-slope * rho * rho, -STEEPEST), STEEPEST)
+    varies = min(max(-bend * rho**3 + 2 * (slope * rho * rho) ** 2, -SHARPEST), SHARPEST)
+    varies = min(max(varies - 2 / 3 * rate * rate, -SHARPEST), SHARPEST)
+    root = kappa[k] ** (1 / 3)
+    t = (torsion[k] * rho) ** 2
+    rates[0, k] = root * root
+    rates[1, k] = root**4 * (1 / 60 - 2 / 45 * varies)
+    rates[2, k] = root**4 * (0.1 + 0.25 * across[k] * rho - varies / 60 - 0.15 * t)
+    rates[3, k] = varies
+    rates[4, k] = 2 / 3 / root * (states[k, 8] * twist + 2 * states[k, 9] * torsion[k])
+
+
+@njit(**options)
+def _add_torsion(kappa, torsion, leaning, spreading, squares, k, rates):
+    """Complete the first exponent's integrand by g, and put that of the spreading's change into row 4."""
+    if not kappa > 0.0:
+        rates[4, k] = 0.0
+        return
+    root, rho = kappa ** (1 / 3), 1.0 / kappa
+    g = 4 / 3 * torsion
+    if k > 0 and spreading != 0.0:
+        g = root * leaning / spreading
+    g = min(max(g, -TURNED * kappa), TURNED * kappa)
+    rates[1, k] -= root**4 * rho * rho * (0.25 * squares * g * g - 2 / 3 * g * torsion + 0.4 * torsion * torsion)
+    t = (torsion * rho) ** 2
+    # r from the second exponent's integrand
+    r = 4 * (rates[2, k] / root**4 - 0.1 + rates[3, k] / 60 + 0.15 * t)
+    rates[4, k] = root * root * (r / 3 - 1 / 12 - 5 / 18 * t)
+
+
+@njit(**options)
+def _stretch(rates, row, k, step, central):
+    """Integral of a row over the step from node k on."""
+    if central:
+        f0, f1, f2, f3 = rates[row, k - 1], rates[row, k], rates[row, k + 1], rates[row, k + 2]
+        return step / 24 * (13 * (f1 + f2) - f0 - f3)
+    f0, f1, f2 = rates[row, k], rates[row, k + 1], rates[row, k + 2]
+    return step / 12 * (5 * f0 + 8 * f1 - f2)
+
+
+@njit(**options)
+def _weights(u, value, slope):
+    """Lagrange weights of NODES places -BEHIND ... AHEAD at u, and their derivatives."""
+    for j in range(NODES):
+        product, total = 1.0, 0.0
+        for i in range(NODES):
+            if i != j:
+                part = 1.0
+                for q in range(NODES):
+                    if q != j:
+                        part *= (1.0 if q == i else u - (q - BEHIND)) / (j - q)
+                total += part
+                product *= (u - (i - BEHIND)) / (j - i)
+        value[j], slope[j] = product, total
+
+
+@njit(**options)
+def _point(lanes, m, k, w, point, along, aside):
+    """x and its derivatives in s and angle, in cells, by weights w (4, NODES) of angle and s, around cell (m, k)."""
+    rays = lanes.shape[0]
+    for axis in range(3):
+        point[axis] = along[axis] = aside[axis] = 0.0
+    for i in range(NODES):
+        ray = lanes[(m + i - BEHIND) % rays]
+        for axis in range(3):
+            value = rate = 0.0
+            for j in range(NODES):
+                value += w[2, j] * ray[k + j, axis]
+                rate += w[3, j] * ray[k + j, axis]
+            point[axis] += w[0, i] * value
+            along[axis] += w[0, i] * rate
+            aside[axis] += w[1, i] * value
+
+
+@njit(**options)
+def _refined(lanes, m, k, target, place, w, work):
+    """Newton's method for x(angle, s) = target from the place (2,), in cells from node (m, k); returns success."""
+    point, along, aside = work[0], work[1], work[2]
+    for _ in range(TRIES):
+        if not (abs(place[0] - 0.5) < 1.5 and abs(place[1] - 0.5) < 1.5):
+            return False
+        _weights(place[0], w[0], w[1])
+        _weights(place[1], w[2], w[3])
+        _point(lanes, m, k, w, point, along, aside)
+        aa = ab = bb = ea = eb = 0.0
+        for axis in range(3):
+            e = target[axis] - point[axis]
+            aa += aside[axis] * aside[axis]
+            ab += aside[axis] * along[axis]
+            bb += along[axis] * along[axis]
+            ea += e * aside[axis]
+            eb += e * along[axis]
+        det = aa * bb - ab * ab
+        if not det > 0.0:
+            return False
+        first, second = (bb * ea - ab * eb) / det, (aa * eb - ab * ea) / det
+        longest = max(abs(first), abs(second))
+        if longest > 0.7:
+            first, second = 0.7 * first / longest, 0.7 * second / longest
+        place[0] += first
+        place[1] += second
+        if longest < CLOSE:
+            return True
+    return False
+
+
+@njit(**options)
+def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, folds, owner, found):
+    """Where the fan passes ports (n, 3) of numbers above ``after``; returns how many passages there are.
+
+    Parameters
+    ----------
+    lanes, last
+        Of `port_fan`.
+    grid, origin, edge, starts, members
+        Boxes of ports: numbers along the axes (3,), a corner, L, their edge, L, the first member of each, the members.
+    pad : float, L
+        How far from where rays merge a port counts as close to it.
+    folds : (2, n)
+        Least A at which rays merge close to each port, and of those that pass close to it where they have ended; inf at
+        first.
+    owner, found : (most,), (most, LANES + START + 3)
+        Number of the port, and of each passage the angle in rays, s in steps, the lanes there, those of the port
+        itself, and how far polynomials of degree 3 differ in x, L; past ``most`` only counted.
+    """
+    rays, count = lanes.shape[0], lanes.shape[1]
+    most, total = len(owner), 0
+    first, following = np.full(len(ports), -1), np.empty(most, np.int64)
+    w, work, place, target = np.empty((4, NODES)), np.empty((3, 3)), np.empty(2), np.empty(3)
+    middle, low, high = np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
+    for m in range(rays):
+        one, two = lanes[m], lanes[(m + 1) % rays]
+        for k in range(BEHIND, count - AHEAD):
+            radius = 0.0
+            for axis in range(3):
+                middle[axis] = 0.25 * (one[k, axis] + one[k + 1, axis] + two[k, axis] + two[k + 1, axis])
+            for corner in range(4):
+                at = (one[k], one[k + 1], two[k], two[k + 1])[corner]
+                square = 0.0
+                for axis in range(3):
+                    square += (at[axis] - middle[axis]) ** 2
+                radius = max(radius, math.sqrt(square))
+            least = min(min(one[k, 6], one[k + 1, 6]), min(two[k, 6], two[k + 1, 6]))
+            greatest = max(max(one[k, 6], one[k + 1, 6]), max(two[k, 6], two[k + 1, 6]))
+            folded = least < 0.0 < greatest and k > BEHIND
+            dead = k + 1 - BEHIND > min(last[m], last[(m + 1) % rays])
+            reach = PAD * radius
+            wide = reach + pad if folded and not dead else reach
+            for axis in range(3):
+                low[axis] = max(math.floor((middle[axis] - wide - origin[axis]) / edge), 0)
+                high[axis] = min(math.floor((middle[axis] + wide - origin[axis]) / edge), grid[axis] - 1)
+            for bx in range(low[0], high[0] + 1):
+                for by in range(low[1], high[1] + 1):
+                    for bz in range(low[2], high[2] + 1):
+                        box = (bx * grid[1] + by) * grid[2] + bz
+                        for number in range(starts[box], starts[box + 1]):
+                            j = members[number]
+                            if j <= after:
+                                continue
+                            square = 0.0
+                            for axis in range(3):
+                                target[axis] = ports[j, axis]
+                                square += (target[axis] - middle[axis]) ** 2
+                            if square > wide * wide:
+                                continue
+                            if dead:
+                                folds[1, j] = min(folds[1, j], one[k, INTEGRALS])
+                                continue
+                            if folded:
+                                folds[0, j] = min(folds[0, j], one[k, INTEGRALS])
+                            if square > reach * reach:
+                                continue
+                            for start in range(4 if folded else 1):
+                                place[0], place[1] = (start % 2) * 1.0, (start // 2) * 1.0
+                                if not folded:
+                                    place[0] = place[1] = 0.5
+                                if not _refined(lanes, m, k - BEHIND, target, place, w, work):
+                                    continue
+                                if not (-1e-6 < place[0] < 1 + 1e-6 and -1e-6 < place[1] < 1 + 1e-6):
+                                    continue
+                                angle, length = m + place[0], k - BEHIND + place[1]
+                                known, other = False, first[j]
+                                while other >= 0:
+                                    turn = abs(found[other, 0] - angle)
+                                    turn = min(turn, rays - turn)
+                                    known |= turn < 1e-4 and abs(found[other, 1] - length) < 1e-4
+                                    other = following[other]
+                                if known:
+                                    continue
+                                if total < most:
+                                    owner[total], following[total], first[j] = j, first[j], total
+                                    found[total, 0], found[total, 1] = angle, length
+                                    _read(lanes, m, k - BEHIND, place, w, found[total, 2:])
+                                total += 1
+    return total
+
+
+@njit(**options)
+def _read(lanes, m, k, place, w, out):
+    """All lanes at a place of cell (m, k), those of the port, and the difference of polynomials."""
+    rays = lanes.shape[0]
+    _weights(place[0], w[0], w[1])
+    _weights(place[1], w[2], w[3])
+    for lane in range(LANES):
+        out[lane] = 0.0
+    for lane in range(LANES, LANES + START):
+        out[lane] = 0.0
+    for i in range(NODES):
+        ray = lanes[(m + i - BEHIND) % rays]
+        for j in range(NODES):
+            weight = w[0, i] * w[2, j]
+            for lane in range(LANES):
+                out[lane] += weight * ray[k + j, lane]
+        for lane in range(START):
+            out[LANES + lane] += w[0, i] * ray[BEHIND, CURVATURE + lane]
+    u, v = place[0], place[1]
+    coarse, four = np.zeros(3), np.empty((2, 4))
+    for row in range(2):
+        z = u if row == 0 else v
+        four[row, 0], four[row, 1] = -z * (z - 1) * (z - 2) / 6, (z + 1) * (z - 1) * (z - 2) / 2
+        four[row, 2], four[row, 3] = -(z + 1) * z * (z - 2) / 2, (z + 1) * z * (z - 1) / 6
+    for i in range(4):
+        ray = lanes[(m + i - 1) % rays]
+        for j in range(4):
+            for axis in range(3):
+                coarse[axis] += four[0, i] * four[1, j] * ray[k + j + 1, axis]
+    square = 0.0
+    for axis in range(3):
+        square += (coarse[axis] - out[axis]) ** 2
+    out[LANES + START] = math.sqrt(square)

@@ -1,0 +1,274 @@
+"""All geodesics between ports on a body: fans from each port, and where they pass the others.
+
+Each fan leaves its port in all directions, with its second Jacobi field J2, J2(0) = 0, J2'(0) = 1; a cell between two
+rays and two steps in which another port may lie is searched by Newton's method on polynomials of degree 5 in angle and
+arclength. Rays from port i to j > i serve both ways, so what is made of them is reciprocal.
+
+Sources: Derivations, R3 and F25.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import FloatArray, IntArray
+from creeping.errors import IntegrationError, SurfaceError
+from creeping.geodesics.attenuation import curvature_values
+from creeping.geodesics.equations import sharpest_curvature
+from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.states import M12, WITH_JACOBI, pack
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.surface import Surface, normal, size
+from creeping.storage.memory import within_budget
+
+RAYS = 96
+"""Rays of a fan, at least;"""
+WIDEST, MOST_RAYS = 0.2, 1536
+"""neighbours part by no more than this, in body sizes, unless there are so many rays."""
+TURN = 0.2
+"""Largest angle by which a ray turns in one step."""
+RTOL = 1e-9
+NODES = 400_000
+"""Nodes of fans that are held at once: 60 MB."""
+PER_PAIR = 3
+"""Geodesics for which there is place at first, for each pair of ports."""
+
+
+@dataclass(frozen=True, eq=False)
+class PortRays:
+    """Geodesics (m,) between n ports, each once, from the lower number to the higher.
+
+    Attributes
+    ----------
+    body : Surface
+    ports, normals : (n, 3), L and 1
+    length : float, L
+        How far fans go.
+    first, second : (m,)
+        Numbers of the ports at both ends.
+    arclength : (m,), L
+    points, directions : (m, 2, 3), L and 1
+        Of both ends; directions are unit tangents, towards the second port.
+    spreading : (m,), L
+        J2, negative beyond an odd number of caustics.
+    rates : (m, 2)
+        Its slopes at both ends, as seen from the other.
+    caustics : (m,)
+        Zeros of J2 passed.
+    curvature, torsion : (m, 2), 1/L
+        kappa_n and p.Hb/|grad F| at both ends.
+    bend : (m, 2)
+        rho rho'' - (2/3) rho'^2 at both ends.
+    integrals : (m, 4), L^(1/3), L^(-1/3), L^(-1/3), L^(1/3)
+        Of A and of the second order; see `creeping.rays.kernels.port_fans`.
+    error : (m,), L
+        Of the arclength, by polynomials of lower degree.
+    folds, ended : (n, n), L^(1/3)
+        Least A at which rays merge close to a port, and of rays that pass close to it after kappa_n has fallen to 0,
+        from the lower number; inf where none do.
+    """
+
+    body: Surface
+    ports: FloatArray
+    normals: FloatArray
+    length: float
+    first: IntArray
+    second: IntArray
+    arclength: FloatArray
+    points: FloatArray
+    directions: FloatArray
+    spreading: FloatArray
+    rates: FloatArray
+    caustics: IntArray
+    curvature: FloatArray
+    torsion: FloatArray
+    bend: FloatArray
+    integrals: FloatArray
+    error: FloatArray
+    folds: FloatArray
+    ended: FloatArray
+
+    def __len__(self) -> int:
+        """Number of geodesics."""
+        return len(self.first)
+
+
+def tangent_frames(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit tangents at each normal, right-handed with it: (n, 3) -> (n, 3), (n, 3)."""
+    least = np.argmin(np.abs(normals), axis=1)
+    one = np.cross(normals, np.eye(3)[least])
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    return one, np.cross(normals, one)
+
+
+def departures(normals: FloatArray, angles: FloatArray) -> FloatArray:
+    """Unit tangents at angles (r,), radians, in the frame of each normal (n, 3): (n, r, 3)."""
+    one, two = tangent_frames(normals)
+    cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    return np.asarray(one[:, None] * cosine + two[:, None] * sine)
+
+
+def rays_between(body: Surface, ports: FloatArray, length: float, *, pad: float = 0.0) -> PortRays:
+    """All geodesics between ports up to a length, along which kappa_n > 0.
+
+    Parameters
+    ----------
+    body : Surface
+        Plain and smooth.
+    ports : (n, 3), L
+        On the body, no two of them the same.
+    length : float, L
+    pad : float, L
+        How far from a caustic a port counts as close to it.
+
+    Raises
+    ------
+    SurfaceError
+        If rays cannot be traced on the body.
+    """
+    from creeping.rays.kernels.port_fans import GUARD, LANES, START
+
+    normals = normal(body, ports)
+    steps = max(16, int(np.ceil(length * sharpest_curvature(body) / TURN)))
+    times = length / steps * np.arange(steps + GUARD + 1, dtype=float)
+    boxes = _boxes(ports)
+    within_budget(24.0 * PER_PAIR * (LANES + START + 3) * len(ports) ** 2, f"{len(ports)} ports", "ask for fewer")
+    folds = np.full((2, len(ports), len(ports)), np.inf)
+    owners, rows, wide = [], [], []
+    counts = _ray_counts(body, ports, normals, times)
+    for rays in np.unique(counts):
+        mine = np.flatnonzero(counts == rays)
+        some = max(1, NODES // (int(rays) * len(times)))
+        for begin in range(0, len(mine), some):
+            numbers = mine[begin : begin + some]
+            states = traced_fans(body, ports[numbers], normals[numbers], int(rays), times)
+            for number, fan in zip(numbers, states, strict=True):
+                owner, found = _passages(body, fan, times[1], ports, int(number), boxes, pad, folds[:, number])
+                owners.append((np.full(len(owner), number), owner))
+                rows.append(found)
+                wide.append(np.full(len(owner), rays))
+    first, second = (np.concatenate([pair[k] for pair in owners]) for k in range(2))
+    return _assembled(body, ports, normals, length, times[1], first, second, np.concatenate(rows), wide, folds)
+
+
+def _ray_counts(body: Surface, ports: FloatArray, normals: FloatArray, times: FloatArray) -> IntArray:
+    """Even numbers of rays (n,) with which neighbours stay close, powers of 2 times RAYS, by a few rays of each."""
+    few = 16
+    sparse = times[:: max(1, len(times) // 24)]
+    states = traced_fans(body, ports, normals, few, sparse)
+    convex = curvature_values(body, states.reshape(-1, WITH_JACOBI)).reshape(states.shape[:3]) > 0
+    creeps = np.logical_and.accumulate(convex, axis=2)
+    widest = np.max(np.abs(states[..., M12]), axis=(1, 2), where=creeps, initial=0.0)
+    asked = 2 * np.pi * widest / (WIDEST * size(body))
+    factor = 2.0 ** np.ceil(np.log2(np.maximum(asked / RAYS, 1.0)))
+    return np.asarray(np.minimum(RAYS * factor, MOST_RAYS), dtype=np.int64)
+
+
+def traced_fans(body: Surface, ports: FloatArray, normals: FloatArray, rays: int, times: FloatArray) -> FloatArray:
+    """Fans of ports (n, 3) at the times: (n, rays, times, 10)."""
+    directions = departures(normals, 2 * np.pi * np.arange(rays) / rays)
+    points = np.broadcast_to(ports[:, None], directions.shape)
+    try:
+        states = trace_states(body, pack(points, directions, jacobi=True), times, rtol=RTOL)
+    except IntegrationError as error:
+        raise SurfaceError(f"no geodesics between ports on {body!r}: {error}") from error
+    return states.reshape(len(ports), rays, len(times), -1)
+
+
+def _boxes(ports: FloatArray) -> tuple[IntArray, FloatArray, float, IntArray, IntArray]:
+    """Boxes of ports: numbers along the axes, a corner, the edge, the first member of each, and the members."""
+    low, high = ports.min(axis=0), ports.max(axis=0)
+    edge = max(
+        float(np.max(high - low)) / max(1.0, np.sqrt(len(ports) / 2)), 1e-9 * float(np.max(np.abs(high))), 1e-300
+    )
+    grid = np.maximum(1, np.floor((high - low) / edge).astype(np.int64) + 1)
+    place = np.minimum(np.floor((ports - low) / edge).astype(np.int64), grid - 1)
+    box = (place[:, 0] * grid[1] + place[:, 1]) * grid[2] + place[:, 2]
+    members = np.argsort(box, kind="stable")
+    starts = np.searchsorted(box[members], np.arange(int(np.prod(grid)) + 1))
+    return grid, low, edge, starts.astype(np.int64), members.astype(np.int64)
+
+
+def _passages(
+    body: Surface,
+    states: FloatArray,
+    step: float,
+    ports: FloatArray,
+    number: int,
+    boxes: tuple[IntArray, FloatArray, float, IntArray, IntArray],
+    pad: float,
+    folds: FloatArray,
+) -> tuple[IntArray, FloatArray]:
+    """Ports of higher numbers that one fan passes (m,), and what is known there; fills ``folds`` (2, n)."""
+    from creeping.rays.kernels.port_fans import BEHIND, LANES, START, passed, port_fan
+
+    rays, count = states.shape[:2]
+    lanes, last = np.zeros((rays, count - 4 + BEHIND, LANES)), np.zeros(rays, dtype=np.int64)
+    with evaluators(body) as parts:
+        port_fan(parts.level, parts.level_parameters, step, size(body), 1.0, states, lanes, last)
+    most = PER_PAIR * len(ports) + 64
+    while True:
+        owner, found = np.empty(most, dtype=np.int64), np.empty((most, LANES + START + 3))
+        total = passed(lanes, last, ports, number, *boxes, pad, folds, owner, found)
+        if total <= most:
+            return owner[:total], found[:total]
+        most = total
+
+
+def _assembled(
+    body: Surface,
+    ports: FloatArray,
+    normals: FloatArray,
+    length: float,
+    step: float,
+    first: IntArray,
+    second: IntArray,
+    rows: FloatArray,
+    wide: list[IntArray],
+    folds: FloatArray,
+) -> PortRays:
+    """Geodesics in order of pairs and length."""
+    from creeping.rays.kernels import port_fans as lane
+
+    arclength = rows[:, 1] * step
+    order = np.flatnonzero(arclength <= length)
+    order = order[np.lexsort((arclength[order], second[order], first[order]))]
+    first, second, rows, arclength = first[order], second[order], rows[order], arclength[order]
+    angles = 2 * np.pi * rows[:, 0] / np.concatenate(wide)[order]
+    known, start = rows[:, 2 : 2 + lane.LANES], rows[:, 2 + lane.LANES :]
+    one, two = tangent_frames(normals)
+    leaving = one[first] * np.cos(angles)[:, None] + two[first] * np.sin(angles)[:, None]
+    arriving = known[:, 3:6]
+    facing = np.sum(arriving * normals[second], axis=1, keepdims=True)
+    arriving = arriving - facing * normals[second]
+    arriving /= np.linalg.norm(arriving, axis=1, keepdims=True)
+    J2, rate = known[:, lane.SPREADING], known[:, lane.RATE]
+    principal = np.arctan2(J2, size(body) * rate)
+    # J2 > 0 for angles from 0 to pi: whole half turns beyond are zeros
+    principal = np.where(principal < 0, principal + np.pi, principal)
+    caustics = np.maximum(np.rint((known[:, lane.ANGLE] - principal) / np.pi), 0).astype(np.int64)
+
+    def ends(of: int) -> FloatArray:
+        return np.stack([start[:, of - lane.CURVATURE], known[:, of]], axis=1)
+
+    return PortRays(
+        body=body,
+        ports=ports,
+        normals=normals,
+        length=length,
+        first=first,
+        second=second,
+        arclength=arclength,
+        points=ports[np.stack([first, second], axis=1)],
+        directions=np.stack([leaving, arriving], axis=1),
+        spreading=J2,
+        rates=np.stack([known[:, lane.BACK], rate], axis=1),
+        caustics=caustics,
+        curvature=ends(lane.CURVATURE),
+        torsion=ends(lane.TORSION),
+        bend=ends(lane.BEND),
+        integrals=known[:, lane.INTEGRALS : lane.INTEGRALS + 4],
+        error=start[:, lane.START],
+        folds=folds[0],
+        ended=folds[1],
+    )

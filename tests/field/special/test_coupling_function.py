@@ -1,0 +1,38 @@
+"""The coupling function against sums of many modes and the differential equation of its integrand."""
+
+import numpy as np
+import pytest
+
+from creeping.field.special.airy import hard_modes
+from creeping.field.special.coupling_function import DEEP, SERIES, coupling_function
+
+
+@pytest.mark.parametrize("power", [0, 1, 2])
+def test_series_is_the_sum_of_two_hundred_modes(power):
+    xi, tau = np.linspace(0.5, SERIES, 9), hard_modes(200).tau
+    sums = np.exp(1j * xi[:, None] * tau) @ tau ** (power - 1)
+    assert np.allclose(coupling_function(xi, power), np.exp(0.25j * np.pi) * np.sqrt(np.pi * xi) * sums, rtol=1e-11)
+
+
+@pytest.mark.parametrize(("power", "squared"), [(0, False), (1, False), (2, False), (0, True)])
+@pytest.mark.parametrize("seam", [SERIES, DEEP])
+def test_no_jump_where_modes_take_over(power, squared, seam):
+    below, above = coupling_function(np.array([seam, np.nextafter(seam, 9)]), power, squared=squared)
+    assert abs(above - below) < 1e-8 * abs(below)
+
+
+def test_plane_limit_and_first_term():
+    xi = np.array([1e-6, 1e-4])
+    first = 1 - np.sqrt(np.pi) / 4 * np.exp(-0.25j * np.pi) * xi**1.5
+    assert np.allclose(coupling_function(xi), first, rtol=1e-12)
+
+
+@pytest.mark.parametrize("xi", [0.3, 1.2, 2.2])
+def test_squares_obey_riccati(xi):
+    """R' = 1 - t R² under the integral: -iξ W0 = i d/dξ of that of R², of integrals without √ξ."""
+    h = 1e-4
+    at = xi + h * np.array([-2, -1, 1, 2])
+    square = coupling_function(at, squared=True) / np.sqrt(at)
+    slope = (square[0] - 8 * square[1] + 8 * square[2] - square[3]) / (12 * h)
+    # t R² under the integral is -i times the slope; the integral of 1 is zero
+    assert np.isclose(1j * xi * coupling_function(np.array(xi)) / np.sqrt(xi), -1j * slope, rtol=1e-8)
