@@ -2,7 +2,7 @@
 
 The error of lit ground, as a share of u1 and with u2 of second order, is
 
-    [(A |u2/u1 - 1|^2)^2 + (B/m^4)^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
+    [(A |u2/u1 - 1|^2)^2 + (B/(m^4 (1 + G xi^2)))^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
     E = F max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
 
 E is for ground that is flat by the measure of the body's size a: the second order kappa_a/(2kc^3) of optics knows
@@ -28,20 +28,22 @@ from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
 
-SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6}
+SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6, "conductor": 2.0}
 """Factor A of the error on lit ground, by boundary."""
-LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05}
+LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05, "conductor": 0.25}
 """B."""
-VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06}
+FADES = {"soft": 0.0, "hard": 0.0, "impedance": 0.0, "conductor": 1.0}
+"""G: what is left out of a conductor's currents is most where the wave grazes."""
+VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06, "conductor": 0.02}
 """C; an impedance leaves curvature that varies out of its second order."""
-ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15}
+ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15, "conductor": 0.05}
 """D."""
 FLAT, ENDS = 2.0, 0.7
 """1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
 LEFT, UNKNOWN = 2.0, 2.0
 """Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
 reflected wave and its image."""
-AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0}
+AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0, "conductor": 2.5}
 """The factor on dark ground where waves are marched beyond the end of rays."""
 
 
@@ -105,7 +107,7 @@ def lit_error(
         across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
     terms = (
         SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
-        LEAST[kind.kind] / m**4,
+        LEAST[kind.kind] / m**4 / (1 + FADES[kind.kind] * (m * part.cosine) ** 2),
         VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
         ACROSS[kind.kind] * across**2,
         _flat_error(part, k, extent),

@@ -32,12 +32,13 @@ from creeping.rays.shedding import ShedRays
 from creeping.rays.status import RayStatus
 from creeping.rays.strips import Strip
 
-CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25}
+CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25, "conductor": 0.4}
 """A, and B off the body."""
-SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8}
-VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25}
+SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8, "electric hard": 3.0, "conductor": 3.0}
+VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25, "electric hard": 0.15, "conductor": 0.15}
 """C, and B on the body."""
-ACROSS, LEAST_XI = 0.3, 0.7
+ACROSS = {"soft": 0.3, "hard": 0.3, "impedance": 0.3, "electric hard": 0.3, "conductor": 1.1}
+LEAST_XI = 0.7
 """D, and the least xi that the error on the body grows with."""
 MERGING = 0.3
 """P: 5/36 at a fold, 1/4 on the axis of a sphere."""
@@ -90,10 +91,14 @@ def ray_sum(
     own_error: FloatArray,
     wavenumber: float,
     boundary: Boundary,
+    size: FloatArray | None = None,
 ) -> RaySum:
-    """Sum over the rays found (m,) of their waves (m,) or (m, 3), each with its own error, at ``count`` points."""
+    """Sum over the rays found (m,) of their waves (m,) or (m, 3), each with its own error, at ``count`` points.
+
+    Where waves merge they err by shares of ``size`` (m,): of |waves| if it is not given.
+    """
     rays, observer = shed.rays, shed.observer
-    size = magnitude(waves, rays.time)
+    size = magnitude(waves, rays.time) if size is None else size
     values = total_of(waves, observer, count)
     strength = total_of(size, observer, count)
     decay, end = fan_decay(fan, wavenumber, boundary)
@@ -146,7 +151,7 @@ def own_error(
         small, varying = np.mean([[m**-2, (np.abs(bend) + rate**2) / m**2] for m, rate, bend in ends], axis=0)
         if on:
             across = _mean_across(rays, wavenumber)
-            growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS * across**2)
+            growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS[boundary.kind] * across**2)
             growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
             share = np.hypot(SQUARED[boundary.kind] * (change / size) ** 2, growing)
         else:
