@@ -164,7 +164,7 @@ def _judged(
 
 def _wide(values: FloatArray | BoolArray, like: ComplexArray) -> FloatArray:
     """Values (n,) with as many axes as ``like`` (n, ...)."""
-    return np.asarray(values).reshape(-1, *(1,) * (like.ndim - 1))
+    return np.asarray(values, dtype=float).reshape(-1, *(1,) * (like.ndim - 1))
 
 
 def _apart_from_line(fan: RayFan, shed: ShedRays, k: float, count: int) -> tuple[BoolArray, FloatArray]:

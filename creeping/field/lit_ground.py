@@ -34,9 +34,9 @@ LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05, "conductor": 0.25}
 """B."""
 FADES = {"soft": 0.0, "hard": 0.0, "impedance": 0.0, "conductor": 1.0}
 """G: what is left out of a conductor's currents is most where the wave grazes."""
-VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06, "conductor": 0.02}
+VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06, "conductor": 0.05}
 """C; an impedance leaves curvature that varies out of its second order."""
-ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15, "conductor": 0.05}
+ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15, "conductor": 0.2}
 """D."""
 FLAT, ENDS = 2.0, 0.7
 """1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
@@ -107,7 +107,7 @@ def lit_error(
         across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
     terms = (
         SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
-        LEAST[kind.kind] / m**4 / (1 + FADES[kind.kind] * (m * part.cosine) ** 2),
+        LEAST[kind.kind] / m**4 / (1 + FADES[kind.kind] * (np.minimum(m, 1e9) * part.cosine) ** 2),
         VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
         ACROSS[kind.kind] * across**2,
         _flat_error(part, k, extent),

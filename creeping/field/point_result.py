@@ -67,7 +67,7 @@ WORTH, LEAST_WORTH = 0.5, 0.1
 
 
 def judged(
-    status: IntArray, values: ComplexArray, error: FloatArray, error_by: np.ndarray[Any, Any], unit: float
+    status: IntArray, values: ComplexArray | FloatArray, error: FloatArray, error_by: np.ndarray[Any, Any], unit: float
 ) -> IntArray:
     """Status (...) with UNRESOLVED in place of OK; ``unit`` is the incident wave's amplitude, k (1/L) for du/dn."""
     with np.errstate(invalid="ignore"):

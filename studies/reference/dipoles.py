@@ -71,7 +71,7 @@ class ConductorSolution:
             H = np.einsum("mnb,bec->mcne", turned, _LEVI_CIVITA)
             parts.append([(part.reshape(3 * len(some), -1) @ q).reshape(shape) for part in (E, H)])
         scattered = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return tuple(wave * one + its for one, its in zip((e0, h0), scattered, strict=True))  # type: ignore[return-value]
+        return tuple(wave * one + its for one, its in zip((e0, h0), scattered, strict=True))
 
 
 _LEVI_CIVITA = np.array(

@@ -8,6 +8,8 @@
 Sources: [CK13, sec. 6.2]; Derivations, F18, F20 and F26.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
@@ -22,7 +24,7 @@ from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough
 from creeping.field.currents.whole_body import POINTS as INNER
-from creeping.field.lit_ground import convex
+from creeping.field.lit_ground import LEFT, UNKNOWN, convex
 from creeping.field.near import ON_BODY, checked_height, rays_alone
 from creeping.field.point_result import FieldStatus, judged
 from creeping.field.polarisation import incident_mix, spherical_frame
@@ -99,7 +101,11 @@ def conductor_field(
         fields = [one.put(at, _on_body(found, i, n)) for i, one in enumerate(fields)]
     if len(off):
         sums = shed_sums(fan, flat[off], k, electric)
-        fields = [one.put(off, rays_alone(its, ~dark[off])) for one, its in zip(fields, sums, strict=True)]
+        rays = [
+            _from_elsewhere(rays_alone(its, ~dark[off]), float(its_left))
+            for its, its_left in zip(sums, left, strict=True)
+        ]
+        fields = [one.put(off, its) for one, its in zip(fields, rays, strict=True)]
         fine = np.all([(one.status == FieldStatus.OK) & (one.error <= FINE) for one in fields], axis=0)
         asked = np.flatnonzero(~on & ~fine)
         if len(asked):
@@ -214,6 +220,16 @@ def _on_body(found: OnConductor, i: int, n: FloatArray) -> Served:
             for its, one in ((part, J.wave), (1 - part, J.creeping))
         )
     return Served(wave, creeping, J.error, J.error_by, J.status, J.method)
+
+
+def _from_elsewhere(rays: Served, left: float) -> Served:
+    """Rays with the error by waves that come from elsewhere on the body, of which ``left`` inside of it tells."""
+    known = np.isfinite(left)
+    return replace(
+        rays,
+        error=np.hypot(rays.error, LEFT * left if known else UNKNOWN),
+        error_by=rays.error_by if known else np.full(len(rays.error), "bound"),
+    )
 
 
 def _with_currents(

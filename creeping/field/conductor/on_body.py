@@ -94,7 +94,8 @@ def _crosses(fan: RayFan, points: FloatArray, k: float) -> tuple[FloatArray, Flo
 def _divergence(values: ComplexArray, apart: FloatArray) -> ComplexArray:
     """Surface divergence (n, p), 1/L, of tangential vectors at points and around them (5, n, 3, p)."""
     change = np.stack([values[1] - values[2], values[3] - values[4]])
-    return np.asarray(np.sum(apart[..., None] * change, axis=2) / np.sum(apart**2, axis=2)[..., None]).sum(axis=0)
+    slopes = np.sum(apart[..., None] * change, axis=2) / np.sum(apart**2, axis=2)[..., None]
+    return np.asarray(slopes.sum(axis=0))
 
 
 def _lit_at(
@@ -145,7 +146,7 @@ def _rays_at(
     sums, methods, parts = [], [], []
     for i in range(electric.shape[1]):
         pair = waves[middle, :, i], other[middle, :, i]
-        own = own_error(found.rays[middle], pair, k, CONDUCTOR, 2, on=True)
+        own = own_error(found.rays[middle], pair, k, CONDUCTOR, 2, on=True, mixed=strength[middle])
         one = ray_sum(fan, found[middle], count, pair[0], own, k, ELECTRIC_HARD, strength[middle])
         sums.append(replace(one, values=total_of(waves[:, :, i], found.observer, 5 * count)))
         methods.append(np.full(count, "rays"))
@@ -173,13 +174,13 @@ def _taken(mine: RaySum, its: RaySum, at: IntArray, better: IntArray, method: Wo
     count = len(mine.status)
     row = np.full(count, -1)
     row[at] = np.arange(len(at))
-    values, error, status, faded = (part.copy() for part in mine.parts)
+    values, error, status = mine.values.copy(), mine.error.copy(), mine.status.copy()
     for block in range(5):
         values[better + block * count] = its.values[row[better] + block * len(at)]
     error[better], status[better] = its.error[row[better]], its.status[row[better]]
     method = method.astype("<U8")
     method[better] = "beams"
-    return RaySum(values, error, status, faded), method
+    return RaySum(values, error, status, mine.faded), method
 
 
 def _beams_at(
@@ -202,7 +203,7 @@ def _beams_at(
     row[rows] = np.arange(len(rows))
     mine = row[found.observer] >= 0
     shed = replace(found[mine], observer=row[found.observer[mine]])
-    J, other, strength = (part[mine] for part in waves)
+    J, other, strength = waves[0][mine], waves[1][mine], waves[2][mine]
     own = np.where(np.isfinite(J), J, 0.0)
     beams = mode_waves_of(fan, k, electric)
     sums = beams_beside_rays(
@@ -221,9 +222,10 @@ def _beams_at(
     for i in range(p):
         one = own[:, :, i]
         with np.errstate(invalid="ignore", divide="ignore"):
-            long = np.linalg.norm(one, axis=1)
-            part = own_error(shed.rays, (one, other[:, :, i]), k, CONDUCTOR, 2, on=True) / long
-        pair = sums[0].reshape(-1, 3, p)[:, :, i], sums[1].reshape(-1, 3, p)[:, :, i]
-        whole = blended_sum(fan, shed, one, strength, long * bounded, np.nan_to_num(part), eta, pair, k, ELECTRIC_HARD)
+            pair = one, other[:, :, i]
+            long = np.maximum(np.linalg.norm(one, axis=1), strength)
+            part = own_error(shed.rays, pair, k, CONDUCTOR, 2, on=True, mixed=strength) / long
+        both = sums[0].reshape(-1, 3, p)[:, :, i], sums[1].reshape(-1, 3, p)[:, :, i]
+        whole = blended_sum(fan, shed, one, strength, long * bounded, np.nan_to_num(part), eta, both, k, ELECTRIC_HARD)
         out.append(RaySum(whole.values, whole.error[:few], whole.status[:few], whole.faded[:few]))
     return out

@@ -85,7 +85,7 @@ class ConductorField(PointData):
     def power_flow(self) -> FloatArray:
         """Re E x H*, the mean flow of power in units of the incident one (..., 3) or (..., 3, 2)."""
         axis = self.points.ndim - 1
-        return np.cross(self.E, self.H.conj(), axis=axis).real
+        return np.asarray(np.real(np.cross(self.E, self.H.conj(), axis=axis)), dtype=float)
 
     @property
     def unit(self) -> str:
@@ -149,7 +149,7 @@ class ConductorCurrent(ArrayResult, PointData):
     @property
     def magnitude(self) -> FloatArray:
         """|J| (...), of the shape of the status."""
-        return np.linalg.norm(self.values, axis=self.points.ndim - 1)
+        return np.asarray(np.linalg.norm(self.values, axis=self.points.ndim - 1))
 
     @property
     def unit(self) -> str:
