@@ -39,6 +39,8 @@ LEAST, VARIES, BROADER = 0.02, 0.5, 1.5
 """A, B and C."""
 STRONG = 1.5
 """Bound of |J|^(-1/2) in errors: on a caustic a ray is no stronger than its neighbours."""
+CROWD, FOCUSED = 8, 2.0
+"""Rays from which a point is a focus of all of them, and how much stronger than the field its waves are there."""
 FACTORS = (1.3, 0.8)
 """Widths of the beams that serve, and of those by which they are judged."""
 
@@ -93,7 +95,11 @@ def blended_sum(
     bounded = np.where(np.isfinite(part), np.minimum(part, 1.0), 1.0)
     # at a focus more rays come than those that are found
     sums = total_of(size, shed.observer, len(values))
-    more = np.maximum(1.0, magnitude(values, sums) / np.maximum(sums, 1e-300))
+    field = magnitude(values, sums)
+    more = np.maximum(1.0, field / np.maximum(sums, 1e-300))
+    # and at one where all rays of a fan come their number says how dense it is, and no more
+    crowd = total_of(np.ones(len(size)), shed.observer, len(values)) > CROWD
+    more = np.where(crowd, np.minimum(more, FOCUSED * field / np.maximum(sums, 1e-300)), more)
     error = np.hypot(more * total_of(size * bounded, shed.observer, len(values)), rest)
     return _judged(fan, shed, size, values, error, part >= 1, wavenumber, boundary)
 

@@ -36,7 +36,7 @@ from creeping.rays.strips import Strip
 CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25, "conductor": 0.4}
 """A, and B off the body."""
 SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8, "electric hard": 3.0, "conductor": 3.0}
-VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25, "electric hard": 0.15, "conductor": 0.25}
+VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25, "electric hard": 0.15, "conductor": 0.15}
 """C, and B on the body."""
 ACROSS = {"soft": 0.3, "hard": 0.3, "impedance": 0.3, "electric hard": 0.3, "conductor": 1.1}
 LEAST_XI = 0.7

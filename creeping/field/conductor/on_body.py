@@ -26,6 +26,7 @@ from creeping.field.point_result import FieldStatus
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
 from creeping.field.served import Served, Words
 from creeping.field.shed_wave import fock_parameter
+from creeping.field.strip_waves import without_tubes
 from creeping.field.surface import surface_waves
 from creeping.geometry.surface import normal, project, size
 from creeping.rays.fan import RayFan
@@ -36,6 +37,9 @@ APART = 0.02
 """Distance of the points between which currents are differenced, over the wavelength over 2 pi."""
 MERGED = 1e-3
 """Error of the sum over rays, as a share of the incident wave, from which beams are asked."""
+
+WORST = 0.99
+"""Error of a ray, as a share of it, at most: one that has ended is none of those that beams are made of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +158,7 @@ def _rays_at(
     asked = np.any([(one.status == FieldStatus.CAUSTIC) | (one.error > MERGED) for one in sums], axis=0)
     at = np.flatnonzero(asked)
     if len(at) and beams_serve(fan, 5 * len(at), k):
-        by_beams = _beams_at(fan, around, at, found, (waves, other, strength), share, k, electric)
+        by_beams = _beams_at(fan, around, at, found, (waves, strength, weight[:, 0, 0]), share, k, electric)
         for i, its in enumerate(by_beams):
             mine = sums[i]
             ok = its.status == FieldStatus.OK
@@ -188,14 +192,14 @@ def _beams_at(
     around: FloatArray,
     at: IntArray,
     found: ShedRays,
-    waves: tuple[ComplexArray, ComplexArray, FloatArray],
+    waves: tuple[ComplexArray, FloatArray, FloatArray],
     share: FloatArray,
     k: float,
     electric: ComplexArray,
 ) -> list[RaySum]:
     """Sums of beams at the points ``at`` and around them, each with the error and status of the points alone.
 
-    ``waves`` of the rays found are J of both orders (m, 3, p), and |u| (m,).
+    ``waves`` of the rays found are J (m, 3, p), |u| (m,), and their weights (m,).
     """
     count, few, p = len(around) // 5, len(at), electric.shape[1]
     rows = np.concatenate([at + block * count for block in range(5)])
@@ -203,8 +207,9 @@ def _beams_at(
     row[rows] = np.arange(len(rows))
     mine = row[found.observer] >= 0
     shed = replace(found[mine], observer=row[found.observer[mine]])
-    J, other, strength = waves[0][mine], waves[1][mine], waves[2][mine]
-    own = np.where(np.isfinite(J), J, 0.0)
+    J, strength, weight = waves[0][mine], waves[1][mine], waves[2][mine]
+    # an infinite wave is that of a caustic: beams serve there
+    own, strength = np.where(np.isfinite(J), J, 0.0), np.where(np.isfinite(strength), strength, 0.0)
     beams = mode_waves_of(fan, k, electric)
     sums = beams_beside_rays(
         fan, beams, shed, around[rows], own.reshape(len(own), 3 * p), share[rows], beams.components
@@ -214,18 +219,33 @@ def _beams_at(
         these = np.flatnonzero(shed.strip == number)
         place = number, shed.sigma[these], shed.rays.time[these]
         y[these], across[these] = beams.at(*place), beams.across(*place)
-    eta = variation(fan, shed, y, across, k)
-    tube = np.abs(shed.rays.spreading)
-    bounded = np.sqrt(np.minimum(1.0, STRONG**2 * tube))
-    strength = np.where(np.isfinite(strength), strength, 0.0)
+    eta, n = variation(fan, shed, y, across, k), normal(fan.body, around[rows])
+    large, part = _without_caustics(fan, shed, around[rows], k, electric)
+    with np.errstate(divide="ignore"):
+        large = large * (weight * np.minimum(np.abs(shed.rays.spreading) ** -0.5, STRONG))[:, None]
     out = []
     for i in range(p):
-        one = own[:, :, i]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            pair = one, other[:, :, i]
-            long = np.maximum(np.linalg.norm(one, axis=1), strength)
-            part = own_error(shed.rays, pair, k, CONDUCTOR, 2, on=True, mixed=strength) / long
         both = sums[0].reshape(-1, 3, p)[:, :, i], sums[1].reshape(-1, 3, p)[:, :, i]
-        whole = blended_sum(fan, shed, one, strength, long * bounded, np.nan_to_num(part), eta, both, k, ELECTRIC_HARD)
-        out.append(RaySum(whole.values, whole.error[:few], whole.status[:few], whole.faded[:few]))
+        whole = blended_sum(fan, shed, own[:, :, i], strength, large[:, i], part[:, i], eta, both, k, ELECTRIC_HARD)
+        # feet of beams have tangents of their own
+        tangential = whole.values - np.sum(n * whole.values, axis=1, keepdims=True) * n
+        out.append(RaySum(tangential, whole.error[:few], whole.status[:few], whole.faded[:few]))
     return out
+
+
+def _without_caustics(
+    fan: RayFan, shed: ShedRays, points: FloatArray, k: float, electric: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Size of each ray's J but for its tube, at least |u|, and the error of J as a share of that: (m, p) each."""
+    rays, x = without_tubes(shed.rays), points[shed.observer]
+    n = normal(fan.body, x)
+    twist = nodes_at(fan.body, x, n).twist(rays.directions)
+    pair = [ray_vectors(rays, n, twist, fan.line.direction, electric, k, o) for o in (2, 1)]
+    u = np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1))
+    large = np.maximum(np.linalg.norm(pair[0], axis=1), u[:, None])
+    off = [
+        own_error(rays, (pair[0][:, :, i], pair[1][:, :, i]), k, CONDUCTOR, 2, on=True, mixed=u)
+        for i in range(electric.shape[1])
+    ]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return large, np.nan_to_num(np.minimum(np.stack(off, axis=1) / large, WORST))
