@@ -27,6 +27,8 @@ from creeping.shadow.occlusion import occluded
 
 ABOVE = (0.27, 0.54)
 """Heights, in wavelengths, of the points at which currents are asked."""
+CLEAR = 0.2
+"""Distance from all of the body that nodes must tell of these, in wavelengths: they are too far apart to tell more."""
 GRAZING = 0.15
 """Least c: below, the four terms are powers of t to rounding."""
 LEFT_OUT = {"soft": 0.08, "hard": 0.08, "impedance": 0.03}
@@ -56,22 +58,22 @@ def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind
 
 
 def feet_of(
-    body: Surface, points: FloatArray, k: float, above: tuple[float, ...]
+    body: Surface, points: FloatArray, k: float, above: tuple[float, ...], clear: float = CLEAR
 ) -> tuple[IntArray, BodyNodes, FloatArray, list[FloatArray]]:
     """Rows of the points (n, 3), L, at most two heights up that have a foot: feet, own heights, and points above them.
 
-    Heights ``above`` are in wavelengths; at each of them the point above a foot is outside, and off all of the body.
+    Heights ``above`` are in wavelengths; at each of them the point above a foot is outside, and ``clear`` of the body.
     """
     foot, n, hessians, height = nearest_points(body, points)
     scale = size(body)
     there = np.linalg.norm(foot + height[:, None] * n - points, axis=1) < FOOT * scale
-    there &= (height > 0) & (height < ABOVE[1] * 2 * np.pi / k)
+    there &= (height > 0) & (height < above[1] * 2 * np.pi / k)
     there &= np.abs(body.level(foot)) <= FOOT * scale * np.linalg.norm(body.gradient(foot), axis=1)
     tops = [foot + share * 2 * np.pi / k * n for share in above]
     for top in tops:
         at = np.flatnonzero(there)
         # over a bay they may be in the body or near its other side
-        there[at] = (body.level(top[at]) > 0) & far_enough(body, k, top[at])
+        there[at] = (body.level(top[at]) > 0) & far_enough(body, k, top[at], clear)
     at = np.flatnonzero(there)
     nodes = BodyNodes(foot[at], n[at], np.ones(len(at)), hessians[at], 0.0)
     return at, nodes, height[at], [top[at] for top in tops]

@@ -15,7 +15,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_plain
-from creeping.field.conductor.layer import layer_fields
+from creeping.field.conductor.layer import layer_fields, lowest_height
 from creeping.field.conductor.on_body import OnConductor, on_conductor
 from creeping.field.conductor.result import ConductorCurrent, ConductorField, Fields
 from creeping.field.conductor.shed import shed_sums
@@ -37,8 +37,8 @@ from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 from creeping.shadow.occlusion import occluded
 
-VECTOR = 12
-"""What a sum for both fields costs, in terms of a scalar's."""
+VECTOR = 1.5
+"""What sums for both fields of a polarisation cost, in terms of a scalar's."""
 FINE = 1e-4
 """Error of rays up to which currents are not asked."""
 
@@ -181,13 +181,18 @@ def _checked(fan: RayFan, wavenumber: float, polarisation: str | ArrayLike | Non
     return checked(wavenumber, 2), incident_mix(polarisation, fan.line.direction)
 
 
+def _places(count: int, mix: ComplexArray) -> int:
+    """Points at which a scalar's sums cost as much as both fields of each polarisation at ``count``."""
+    return int(np.ceil(VECTOR * mix.shape[1] * count))
+
+
 def _left_inside(fan: RayFan, k: float, mix: ComplexArray) -> FloatArray:
     """What currents leave inside of each incident wave (p,): 0 on a convex body, NaN where it is not to be known."""
     if convex(fan):
         return np.zeros(mix.shape[1])
     unknown = np.full(mix.shape[1], np.nan)
     try:
-        currents = _currents(fan, k, mix) if affordable(fan, INNER * VECTOR, k) else None
+        currents = _currents(fan, k, mix) if affordable(fan, _places(INNER, mix), k) else None
     except SurfaceError:
         return unknown
     return unknown if currents is None else np.max(currents.left_of_each, axis=0)
@@ -243,10 +248,10 @@ def _with_currents(
     left: FloatArray,
 ) -> list[Served]:
     """Fields with those of currents, or of the layer, at the points asked for where they are better."""
-    if not affordable(fan, len(asked) * VECTOR, k):
+    if not affordable(fan, _places(len(asked), mix), k):
         return fields
     try:
-        far = far_enough(fan.body, k, points[asked])
+        far = far_enough(fan.body, k, points[asked], lowest_height(fan, k))
         currents = _currents(fan, k, mix)
     except SurfaceError:
         return fields

@@ -79,13 +79,13 @@ class ConductorField(PointData):
     def magnitude(self) -> FloatArray:
         """The larger of |E| and |H| (...), of the shape of the status."""
         axis = self.points.ndim - 1
-        return np.maximum(np.linalg.norm(self.E, axis=axis), np.linalg.norm(self.H, axis=axis))
+        return np.asarray(np.maximum(np.linalg.norm(self.E, axis=axis), np.linalg.norm(self.H, axis=axis)))
 
     @property
     def power_flow(self) -> FloatArray:
         """Re E x H*, the mean flow of power in units of the incident one (..., 3) or (..., 3, 2)."""
         axis = self.points.ndim - 1
-        return np.asarray(np.real(np.cross(self.E, self.H.conj(), axis=axis)), dtype=float)
+        return np.asarray(np.cross(self.E, self.H.conj(), axis=axis).real)
 
     @property
     def unit(self) -> str:

@@ -13,6 +13,7 @@ are exact on the circular cylinder and on the sphere.
 Sources: [F46], [CK13, sec. 6.2]; Derivations, F18.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
@@ -77,21 +78,22 @@ class ConductorCurrents(SurfaceCurrents):
 
     def changed_electric(self, points: FloatArray) -> FloatArray:
         """As `changed`, of E and components added (m, p)."""
-        lit, dark = (self._electric(self._part(part), points) for part in (self.lit, ~self.lit))
-        return np.asarray(np.sqrt(np.sum(np.abs(lit) ** 2 + np.abs(dark) ** 2, axis=1)) / self._electric_inside)
+        return self._changed(electric_field_of_vector, points) / self._electric_inside
+
+    def changed_magnetic(self, points: FloatArray) -> FloatArray:
+        """As `changed`, components added (m, p)."""
+        return self._changed(magnetic_field_of_vector, points) / self._change_inside
+
+    def _changed(self, radiated: Callable[..., ComplexArray], points: FloatArray) -> FloatArray:
+        """What the second order of the lit nodes and of the others adds, apart, in the root of squares (m, p)."""
+        J = self.change * self.weights[:, None, None]
+        each = [radiated(self.points[part], J[part], points, self.wavenumber) for part in (self.lit, ~self.lit)]
+        return np.asarray(np.sqrt(np.sum(np.abs(each) ** 2, axis=(0, 2))))
 
     @cached_property
     def _electric_inside(self) -> FloatArray:
         """Rms inside of what the second order adds to E, of each incident wave."""
         return self._rms(self._electric(self.change, self.inner_points))
-
-    def changed_magnetic(self, points: FloatArray) -> FloatArray:
-        """As `changed`, components added (m, p)."""
-        lit, dark = (self._field(self._part(part), points) for part in (self.lit, ~self.lit))
-        return np.asarray(np.sqrt(np.sum(np.abs(lit) ** 2 + np.abs(dark) ** 2, axis=1)) / self._change_inside)
-
-    def _part(self, part: BoolArray) -> ComplexArray:
-        return np.where(part[:, None, None], self.change, 0.0)
 
     def _radiated(self, values: ComplexArray, part: BoolArray, directions: FloatArray) -> ComplexArray:
         strength = values[part] * self.weights[part, None, None]

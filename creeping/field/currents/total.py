@@ -27,8 +27,10 @@ OFF = 0.25
 """Least distance from the body, in wavelengths, at which currents serve."""
 
 
-def far_enough(body: Surface, wavenumber: float, points: FloatArray) -> BoolArray:
+def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: float = OFF) -> BoolArray:
     """Whether points (n, 3), L, are so far off the body that sums over nodes are integrals: (n,).
+
+    ``least`` is the distance asked for, in wavelengths.
 
     Raises
     ------
@@ -36,7 +38,7 @@ def far_enough(body: Surface, wavenumber: float, points: FloatArray) -> BoolArra
         If the wavenumber, 1/L, is too high for any mesh of the body.
     """
     # the nodes of the lit side, on the whole of the body
-    return body_nodes(body, 2 * wavenumber).distance(points) > OFF * 2 * np.pi / wavenumber
+    return body_nodes(body, 2 * wavenumber).distance(points) > least * 2 * np.pi / wavenumber
 
 
 def total_at(
