@@ -12,6 +12,11 @@ from .field.comparison import Comparison as Comparison
 from .field.comparison import compare as compare
 from .field.coupling_result import Coupling as Coupling
 from .field.coupling_result import CouplingPaths as CouplingPaths
+from .field.conductor.near import conductor_current as conductor_current
+from .field.conductor.near import conductor_field as conductor_field
+from .field.conductor.result import ConductorCurrent as ConductorCurrent
+from .field.conductor.result import ConductorField as ConductorField
+from .field.conductor.result import Fields as Fields
 from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.echo import Echo as Echo

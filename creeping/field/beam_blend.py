@@ -39,6 +39,8 @@ LEAST, VARIES, BROADER = 0.02, 0.5, 1.5
 """A, B and C."""
 STRONG = 1.5
 """Bound of |J|^(-1/2) in errors: on a caustic a ray is no stronger than its neighbours."""
+CROWD, FOCUSED = 8, 2.0
+"""Rays from which a point is a focus of all of them, and how much stronger than the field its waves are there."""
 FACTORS = (1.3, 0.8)
 """Widths of the beams that serve, and of those by which they are judged."""
 
@@ -76,6 +78,7 @@ def blended_sum(
     fan: RayFan,
     shed: ShedRays,
     own: ComplexArray,
+    strength: FloatArray,
     size: FloatArray,
     part: FloatArray,
     eta: FloatArray,
@@ -83,15 +86,20 @@ def blended_sum(
     wavenumber: float,
     boundary: Boundary,
 ) -> RaySum:
-    """Sum of the waves ``own`` (m, ...) of rays, strong as ``size`` (m,), and of beams at points, both sums (n, ...).
+    """Sum of the waves ``own`` (m, ...) of rays and of beams at points, both sums (n, ...).
 
+    Where rays merge they err by shares of ``strength``, by themselves by shares of ``size`` (m,), which is bounded.
     ``part`` (m,) is the error of each wave as a share of it, 1 or more where there is none.
     """
-    values, rest = _blended(fan, shed, own, size, eta, beams, wavenumber)
+    values, rest = _blended(fan, shed, own, strength, size, eta, beams, wavenumber)
     bounded = np.where(np.isfinite(part), np.minimum(part, 1.0), 1.0)
     # at a focus more rays come than those that are found
-    strength = total_of(size, shed.observer, len(values))
-    more = np.maximum(1.0, magnitude(values, strength) / np.maximum(strength, 1e-300))
+    sums = total_of(size, shed.observer, len(values))
+    field = magnitude(values, sums)
+    more = np.maximum(1.0, field / np.maximum(sums, 1e-300))
+    # and at one where all rays of a fan come their number says how dense it is, and no more
+    crowd = total_of(np.ones(len(size)), shed.observer, len(values)) > CROWD
+    more = np.where(crowd, np.minimum(more, FOCUSED * field / np.maximum(sums, 1e-300)), more)
     error = np.hypot(more * total_of(size * bounded, shed.observer, len(values)), rest)
     return _judged(fan, shed, size, values, error, part >= 1, wavenumber, boundary)
 
@@ -100,17 +108,17 @@ def _blended(
     fan: RayFan,
     shed: ShedRays,
     own: ComplexArray,
+    strength: FloatArray,
     size: FloatArray,
     eta: FloatArray,
     beams: tuple[ComplexArray, ComplexArray],
     wavenumber: float,
 ) -> tuple[ComplexArray, FloatArray]:
-    """The field (n, ...) of rays (m, ...), strong as ``size`` (m,), and of beams; and the error of merging."""
+    """The field (n, ...) of rays (m, ...) and of beams, and the error of merging."""
     by_beams, others = beams
     count, observer = len(by_beams), shed.observer
     plain = np.zeros(count)
     by_rays = total_of(own, observer, count)
-    strength = magnitude(own, size)
     e_b = np.sqrt(total_of((size * (LEAST + np.minimum(VARIES * eta, 1.0))) ** 2, observer, count))
     e_b = np.linalg.norm(
         [e_b, LEAST * magnitude(by_beams, plain), BROADER * magnitude(by_beams - others, plain)], axis=0
@@ -162,7 +170,7 @@ def _judged(
 
 def _wide(values: FloatArray | BoolArray, like: ComplexArray) -> FloatArray:
     """Values (n,) with as many axes as ``like`` (n, ...)."""
-    return np.asarray(values).reshape(-1, *(1,) * (like.ndim - 1))
+    return np.asarray(values, dtype=float).reshape(-1, *(1,) * (like.ndim - 1))
 
 
 def _apart_from_line(fan: RayFan, shed: ShedRays, k: float, count: int) -> tuple[BoolArray, FloatArray]:

@@ -14,8 +14,9 @@ from creeping.storage.extras import required
 if TYPE_CHECKING:
     import xarray
 
+    from creeping._typing import ComplexArray
     from creeping.field.far_result import FarField
-    from creeping.field.point_result import PointField
+    from creeping.field.point_result import PointData, PointField
     from creeping.field.source_pattern import SourcePattern
 
 COMPONENTS = ("theta", "phi")
@@ -79,19 +80,45 @@ def far_dataset(far: "FarField") -> "xarray.Dataset":
 
 def point_dataset(field: "PointField", parts: tuple[str, ...]) -> "xarray.Dataset":
     """A field at points with its parts, error and status, one row a point: see `PointField.to_xarray`."""
+    variables: dict[str, Any] = {"total": (("point",), field.values.reshape(-1), {"units": field.unit})}
+    for name in parts:
+        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {"units": field.unit})
+    return _of_points(field, variables, ("point",), {})
+
+
+def vector_dataset(field: "PointData", vectors: "dict[str, ComplexArray]") -> "xarray.Dataset":
+    """Vectors (..., 3) or (..., 3, 2) and scalars at points with error and status: see `ConductorField.to_xarray`."""
+    both = field.status.ndim == field.points.ndim
+    rows = ("point", "polarisation") if both else ("point",)
+    variables: dict[str, Any] = {}
+    for name, values in vectors.items():
+        vector = values.ndim > field.status.ndim
+        dims = ("point", *(("component",) if vector else ()), *rows[1:])
+        shape = (-1, *values.shape[field.points.ndim - 1 :])
+        variables[name] = (dims, values.reshape(shape), {"units": field.unit})
+    named: dict[str, Any] = {"component": (("component",), ["x", "y", "z"])}
+    if both:
+        named["polarisation"] = (("polarisation",), list(COMPONENTS))
+    return _of_points(field, variables, rows, named)
+
+
+def _of_points(
+    field: "PointData", variables: dict[str, Any], rows: tuple[str, ...], named: dict[str, Any]
+) -> "xarray.Dataset":
+    """Variables with error, status and coordinates of points."""
     library = required("xarray", use="labelled results need", extra="sweep")
     flat = field.points.reshape(-1, 3)
     coordinates: dict[str, Any] = {
         name: (("point",), flat[:, i], {"units": field.length_unit}) for i, name in enumerate(("x", "y", "z"))
     }
     coordinates["wavenumber"] = ((), field.wavenumber, {"units": power(field.length_unit, -1), "long_name": "k"})
-    variables: dict[str, Any] = {"total": (("point",), field.values.reshape(-1), {"units": field.unit})}
-    for name in (*parts, "error"):
-        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {"units": field.unit})
+    shape = (-1,) if len(rows) == 1 else (-1, len(COMPONENTS))
+    variables = dict(variables)
+    variables["error"] = (rows, field.error.reshape(shape), {"units": field.unit})
     for name in ("error_by", "status", "method"):
-        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {})
+        variables[name] = (rows, np.reshape(getattr(field, name), shape), {})
     words = {"boundary": field.boundary, "order": field.order, "conventions": "time factor exp(-i omega t)"}
-    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+    found: xarray.Dataset = library.Dataset(variables, coordinates | named, words)
     return found
 
 

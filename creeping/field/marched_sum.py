@@ -52,7 +52,7 @@ def marched_sum(
     own = np.where(np.isfinite(own), own, 0.0) * np.where(young, share[observer], 1.0)
     size = np.minimum(np.abs(own), STRONG * np.abs(y))
     beams = beams_beside_rays(fan, waves, shed, points, own, share)
-    return blended_sum(fan, shed, own, size, part, variation(fan, shed, y, slope, k), beams, k, boundary)
+    return blended_sum(fan, shed, own, np.abs(own), size, part, variation(fan, shed, y, slope, k), beams, k, boundary)
 
 
 def _on_rays(waves: FanWaves, shed: ShedRays) -> tuple[ComplexArray, ComplexArray, FloatArray]:

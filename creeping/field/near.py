@@ -107,7 +107,7 @@ def near_field(
     checked_method(method, order)
     y = as_points(points)
     flat = y.reshape(-1, 3)
-    on = _checked_height(fan, flat) <= ON_BODY
+    on = checked_height(fan, flat) <= ON_BODY
     off, at = np.flatnonzero(~on), np.flatnonzero(on)
     dark = np.zeros(len(flat), dtype=bool)
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
@@ -150,7 +150,7 @@ def _result(field: Served, fan: RayFan, points: FloatArray, k: float, boundary: 
     )
 
 
-def _checked_height(fan: RayFan, points: FloatArray) -> FloatArray:
+def checked_height(fan: RayFan, points: FloatArray) -> FloatArray:
     """F/|grad F| in body sizes (n,), about the height above the body near it."""
     gradient = np.linalg.norm(fan.body.gradient(points), axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -172,7 +172,7 @@ def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: B
     shed = shed[~occluded(fan.body, shed.rays.points, -shed.rays.directions, shed.reach)]
     waves, other = (shed_waves(shed.rays, shed.reach, k, kind, o) for o in (order, 3 - order))
     error = own_error(shed.rays, (waves, other), k, kind, order, on=False)
-    return _rays_alone(ray_sum(fan, shed, len(points), waves, error, k, kind), lit)
+    return rays_alone(ray_sum(fan, shed, len(points), waves, error, k, kind), lit)
 
 
 def _no_rays(lit: BoolArray) -> Served:
@@ -195,10 +195,10 @@ def _rays_alone_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, or
     lit = normal(fan.body, points) @ d < 0
     lit[lit] = ~occluded(fan.body, points[lit], d)
     rays, by = rays_on(fan, points, k, kind, order)
-    return replace(_rays_alone(rays, lit), method=by)
+    return replace(rays_alone(rays, lit), method=by)
 
 
-def _rays_alone(rays: RaySum, lit: BoolArray) -> Served:
+def rays_alone(rays: RaySum, lit: BoolArray) -> Served:
     """A sum over rays as the field, with a bound of what it lacks on the lit side and where it is not to be trusted."""
     status = np.where(lit, FieldStatus.LIT, rays.status).astype(np.int64)
     bad = status != FieldStatus.OK

@@ -67,7 +67,7 @@ WORTH, LEAST_WORTH = 0.5, 0.1
 
 
 def judged(
-    status: IntArray, values: ComplexArray, error: FloatArray, error_by: np.ndarray[Any, Any], unit: float
+    status: IntArray, values: ComplexArray | FloatArray, error: FloatArray, error_by: np.ndarray[Any, Any], unit: float
 ) -> IntArray:
     """Status (...) with UNRESOLVED in place of OK; ``unit`` is the incident wave's amplitude, k (1/L) for du/dn."""
     with np.errstate(invalid="ignore"):
@@ -76,13 +76,12 @@ def judged(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PointField(ArrayResult, Shown):
-    """Field at points (...), in arrays of their shape; it acts as the array of its values.
+class PointData(Shown):
+    """What every field at points (...) says of itself, in arrays of their shape.
 
     Attributes
     ----------
     points : (..., 3), L
-    values : (...) complex
     error : (...)
         Of the values, in their unit, meant to hold at 95 of 100 points whose status is OK; at others a bound, infinite
         where the values are.
@@ -103,7 +102,6 @@ class PointField(ArrayResult, Shown):
     """
 
     points: FloatArray
-    values: ComplexArray
     error: FloatArray
     error_by: np.ndarray[Any, np.dtype[np.str_]]
     status: IntArray
@@ -125,21 +123,18 @@ class PointField(ArrayResult, Shown):
         return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     @property
-    def total(self) -> ComplexArray:
-        """The values (...)."""
-        return self.values
-
-    @property
     def unit(self) -> str:
         """Unit of the values."""
         return "of the incident wave"
 
+    @property
+    def magnitude(self) -> FloatArray:
+        """Size of what the error is of (...), of the shape of the status."""
+        raise NotImplementedError
+
     def to_xarray(self) -> xarray.Dataset:
         """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
-        from creeping.field.labelled import point_dataset
-
-        own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
-        return point_dataset(self, tuple(sorted(own)))
+        raise NotImplementedError
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The same as a ``pandas.DataFrame``, one row a point."""
@@ -149,15 +144,49 @@ class PointField(ArrayResult, Shown):
         names, counts = np.unique(self.method, return_counts=True)
         served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
         states = ", ".join(f"{n} {name}" for name, n in self.status_counts.items())
-        size = np.abs(self.values[self.ok])
-        off = self.error[self.ok]
+        size, off = self.magnitude[self.ok], self.error[self.ok]
         error = f", error {np.median(off):.2g} in the median, {off.max():.2g} at most" if off.size else ""
         return (
-            f"{type(self).__name__}({' x '.join(map(str, self.shape)) or 'one'} points, k = {self.wavenumber:g}, "
-            f"{self.boundary}, order {self.order})\n"
+            f"{type(self).__name__}({self._counted}, k = {self.wavenumber:g}, {self.boundary}, order {self.order})\n"
             f"  {served or 'none'}; {states or 'no status'}\n"
             f"  where OK up to {np.max(size, initial=0.0):.4g} {self.unit}{error}"
         )
+
+    @property
+    def _counted(self) -> str:
+        """How many points there are, in words."""
+        return f"{' x '.join(map(str, self.points.shape[:-1])) or 'one'} points"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointField(ArrayResult, PointData):
+    """Field at points (...), in arrays of their shape; it acts as the array of its values.
+
+    Attributes
+    ----------
+    points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
+        As of every field at points.
+    values : (...) complex
+    """
+
+    values: ComplexArray
+
+    @property
+    def total(self) -> ComplexArray:
+        """The values (...)."""
+        return self.values
+
+    @property
+    def magnitude(self) -> FloatArray:
+        """Absolute values (...)."""
+        return np.abs(self.values)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
+        from creeping.field.labelled import point_dataset
+
+        own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
+        return point_dataset(self, tuple(sorted(own)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,10 +11,14 @@ Sources: Derivations, F14.
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.geometry.arguments import shown
 
 CLEAR = 1e-6
 """Least |n × d| that has a direction: normals are known to 1e-11, and d and r share ``spare`` to this angle."""
+ACROSS = 1e-6
+"""Share of an incident E0 up to which it may lie along the direction, by rounding."""
 
 
 def spherical_frame(directions: FloatArray) -> FloatArray:
@@ -27,6 +31,47 @@ def spherical_frame(directions: FloatArray) -> FloatArray:
     theta = np.stack([z * cos, z * sin, -across], axis=-1)
     phi = np.stack([-sin, cos, np.zeros_like(cos)], axis=-1)
     return np.stack([theta, phi], axis=-2)
+
+
+def incident_mix(polarisation: str | ArrayLike | None, direction: FloatArray) -> ComplexArray:
+    """Components along theta and phi of incident waves of unit E, both of them for None: (2, p).
+
+    Raises
+    ------
+    InvalidInputError
+        If a polarisation is no text known, not three finite numbers, 0, or not across the direction.
+
+    Examples
+    --------
+    >>> d = np.array([0.0, 0.0, 1.0])
+    >>> incident_mix("phi", d).real.tolist(), np.round(incident_mix((1, 1j, 0), d), 3).tolist()
+    ([[0.0], [1.0]], [[(0.707+0j)], [0.707j]])
+    """
+    if polarisation is None:
+        return np.eye(2, dtype=complex)
+    if isinstance(polarisation, str):
+        if polarisation not in ("theta", "phi"):
+            raise InvalidInputError(
+                f"polarisation = {polarisation!r} is not 'theta' or 'phi'; or give E0 as three numbers"
+            )
+        return np.eye(2, dtype=complex)[:, [("theta", "phi").index(polarisation)]]
+    try:
+        given = np.asarray(polarisation, dtype=complex)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"polarisation = {shown(polarisation)} is not E0 of three numbers") from error
+    if given.shape != (3,) or not np.all(np.isfinite(given)) or not np.any(given):
+        raise InvalidInputError(
+            f"polarisation = {shown(polarisation)} is not E0 of three finite numbers, not all of them 0"
+        )
+    given = given / np.linalg.norm(given)
+    along = abs(given @ direction)
+    if along > ACROSS:
+        raise InvalidInputError(
+            f"polarisation = {shown(polarisation)} has {100 * along:.3g} % of itself along the direction of incidence; "
+            "give E0 across it"
+        )
+    mix = spherical_frame(direction) @ given
+    return np.asarray((mix / np.linalg.norm(mix))[:, None])
 
 
 def turned_to_azimuth(directions: FloatArray, phi: FloatArray) -> FloatArray:

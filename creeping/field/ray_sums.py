@@ -5,7 +5,8 @@ With T = J + l J' the width of a ray's tube, T' its slope across the rays, and J
     error^2 = (sum |ui| e_i)^2 + sum_i |ui|^2 f_i + (sum_pairs P (|ui| + |uj|)/(k |Li - Lj|))^2 + (sum |ui| g_i)^2
     f = (5/8k) T'^2/T^4/(3 |J'/T| + 1/(s + l)),   g = e^(-a (xi_end - xi))
     e = [(A/m^2)^2 + (B V)^2]^(1/2) off the body,   [(C |u2/u1 - 1|^2)^2 + xi^2 (B V)^2 + xi^2 (D r^2)^2]^(1/2)
-    V = (|rho rho''| + rho'^2)/m^2,   r = rho kappa_t/m^2,   on it; A/m^2, V and r means of both ends
+    V = (|rho rho''| + rho'^2)/m^2,   r = rho kappa_t/m^2,   on it; A/m^2, V and r means of both ends;
+    of a conductor r/m^2 for r^2, and of either polarisation 0.8 of what grows with xi of the other one's |u| more
 
 f is the next term of the transport equation, at a fold the 5/(72 zeta) of Airy's function; near caustics the error
 is of its root's size. Two waves of which one has touched a caustic that the other has not are the leading terms of one
@@ -32,13 +33,16 @@ from creeping.rays.shedding import ShedRays
 from creeping.rays.status import RayStatus
 from creeping.rays.strips import Strip
 
-CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25}
+CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25, "conductor": 0.4}
 """A, and B off the body."""
-SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8}
-VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25}
+SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8, "electric hard": 3.0, "conductor": 3.0}
+VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25, "electric hard": 0.15, "conductor": 0.15}
 """C, and B on the body."""
-ACROSS, LEAST_XI = 0.3, 0.7
+ACROSS = {"soft": 0.3, "hard": 0.3, "impedance": 0.3, "electric hard": 0.3, "conductor": 1.1}
+LEAST_XI = 0.7
 """D, and the least xi that the error on the body grows with."""
+MIXED = 0.8
+"""What torsion brings from one polarisation to the other on the way, as a share of what grows with xi."""
 MERGING = 0.3
 """P: 5/36 at a fold, 1/4 on the axis of a sphere."""
 FOLDED, MERGED = 0.008, 0.04
@@ -90,10 +94,14 @@ def ray_sum(
     own_error: FloatArray,
     wavenumber: float,
     boundary: Boundary,
+    size: FloatArray | None = None,
 ) -> RaySum:
-    """Sum over the rays found (m,) of their waves (m,) or (m, 3), each with its own error, at ``count`` points."""
+    """Sum over the rays found (m,) of their waves (m,) or (m, 3), each with its own error, at ``count`` points.
+
+    Where waves merge they err by shares of ``size`` (m,): of |waves| if it is not given.
+    """
     rays, observer = shed.rays, shed.observer
-    size = magnitude(waves, rays.time)
+    size = magnitude(waves, rays.time) if size is None else size
     values = total_of(waves, observer, count)
     strength = total_of(size, observer, count)
     decay, end = fan_decay(fan, wavenumber, boundary)
@@ -133,10 +141,12 @@ def own_error(
     order: int,
     *,
     on: bool,
+    mixed: FloatArray | None = None,
 ) -> FloatArray:
     """Error of each ray's own wave (...), on the body or off it, from the wave in this and in the other order.
 
-    Waves may have components beyond the axes of the rays.
+    Waves may have components beyond the axes of the rays. ``mixed`` (...) is the size of the wave from
+    which torsion may bring some of it, which has a share in its error.
     """
     size = magnitude(waves[0], rays.time)
     # a wave may be infinite
@@ -146,12 +156,16 @@ def own_error(
         small, varying = np.mean([[m**-2, (np.abs(bend) + rate**2) / m**2] for m, rate, bend in ends], axis=0)
         if on:
             across = _mean_across(rays, wavenumber)
-            growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS * across**2)
+            power = small if boundary.kind == "conductor" else across
+            growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS[boundary.kind] * across * power)
             growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
             share = np.hypot(SQUARED[boundary.kind] * (change / size) ** 2, growing)
         else:
+            growing = np.zeros_like(size)
             share = np.hypot(CLOSE * small, VARIES_NEAR[boundary.kind] * varying)
         error = size * np.minimum(share, 1.0) + (change if order == 1 else 0.0)
+        if mixed is not None:
+            error = np.hypot(error, MIXED * np.minimum(growing, 1.0) * mixed)
     return np.asarray(np.where(size > 0, error, 0.0))
 
 

@@ -45,12 +45,13 @@ def scalar_boundary(boundary: BoundaryLike) -> Boundary:
     Raises
     ------
     InvalidInputError
-        If it is unknown, or "pec", whose fields near the body are vectors that this package does not assemble.
+        If it is unknown, or "pec", whose fields are vectors.
     """
     kinds = scalar_boundaries(boundary)
     if len(kinds) > 1:
         raise InvalidInputError(
-            "boundary 'pec' is for the far field; on and near the body give 'soft', 'hard' or ImpedanceBoundary"
+            "the field of boundary 'pec' is no scalar: creeping.conductor_field gives its E and H, "
+            "creeping.conductor_current n x H on the body"
         )
     return kinds[0]
 

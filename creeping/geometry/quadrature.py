@@ -84,9 +84,12 @@ class BodyNodes:
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of points (m, 3) from the body as nodes tell it, L: the nearest less their spacing."""
-        # half the distance between neighbouring nodes, of those that are furthest apart
-        apart = 0.5 * float(np.sqrt(np.max(self.weights)))
-        return np.asarray(np.sqrt(np.maximum(self._tree.query(points)[0] ** 2 - apart**2, 0.0)))
+        return np.asarray(np.sqrt(np.maximum(self._tree.query(points)[0] ** 2 - (0.5 * self.spacing) ** 2, 0.0)))
+
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring nodes, L, of those that are furthest apart."""
+        return float(np.sqrt(np.max(self.weights)))
 
     @cached_property
     def _tree(self) -> Any:

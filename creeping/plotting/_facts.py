@@ -12,7 +12,7 @@ from creeping.files.far_table import angles_of
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
-    from creeping.field.point_result import PointField
+    from creeping.field.point_result import PointData
     from creeping.geodesics.direct_flow import DirectFlow
     from creeping.geodesics.integrator import ErrorEstimate
     from creeping.phaseflow.phase_map import PhaseMap
@@ -116,10 +116,10 @@ def of_far(far: "FarField") -> Facts:
     yield from _lost(total)
 
 
-def of_points(field: "PointField") -> Facts:
+def of_points(field: "PointData") -> Facts:
     """Facts of a near or surface field."""
     unit = field.length_unit
-    yield "points", " x ".join(map(str, field.shape)) or "1"
+    yield "points", " x ".join(map(str, field.points.shape[:-1])) or "1"
     yield (
         "wavenumber",
         f"{field.wavenumber:g} 1/{unit} (wavelength {2 * np.pi / field.wavenumber:.6g} {unit})",
@@ -131,7 +131,7 @@ def of_points(field: "PointField") -> Facts:
     for name, count in field.status_counts.items():
         yield name, f"{count} points"
     if np.any(field.ok):
-        yield "largest where OK", f"{np.abs(field.values[field.ok]).max():.6g} {field.unit}"
+        yield "largest where OK", f"{field.magnitude[field.ok].max():.6g} {field.unit}"
         off = field.error[field.ok]
         yield "error where OK", f"{np.median(off):.2g} in the median, {off.max():.2g} at most"
 

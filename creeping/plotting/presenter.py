@@ -17,7 +17,7 @@ _FACTS: dict[str, Callable[..., _facts.Facts]] = {
     "RayFan": _facts.of_fan,
     "IsoPhaseCurve": _facts.of_curve,
     "FarField": _facts.of_far,
-    "PointField": _facts.of_points,
+    "PointData": _facts.of_points,
     "PhaseMap": _facts.of_map,
     "DirectFlow": _facts.of_direct,
 }

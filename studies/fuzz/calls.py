@@ -259,6 +259,14 @@ def _calls_of_fields(made: dict[str, Any]) -> dict[str, Call]:
     return {
         "surface_field": (cr.surface_field, {"fan": fan, "points": [(0.0, 0.0, 0.8)], **at}),
         "near_field": (cr.near_field, {"fan": fan, "points": outside, **at, "method": "auto"}),
+        "conductor_field": (
+            cr.conductor_field,
+            {"fan": fan, "points": outside, "wavenumber": 12.0, "polarisation": (1.0, 0.0, 0.0)},
+        ),
+        "conductor_current": (
+            cr.conductor_current,
+            {"fan": fan, "points": [(0.0, 0.0, 0.8)], "wavenumber": 12.0, "polarisation": "theta"},
+        ),
         "far_field": (cr.far_field, {"fan": fan, "observation": looks, **at, "method": "auto"}),
         "far_field by rays": (cr.far_field, {"fan": fan, "observation": looks, **at, "method": "rays"}),
         "far_field_uncertainty": (cr.far_field_uncertainty, {"fan": fan, "observation": looks, **at}),

@@ -50,8 +50,8 @@ def test_bad_boundaries_are_named(field, fan, boundary):
 
 
 @pytest.mark.parametrize("name", ["near", "surface"])
-def test_a_conductor_is_for_the_far_field(fan, name):
-    with pytest.raises(cr.CreepingError, match="far field"):
+def test_a_conductor_has_functions_of_its_own(fan, name):
+    with pytest.raises(cr.CreepingError, match="conductor_field gives its E and H"):
         FIELDS[name](fan, wavenumber=10.0, boundary="pec")
 
 

@@ -113,7 +113,7 @@ def test_decay_picture(tmp_path, fan, boundary, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ({"boundary": "pec"}, "'pec' is for the far field"),
+        ({"boundary": "pec"}, "'pec' is no scalar"),
         ({"boundary": "firm"}, "'firm' is not"),
         ({"wavenumber": -1.0}, "wavenumber = -1.0"),
         ({"order": 3}, "order = 3"),

@@ -13,7 +13,9 @@ are exact on the circular cylinder and on the sphere.
 Sources: [F46], [CK13, sec. 6.2]; Derivations, F18.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -23,22 +25,75 @@ from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT
 from creeping.field.currents.lit import STEEPEST
 from creeping.field.currents.lit_conductor import lit_conductor
 from creeping.field.currents.nodes import LitNodes, RayNodes
-from creeping.field.currents.radiation import far_of_vector, magnetic_field_of_vector
+from creeping.field.currents.radiation import (
+    electric_field_of_vector,
+    far_of_vector,
+    magnetic_field_of_vector,
+)
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.polarisation import spherical_frame
 from creeping.field.shed_wave import fock_parameter, scales
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import ray_factor, surface_waves
+from creeping.rays.quantities import RayPoints
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConductorCurrents(SurfaceCurrents):
-    """Currents n x H at nodes of a perfect conductor, (n, 3, 2): components, and incident polarisations theta and phi.
+    """Currents n x H at nodes of a perfect conductor, (n, 3, p): components, and incident polarisations.
 
-    Fields are (m, 2, 2), theta and phi scattered by theta and phi incident, far away, and H (m, 3, 2) near.
+    Fields are (m, 2, p) far away, theta and phi scattered, and H and E (m, 3, p) near.
+
+    Attributes
+    ----------
+    mix : (2, p) complex
+        Components along theta and phi of each incident polarisation: those two, unless `polarised` by others.
     """
 
+    mix: ComplexArray = field(default_factory=lambda: np.eye(2, dtype=complex))
     _factors: ClassVar[tuple[float, float]] = (2.8, 2.3)
+
+    def polarised(self, mix: ComplexArray) -> "ConductorCurrents":
+        """Currents of incident waves with other components along theta and phi (2, p)."""
+        if np.array_equal(mix, self.mix):
+            return self
+        return replace(self, values=self.values @ mix, change=self.change @ mix, mix=mix)
+
+    @property
+    def incident_electric(self) -> ComplexArray:
+        """E0 of each polarisation (3, p)."""
+        return np.asarray(spherical_frame(self.direction).T @ self.mix)
+
+    def scattered_electric(self, points: FloatArray) -> ComplexArray:
+        """Scattered E at points (m, 3), L, at least a quarter of a wavelength off the surface: (m, 3, p)."""
+        return self._electric(self.values, points)
+
+    @cached_property
+    def left_of_each(self) -> FloatArray:
+        """What is left inside of E and of H, rms, as a share of the incident wave (2, p)."""
+        x = self.inner_points
+        wave = np.exp(1j * self.wavenumber * (x @ self.direction))
+        electric = self._electric(self.values, x) + np.multiply.outer(wave, self.incident_electric)
+        return np.stack([self._rms(electric), self._left])
+
+    def changed_electric(self, points: FloatArray) -> FloatArray:
+        """As `changed`, of E and components added (m, p)."""
+        return self._changed(electric_field_of_vector, points) / self._electric_inside
+
+    def changed_magnetic(self, points: FloatArray) -> FloatArray:
+        """As `changed`, components added (m, p)."""
+        return self._changed(magnetic_field_of_vector, points) / self._change_inside
+
+    def _changed(self, radiated: Callable[..., ComplexArray], points: FloatArray) -> FloatArray:
+        """What the second order of the lit nodes and of the others adds, apart, in the root of squares (m, p)."""
+        J = self.change * self.weights[:, None, None]
+        each = [radiated(self.points[part], J[part], points, self.wavenumber) for part in (self.lit, ~self.lit)]
+        return np.asarray(np.sqrt(np.sum(np.abs(each) ** 2, axis=(0, 2))))
+
+    @cached_property
+    def _electric_inside(self) -> FloatArray:
+        """Rms inside of what the second order adds to E, of each incident wave."""
+        return self._rms(self._electric(self.change, self.inner_points))
 
     def _radiated(self, values: ComplexArray, part: BoolArray, directions: FloatArray) -> ComplexArray:
         strength = values[part] * self.weights[part, None, None]
@@ -48,45 +103,114 @@ class ConductorCurrents(SurfaceCurrents):
     def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         return magnetic_field_of_vector(self.points, values * self.weights[:, None, None], points, self.wavenumber)
 
+    def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
+        return electric_field_of_vector(self.points, values * self.weights[:, None, None], points, self.wavenumber)
+
+    @cached_property
+    def _amplitude(self) -> FloatArray:
+        """Rms of |f| over all directions, L, of each incident wave."""
+        forward = np.sum(np.conj(self.mix) * self.far(self.direction[None])[0], axis=0)
+        return np.asarray(np.sqrt(np.abs(forward.imag) / self.wavenumber))
+
     @property
-    def _incident(self) -> FloatArray:
-        """H0 of both polarisations (3, 2)."""
-        return np.cross(self.direction, spherical_frame(self.direction)).T
+    def amplitudes(self) -> FloatArray:
+        """Rms of |f| over all directions, L, of each incident wave (p,)."""
+        return self._amplitude
+
+    @property
+    def _incident(self) -> ComplexArray:
+        """H0 of each polarisation (3, p)."""
+        return np.cross(self.direction, self.incident_electric, axisb=0).T
 
 
 def conductor_waves(lit: LitNodes, shadow: RayNodes, direction: FloatArray, k: float, order: int) -> ComplexArray:
     """J at the nodes of the lit side, then at those of the rays, for both incident polarisations (n, 3, 2)."""
-    bright = lit_conductor(lit.cosine, lit.along, lit.across, lit.twist, lit.rate, lit.bend, k, order)
-    bright = bright * np.exp(1j * k * (lit.points @ direction))[:, None, None]
-    h, e = _amplitudes(lit.normals, lit.axes, direction)
+    electric = np.asarray(spherical_frame(direction).T, dtype=complex)
+    on_lit = lit_vectors(lit, direction, electric, k, order)
+    on_rays = ray_vectors(shadow.rays, shadow.normals, shadow.twist, direction, electric, k, order, coupled=order == 2)
+    return np.concatenate([on_lit, np.where(np.isfinite(on_rays), on_rays, 0.0)])
+
+
+def lit_vectors(
+    lit: LitNodes, direction: FloatArray, electric: ComplexArray, wavenumber: float, order: int
+) -> ComplexArray:
+    """J of the lit side's expansion at its nodes, for incident E0 (3, p): (n, 3, p)."""
+    bright = lit_conductor(lit.cosine, lit.along, lit.across, lit.twist, lit.rate, lit.bend, wavenumber, order)
+    bright = bright * np.exp(1j * wavenumber * (lit.points @ direction))[:, None, None]
+    h, e = amplitudes(lit.normals, lit.axes, direction, electric)
     b = np.cross(lit.normals, lit.axes)
     rows = bright[:, :, :1] * h[:, None] + bright[:, :, 1:] * e[:, None]
-    on_lit = lit.axes[:, :, None] * rows[:, :1] + b[:, :, None] * rows[:, 1:]
-    return np.concatenate([on_lit, _on_rays(shadow, direction, k, order)])
+    return np.asarray(lit.axes[:, :, None] * rows[:, :1] + b[:, :, None] * rows[:, 1:])
 
 
-def _amplitudes(normals: FloatArray, axes: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """H = H0.b and e = E0.b (n, 2) of both incident polarisations, b = n x a."""
-    b, electric = np.cross(normals, axes), spherical_frame(direction)
-    return b @ np.cross(direction, electric).T, b @ electric.T
+def amplitudes(
+    normals: FloatArray, axes: FloatArray, direction: FloatArray, electric: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """H = H0.b and e = E0.b (n, p) of incident waves E0 (3, p), b = n x a."""
+    b = np.cross(normals, axes)
+    return np.asarray(b @ np.cross(direction, electric, axisb=0).T), np.asarray(b @ electric)
 
 
-def _on_rays(shadow: RayNodes, direction: FloatArray, k: float, order: int) -> ComplexArray:
-    rays = shadow.rays
-    h, e = _amplitudes(rays.first_normal, np.broadcast_to(direction, rays.first_normal.shape), direction)
-    hard = surface_waves(rays, k, ELECTRIC_HARD, order)
-    soft = 1j / k * surface_waves(rays, k, ELECTRIC_SOFT, order)
-    p = rays.directions
-    b = np.cross(shadow.normals, p)
-    along, across = -h * hard[:, None], e * soft[:, None]
-    if order == 2:
+def ray_vectors(
+    rays: RayPoints,
+    normals: FloatArray,
+    twist: FloatArray,
+    direction: FloatArray,
+    electric: ComplexArray,
+    wavenumber: float,
+    order: int,
+    *,
+    coupled: bool = True,
+) -> ComplexArray:
+    """J of creeping rays (n,) at points with these normals and torsions, for incident E0 (3, p): (n, 3, p).
+
+    It is not finite on their caustics. ``order`` is that of u and v; what either gives to the other polarisation is of
+    second order itself.
+    """
+    k, p = wavenumber, rays.directions
+    axes = np.broadcast_to(direction, rays.first_normal.shape)
+    h, e = amplitudes(rays.first_normal, axes, direction, electric)
+    hard, soft, changing = ray_scalars(rays, k, order)
+    across, turn = e * soft[:, None], np.zeros(hard.shape)
+    if coupled:
+        turn = turn_of(rays.curvature[1], twist)
         m = scales(rays, k)[1]
-        turn = np.clip(shadow.twist / rays.curvature[1], -STEEPEST, STEEPEST)
         # 1/J is held where rays cross: J is known to be no narrower than the boundary layer there
         spread = rays.spreading / (rays.spreading**2 + 1 / m**4)
         across = across - e * (1j / k * rays.transverse[0] * spread * hard)[:, None]
-        changing = surface_function(fock_parameter(rays, k), 0.0, 1) * ray_factor(rays, k) / (2 * m**2)
-        along = along - turn[:, None] * across - h * (turn**2 * changing)[:, None]
-        across = across + h * (turn * changing)[:, None]
-    values = p[:, :, None] * along[:, None] + b[:, :, None] * across[:, None]
-    return np.asarray(np.where(np.isfinite(values), values, 0.0))
+    return vectors_of(p, np.cross(normals, p), h, across, hard, turn, changing)
+
+
+def ray_scalars(rays: RayPoints, wavenumber: float, order: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Waves u, (i/k) v and Du/(2m^2) of rays (...); the last one is of second order."""
+    hard = surface_waves(rays, wavenumber, ELECTRIC_HARD, order)
+    soft = 1j / wavenumber * surface_waves(rays, wavenumber, ELECTRIC_SOFT, order)
+    changing = np.zeros_like(hard)
+    if order == 2:
+        m = scales(rays, wavenumber)[1]
+        # where a ray has ended there is no wave to change
+        rate = surface_function(np.where(rays.alive, fock_parameter(rays, wavenumber), 0.0), 0.0, 1)
+        changing = np.where(rays.alive, rate * ray_factor(rays, wavenumber) / (2 * m**2), 0.0)
+    return hard, soft, changing
+
+
+def turn_of(curvature: FloatArray, twist: FloatArray) -> FloatArray:
+    """t rho (...), bounded, of kappa_n and t, 1/L."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.clip(twist / curvature, -STEEPEST, STEEPEST)
+    return np.asarray(np.nan_to_num(turn))
+
+
+def vectors_of(
+    p: FloatArray,
+    b: FloatArray,
+    h: ComplexArray,
+    across: ComplexArray,
+    hard: ComplexArray | FloatArray,
+    turn: FloatArray,
+    changing: ComplexArray,
+) -> ComplexArray:
+    """J (n, 3, p) along p and b (n, 3), of h and j = ``across`` (n, p) and u, t rho and Du/(2m^2) (n,)."""
+    along = -h * (hard + turn**2 * changing)[:, None] - turn[:, None] * across
+    across = across + h * (turn * changing)[:, None]
+    return np.asarray(p[:, :, None] * along[:, None] + b[:, :, None] * across[:, None])

@@ -27,8 +27,10 @@ OFF = 0.25
 """Least distance from the body, in wavelengths, at which currents serve."""
 
 
-def far_enough(body: Surface, wavenumber: float, points: FloatArray) -> BoolArray:
+def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: float = OFF) -> BoolArray:
     """Whether points (n, 3), L, are so far off the body that sums over nodes are integrals: (n,).
+
+    ``least`` is the distance asked for, in wavelengths.
 
     Raises
     ------
@@ -36,19 +38,25 @@ def far_enough(body: Surface, wavenumber: float, points: FloatArray) -> BoolArra
         If the wavenumber, 1/L, is too high for any mesh of the body.
     """
     # the nodes of the lit side, on the whole of the body
-    return body_nodes(body, 2 * wavenumber).distance(points) > OFF * 2 * np.pi / wavenumber
+    return body_nodes(body, 2 * wavenumber).distance(points) > least * 2 * np.pi / wavenumber
 
 
 def total_at(
     currents: SurfaceCurrents, points: FloatArray, dark: BoolArray
 ) -> tuple[ComplexArray, ComplexArray, FloatArray]:
     """Incident and scattered field and the error of their sum at points (n, 3), L, some of them in the dark: (n,)."""
-    k = currents.wavenumber
-    incident = np.exp(1j * k * (points @ currents.direction))
-    middle = np.mean(np.asarray(currents.body.bounds, dtype=float), axis=0)
-    away = np.linalg.norm(points - middle, axis=1)
-    mean = currents.mean_amplitude
-    level = ABSORBING_LEVEL if currents.boundary.kind == "impedance" else LIT_LEVEL
-    level = np.where(dark, DARK_LEVEL / np.hypot(1, away / (k * mean**2)), level / np.hypot(1, away / mean))
+    incident = np.exp(1j * currents.wavenumber * (points @ currents.direction))
+    lit = ABSORBING_LEVEL if currents.boundary.kind == "impedance" else LIT_LEVEL
+    level = level_at(currents, points, dark, currents.mean_amplitude, lit, DARK_LEVEL)
     shape = currents.changed(points)
     return incident, currents.scattered(points), currents.extinction * np.hypot(level, SHAPE * shape)
+
+
+def level_at(
+    currents: SurfaceCurrents, points: FloatArray, dark: BoolArray, mean: float, lit: float, shadow: float
+) -> FloatArray:
+    """L s (n,) at points (n, 3), L, some in the dark, with f_rms = ``mean`` and L in the light and the shadow."""
+    middle = np.mean(np.asarray(currents.body.bounds, dtype=float), axis=0)
+    away = np.linalg.norm(points - middle, axis=1)
+    in_shadow = shadow / np.hypot(1, away / (currents.wavenumber * mean**2))
+    return np.asarray(np.where(dark, in_shadow, lit / np.hypot(1, away / mean)))

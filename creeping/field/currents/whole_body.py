@@ -232,8 +232,7 @@ class SurfaceCurrents:
     def _amplitude(self) -> FloatArray:
         """Rms of |f| over all directions, L, of each incident wave."""
         forward = self.far(self.direction[None])[0]
-        own = np.diagonal(forward) if forward.ndim else forward
-        return np.asarray(np.sqrt(np.abs(own.imag) / self.wavenumber))
+        return np.asarray(np.sqrt(np.abs(forward.imag) / self.wavenumber))
 
     def _rms(self, field: ComplexArray) -> FloatArray:
         """Rms over points (m, ...), components added, of each incident wave."""
@@ -251,9 +250,9 @@ class SurfaceCurrents:
         return field_of_scalar(self.points, self.normals, *self._scalar(values), points, self.wavenumber)
 
     @property
-    def _incident(self) -> FloatArray:
+    def _incident(self) -> ComplexArray:
         """Amplitude of the incident wave."""
-        return np.ones(())
+        return np.ones((), dtype=complex)
 
     def _scalar(self, values: ComplexArray) -> tuple[ComplexArray | None, ComplexArray | None]:
         """u dS and du/dn dS, None for nothing."""

@@ -37,3 +37,14 @@ def test_reciprocity():
     one, other = solution.far_field(d[1:])[0, 0], back.far_field(-d[:1])[0, 0]
     turn = np.diag([1.0, -1.0])
     np.testing.assert_allclose(one, turn @ other.T @ turn, atol=1e-3)
+
+
+def test_near_field_of_the_sphere(rng):
+    d = np.array([[0.36, 0.48, 0.8]])
+    solution = dipoles.scatter(clouds.ellipsoid(1.0, 1.0, 1.0), 4.0, d, depth=0.3)
+    x = rng.normal(size=(30, 3))
+    x *= rng.uniform(1.0, 2.0, (30, 1)) / np.linalg.norm(x, axis=1, keepdims=True)
+    found = solution.total(x)
+    for i, e in enumerate(dipoles.frames(d)[0]):
+        for mine, exact in zip(found, sphere.pec_total_field(4.0, 1.0, x, d[0], e), strict=True):
+            np.testing.assert_allclose(mine[:, :, 0, i], exact, atol=1e-5)

@@ -126,6 +126,27 @@ def test_mie_rayleigh_limit():
     np.testing.assert_allclose(within, k**2 * a**3 * (c - 1 / 2), atol=1e-3 * k**2 * a**3)
 
 
+def test_mie_near_field_meets_the_boundary_and_maxwells_equations(rng):
+    k, d = 6.0, np.array([0.36, 0.48, 0.8])
+    e = np.cross(d, (1.0, 0.0, 0.0)) / np.linalg.norm(np.cross(d, (1.0, 0.0, 0.0)))
+    x = rng.normal(size=(8, 3))
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    E, H = sphere.pec_total_field(k, 1.0, x, d, e)
+    assert np.max(np.abs(np.cross(x, E))) < 1e-13 and np.max(np.abs(np.sum(x * H, axis=1))) < 1e-13
+    first, second = sphere.pec_surface_field(k, 1.0, x @ d)
+    size = np.hypot(np.abs(first * (x @ np.cross(d, e))), np.abs(second * (x @ e))) / np.sqrt(1 - (x @ d) ** 2)
+    np.testing.assert_allclose(np.linalg.norm(H, axis=1), size, rtol=1e-9)
+    step = 1e-4
+    ends = np.concatenate([1.4 * x + sign * step * axis for axis in np.eye(3) for sign in (1, -1)])
+    fields = sphere.pec_total_field(k, 1.0, ends, d, e)
+    exact = sphere.pec_total_field(k, 1.0, 1.4 * x, d, e)
+    for mine, other, sign in ((0, 1, 1), (1, 0, -1)):
+        values = fields[mine].reshape(3, 2, 8, 3)
+        slope = (values[:, 0] - values[:, 1]) / (2 * step)
+        curl = np.stack([slope[(i + 1) % 3][:, (i + 2) % 3] - slope[(i + 2) % 3][:, (i + 1) % 3] for i in range(3)], 1)
+        np.testing.assert_allclose(curl, sign * 1j * k * exact[other], atol=1e-5)
+
+
 def test_refusals():
     with pytest.raises(ValueError, match="inside the sphere"):
         sphere.total_field(1.0, 1.0, [[0.5, 0.0, 0.0]], [0, 0, 1.0], "soft")

@@ -1,0 +1,1 @@
+"""Currents, charges and fields on and near a perfect conductor."""

@@ -1,0 +1,324 @@
+"""E and H at points off a perfect conductor or on it, and the current on it, for plane waves of chosen polarisation.
+
+    on the body              E = (n.E) n,  H = J x n, by J and its divergence     `creeping.field.conductor.on_body`
+    a quarter wavelength off the radiation of the whole body's currents           `creeping.field.conductor.total`
+    nearer                   between the two                                      `creeping.field.conductor.layer`
+    in the shadow            creeping rays, where they state the smaller error    `creeping.field.conductor.shed`
+
+Sources: [CK13, sec. 6.2]; Derivations, F18, F20 and F26.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.errors import SurfaceError
+from creeping.field.arguments import checked, checked_plain
+from creeping.field.conductor.layer import layer_fields, lowest_height
+from creeping.field.conductor.on_body import OnConductor, on_conductor
+from creeping.field.conductor.result import ConductorCurrent, ConductorField, Fields
+from creeping.field.conductor.shed import shed_sums
+from creeping.field.conductor.total import incident_fields, total_fields
+from creeping.field.currents.conductor import ConductorCurrents
+from creeping.field.currents.kept import affordable, kept_currents
+from creeping.field.currents.total import far_enough
+from creeping.field.currents.whole_body import POINTS as INNER
+from creeping.field.lit_ground import LEFT, UNKNOWN, convex
+from creeping.field.near import ON_BODY, checked_height, rays_alone
+from creeping.field.point_result import FieldStatus, judged
+from creeping.field.polarisation import incident_mix, spherical_frame
+from creeping.field.served import Served, measured_field, zero_field
+from creeping.field.validity_range import validity
+from creeping.geodesics.bundle import as_points, on_body
+from creeping.geometry.arguments import one_of
+from creeping.geometry.surface import normal
+from creeping.geometry.unit import unit_of
+from creeping.rays.fan import RayFan
+from creeping.shadow.occlusion import occluded
+
+VECTOR = 1.5
+"""What sums for both fields of a polarisation cost, in terms of a scalar's."""
+FINE = 1e-4
+"""Error of rays up to which currents are not asked."""
+
+
+def conductor_field(
+    fan: RayFan,
+    points: ArrayLike,
+    *,
+    wavenumber: float,
+    polarisation: str | ArrayLike | None = None,
+) -> ConductorField:
+    """Total E and H at points off a perfect conductor or on it, with their error.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Long enough to pass where rays leave towards the points.
+    points : (..., 3), L
+        Outside the body or on it.
+    wavenumber : float, 1/L
+    polarisation : "theta", "phi" or (3,) complex, optional
+        E0 of the incident wave, across its direction and of any length; both theta and phi if it is not given.
+
+    Returns
+    -------
+    ConductorField
+        E in units of the incident E, and H times the impedance of free space in the same.
+
+    Raises
+    ------
+    InvalidInputError
+        On points inside the body or not finite, a bad wavenumber or polarisation, and for a weighted body or one with
+        edges.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> field = cr.conductor_field(fan, [(0, 0, -1), (0, 2.0, -0.5)], wavenumber=12.0, polarisation=(1, 0, 0))
+    >>> field.method.tolist(), np.abs(field.H[0]).round(1).tolist(), np.abs(field.E[0]).round(1).tolist()
+    (['lit', 'currents'], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0])
+    """
+    k, mix = _checked(fan, wavenumber, polarisation)
+    electric = np.asarray(spherical_frame(fan.line.direction).T @ mix, dtype=complex)
+    y = as_points(points)
+    flat = y.reshape(-1, 3)
+    on = checked_height(fan, flat) <= ON_BODY
+    off, at = np.flatnonzero(~on), np.flatnonzero(on)
+    dark = np.zeros(len(flat), dtype=bool)
+    dark[off] = occluded(fan.body, flat[off], fan.line.direction)
+    fields = [_no_field(len(flat)) for _ in electric.T]
+    left = _left_inside(fan, k, mix)
+    if len(at):
+        found = on_conductor(fan, flat[at], k, electric, left)
+        n = normal(fan.body, flat[at])
+        fields = [one.put(at, _on_body(found, i, n)) for i, one in enumerate(fields)]
+    if len(off):
+        sums = shed_sums(fan, flat[off], k, electric)
+        rays = [
+            _from_elsewhere(rays_alone(its, ~dark[off]), float(its_left))
+            for its, its_left in zip(sums, left, strict=True)
+        ]
+        fields = [one.put(off, its) for one, its in zip(fields, rays, strict=True)]
+        fine = np.all([(one.status == FieldStatus.OK) & (one.error <= FINE) for one in fields], axis=0)
+        asked = np.flatnonzero(~on & ~fine)
+        if len(asked):
+            fields = _with_currents(fields, fan, flat, asked, dark, k, mix, left)
+    return _result(fields, fan, y, k, electric, single=polarisation is not None)
+
+
+def conductor_current(
+    fan: RayFan,
+    points: ArrayLike,
+    *,
+    wavenumber: float,
+    polarisation: str | ArrayLike | None = None,
+) -> ConductorCurrent:
+    """Current J = n x H and charge n.E at points of a perfect conductor, with their error; it acts as the array of J.
+
+    Parameters
+    ----------
+    fan : RayFan
+    points : (..., 3), L
+        Points on the body, lit or in the shadow.
+    wavenumber : float, 1/L
+    polarisation : "theta", "phi" or (3,) complex, optional
+        E0 of the incident wave, across its direction and of any length; both theta and phi if it is not given.
+
+    Returns
+    -------
+    ConductorCurrent
+        J in units of the incident H, the charge in those of the incident E.
+
+    Raises
+    ------
+    InvalidInputError
+        On points off the body or not finite, a bad wavenumber or polarisation, and for a weighted body or one with
+        edges.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> J = cr.conductor_current(fan, [(0, 1, 0), (1, 0, 0)], wavenumber=30.0, polarisation=(1, 0, 0))
+    >>> np.linalg.norm(J, axis=1).round(1).tolist(), np.abs(J.charge).round(1).tolist()   # E across n, and along it
+    ([0.3, 1.4], [0.0, 1.5])
+    """
+    k, mix = _checked(fan, wavenumber, polarisation)
+    electric = np.asarray(spherical_frame(fan.line.direction).T @ mix, dtype=complex)
+    y = as_points(points)
+    found = on_conductor(fan, on_body(fan.body, y).reshape(-1, 3), k, electric, _left_inside(fan, k, mix))
+    shape, single = y.shape[:-1], polarisation is not None
+    fields = found.current
+    values, lit, creeping = (
+        _vectors([getattr(one, name) for one in fields], shape, single) for name in ("values", "wave", "creeping")
+    )
+    return ConductorCurrent(
+        points=y.copy(),
+        values=values,
+        charge=_scalars(list(found.charge.T), shape, single),
+        lit=lit,
+        creeping=creeping,
+        **_judgement(fields, [np.linalg.norm(one.values, axis=1) for one in fields], shape, single),
+        **_facts(fan, k, electric, single),
+    )
+
+
+def _checked(fan: RayFan, wavenumber: float, polarisation: str | ArrayLike | None) -> tuple[float, ComplexArray]:
+    """The wavenumber and the polarisations' components along theta and phi (2, p), if they and the body will do."""
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    checked_plain(fan.body, smooth="the near field")
+    return checked(wavenumber, 2), incident_mix(polarisation, fan.line.direction)
+
+
+def _places(count: int, mix: ComplexArray) -> int:
+    """Points at which a scalar's sums cost as much as both fields of each polarisation at ``count``."""
+    return int(np.ceil(VECTOR * mix.shape[1] * count))
+
+
+def _left_inside(fan: RayFan, k: float, mix: ComplexArray) -> FloatArray:
+    """What currents leave inside of each incident wave (p,): 0 on a convex body, NaN where it is not to be known."""
+    if convex(fan):
+        return np.zeros(mix.shape[1])
+    unknown = np.full(mix.shape[1], np.nan)
+    try:
+        currents = _currents(fan, k, mix) if affordable(fan, _places(INNER, mix), k) else None
+    except SurfaceError:
+        return unknown
+    return unknown if currents is None else np.max(currents.left_of_each, axis=0)
+
+
+def _currents(fan: RayFan, k: float, mix: ComplexArray) -> ConductorCurrents:
+    """Currents of the whole body for these polarisations."""
+    found = kept_currents(fan, k, "pec")
+    assert isinstance(found, ConductorCurrents)
+    return found.polarised(mix)
+
+
+def _no_field(count: int) -> Served:
+    """No E and no H (n, 6)."""
+    none = zero_field(count, "rays")
+    nothing = np.zeros((count, 6), dtype=complex)
+    return Served(nothing, nothing, none.error, none.error_by, none.status, none.method)
+
+
+def _on_body(found: OnConductor, i: int, n: FloatArray) -> Served:
+    """E and H (n, 6) of a polarisation on the body."""
+    J = found.current[i]
+    share = np.linalg.norm(J.wave, axis=1), np.linalg.norm(J.creeping, axis=1)
+    with np.errstate(invalid="ignore"):
+        # the charge belongs to both parts as the current does
+        part = np.where(share[0] + share[1] > 0, share[0] / (share[0] + share[1]), 1.0)
+        charge = found.charge[:, i]
+        wave, creeping = (
+            np.concatenate([(its * charge)[:, None] * n, np.cross(one, n)], axis=1)
+            for its, one in ((part, J.wave), (1 - part, J.creeping))
+        )
+    return Served(wave, creeping, J.error, J.error_by, J.status, J.method)
+
+
+def _from_elsewhere(rays: Served, left: float) -> Served:
+    """Rays with the error by waves that come from elsewhere on the body, of which ``left`` inside of it tells."""
+    known = np.isfinite(left)
+    return replace(
+        rays,
+        error=np.hypot(rays.error, LEFT * left if known else UNKNOWN),
+        error_by=rays.error_by if known else np.full(len(rays.error), "bound"),
+    )
+
+
+def _with_currents(
+    fields: list[Served],
+    fan: RayFan,
+    points: FloatArray,
+    asked: IntArray,
+    dark: BoolArray,
+    k: float,
+    mix: ComplexArray,
+    left: FloatArray,
+) -> list[Served]:
+    """Fields with those of currents, or of the layer, at the points asked for where they are better."""
+    if not affordable(fan, _places(len(asked), mix), k):
+        return fields
+    try:
+        far = far_enough(fan.body, k, points[asked], lowest_height(fan, k))
+        currents = _currents(fan, k, mix)
+    except SurfaceError:
+        return fields
+    at, close = asked[far], asked[~far]
+    if len(at):
+        incident, scattered, error = total_fields(currents, points[at], dark[at])
+        total = incident + scattered
+        new = [measured_field(total[..., i], error[:, i], "currents", "extinction") for i in range(len(fields))]
+        fields = [one.put_better(at, its, must=False) for one, its in zip(fields, new, strict=True)]
+    if len(close):
+        rows, layer = layer_fields(fan, currents, points[close], left)
+        fields = [one.put_better(close[rows], its, must=False) for one, its in zip(fields, layer, strict=True)]
+    return fields
+
+
+def _result(
+    fields: list[Served], fan: RayFan, points: FloatArray, k: float, electric: ComplexArray, *, single: bool
+) -> ConductorField:
+    """The field at points (..., 3), judged, in the parts that a reader wants."""
+    shape = points.shape[:-1]
+    waves = incident_fields(fan.line.direction, electric, points.reshape(-1, 3), k)
+    parts: tuple[list[ComplexArray], ...] = ([], [], [])
+    for i, one in enumerate(fields):
+        incident = np.where(np.isin(one.method, ("rays", "beams"))[:, None], 0.0, waves[..., i])
+        for part, value in zip(parts, (incident, one.wave - incident, one.creeping), strict=True):
+            part.append(np.asarray(value))
+    incident_, scattered, creeping = (
+        Fields(*(_vectors([v[:, part] for v in values], shape, single) for part in (slice(0, 3), slice(3, 6))))
+        for values in parts
+    )
+    sizes = [
+        np.maximum(np.linalg.norm(one.values[:, :3], axis=1), np.linalg.norm(one.values[:, 3:], axis=1))
+        for one in fields
+    ]
+    return ConductorField(
+        points=points.copy(),
+        incident=incident_,
+        scattered=scattered,
+        creeping=creeping,
+        **_judgement(fields, sizes, shape, single),
+        **_facts(fan, k, electric, single),
+    )
+
+
+def _judgement(fields: list[Served], sizes: list[FloatArray], shape: tuple[int, ...], single: bool) -> dict[str, Any]:
+    """Error, its source, status and method (..., p) of values so large."""
+    status = [judged(v.status, s, v.error, v.error_by, 1.0) for v, s in zip(fields, sizes, strict=True)]
+    arrays = {name: [getattr(v, name) for v in fields] for name in ("error", "error_by", "method")} | {"status": status}
+    return {name: _scalars(values, shape, single) for name, values in arrays.items()}
+
+
+def _facts(fan: RayFan, k: float, electric: ComplexArray, single: bool) -> dict[str, Any]:
+    return {
+        "incident_electric": electric[:, 0] if single else electric,
+        "wavenumber": k,
+        "boundary": "pec",
+        "order": 2,
+        "validity": validity(fan, wavenumber=k),
+        "length_unit": unit_of(fan.body),
+    }
+
+
+def _scalars(values: list[Any], shape: tuple[int, ...], single: bool) -> Any:
+    """Values (n,) of each polarisation as (...) or (..., 2)."""
+    return values[0].reshape(shape) if single else np.stack(values, axis=-1).reshape(*shape, len(values))
+
+
+def _vectors(values: list[ComplexArray], shape: tuple[int, ...], single: bool) -> ComplexArray:
+    """Vectors (n, 3) of each polarisation as (..., 3) or (..., 3, 2)."""
+    return values[0].reshape(*shape, 3) if single else np.stack(values, axis=-1).reshape(*shape, 3, len(values))

@@ -1,0 +1,251 @@
+"""The current J = n x H and the charge n.E at points of a perfect conductor.
+
+    J = (1 - W) J_lit + sum_rays w_i J_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
+    n.E = div J/(ik),   dH_n/dn = -div (J x n)
+
+J_lit and J_i are those of `creeping.field.currents.conductor`; where rays merge beams stand for them
+(`creeping.field.conductor.mode_beams`). Divergences on the surface are differences between points 0.02/k to either
+side. Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|.
+
+Sources: [CK13, sec. 6.2]; Derivations, F18 and F26.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
+from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
+from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
+from creeping.field.currents.conductor import lit_vectors, ray_vectors
+from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part, nodes_at
+from creeping.field.far_geometry import fan_strips
+from creeping.field.lit_ground import composed, lit_error
+from creeping.field.point_result import FieldStatus
+from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
+from creeping.field.served import Served, Words
+from creeping.field.shed_wave import fock_parameter
+from creeping.field.strip_waves import without_tubes
+from creeping.field.surface import surface_waves
+from creeping.geometry.surface import normal, project, size
+from creeping.rays.fan import RayFan
+from creeping.rays.quantities import RayPoints
+from creeping.rays.shedding import ShedRays, shed_on
+
+APART = 0.02
+"""Distance of the points between which currents are differenced, over the wavelength over 2 pi."""
+MERGED = 1e-3
+"""Error of the sum over rays, as a share of the incident wave, from which beams are asked."""
+
+WORST = 0.99
+"""Error of a ray, as a share of it, at most: one that has ended is none of those that beams are made of."""
+
+
+@dataclass(frozen=True, eq=False)
+class OnConductor:
+    """What is on the body at points (n,), for each of p incident polarisations.
+
+    Attributes
+    ----------
+    current : list of Served
+        J (n, 3) of each polarisation.
+    charge : (n, p) complex
+        n.E, in units of the incident E.
+    slope : (n, p) complex
+        (1/k) dH_n/dn.
+    """
+
+    current: list[Served]
+    charge: ComplexArray
+    slope: ComplexArray
+
+
+def on_conductor(fan: RayFan, points: FloatArray, k: float, electric: ComplexArray, left: FloatArray) -> OnConductor:
+    """J, n.E and dH_n/dn at points of the body (n, 3), for incident E0 (3, p).
+
+    ``left`` (p,) is what currents leave inside of each incident wave, 0 on a body that is convex.
+    """
+    count = len(points)
+    around, normals, apart = _crosses(fan, points, k)
+    lit, lit_off, share = _lit_at(fan, around, normals, k, electric)
+    rays, by = _rays_at(fan, around, normals, k, electric, 1 - share)
+    served, total = [], np.empty_like(lit)
+    for i, (sums, method) in enumerate(zip(rays, by, strict=True)):
+        centre = RaySum(sums.values[:count], sums.error, sums.status, sums.faded)
+        parts = lit[:count, :, i], lit_off[:count, i], share[:count]
+        one = composed(fan, parts, centre, method, float(left[i]), k, CONDUCTOR, 1.0)
+        served.append(one)
+        # what is left out at a point is left out around it
+        dropped = np.all(one.creeping == 0, axis=1) | ~np.all(np.isfinite(sums.values[:count]), axis=1)
+        total[:, :, i] = lit[:, :, i] + np.where(np.tile(dropped, 5)[:, None], 0.0, sums.values)
+    magnetic = np.cross(total, normals[:, :, None], axis=1)
+    charge, turned = (_divergence(v.reshape(5, count, 3, -1), apart) for v in (total, magnetic))
+    return OnConductor(served, charge / (1j * k), -turned / k)
+
+
+def _crosses(fan: RayFan, points: FloatArray, k: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points, those to either side of them along two tangents (5n, 3), their normals, and steps (2, n, 3)."""
+    n = normal(fan.body, points)
+    first = axes_of_incidence(n, fan.line.direction)
+    ends = [
+        project(fan.body, points + sign * APART / k * t) for t in (first, np.cross(n, first)) for sign in (1.0, -1.0)
+    ]
+    around = np.concatenate([points, *ends])
+    return around, normal(fan.body, around), np.stack([ends[0] - ends[1], ends[2] - ends[3]])
+
+
+def _divergence(values: ComplexArray, apart: FloatArray) -> ComplexArray:
+    """Surface divergence (n, p), 1/L, of tangential vectors at points and around them (5, n, 3, p)."""
+    change = np.stack([values[1] - values[2], values[3] - values[4]])
+    slopes = np.sum(apart[..., None] * change, axis=2) / np.sum(apart**2, axis=2)[..., None]
+    return np.asarray(slopes.sum(axis=0))
+
+
+def _lit_at(
+    fan: RayFan, points: FloatArray, normals: FloatArray, k: float, electric: ComplexArray
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """The lit side's part of J at points (n, 3, p), its error (n, p), and its share (n,)."""
+    body, d, p = fan.body, fan.line.direction, electric.shape[1]
+    at, part = lit_part(body, fan.line, nodes_at(body, points, normals), k)
+    J, other = (lit_vectors(part, d, electric, k, o) for o in (2, 1))
+    values, error, share = (
+        np.zeros((len(points), 3, p), dtype=complex),
+        np.zeros((len(points), p)),
+        np.zeros(len(points)),
+    )
+    share[at] = part.weights
+    values[at] = part.weights[:, None, None] * J
+    large, change = np.linalg.norm(J, axis=1), np.linalg.norm(J - other, axis=1)
+    for i in range(p):
+        off = lit_error(part, large[:, i], change[:, i], k, CONDUCTOR, 2, size(body))
+        error[at, i] = part.weights * off
+    return values, error, share
+
+
+def _rays_at(
+    fan: RayFan,
+    around: FloatArray,
+    normals: FloatArray,
+    k: float,
+    electric: ComplexArray,
+    share: FloatArray,
+) -> tuple[list[RaySum], list[Words]]:
+    """Sums over rays at points and around them (5n, 3), with the error and status of the points alone (n,).
+
+    One for each polarisation, and what serves at each point; ``share`` (5n,) is that of rays next to the line.
+    """
+    count = len(around) // 5
+    found = shed_on(fan_strips(fan), fan.body, around)
+    of = normals[found.observer]
+    # rays pass through points of the body that differ from those of the strip by its error alone
+    twist = nodes_at(fan.body, around[found.observer], of).twist(found.rays.directions)
+    young = fock_parameter(found.rays, k) < TAKEN_OVER
+    weight = np.where(young, share[found.observer], 1.0)[:, None, None]
+    with np.errstate(invalid="ignore"):
+        waves, other = (weight * ray_vectors(found.rays, of, twist, fan.line.direction, electric, k, o) for o in (2, 1))
+    waves, other = (np.where(weight > 0, wave, 0.0) for wave in (waves, other))
+    middle = found.observer < count
+    strength = _strength(found.rays, weight, k)
+    sums, methods, parts = [], [], []
+    for i in range(electric.shape[1]):
+        pair = waves[middle, :, i], other[middle, :, i]
+        own = own_error(found.rays[middle], pair, k, CONDUCTOR, 2, on=True, mixed=strength[middle])
+        one = ray_sum(fan, found[middle], count, pair[0], own, k, ELECTRIC_HARD, strength[middle])
+        sums.append(replace(one, values=total_of(waves[:, :, i], found.observer, 5 * count)))
+        methods.append(np.full(count, "rays"))
+        parts.append(own)
+    asked = np.any([(one.status == FieldStatus.CAUSTIC) | (one.error > MERGED) for one in sums], axis=0)
+    at = np.flatnonzero(asked)
+    if len(at) and beams_serve(fan, 5 * len(at), k):
+        by_beams = _beams_at(fan, around, at, found, (waves, strength, weight[:, 0, 0]), share, k, electric)
+        for i, its in enumerate(by_beams):
+            mine = sums[i]
+            ok = its.status == FieldStatus.OK
+            better = at[ok & ((mine.status[at] != FieldStatus.OK) | (its.error < mine.error[at]))]
+            sums[i], methods[i] = _taken(mine, its, at, better, methods[i])
+    return sums, methods
+
+
+def _strength(rays: RayPoints, weight: FloatArray, k: float) -> FloatArray:
+    """|u| of rays (m,): what their currents of either polarisation are made of."""
+    with np.errstate(invalid="ignore"):
+        return np.where(weight[:, 0, 0] > 0, np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1)) * weight[:, 0, 0], 0.0)
+
+
+def _taken(mine: RaySum, its: RaySum, at: IntArray, better: IntArray, method: Words) -> tuple[RaySum, Words]:
+    """A sum with that of beams, at points ``at`` and around them, in its place at the points ``better``."""
+    count = len(mine.status)
+    row = np.full(count, -1)
+    row[at] = np.arange(len(at))
+    values, error, status = mine.values.copy(), mine.error.copy(), mine.status.copy()
+    for block in range(5):
+        values[better + block * count] = its.values[row[better] + block * len(at)]
+    error[better], status[better] = its.error[row[better]], its.status[row[better]]
+    method = method.astype("<U8")
+    method[better] = "beams"
+    return RaySum(values, error, status, mine.faded), method
+
+
+def _beams_at(
+    fan: RayFan,
+    around: FloatArray,
+    at: IntArray,
+    found: ShedRays,
+    waves: tuple[ComplexArray, FloatArray, FloatArray],
+    share: FloatArray,
+    k: float,
+    electric: ComplexArray,
+) -> list[RaySum]:
+    """Sums of beams at the points ``at`` and around them, each with the error and status of the points alone.
+
+    ``waves`` of the rays found are J (m, 3, p), |u| (m,), and their weights (m,).
+    """
+    count, few, p = len(around) // 5, len(at), electric.shape[1]
+    rows = np.concatenate([at + block * count for block in range(5)])
+    row = np.full(len(around), -1)
+    row[rows] = np.arange(len(rows))
+    mine = row[found.observer] >= 0
+    shed = replace(found[mine], observer=row[found.observer[mine]])
+    J, strength, weight = waves[0][mine], waves[1][mine], waves[2][mine]
+    # an infinite wave is that of a caustic: beams serve there
+    own, strength = np.where(np.isfinite(J), J, 0.0), np.where(np.isfinite(strength), strength, 0.0)
+    beams = mode_waves_of(fan, k, electric)
+    sums = beams_beside_rays(
+        fan, beams, shed, around[rows], own.reshape(len(own), 3 * p), share[rows], beams.components
+    )
+    y, across = np.zeros((2, len(shed.sigma)), dtype=complex)
+    for number in range(len(beams.strips)):
+        these = np.flatnonzero(shed.strip == number)
+        place = number, shed.sigma[these], shed.rays.time[these]
+        y[these], across[these] = beams.at(*place), beams.across(*place)
+    eta, n = variation(fan, shed, y, across, k), normal(fan.body, around[rows])
+    large, part = _without_caustics(fan, shed, around[rows], k, electric)
+    with np.errstate(divide="ignore"):
+        large = large * (weight * np.minimum(np.abs(shed.rays.spreading) ** -0.5, STRONG))[:, None]
+    out = []
+    for i in range(p):
+        both = sums[0].reshape(-1, 3, p)[:, :, i], sums[1].reshape(-1, 3, p)[:, :, i]
+        whole = blended_sum(fan, shed, own[:, :, i], strength, large[:, i], part[:, i], eta, both, k, ELECTRIC_HARD)
+        # feet of beams have tangents of their own
+        tangential = whole.values - np.sum(n * whole.values, axis=1, keepdims=True) * n
+        out.append(RaySum(tangential, whole.error[:few], whole.status[:few], whole.faded[:few]))
+    return out
+
+
+def _without_caustics(
+    fan: RayFan, shed: ShedRays, points: FloatArray, k: float, electric: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Size of each ray's J but for its tube, at least |u|, and the error of J as a share of that: (m, p) each."""
+    rays, x = without_tubes(shed.rays), points[shed.observer]
+    n = normal(fan.body, x)
+    twist = nodes_at(fan.body, x, n).twist(rays.directions)
+    pair = [ray_vectors(rays, n, twist, fan.line.direction, electric, k, o) for o in (2, 1)]
+    u = np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1))
+    large = np.maximum(np.linalg.norm(pair[0], axis=1), u[:, None])
+    off = [
+        own_error(rays, (pair[0][:, :, i], pair[1][:, :, i]), k, CONDUCTOR, 2, on=True, mixed=u)
+        for i in range(electric.shape[1])
+    ]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return large, np.nan_to_num(np.minimum(np.stack(off, axis=1) / large, WORST))

@@ -1,0 +1,165 @@
+"""What fields and currents of a conductor at points are: complex vectors with their error and status.
+
+Both incident polarisations, theta and phi, have the last axis of vectors, errors and statuses; one of them has none.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.array_result import ArrayResult
+from creeping.field.point_result import PointData
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Fields(NamedTuple):
+    """E and H at points (..., 3), in units of the incident E, H times the impedance of free space.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> Fields(np.ones((5, 3)), np.zeros((5, 3))).E.shape
+    (5, 3)
+    """
+
+    E: ComplexArray
+    H: ComplexArray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConductorField(PointData):
+    """E and H at points off a perfect conductor or on it, in units of the incident E.
+
+    Attributes
+    ----------
+    points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
+        As of every field at points; the error holds for E and for H. ``method`` is "currents", "layer" between them and
+        the body, or "rays"; on the body that of `ConductorCurrent`.
+    incident, scattered, creeping : Fields
+        Parts, whose sum the field is: where currents or lit ground served, the incident wave and the rest; where rays
+        did, the sum over them, which in the shadow is the whole field.
+    incident_electric : (3,) or (3, 2) complex
+        E0 of the incident wave, of both polarisations if none was chosen.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> field = cr.conductor_field(fan, [(0, 2.0, -0.5)], wavenumber=12.0, polarisation=(1, 0, 0))
+    >>> field.E.shape, field.status_counts, bool(abs(field.E - field.incident.E - field.scattered.E).max() < 1e-12)
+    ((1, 3), {'OK': 1}, True)
+    """
+
+    incident: Fields
+    scattered: Fields
+    creeping: Fields
+    incident_electric: ComplexArray
+
+    @property
+    def E(self) -> ComplexArray:  # noqa: N802
+        """Total electric field (..., 3) or (..., 3, 2)."""
+        return np.asarray(self.incident.E + self.scattered.E + self.creeping.E)
+
+    @property
+    def H(self) -> ComplexArray:  # noqa: N802
+        """Total magnetic field times the impedance of free space (..., 3) or (..., 3, 2)."""
+        return np.asarray(self.incident.H + self.scattered.H + self.creeping.H)
+
+    @property
+    def magnitude(self) -> FloatArray:
+        """The larger of |E| and |H| (...), of the shape of the status."""
+        axis = self.points.ndim - 1
+        return np.asarray(np.maximum(np.linalg.norm(self.E, axis=axis), np.linalg.norm(self.H, axis=axis)))
+
+    @property
+    def power_flow(self) -> FloatArray:
+        """Re E x H*, the mean flow of power in units of the incident one (..., 3) or (..., 3, 2)."""
+        axis = self.points.ndim - 1
+        return np.asarray(np.cross(self.E, self.H.conj(), axis=axis).real)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return "of the incident E"
+
+    def to_xarray(self) -> xarray.Dataset:
+        """E, H, their parts, error and status with names: an ``xarray.Dataset`` by point, component, polarisation."""
+        from creeping.field.labelled import vector_dataset
+
+        parts = {f"{letter}_{name}": getattr(getattr(self, name), letter) for name in PARTS for letter in "EH"}
+        return vector_dataset(self, {"E": self.E, "H": self.H, **parts})
+
+
+PARTS = ("incident", "scattered", "creeping")
+"""Parts of a field near a conductor."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConductorCurrent(ArrayResult, PointData):
+    """Current J = n x H on a perfect conductor, in units of the incident H; it acts as the array of J.
+
+    Attributes
+    ----------
+    points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
+        As of every field at points; ``method`` is "lit", "rays", "beams" where these merge, or, in the penumbra, both
+        with "lit+".
+    values : (..., 3) or (..., 3, 2) complex
+    charge : (...) or (..., 2) complex
+        n.E = div J/(ik), the surface charge over the permittivity of free space, in units of the incident E; its error
+        is that of J.
+    lit, creeping : as values
+        Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
+    incident_electric : (3,) or (3, 2) complex
+        E0 of the incident wave, of both polarisations if none was chosen.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> J = cr.conductor_current(fan, [(0, 0, -1), (0, 0.6, 0.8)], wavenumber=30.0, polarisation=(1, 0, 0))
+    >>> J.shape, np.abs(J[0]).round(1).tolist(), J.method.tolist()                   # 2 n x H where the wave falls in
+    ((2, 3), [2.0, 0.0, 0.0], ['lit', 'beams'])
+    """
+
+    values: ComplexArray
+    charge: ComplexArray
+    lit: ComplexArray
+    creeping: ComplexArray
+    incident_electric: ComplexArray
+
+    @property
+    def total(self) -> ComplexArray:
+        """The values."""
+        return self.values
+
+    @property
+    def magnitude(self) -> FloatArray:
+        """|J| (...), of the shape of the status."""
+        return np.asarray(np.linalg.norm(self.values, axis=self.points.ndim - 1))
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return "of the incident H"
+
+    def to_xarray(self) -> xarray.Dataset:
+        """J, its parts, charge, error and status with names: an ``xarray.Dataset`` by point and component."""
+        from creeping.field.labelled import vector_dataset
+
+        return vector_dataset(
+            self, {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
+        )

@@ -1,0 +1,127 @@
+"""The current and the charge on conductors: Mie, dipoles, caustics, polarisations, statuses."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.errors import InvalidInputError
+from creeping.field.polarisation import spherical_frame
+from creeping.geometry.quadrature import body_nodes
+
+OBLIQUE = np.array([0.36, 0.48, 0.8])
+
+
+def vectors(rng, n):
+    r = rng.normal(size=(n, 3))
+    return r / np.linalg.norm(r, axis=1, keepdims=True)
+
+
+def wrong(current, x, E, H):
+    """|J - n x H| and |q - n.E|, each (n, 2)."""
+    J, q = np.cross(x[:, :, None], H, axis=1), np.einsum("nc,nci->ni", x, E)
+    return np.linalg.norm(current - J, axis=1), np.abs(current.charge - q)
+
+
+@pytest.mark.parametrize("k, limit", [(30.0, 0.025), (100.0, 0.006)])
+def test_sphere_at_all_angles(ball, mie, rng, k, limit):
+    x = np.concatenate([vectors(rng, 200), OBLIQUE + 0.2 * rng.normal(size=(40, 3))])
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    found = cr.conductor_current(ball, x, wavenumber=k)
+    off, charge = wrong(found, x, *mie(k, x))
+    assert np.mean(found.ok) > 0.98
+    assert off[found.ok].max() < limit
+    # by differences between points, of which some stand across the edge of a beam
+    assert np.quantile(charge[found.ok], 0.99) < limit
+    assert np.mean(off[found.ok] <= found.error[found.ok]) > 0.95
+    assert np.mean(charge[found.ok] <= found.error[found.ok]) > 0.95
+    assert np.median(found.error / off) < 10
+
+
+def test_the_focus_behind_a_sphere(ball, mie):
+    x = OBLIQUE[None] + 1e-3 * np.array([[0.0, 0.0, 0.0], [0.8, -0.6, 0.0], [0.0, 5.0, -3.0]])
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    E, H = mie(30.0, x)
+    found = cr.conductor_current(ball, x, wavenumber=30.0)
+    assert set(found.method.ravel()) == {"beams"} and np.all(found.ok)
+    off, _ = wrong(found, x, E, H)
+    # the current there is a third of the incident wave, by rays infinite
+    assert np.linalg.norm(H, axis=1).min() > 0.25 and off.max() < 2e-3
+
+
+def test_triaxial(triaxial, rng):
+    fan, k, solution = triaxial
+    nodes = body_nodes(fan.body, 20.0)
+    at = rng.choice(len(nodes.points), 400, p=nodes.weights / nodes.weights.sum())
+    x, n = nodes.points[at], nodes.normals[at]
+    E, H = (part[:, :, 0] for part in solution.total(x))
+    found = cr.conductor_current(fan, x, wavenumber=k)
+    off, charge = wrong(found, n, E, H)
+    assert solution.residual.max() < 1e-2
+    assert np.mean(off[found.ok] <= found.error[found.ok]) > 0.95
+    assert np.mean(charge[found.ok] <= found.error[found.ok]) > 0.93
+    assert np.median(off[found.ok]) < 0.04
+    # along the body, to its normals' error
+    assert np.max(np.abs(np.einsum("nc,nci->ni", n, found.values))) < 1e-8
+
+
+def test_polarisations(ball, rng):
+    x = vectors(rng, 20)
+    both = cr.conductor_current(ball, x, wavenumber=30.0)
+    theta, phi = spherical_frame(OBLIQUE)
+    left = (theta + 1j * phi) / np.sqrt(2)
+    for given, mix in (
+        ("theta", (1, 0)),
+        ("phi", (0, 1)),
+        (3 * phi, (0, 1)),
+        (left, (np.sqrt(0.5), 1j * np.sqrt(0.5))),
+    ):
+        one = cr.conductor_current(ball, x, wavenumber=30.0, polarisation=given)
+        assert one.shape == (20, 3) and one.error.shape == one.charge.shape == one.status.shape == (20,)
+        np.testing.assert_allclose(np.linalg.norm(one.incident_electric), 1.0)
+        # rays and beams are chosen by their error, which is the polarisation's own
+        off = np.linalg.norm(one - both @ np.array(mix), axis=1)
+        assert np.all(off <= one.error + np.abs(both.error @ np.abs(mix)))
+        same = np.isin(one.method, ("lit", "lit+rays"))
+        assert np.any(same) and off[same].max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "polarisation, message",
+    [
+        ("vertical", "'vertical' is not 'theta' or 'phi'"),
+        ((1, 0), "is not E0 of three finite numbers"),
+        ((0, 0, 0), "not all of them 0"),
+        ((1, np.nan, 0), "finite"),
+        (object(), "is not E0 of three numbers"),
+        (OBLIQUE, "100 % of itself along the direction of incidence; give E0 across it"),
+    ],
+)
+def test_bad_polarisations(ball, polarisation, message):
+    with pytest.raises(InvalidInputError, match=message):
+        cr.conductor_current(ball, [(0, 0, 1)], wavenumber=10.0, polarisation=polarisation)
+
+
+def test_units():
+    x = np.array([[0.0, 0.0, -0.6], [1.0, 0.0, 0.0], [0.0, 0.48, 0.48]])
+    found = []
+    for s in (1.0, 1e3):
+        body = sc.Ellipsoid(s, 0.8 * s, 0.6 * s)
+        line = cr.shadow_line(body, direction=OBLIQUE)
+        fan = cr.launch(cr.DirectFlow(body), line, length=4.0 * s, n_rays=64)
+        found.append(cr.conductor_current(fan, s * x, wavenumber=20 / s))
+    assert found[0].method.tolist() == found[1].method.tolist()
+    for name in ("values", "charge", "error"):
+        np.testing.assert_allclose(getattr(found[1], name), getattr(found[0], name), atol=1e-4)
+
+
+def test_where_rays_end_the_status_says_so():
+    body = sc.TwistedEllipsoid()
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, direction=OBLIQUE), length=4.0, n_rays=48)
+    nodes = body_nodes(body, 10.0)
+    dark = nodes.points[nodes.normals @ OBLIQUE > 0.3][::40]
+    found = cr.conductor_current(fan, dark, wavenumber=10.0)
+    counts = found.status_counts
+    assert counts.get("DETACHED", 0) > 0 and np.all(np.isfinite(found.error))
+    short = cr.launch(fan.flow, fan.line, length=0.2, n_rays=48)
+    assert "TRUNCATED" in cr.conductor_current(short, dark, wavenumber=10.0).status_counts
