@@ -10,13 +10,13 @@ from .errors import ToleranceError as ToleranceError
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
 from .field.comparison import Comparison as Comparison
 from .field.comparison import compare as compare
-from .field.coupling_result import Coupling as Coupling
-from .field.coupling_result import CouplingPaths as CouplingPaths
 from .field.conductor.near import conductor_current as conductor_current
 from .field.conductor.near import conductor_field as conductor_field
 from .field.conductor.result import ConductorCurrent as ConductorCurrent
 from .field.conductor.result import ConductorField as ConductorField
 from .field.conductor.result import Fields as Fields
+from .field.coupling_result import Coupling as Coupling
+from .field.coupling_result import CouplingPaths as CouplingPaths
 from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.echo import Echo as Echo
@@ -31,8 +31,8 @@ from .field.point_result import SurfaceField as SurfaceField
 from .field.port_coupling import coupling as coupling
 from .field.slant_range import RangeProfile as RangeProfile
 from .field.slant_range import range_profile as range_profile
-from .field.source_pattern import SourcePattern as SourcePattern
-from .field.source_pattern import source_pattern as source_pattern
+from .field.sources import SourcePattern as SourcePattern
+from .field.sources import source_pattern as source_pattern
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty
 from .field.validity_range import Validity as Validity
 from .field.validity_range import validity as validity

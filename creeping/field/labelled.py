@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from creeping._typing import ComplexArray
     from creeping.field.far_result import FarField
     from creeping.field.point_result import PointData, PointField
-    from creeping.field.source_pattern import SourcePattern
+    from creeping.field.sources import SourcePattern
 
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""

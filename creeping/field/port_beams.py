@@ -135,9 +135,11 @@ class PortBeams:
             weight = 0.5 * np.log(self.k * eps / (2 * np.pi)) + np.log(self.apart)
             strength = self.size - 0.5 * np.log(np.abs(q)) + weight
             phase = self.phase - 0.5 * np.unwrap(np.angle(q), axis=1)
-            early, late = np.zeros((2, len(points)), dtype=complex)
+            early, late = np.zeros((2, len(points), 1), dtype=complex)
             cut = max(2, round(beyond / self.step))
             table = (*self.rays, strength, phase, rate / q * self.turned, self.k, cut, REACH * self.a, *self.balls)
-            add_beams(points, *table, early, late)
-            found.append(late)
+            add_beams(
+                points, *table, np.ones((1, 1, 1), dtype=complex), np.zeros((1, 1, 1), dtype=complex), early, late
+            )
+            found.append(late[:, 0])
         return found[0], found[1]

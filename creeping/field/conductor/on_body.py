@@ -19,7 +19,7 @@ from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, va
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
 from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
 from creeping.field.currents.conductor import lit_vectors, ray_vectors
-from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part, nodes_at
+from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, lit_error
 from creeping.field.point_result import FieldStatus
@@ -28,6 +28,7 @@ from creeping.field.served import Served, Words
 from creeping.field.shed_wave import fock_parameter
 from creeping.field.strip_waves import without_tubes
 from creeping.field.surface import surface_waves
+from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal, project, size
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
