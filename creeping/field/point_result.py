@@ -29,7 +29,7 @@ class FieldStatus(IntEnum):
     --------
     >>> import creeping as cr
     >>> cr.FieldStatus.LIT.name, cr.FieldStatus.LIT.remedy
-    ('LIT', "let currents serve: method='auto', a quarter of a wavelength off the body")
+    ('LIT', "let currents serve: method='currents', a quarter of a wavelength off the body")
     """
 
     OK = 0
@@ -52,7 +52,7 @@ class FieldStatus(IntEnum):
         return _REMEDIES[self]
 
 
-_AWAY = "let currents serve: method='auto', a quarter of a wavelength off the body"
+_AWAY = "let currents serve: method='currents', a quarter of a wavelength off the body"
 _REMEDIES = {
     FieldStatus.OK: "none needed",
     FieldStatus.LIT: _AWAY,

@@ -20,7 +20,9 @@ from creeping.rays.fan import RayFan
 from creeping.rays.reach import ray_length
 
 AFFORDABLE = 3e9
-"""Nodes times directions or points, one by one, up to which "auto" takes currents: some ten seconds of one core."""
+"""Nodes times directions, one by one, up to which "auto" takes currents: some ten seconds of one core."""
+POINTS = 2e10
+"""Nodes times points near the body, likewise: forty seconds."""
 MOST_NODES = 1_500_000
 """Nodes up to which it does, for the memory's sake."""
 MAKING = 2700.0
@@ -39,6 +41,8 @@ def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = F
         return False
     cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
     by_transform = distant and transformed(nodes, places, cells)
+    if not distant:
+        return nodes * MAKING < AFFORDABLE and nodes * places < POINTS
     return nodes * (MAKING + (0 if by_transform else places)) < AFFORDABLE
 
 

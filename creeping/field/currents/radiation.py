@@ -110,13 +110,17 @@ def field_of_scalar(
     at: FloatArray,
     wavenumber: float,
 ) -> ComplexArray:
-    """Scattered field at points (m, 3), L, off the body, of u dS and du/dn dS at nodes (n,)."""
+    """Scattered field at points (m, 3), L, off the body, of u dS and du/dn dS at nodes (n,): (m,).
+
+    Or of several columns (c, n) of them: (m, c).
+    """
     from creeping.field.kernels.radiation import near
 
-    nothing = np.zeros(len(points), dtype=complex)
-    single = -(nothing if slope is None else slope) / (4 * np.pi)
-    double = (nothing if u is None else u) / (4 * np.pi)
-    out = np.empty((len(at), 2))
+    given = slope if u is None else u
+    nothing = np.zeros((1, len(points)) if given is None else np.atleast_2d(given).shape, dtype=complex)
+    single = -(nothing if slope is None else np.atleast_2d(slope)) / (4 * np.pi)
+    double = (nothing if u is None else np.atleast_2d(u)) / (4 * np.pi)
+    out = np.empty((len(at), 2 * len(nothing)))
     columns = np.ascontiguousarray(points.T), np.ascontiguousarray(normals.T)
     pairs = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (single, double)]
     at = np.ascontiguousarray(at)
@@ -126,7 +130,8 @@ def field_of_scalar(
         seconds=EACH * len(points),
         **SHARES,
     )
-    return np.asarray(out[:, 0] + 1j * out[:, 1])
+    field = out[:, : len(nothing)] + 1j * out[:, len(nothing) :]
+    return np.asarray(field if given is not None and given.ndim > 1 else field[:, 0])
 
 
 def far_of_vector(

@@ -48,8 +48,8 @@ def total_at(
     incident = np.exp(1j * currents.wavenumber * (points @ currents.direction))
     lit = ABSORBING_LEVEL if currents.boundary.kind == "impedance" else LIT_LEVEL
     level = level_at(currents, points, dark, currents.mean_amplitude, lit, DARK_LEVEL)
-    shape = currents.changed(points)
-    return incident, currents.scattered(points), currents.extinction * np.hypot(level, SHAPE * shape)
+    scattered, shape = currents.scattered_and_changed(points)
+    return incident, scattered, currents.extinction * np.hypot(level, SHAPE * shape)
 
 
 def level_at(

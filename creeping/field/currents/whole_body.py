@@ -133,6 +133,10 @@ class SurfaceCurrents:
         InvalidInputError
             If a point is nearer to a node than an eighth of a wavelength, where sums over nodes are no integrals.
         """
+        return self._field(self.values, self._off_the_body(points))
+
+    def _off_the_body(self, points: ArrayLike) -> FloatArray:
+        """Points (m, 3), none of them nearer to a node than sums over nodes are integrals."""
         x = as_points(points).reshape(-1, 3)
         wavelength = 2 * np.pi / self.wavenumber
         near, _ = self._nodes.query(x, distance_upper_bound=SHALLOW * wavelength)
@@ -142,7 +146,7 @@ class SurfaceCurrents:
                 f"{len(close)} of {len(x)} points are within {SHALLOW:g} wavelengths of the body "
                 f"(first: row {close[0]}); near_field and surface_field give the field there"
             )
-        return self._field(self.values, x)
+        return x
 
     def left_inside(self, points: ArrayLike) -> ComplexArray:
         """What is left of the incident wave at points (m, 3), L, inside the body, as a share of it: (m,).
@@ -193,9 +197,13 @@ class SurfaceCurrents:
 
     def changed(self, points: ArrayLike) -> FloatArray:
         """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
-        x = as_points(points).reshape(-1, 3)
-        lit, dark = (self._field(np.where(part, self.change, 0.0), x) for part in (self.lit, ~self.lit))
-        return np.asarray(np.hypot(np.abs(lit), np.abs(dark)) / self._change_inside)
+        return self.scattered_and_changed(points)[1]
+
+    def scattered_and_changed(self, points: ArrayLike) -> tuple[ComplexArray, FloatArray]:
+        """`scattered` and `changed` at points (m, 3), L, by one sum over the nodes: (m, ...) each."""
+        x = self._off_the_body(points)
+        lit, dark = (self._parts_of_field(part, x) for part in (self.lit, ~self.lit))
+        return lit[0] + dark[0], np.asarray(np.hypot(np.abs(lit[1]), np.abs(dark[1])) / self._change_inside)
 
     def _together(self, directions: FloatArray) -> FloatArray:
         """[1 + 0.3 max(0, S - 1)]^(1/2) in unit directions (m, 3): (m,)."""
@@ -248,6 +256,13 @@ class SurfaceCurrents:
     def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         """Field (m, ...) of values (n, ...) at points."""
         return field_of_scalar(self.points, self.normals, *self._scalar(values), points, self.wavenumber)
+
+    def _parts_of_field(self, part: BoolArray, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Fields (m, ...) of the values and of their second order on some of the nodes."""
+        columns = self._scalar(np.stack([self.values, self.change]))
+        u, slope = (None if one is None else one[:, part] for one in columns)
+        field = field_of_scalar(self.points[part], self.normals[part], u, slope, points, self.wavenumber)
+        return field[:, 0], field[:, 1]
 
     @property
     def _incident(self) -> ComplexArray:

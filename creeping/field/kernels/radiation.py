@@ -67,25 +67,39 @@ def distant(turns, real, imaginary, r, out):
 
 @njit(**entry_options)
 def near(x, normals, single, double, k, y, out):
-    """Fill out (m, 2), real and imaginary part of u at points y (m, 3).
+    """Fill out (m, 2 C), real parts of u at points y (m, 3) for each of C columns before their imaginary parts.
 
-    x and normals (3, n), single and double (2, n) the weights a and b, real before imaginary parts.
+    x and normals (3, n), single and double (2, C, n) the weights a and b, real before imaginary parts.
     """
-    n = x.shape[1]
+    n, columns = x.shape[1], single.shape[1]
     per = k / (2 * math.pi)
-    for j in range(y.shape[0]):
-        p, q = 0.0, 0.0
-        for i in range(n):
-            dx, dy, dz = y[j, 0] - x[0, i], y[j, 1] - x[1, i], y[j, 2] - x[2, i]
-            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-            c, s = cosine_sine(per / inverse)
-            lean = (normals[0, i] * dx + normals[1, i] * dy + normals[2, i] * dz) * inverse
-            # a + b n.R (1/R - ik)
-            u = single[0, i] + lean * (double[0, i] * inverse + double[1, i] * k)
-            v = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
-            p += (u * c - v * s) * inverse
-            q += (u * s + v * c) * inverse
-        out[j, 0], out[j, 1] = p, q
+    cosines, sines, close, far = np.empty(PART), np.empty(PART), np.empty(PART), np.empty(PART)
+    out[:] = 0.0
+    for first in range(0, n, PART):
+        count = min(PART, n - first)
+        last = first + count
+        x0, x1, x2 = x[0, first:last], x[1, first:last], x[2, first:last]
+        n0, n1, n2 = normals[0, first:last], normals[1, first:last], normals[2, first:last]
+        for j in range(y.shape[0]):
+            y0, y1, y2 = y[j, 0], y[j, 1], y[j, 2]
+            for i in range(count):
+                dx, dy, dz = y0 - x0[i], y1 - x1[i], y2 - x2[i]
+                inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+                c, s = cosine_sine(per / inverse)
+                lean = (n0[i] * dx + n1[i] * dy + n2[i] * dz) * inverse
+                # b n.R (1/R - ik), over R
+                cosines[i], sines[i], close[i], far[i] = c * inverse, s * inverse, lean * inverse, lean * k
+            for column in range(columns):
+                a, b = single[0, column, first:last], single[1, column, first:last]
+                d, e = double[0, column, first:last], double[1, column, first:last]
+                p, q = 0.0, 0.0
+                for i in range(count):
+                    u = a[i] + d[i] * close[i] + e[i] * far[i]
+                    v = b[i] + e[i] * close[i] - d[i] * far[i]
+                    p += u * cosines[i] - v * sines[i]
+                    q += u * sines[i] + v * cosines[i]
+                out[j, column] += p
+                out[j, columns + column] += q
 
 
 @njit(**entry_options)
