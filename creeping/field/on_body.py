@@ -207,20 +207,31 @@ def total_on(
     rays, by = rays_on(fan, points, k, kind, order, 1 - lit[2])
     left = 0.0
     if not convex(fan):
-        left = _left_inside(fan, k, kind) if currents is None else currents.extinction
+        currents = currents or _currents_of(fan, k, kind)
+        left = currents.extinction if currents else np.nan
+        if currents and order == 2 and kind.kind in ("soft", "hard"):
+            lit = lit[0] + _thrown(currents, points, lit[2]), *lit[1:]
     unit = k if kind.kind == "soft" else 1.0
     return composed(fan, lit, rays, by, left, k, kind, unit)
 
 
-def _left_inside(fan: RayFan, k: float, kind: Boundary) -> float:
-    """What currents leave of the wave inside the body; NaN if they cost too much or it is not to be measured."""
+def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:
+    """Currents of the whole body; None if they cost too much or there is no mesh for them."""
     impedance = kind.kind == "impedance"
     boundary = ImpedanceBoundary(kind.coating or kind.admittance) if impedance else SCALAR[kind.kind]
     try:
-        # as many points as it is measured at
-        return kept_currents(fan, k, boundary).extinction if affordable(fan, INNER, k) else np.nan
+        # as many points as they are judged at
+        return kept_currents(fan, k, boundary) if affordable(fan, INNER, k) else None
     except SurfaceError:
-        return np.nan
+        return None
+
+
+def _thrown(currents: SurfaceCurrents, points: FloatArray, share: FloatArray) -> ComplexArray:
+    """What lit ground receives of other parts of the body, where it has a share (n,)."""
+    out = np.zeros(len(points), dtype=complex)
+    at = np.flatnonzero(share > 0)
+    out[at] = share[at] * currents.thrown(points[at], normal(currents.body, points[at]))
+    return out
 
 
 def _lit_at(

@@ -8,6 +8,7 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
+from creeping.field.currents.bounce import faces_itself
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
 from creeping.field.currents.nodes import lit_nodes, ray_nodes
 from creeping.field.currents.waves import lit_waves, ray_waves
@@ -67,7 +68,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         bright, first = lit_waves(lit, fan.line.direction, size(fan.body), k, kind)
         dark, second = ray_waves(shadow, k, kind)
         values, change = np.concatenate([bright, dark]), np.concatenate([bright - first, second])
-    return make(
+    currents = make(
         body=fan.body,
         direction=fan.line.direction,
         points=np.concatenate([lit.points, shadow.rays.points]),
@@ -83,6 +84,9 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         wavenumber=k,
         boundary=kind,
     )
+    if kind.kind in ("soft", "hard") and faces_itself(lit):
+        values[currents.lit] += currents.thrown(lit.points, lit.normals)
+    return currents
 
 
 def _rim(line: ShadowLine, wavenumber: float) -> FloatArray:

@@ -35,6 +35,7 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary
+from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.depth import inner_points
@@ -147,6 +148,14 @@ class SurfaceCurrents:
                 f"(first: row {close[0]}); near_field and surface_field give the field there"
             )
         return x
+
+    def thrown(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
+        """What points of a soft or hard body (m, 3), L, with normals, receive from above: u, or du/dn if soft (m,)."""
+        u, slope = self._scalar(self.values)
+        nothing = np.zeros(len(self.points), dtype=complex)
+        single, double = (nothing if one is None else one / (4 * np.pi) for one in (slope, u))
+        nodes = self.points, self.normals
+        return received((points, normals), nodes, -single, double, self.wavenumber, soft=self.boundary.kind == "soft")
 
     def left_inside(self, points: ArrayLike) -> ComplexArray:
         """What is left of the incident wave at points (m, 3), L, inside the body, as a share of it: (m,).

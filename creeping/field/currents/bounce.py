@@ -1,0 +1,73 @@
+"""What lit ground that faces other parts of the body receives from them: one bounce of physical optics.
+
+    hard  u(x) += 2 int_(t > 0) W(t) u dG/dn_y dS_y,   soft  du/dn(x) += 2ik int_(t > 0) t W(t) du/dn G dS_y
+
+over all the body's currents above the horizon of x, t = n_x.(y - x)/|y - x|; W is a smooth step from 0 to 0.3, without
+which the cut at the horizon would radiate. What is above the horizon throws light on x, or shadow: its currents cancel
+the incident wave behind it. A convex body has nothing there. What goes to and fro more often is left out, and what
+ground in the dark receives. An impedance has no bounce: where it was tried, eta = 0.5, it made fields no better.
+
+Source: Derivations, F29.
+"""
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.currents.nodes import LitNodes
+from creeping.kernels.threads import in_threads
+
+LOW = 0.3
+"""T up to which W rises."""
+BLOCK = 64
+"""Nodes that are looked at together."""
+EACH = 2e-9
+"""Seconds of one pair, about."""
+MOST_PAIRS = 4e9
+"""Pairs of a point and a node up to which it is done: eight seconds, if all stand above each other's horizon."""
+SADDLE = -1e-3
+"""K, over the square of the largest curvature, below which a body is not convex."""
+
+
+def faces_itself(part: LitNodes) -> bool:
+    """Whether lit ground is somewhere not convex, so that it may face other parts of the body."""
+    total = part.along + part.across
+    gauss = part.along * part.across - part.twist**2
+    return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(total**2, initial=0.0))
+
+
+def received(
+    at: tuple[FloatArray, FloatArray],
+    nodes: tuple[FloatArray, FloatArray],
+    single: ComplexArray,
+    double: ComplexArray,
+    k: float,
+    *,
+    soft: bool,
+) -> ComplexArray:
+    """What points of the body receive, u or du/dn if soft (m,); points and their normals (m, 3), those of nodes (n, 3).
+
+    ``single`` and ``double`` (n,) are -du/dn dS/4 pi and u dS/4 pi; zeros where pairs are too many.
+    """
+    from creeping.field.kernels.bounce import balls, from_above
+
+    count = len(at[0])
+    if not 0 < count * len(single) < MOST_PAIRS:
+        return np.zeros(count, dtype=complex)
+
+    def blocks(x: FloatArray, n: FloatArray) -> tuple[FloatArray, ...]:
+        many = -(-x.shape[1] // BLOCK)
+        found = np.empty((many, 3)), np.empty(many), np.empty((many, 3)), np.empty(many)
+        balls(x, n, BLOCK, *found)
+        return found
+
+    points, sources = (tuple(np.ascontiguousarray(part.T) for part in pair) for pair in (at, nodes))
+    of, others = blocks(*points), blocks(*sources)
+    weights = [np.ascontiguousarray(np.stack([one.real, one.imag])) for one in (single, double)]
+    out = np.empty((count, 2))
+
+    def work(part: slice) -> None:
+        given = (*points, of, *sources, others, BLOCK, *weights, k, LOW, soft)
+        from_above(*given, part.start, part.stop, out)
+
+    in_threads(work, len(of[1]), least=4, multiple=1, seconds=EACH * BLOCK * len(single))
+    return np.asarray(out[:, 0] + 1j * out[:, 1])

@@ -1,0 +1,86 @@
+"""Compiled sums over currents at nodes y of what comes to points x of the body from above their horizon.
+
+    u(x) = sum_y r W(t) [a_y + b_y n_y.(x - y) (1/R - ik)/R] e^{ikR}/R,   t = n_x.(y - x)/R > 0,   R = |x - y|
+
+W rises from 0 at the horizon to 1 at t = low; r is 2, what a mirror makes of a wave, or for du/dn of a soft one -2ikt.
+Blocks of nodes of which none is above the horizon of any point of a block are left out.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from creeping.field.kernels.radiation import cosine_sine
+from creeping.kernels.block import entry_options
+
+TOUCHING = 1e-6
+"""Distance, over 1/k, below which a node is the point itself."""
+
+
+@njit(**entry_options)
+def balls(points, normals, block, centres, radii, axes, spreads):
+    """Fill centres (b, 3), radii (b,), mean normals (b, 3) and their spreads (b,) of blocks of points (3, n)."""
+    n = points.shape[1]
+    for b in range(len(radii)):
+        first, last = b * block, min((b + 1) * block, n)
+        for c in range(3):
+            middle, axis = 0.0, 0.0
+            for i in range(first, last):
+                middle += points[c, i]
+                axis += normals[c, i]
+            centres[b, c], axes[b, c] = middle / (last - first), axis / (last - first)
+        far, off = 0.0, 0.0
+        for i in range(first, last):
+            away, turn = 0.0, 0.0
+            for c in range(3):
+                away += (points[c, i] - centres[b, c]) ** 2
+                turn += (normals[c, i] - axes[b, c]) ** 2
+            far, off = max(far, away), max(off, turn)
+        radii[b], spreads[b] = math.sqrt(far), math.sqrt(off)
+
+
+@njit(**entry_options)
+def from_above(x, normals, of, y, sides, nodes, block, single, double, k, low, soft, first, last, out):
+    """Fill rows of blocks first..last of out (m, 2), real and imaginary part of u, or of du/dn if ``soft``.
+
+    Points x and their normals (3, m), nodes y and theirs ``sides`` (3, n), in blocks of so many with the `balls` ``of``
+    and ``nodes``; single and double (2, n) the weights a and b, real before imaginary parts.
+    """
+    centres, radii, axes, spreads = of
+    others, widths = nodes[0], nodes[1]
+    n = y.shape[1]
+    per, least = k / (2 * math.pi), (TOUCHING / k) ** 2
+    some = np.empty(len(widths), np.int64)
+    for b in range(first, last):
+        count = 0
+        for a in range(len(widths)):
+            dx, dy, dz = others[a, 0] - centres[b, 0], others[a, 1] - centres[b, 1], others[a, 2] - centres[b, 2]
+            reach = math.sqrt(dx * dx + dy * dy + dz * dz) + radii[b] + widths[a]
+            up = axes[b, 0] * dx + axes[b, 1] * dy + axes[b, 2] * dz
+            if up + radii[b] + widths[a] + spreads[b] * reach > 0.0:
+                some[count] = a
+                count += 1
+        for j in range(b * block, min((b + 1) * block, x.shape[1])):
+            x0, x1, x2 = x[0, j], x[1, j], x[2, j]
+            n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
+            p, q = 0.0, 0.0
+            for a in range(count):
+                for i in range(some[a] * block, min((some[a] + 1) * block, n)):
+                    dx, dy, dz = y[0, i] - x0, y[1, i] - x1, y[2, i] - x2
+                    inverse = 1.0 / math.sqrt(max(dx * dx + dy * dy + dz * dz, least))
+                    t = max((n0 * dx + n1 * dy + n2 * dz) * inverse, 0.0)
+                    w = min(t / low, 1.0)
+                    w = w * w * (3.0 - 2.0 * w) * inverse
+                    c, s = cosine_sine(per / inverse)
+                    lean = -(sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz) * inverse
+                    u = single[0, i] + lean * (double[0, i] * inverse + double[1, i] * k)
+                    v = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
+                    f, g = w * (u * c - v * s), w * (u * s + v * c)
+                    if soft:
+                        p += 2.0 * k * t * g
+                        q -= 2.0 * k * t * f
+                    else:
+                        p += 2.0 * f
+                        q += 2.0 * g
+            out[j, 0], out[j, 1] = p, q
