@@ -113,6 +113,9 @@ def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
     class Unknown:
         extinction = float("nan")
 
+        def thrown(self, points, normals):
+            return np.zeros(len(points))
+
     monkeypatch.setattr(module, "kept_currents", lambda *_: Unknown())
     x = [(1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
     u = cr.surface_field(torus, x, wavenumber=30.0, boundary="soft")

@@ -21,6 +21,8 @@ from creeping.geometry.surface import Surface
 
 LIT_LEVEL, DARK_LEVEL, SHAPE = 2.0, 4.0, 2.0
 """Factors L and S of the error."""
+ABSORBING_LEVEL = 1.4
+"""L in the light of an impedance: most of what is wrong with its currents stands at the line and radiates ahead."""
 OFF = 0.25
 """Least distance from the body, in wavelengths, at which currents serve."""
 
@@ -44,7 +46,8 @@ def total_at(
 ) -> tuple[ComplexArray, ComplexArray, FloatArray]:
     """Incident and scattered field and the error of their sum at points (n, 3), L, some of them in the dark: (n,)."""
     incident = np.exp(1j * currents.wavenumber * (points @ currents.direction))
-    level = level_at(currents, points, dark, currents.mean_amplitude, LIT_LEVEL, DARK_LEVEL)
+    lit = ABSORBING_LEVEL if currents.boundary.kind == "impedance" else LIT_LEVEL
+    level = level_at(currents, points, dark, currents.mean_amplitude, lit, DARK_LEVEL)
     scattered, shape = currents.scattered_and_changed(points)
     return incident, scattered, currents.extinction * np.hypot(level, SHAPE * shape)
 

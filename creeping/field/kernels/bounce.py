@@ -4,6 +4,8 @@
 
 W rises from 0 at the horizon to 1 at t = low; r is 2, what a mirror makes of a wave, or for du/dn of a soft one -2ikt.
 Blocks of nodes of which none is above the horizon of any point of a block are left out.
+
+Source: Derivations, F29.
 """
 
 import math
