@@ -111,7 +111,7 @@ def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
     import creeping.field.on_body as module
 
     class Unknown:
-        extinction = float("nan")
+        body, extinction = torus.body, float("nan")
 
         def thrown(self, points, normals):
             return np.zeros(len(points))

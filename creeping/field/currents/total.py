@@ -21,7 +21,7 @@ from creeping.geometry.surface import Surface
 
 LIT_LEVEL, DARK_LEVEL, SHAPE = 2.0, 4.0, 2.0
 """Factors L and S of the error."""
-ABSORBING_LEVEL = 1.4
+ABSORBING_LEVEL = 1.3
 """L in the light of an impedance: most of what is wrong with its currents stands at the line and radiates ahead."""
 OFF = 0.25
 """Least distance from the body, in wavelengths, at which currents serve."""
