@@ -19,12 +19,14 @@ from .field.coupling_result import Coupling as Coupling
 from .field.coupling_result import CouplingPaths as CouplingPaths
 from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
+from .field.cut_result import FieldCut as FieldCut
 from .field.echo import Echo as Echo
 from .field.far import far_field as far_field
 from .field.far_result import FarField as FarField
 from .field.frequency import wavenumber as wavenumber
 from .field.near import near_field as near_field
 from .field.on_body import surface_field as surface_field
+from .field.plane_cut import field_cut as field_cut
 from .field.point_result import FieldStatus as FieldStatus
 from .field.point_result import NearField as NearField
 from .field.point_result import SurfaceField as SurfaceField

@@ -13,3 +13,4 @@ from .field_pictures import surface_field_picture as surface_field_picture
 from .parameter_plane import plot_parameters as plot_parameters
 from .pictures import parameter_picture as parameter_picture
 from .pictures import picture as picture
+from .plane_pictures import field_cut_picture as field_cut_picture

@@ -1,0 +1,331 @@
+"""Pictures of the field on a plane through a body: its size or its wave in colours, wave fronts, and what is not known.
+
+Wave fronts are where Re(u e^{-i phase}) = 0, half a wavelength apart; ``phase`` is omega t.
+"""
+
+import os
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.cut_result import FieldCut, status_words
+from creeping.field.decibels import decibels, shown_range
+from creeping.field.point_result import FieldStatus
+from creeping.plotting.coloured_body import NOTHING
+from creeping.plotting.pictures import axes_or_new, new_figure, save_figure
+
+SHOWS = ("level", "magnitude", "wave")
+SECTION = "#5a6872"
+"""Colour of the body's section."""
+FRONT = "#ffffff"
+HATCH, HATCHED = "///", "#6d767d"
+DOUBTFUL = "#a3476a", "#ffffff"
+"""Colours in the legend of what is hatched upon the colours of the field."""
+DOTS, DOTTED = "....", "#9db4c2"
+MOST_FRONTS = 40.0
+"""Wavelengths across a picture up to which it has wave fronts unless they are asked for."""
+LEAST_POINTS = 4.5
+"""Points a wavelength from which wave fronts can be told."""
+OUTLINE = 400
+"""Points along the longer side by which the body's section is drawn."""
+PAGE = 6.4  # inches
+
+
+def plot_field_cut(
+    cut: FieldCut,
+    ax: Any = None,
+    *,
+    quantity: str | None = None,
+    show: str = "level",
+    fronts: bool | None = None,
+    phase: float = 0.0,
+    span: float = 40.0,
+    legend: bool | None = None,
+) -> Any:
+    """Draw the field on a plane with the body's section and the points of the shadow line.
+
+    Hatched is what is not to be trusted, grey where most of the field is missing; dotted where |u| is below its error.
+
+    Parameters
+    ----------
+    cut : FieldCut
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure.
+    quantity : str, optional
+        "u"; "E" (if not given) or "H" of a conductor.
+    show : {"level", "magnitude", "wave"}
+        20 log10 |u|, |u|, or the wave itself, Re(u e^{-i phase}), of E and H the component that the incident one has.
+    fronts : bool, optional
+        Whether to draw wave fronts; by default where they are neither too many nor too coarsely sampled, and not on the
+        wave itself.
+    phase : float, radians
+        omega t.
+    span : float, dB
+        Range of the levels below the highest.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        On an unknown quantity or kind of picture, a bad span, or wave fronts of a cut that is too coarse for them.
+    """
+    fresh, ax = axes_or_new(ax, _page(cut))
+    _draw(cut, ax, quantity=quantity, show=show, fronts=fronts, phase=phase, span=span)
+    if fresh:
+        ax.set_title(_title(cut), fontsize=9, parse_math=False)
+    if fresh if legend is None else legend:
+        _add_legend(cut, ax, fresh=fresh)
+    return ax
+
+
+def field_cut_picture(
+    path: str | os.PathLike[str],
+    cut: FieldCut,
+    *,
+    quantity: str | None = None,
+    show: str = "level",
+    fronts: bool | None = None,
+    phase: float = 0.0,
+    span: float = 40.0,
+    error: bool = False,
+    title: str = "",
+    dpi: int = 200,
+) -> None:
+    """Write a PNG of the field on a plane through a body; see `plot_field_cut`.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write.
+    cut : FieldCut
+        By `creeping.field_cut`.
+    quantity, show, fronts, phase, span
+        As of `plot_field_cut`.
+    error : bool
+        Whether a second panel shows the error of the field.
+    title : str
+        By default wavenumber and boundary.
+    dpi : int
+
+    Raises
+    ------
+    InvalidInputError
+        As `plot_field_cut`.
+    CreepingError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> from creeping.plotting import field_cut_picture
+    >>> ball = sc.Sphere()
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, (0, 0, 1)), length=3.2, n_rays=24)
+    >>> cut = cr.field_cut(fan, wavenumber=8.0, boundary="hard", extent=(3.0, 3.0), step=0.25)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     field_cut_picture(f"{folder}/cut.png", cut, fronts=False, dpi=60)
+    """
+    width, height = _page(cut)
+    figure = new_figure((width, height if not error else 2 * height - 0.7))
+    figure.set_layout_engine("constrained")
+    panels = figure.subplots(2, 1, sharex=True) if error else [figure.add_subplot()]
+    _draw(cut, panels[0], quantity=quantity, show=show, fronts=fronts, phase=phase, span=span)
+    if error:
+        panels[0].set_xlabel("")
+        _draw_error(cut, panels[1], span)
+    panels[0].set_title(title or _title(cut), fontsize=9, parse_math=False)
+    _add_legend(cut, panels[0], fresh=True)
+    save_figure(figure, path, dpi)
+
+
+def _draw(
+    cut: FieldCut, ax: Any, *, quantity: str | None, show: str, fronts: bool | None, phase: float, span: float
+) -> None:
+    size, wave = cut.magnitude(quantity), (cut.wave(quantity) * np.exp(-1j * phase)).real
+    name = quantity or cut.quantities[0]
+    missing = _missing(cut)
+    look: dict[str, Any]
+    if show == "level":
+        levels = decibels(size)
+        low, high = shown_range([levels[cut.outside & ~missing]], span)
+        values, label, look = levels, f"20 log$_{{10}}$|{name}| (dB)", {"vmin": low, "vmax": high, "cmap": "magma"}
+    elif show == "magnitude":
+        # a focus of a few points does not darken the rest
+        high = float(np.percentile(size[cut.outside & ~missing], 99.9)) if np.any(cut.outside & ~missing) else 1.0
+        values, label, look = size, f"|{name}|", {"vmin": 0.0, "vmax": high, "cmap": "magma"}
+    elif show == "wave":
+        high = float(np.percentile(np.abs(wave[cut.outside & ~missing]), 99.5)) if np.any(~missing) else 1.0
+        of = name if name == "u" else f"{name}·{name}$_0$*/|{name}$_0$|"
+        label = f"Re({of} e$^{{-iωt}}$), ωt = {np.degrees(phase):.4g}°" if phase else f"Re({of})"
+        values, look = wave, {"vmin": -high, "vmax": high, "cmap": "RdBu_r"}
+    else:
+        raise InvalidInputError(f"show = {show!r} is not one of {', '.join(SHOWS)}")
+    values = np.where(missing, np.nan, np.where(np.isneginf(values), look["vmin"], values))
+    beyond = ("min" if np.nanmin(values) < look["vmin"] else "") + ("max" if np.nanmax(values) > look["vmax"] else "")
+    _paint(cut, ax, values, label, {"": "neither", "minmax": "both"}.get(beyond, beyond), look)
+    if _with_fronts(cut, show, fronts):
+        shown = _to_the_body(cut, np.where(missing, np.nan, wave))
+        ax.contour(cut.across, cut.up, shown, [0.0], colors=FRONT, linewidths=0.5, alpha=0.6, zorder=1.4)
+    _hatch(cut, ax, size)
+    _dress(cut, ax)
+
+
+def _draw_error(cut: FieldCut, ax: Any, span: float) -> None:
+    levels = decibels(cut.error)
+    finite = levels[np.isfinite(levels)]
+    low, high = shown_range([np.clip(finite, *np.percentile(finite, [0.5, 100.0]))], span)
+    look = {"vmin": low, "vmax": high, "cmap": "viridis"}
+    shown = np.where(np.isneginf(levels), low, levels)
+    _paint(cut, ax, shown, "20 log$_{10}$ error (dB)", "neither" if np.nanmin(shown) >= low else "min", look)
+    _hatch(cut, ax, None)
+    _dress(cut, ax)
+
+
+def _paint(cut: FieldCut, ax: Any, values: FloatArray, label: str, extend: str, look: dict[str, Any]) -> None:
+    ax.set_facecolor(NOTHING)
+    half = [0.5 * (one[1] - one[0]) for one in (cut.across, cut.up)]
+    ends = [end for one, h in zip((cut.across, cut.up), half, strict=True) for end in (one[0] - h, one[-1] + h)]
+    shown = np.ma.masked_invalid(_to_the_body(cut, values))
+    way = {"origin": "lower", "interpolation": "bilinear", "interpolation_stage": "data"}
+    image = ax.imshow(shown, extent=ends, **way, **look)
+    bar = ax.figure.colorbar(image, ax=ax, extend=extend, shrink=0.9, pad=0.02)
+    bar.set_label(label, fontsize=9)
+    bar.ax.tick_params(labelsize=8, width=0.5)
+    bar.outline.set_linewidth(0.5)
+
+
+def _to_the_body(cut: FieldCut, values: FloatArray) -> FloatArray:
+    """Values with those inside the body, which its section covers, from the nearest point outside."""
+    from scipy.ndimage import distance_transform_edt
+
+    nearest = distance_transform_edt(~cut.outside, return_distances=False, return_indices=True)
+    return np.asarray(values[tuple(nearest)])
+
+
+def _missing(cut: FieldCut) -> BoolArray:
+    """Where most of the field is missing: neither OK nor merely of a large error."""
+    kept = (FieldStatus.OK, FieldStatus.UNRESOLVED)
+    return np.asarray(cut.outside & ~np.isin(cut.status, kept))
+
+
+def _hatch(cut: FieldCut, ax: Any, size: FloatArray | None) -> None:
+    """Hatch what is not OK, and dot what is below its error if the size is given."""
+    missing = _missing(cut)
+    doubtful = cut.outside & ~missing & (cut.status != FieldStatus.OK)
+    marks = [(missing, HATCH, HATCHED), (doubtful, HATCH, DOUBTFUL[1])]
+    if size is not None:
+        marks.append((_below(cut, size), DOTS, DOTTED))
+    for where, hatch, colour in marks:
+        if not np.any(where):
+            continue
+        # the colour of hatches is that of edges
+        filled = ax.contourf(
+            cut.across, cut.up, where.astype(float), [0.5, 1.5], colors="none", hatches=[hatch], zorder=1.5
+        )
+        filled.set_edgecolor(colour)
+        filled.set_linewidth(0.0)
+
+
+def _below(cut: FieldCut, size: FloatArray) -> BoolArray:
+    """Where the field is OK, and less than its error."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((cut.status == FieldStatus.OK) & (size < cut.error))
+
+
+def _with_fronts(cut: FieldCut, show: str, fronts: bool | None) -> bool:
+    wavelength = 2 * np.pi / cut.field.wavenumber
+    fine = cut.step * LEAST_POINTS <= wavelength
+    if fronts and not fine:
+        raise InvalidInputError(
+            f"wave fronts of points {cut.step:.3g} apart: a wavelength has {wavelength / cut.step:.2g}; give a step of "
+            f"{wavelength / LEAST_POINTS:.2g} or less, or fronts=False"
+        )
+    few = max(np.ptp(cut.across), np.ptp(cut.up)) <= MOST_FRONTS * wavelength
+    return bool(fine and few and show != "wave") if fronts is None else fronts
+
+
+def _dress(cut: FieldCut, ax: Any) -> None:
+    """Section of the body, shadow line, direction of the wave and axes."""
+    from matplotlib.patheffects import withStroke
+
+    share = max(1, int(np.ceil(OUTLINE / max(cut.outside.shape))))
+    across, up = (np.linspace(one[0], one[-1], share * (len(one) - 1) + 1) for one in (cut.across, cut.up))
+    points = cut.point + across[:, None] * cut.axes[0] + up[:, None, None] * cut.axes[1]
+    level = np.nan_to_num(cut.body.level(points.reshape(-1, 3)).reshape(points.shape[:2]), nan=-1.0)
+    if level.min() < 0 < level.max():
+        ax.contourf(across, up, level, [level.min() - 1.0, 0.0], colors=SECTION, zorder=2)
+        ax.contour(across, up, level, [0.0], colors="#111111", linewidths=0.8, zorder=2.1)
+    ax.plot(*cut.shadow_points().T, "o", color="#111111", markeredgecolor="#ffffff", markersize=5, zorder=3)
+    along = cut.axes @ cut.line.direction
+    if np.hypot(*along) > 0.2:
+        middle = np.array([0.14, 0.9])
+        box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+        ax.annotate(
+            "d", middle - 0.085 * along, xycoords="axes fraction", fontsize=9, weight="bold", bbox=box, **_CENTRE
+        )
+        arrow = {"arrowstyle": "-|>", "color": "#111111", "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0}
+        arrow["path_effects"] = [withStroke(linewidth=3.2, foreground="#ffffff")]
+        ends = middle + 0.08 * along, middle - 0.05 * along
+        ax.annotate("", *ends, xycoords="axes fraction", textcoords="axes fraction", arrowprops=arrow)
+    ax.set_aspect("equal")
+    ax.set_xlim(cut.across[0], cut.across[-1])
+    ax.set_ylim(cut.up[0], cut.up[-1])
+    ax.set_xlabel(_axis(cut, 0), fontsize=9)
+    ax.set_ylabel(_axis(cut, 1), fontsize=9)
+    ax.tick_params(labelsize=8, width=0.5)
+
+
+_CENTRE: dict[str, Any] = {"ha": "center", "va": "center"}
+
+
+def _axis(cut: FieldCut, number: int) -> str:
+    axis, unit = cut.axes[number], cut.field.length_unit
+    place = int(np.argmax(np.abs(axis)))
+    if abs(axis[place]) > 1 - 1e-9:
+        offset = cut.point[place]
+        name = f"{'-' if axis[place] < 0 else ''}{'xyz'[place]}"
+        return f"{name} ({unit})" if abs(offset) < 1e-9 else f"{name} from {'xyz'[place]} = {offset:.4g} ({unit})"
+    if abs(axis @ cut.line.direction) > 1 - 1e-9:
+        return f"along d ({unit})"
+    return f"along ({', '.join(f'{v:.3g}' for v in axis + 0.0)}) ({unit})"
+
+
+def _title(cut: FieldCut) -> str:
+    field = cut.field
+    ok = field.ok & np.isfinite(field.error)
+    off = field.error[ok]
+    told = f"; error {np.median(off):.1g} {field.unit} in the median, {off.max():.1g} at most" if off.size else ""
+    return f"k = {field.wavenumber:g}/{field.length_unit}, {field.boundary}{told}"
+
+
+def _page(cut: FieldCut) -> tuple[float, float]:
+    share = float(np.ptp(cut.up) / np.ptp(cut.across))
+    return PAGE, float(np.clip(0.74 * PAGE * share + 1.0, 2.4, 9.0))
+
+
+def _add_legend(cut: FieldCut, ax: Any, *, fresh: bool) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Any] = []
+    if np.any(~cut.outside):
+        handles.append(Patch(facecolor=SECTION, edgecolor="#111111", label="body"))
+    if len(cut.shadow_points()):
+        look: dict[str, Any] = {"color": "#111111", "markeredgecolor": "#ffffff", "markersize": 5}
+        handles.append(Line2D([], [], marker="o", linestyle="none", label="shadow line", **look))
+    if words := status_words(cut):
+        face, edge = (NOTHING, HATCHED) if np.any(_missing(cut)) else DOUBTFUL
+        handles.append(Patch(facecolor=face, edgecolor=edge, linewidth=0, hatch=HATCH, label=f"not OK: {words}"))
+    if any(np.any(_below(cut, cut.magnitude(name))) for name in cut.quantities):
+        handles.append(Patch(facecolor="#2b2140", edgecolor=DOTTED, linewidth=0, hatch=DOTS, label="below its error"))
+    if handles and fresh:
+        ax.figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=8)
+    elif handles:
+        ax.legend(handles=handles, frameon=True, fontsize=8)
