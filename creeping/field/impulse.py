@@ -168,7 +168,7 @@ def impulse_response(
     bad = ~(np.isfinite(off) & (off >= 0))
     if off.shape != u.shape or np.any(bad):
         raise InvalidInputError(
-            f"error has shape {off.shape}, {int(bad.sum())} of it not finite or negative; give a finite one, 0 or more, "
+            f"error has shape {off.shape}, {int(bad.sum())} of it not finite or negative; give one of 0 or more "
             f"for each of the values {u.shape}"
         )
     c = 1.0 if speed is None else positive_number(speed, "speed")

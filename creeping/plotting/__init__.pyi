@@ -1,5 +1,6 @@
 # Public names and where they are: read by type checkers, and by lazy_loader when the package is imported.
 from .coloured_body import currents_picture as currents_picture
+from .coupling_pictures import coupling_picture as coupling_picture
 from .display import GLProbe as GLProbe
 from .display import gl_available as gl_available
 from .echo_pictures import comparison_picture as comparison_picture
