@@ -158,20 +158,20 @@ def _draw(
         values, label, look = levels, f"20 log$_{{10}}$|{name}| (dB)", {"vmin": low, "vmax": high, "cmap": "magma"}
     elif show == "magnitude":
         # a focus of a few points does not darken the rest
-        high = float(np.percentile(size[cut.outside & ~missing], 99.9)) if np.any(cut.outside & ~missing) else 1.0
+        high = _top(size[cut.outside & ~missing], 99.9)
         values, label, look = size, f"|{name}|", {"vmin": 0.0, "vmax": high, "cmap": "magma"}
     elif show == "wave":
-        high = float(np.percentile(np.abs(wave[cut.outside & ~missing]), 99.5)) if np.any(~missing) else 1.0
+        high = _top(np.abs(wave[cut.outside & ~missing]), 99.5)
         of = name if name == "u" else f"{name}·{name}$_0$*/|{name}$_0$|"
         label = f"Re({of} e$^{{-iωt}}$), ωt = {np.degrees(phase):.4g}°" if phase else f"Re({of})"
         values, look = wave, {"vmin": -high, "vmax": high, "cmap": "RdBu_r"}
     else:
         raise InvalidInputError(f"show = {show!r} is not one of {', '.join(SHOWS)}")
     values = np.where(missing, np.nan, np.where(np.isneginf(values), look["vmin"], values))
-    beyond = ("min" if np.nanmin(values) < look["vmin"] else "") + ("max" if np.nanmax(values) > look["vmax"] else "")
+    beyond = ("min" if np.any(values < look["vmin"]) else "") + ("max" if np.any(values > look["vmax"]) else "")
     _paint(cut, ax, values, label, {"": "neither", "minmax": "both"}.get(beyond, beyond), look)
     if _with_fronts(cut, show, fronts):
-        shown = _to_the_body(cut, np.where(missing, np.nan, wave))
+        shown = np.where(missing, np.nan, _filled(wave, cut.outside))
         ax.contour(cut.across, cut.up, shown, [0.0], colors=FRONT, linewidths=0.5, alpha=0.6, zorder=1.4)
     _hatch(cut, ax, size)
     _dress(cut, ax)
@@ -189,23 +189,37 @@ def _draw_error(cut: FieldCut, ax: Any, span: float) -> None:
 
 
 def _paint(cut: FieldCut, ax: Any, values: FloatArray, label: str, extend: str, look: dict[str, Any]) -> None:
+    from matplotlib.colors import to_rgba
+
     ax.set_facecolor(NOTHING)
     half = [0.5 * (one[1] - one[0]) for one in (cut.across, cut.up)]
     ends = [end for one, h in zip((cut.across, cut.up), half, strict=True) for end in (one[0] - h, one[-1] + h)]
-    shown = np.ma.masked_invalid(_to_the_body(cut, values))
-    way = {"origin": "lower", "interpolation": "bilinear", "interpolation_stage": "data"}
-    image = ax.imshow(shown, extent=ends, **way, **look)
+    shown = np.ma.masked_invalid(_filled(values, np.isfinite(values)))
+    way: dict[str, Any] = {"origin": "lower", "extent": ends}
+    image = ax.imshow(shown, interpolation="bilinear", interpolation_stage="data", **way, **look)
+    unknown = cut.outside & ~np.isfinite(values)
+    if np.any(unknown):
+        cover = np.zeros((*unknown.shape, 4))
+        cover[unknown] = to_rgba(NOTHING)
+        ax.imshow(cover, interpolation="nearest", zorder=1.45, **way)
     bar = ax.figure.colorbar(image, ax=ax, extend=extend, shrink=0.9, pad=0.02)
     bar.set_label(label, fontsize=9)
     bar.ax.tick_params(labelsize=8, width=0.5)
     bar.outline.set_linewidth(0.5)
 
 
-def _to_the_body(cut: FieldCut, values: FloatArray) -> FloatArray:
-    """Values with those inside the body, which its section covers, from the nearest point outside."""
+def _top(sizes: FloatArray, share: float) -> float:
+    """Upper end of the colours: above it are a few in a hundred, or there is nothing to show."""
+    return float(np.percentile(sizes, share)) or 1.0 if sizes.size else 1.0
+
+
+def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
+    """Values with those that are not known, which are painted over, from the nearest that is."""
     from scipy.ndimage import distance_transform_edt
 
-    nearest = distance_transform_edt(~cut.outside, return_distances=False, return_indices=True)
+    if not np.any(known):
+        return np.full(values.shape, np.nan)
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
     return np.asarray(values[tuple(nearest)])
 
 
@@ -277,7 +291,7 @@ def _dress(cut: FieldCut, ax: Any) -> None:
     ax.set_aspect("equal")
     ax.set_xlim(cut.across[0], cut.across[-1])
     ax.set_ylim(cut.up[0], cut.up[-1])
-    ax.set_xlabel(_axis(cut, 0), fontsize=9)
+    ax.set_xlabel(_axis(cut, 0) + _place(cut), fontsize=9)
     ax.set_ylabel(_axis(cut, 1), fontsize=9)
     ax.tick_params(labelsize=8, width=0.5)
 
@@ -295,6 +309,18 @@ def _axis(cut: FieldCut, number: int) -> str:
     if abs(axis @ cut.line.direction) > 1 - 1e-9:
         return f"along d ({unit})"
     return f"along ({', '.join(f'{v:.3g}' for v in axis + 0.0)}) ({unit})"
+
+
+def _place(cut: FieldCut) -> str:
+    """Where the plane is, unless it passes through the origin."""
+    normal = np.cross(*cut.axes)
+    height = float(normal @ cut.point)
+    if abs(height) < 1e-9:
+        return ""
+    place = int(np.argmax(np.abs(normal)))
+    if abs(normal[place]) > 1 - 1e-9:
+        return f", at {'xyz'[place]} = {cut.point[place]:.4g}"
+    return f", through ({', '.join(f'{v:.4g}' for v in cut.point + 0.0)})"
 
 
 def _title(cut: FieldCut) -> str:
@@ -325,7 +351,8 @@ def _add_legend(cut: FieldCut, ax: Any, *, fresh: bool) -> None:
         handles.append(Patch(facecolor=face, edgecolor=edge, linewidth=0, hatch=HATCH, label=f"not OK: {words}"))
     if any(np.any(_below(cut, cut.magnitude(name))) for name in cut.quantities):
         handles.append(Patch(facecolor="#2b2140", edgecolor=DOTTED, linewidth=0, hatch=DOTS, label="below its error"))
+    columns = len(handles) if sum(len(one.get_label()) for one in handles) < 70 else 2
     if handles and fresh:
-        ax.figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=8)
+        ax.figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
     elif handles:
         ax.legend(handles=handles, frameon=True, fontsize=8)

@@ -57,9 +57,9 @@ def test_wave_fronts_of_the_incident_wave_are_half_a_wavelength_apart(total):
 
 def test_what_is_missing_is_grey_and_named(rays):
     ax = rays.plot()
-    shown = ax.images[0].get_array()
-    assert np.ma.getmaskarray(shown)[rays.status == cr.FieldStatus.LIT].all()
-    assert not np.ma.getmaskarray(shown)[rays.status == cr.FieldStatus.OK].any()
+    cover = ax.images[1].get_array()
+    missing = np.isin(rays.status, [s for s in cr.FieldStatus if s.name not in ("OK", "UNRESOLVED")])
+    np.testing.assert_array_equal(cover[..., 3] == 1.0, missing)
     assert any(one.hatches == [plane_pictures.HATCH] for one in ax.collections if hasattr(one, "hatches"))
     words = [text.get_text() for legend in ax.figure.legends for text in legend.get_texts()]
     count = int(np.sum(rays.status == cr.FieldStatus.LIT))
@@ -75,6 +75,20 @@ def test_a_field_below_its_error_is_dotted(total):
     assert not ax.figure.legends
     certain = replace(total, field=replace(total.field, error=np.zeros(total.field.error.shape)))
     assert not any(getattr(one, "hatches", None) == [plane_pictures.DOTS] for one in certain.plot().collections)
+
+
+@pytest.mark.parametrize("show", ["magnitude", "wave"])
+def test_nothing_known_is_all_grey(rays, show):
+    from dataclasses import replace
+
+    lost = replace(rays.field, status=np.full(rays.field.status.shape, int(cr.FieldStatus.LIT)))
+    ax = replace(rays, field=lost).plot(show=show)
+    np.testing.assert_array_equal(ax.images[1].get_array()[..., 3] == 1.0, rays.outside)
+
+
+def test_a_plane_off_the_origin_says_where_it_is(fan):
+    cut = cr.field_cut(fan, wavenumber=K, boundary="hard", point=(0, 0, 1.5), across=(1, 0, 0), up=(0, 1, 0), step=0.4)
+    assert cut.plot(fronts=False).get_xlabel() == "x (L), at z = 1.5"
 
 
 def test_marks_of_the_shadow_line(total):
