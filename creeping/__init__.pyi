@@ -33,8 +33,8 @@ from .field.point_result import FieldStatus as FieldStatus
 from .field.point_result import NearField as NearField
 from .field.point_result import SurfaceField as SurfaceField
 from .field.port_coupling import coupling as coupling
-from .field.port_field import PortField as PortField
-from .field.port_field import port_field as port_field
+from .field.port_source import PortField as PortField
+from .field.port_source import port_field as port_field
 from .field.slant_range import RangeProfile as RangeProfile
 from .field.slant_range import range_profile as range_profile
 from .field.sources import SourcePattern as SourcePattern

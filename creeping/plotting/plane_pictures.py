@@ -9,26 +9,18 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.cut_result import FieldCut, status_words
+from creeping.field.cut_result import FieldCut
 from creeping.field.decibels import decibels, shown_range
-from creeping.field.point_result import FieldStatus
 from creeping.plotting.coloured_body import NOTHING
 from creeping.plotting.pictures import axes_or_new, new_figure, save_figure
+from creeping.plotting.plane_marks import add_cut_legend, dress, hatch, missing_of
 
 SHOWS = ("level", "magnitude", "wave")
-SECTION = "#5a6872"
-"""Colour of the body's section."""
 FRONT = "#ffffff"
-HATCH, HATCHED = "///", "#6d767d"
-DOUBTFUL = "#a3476a", "#ffffff"
-"""Colours in the legend of what is hatched upon the colours of the field."""
-DOTS, DOTTED = "....", "#9db4c2"
 MOST_FRONTS = 40.0
 """Wavelengths across a picture up to which it has wave fronts unless they are asked for."""
 LEAST_POINTS = 4.5
 """Points a wavelength from which wave fronts can be told."""
-OUTLINE = 400
-"""Points along the longer side by which the body's section is drawn."""
 PAGE = 6.4  # inches
 
 
@@ -80,7 +72,7 @@ def plot_field_cut(
     if fresh:
         ax.set_title(_title(cut), fontsize=9, parse_math=False)
     if fresh if legend is None else legend:
-        _add_legend(cut, ax, fresh=fresh)
+        add_cut_legend(cut, ax, fresh=fresh)
     return ax
 
 
@@ -141,7 +133,7 @@ def field_cut_picture(
         panels[0].set_xlabel("")
         _draw_error(cut, panels[1], span)
     panels[0].set_title(title or _title(cut), fontsize=9, parse_math=False)
-    _add_legend(cut, panels[0], fresh=True)
+    add_cut_legend(cut, panels[0], fresh=True)
     save_figure(figure, path, dpi)
 
 
@@ -150,7 +142,7 @@ def _draw(
 ) -> None:
     size, wave = cut.magnitude(quantity), (cut.wave(quantity) * np.exp(-1j * phase)).real
     name = quantity or cut.quantities[0]
-    missing = _missing(cut)
+    missing = missing_of(cut)
     look: dict[str, Any]
     if show == "level":
         levels = decibels(size)
@@ -173,8 +165,8 @@ def _draw(
     if _with_fronts(cut, show, fronts):
         shown = np.where(missing, np.nan, _filled(wave, cut.outside))
         ax.contour(cut.across, cut.up, shown, [0.0], colors=FRONT, linewidths=0.5, alpha=0.6, zorder=1.4)
-    _hatch(cut, ax, size)
-    _dress(cut, ax)
+    hatch(cut, ax, size)
+    dress(cut, ax)
 
 
 def _draw_error(cut: FieldCut, ax: Any, span: float) -> None:
@@ -184,8 +176,8 @@ def _draw_error(cut: FieldCut, ax: Any, span: float) -> None:
     look = {"vmin": low, "vmax": high, "cmap": "viridis"}
     shown = np.where(np.isneginf(levels), low, levels)
     _paint(cut, ax, shown, "20 log$_{10}$ error (dB)", "neither" if np.nanmin(shown) >= low else "min", look)
-    _hatch(cut, ax, None)
-    _dress(cut, ax)
+    hatch(cut, ax, None)
+    dress(cut, ax)
 
 
 def _paint(cut: FieldCut, ax: Any, values: FloatArray, label: str, extend: str, look: dict[str, Any]) -> None:
@@ -223,36 +215,6 @@ def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
     return np.asarray(values[tuple(nearest)])
 
 
-def _missing(cut: FieldCut) -> BoolArray:
-    """Where most of the field is missing: neither OK nor merely of a large error."""
-    kept = (FieldStatus.OK, FieldStatus.UNRESOLVED)
-    return np.asarray(cut.outside & ~np.isin(cut.status, kept))
-
-
-def _hatch(cut: FieldCut, ax: Any, size: FloatArray | None) -> None:
-    """Hatch what is not OK, and dot what is below its error if the size is given."""
-    missing = _missing(cut)
-    doubtful = cut.outside & ~missing & (cut.status != FieldStatus.OK)
-    marks = [(missing, HATCH, HATCHED), (doubtful, HATCH, DOUBTFUL[1])]
-    if size is not None:
-        marks.append((_below(cut, size), DOTS, DOTTED))
-    for where, hatch, colour in marks:
-        if not np.any(where):
-            continue
-        # the colour of hatches is that of edges
-        filled = ax.contourf(
-            cut.across, cut.up, where.astype(float), [0.5, 1.5], colors="none", hatches=[hatch], zorder=1.5
-        )
-        filled.set_edgecolor(colour)
-        filled.set_linewidth(0.0)
-
-
-def _below(cut: FieldCut, size: FloatArray) -> BoolArray:
-    """Where the field is OK, and less than its error."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray((cut.status == FieldStatus.OK) & (size < cut.error))
-
-
 def _with_fronts(cut: FieldCut, show: str, fronts: bool | None) -> bool:
     wavelength = 2 * np.pi / cut.field.wavenumber
     fine = cut.step * LEAST_POINTS <= wavelength
@@ -263,64 +225,6 @@ def _with_fronts(cut: FieldCut, show: str, fronts: bool | None) -> bool:
         )
     few = max(np.ptp(cut.across), np.ptp(cut.up)) <= MOST_FRONTS * wavelength
     return bool(fine and few and show != "wave") if fronts is None else fronts
-
-
-def _dress(cut: FieldCut, ax: Any) -> None:
-    """Section of the body, shadow line, direction of the wave and axes."""
-    from matplotlib.patheffects import withStroke
-
-    share = max(1, int(np.ceil(OUTLINE / max(cut.outside.shape))))
-    across, up = (np.linspace(one[0], one[-1], share * (len(one) - 1) + 1) for one in (cut.across, cut.up))
-    points = cut.point + across[:, None] * cut.axes[0] + up[:, None, None] * cut.axes[1]
-    level = np.nan_to_num(cut.body.level(points.reshape(-1, 3)).reshape(points.shape[:2]), nan=-1.0)
-    if level.min() < 0 < level.max():
-        ax.contourf(across, up, level, [level.min() - 1.0, 0.0], colors=SECTION, zorder=2)
-        ax.contour(across, up, level, [0.0], colors="#111111", linewidths=0.8, zorder=2.1)
-    ax.plot(*cut.shadow_points().T, "o", color="#111111", markeredgecolor="#ffffff", markersize=5, zorder=3)
-    along = cut.axes @ cut.line.direction
-    if np.hypot(*along) > 0.2:
-        middle = np.array([0.14, 0.9])
-        box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-        ax.annotate(
-            "d", middle - 0.085 * along, xycoords="axes fraction", fontsize=9, weight="bold", bbox=box, **_CENTRE
-        )
-        arrow = {"arrowstyle": "-|>", "color": "#111111", "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0}
-        arrow["path_effects"] = [withStroke(linewidth=3.2, foreground="#ffffff")]
-        ends = middle + 0.08 * along, middle - 0.05 * along
-        ax.annotate("", *ends, xycoords="axes fraction", textcoords="axes fraction", arrowprops=arrow)
-    ax.set_aspect("equal")
-    ax.set_xlim(cut.across[0], cut.across[-1])
-    ax.set_ylim(cut.up[0], cut.up[-1])
-    ax.set_xlabel(_axis(cut, 0) + _place(cut), fontsize=9)
-    ax.set_ylabel(_axis(cut, 1), fontsize=9)
-    ax.tick_params(labelsize=8, width=0.5)
-
-
-_CENTRE: dict[str, Any] = {"ha": "center", "va": "center"}
-
-
-def _axis(cut: FieldCut, number: int) -> str:
-    axis, unit = cut.axes[number], cut.field.length_unit
-    place = int(np.argmax(np.abs(axis)))
-    if abs(axis[place]) > 1 - 1e-9:
-        offset = cut.point[place]
-        name = f"{'-' if axis[place] < 0 else ''}{'xyz'[place]}"
-        return f"{name} ({unit})" if abs(offset) < 1e-9 else f"{name} from {'xyz'[place]} = {offset:.4g} ({unit})"
-    if abs(axis @ cut.line.direction) > 1 - 1e-9:
-        return f"along d ({unit})"
-    return f"along ({', '.join(f'{v:.3g}' for v in axis + 0.0)}) ({unit})"
-
-
-def _place(cut: FieldCut) -> str:
-    """Where the plane is, unless it passes through the origin."""
-    normal = np.cross(*cut.axes)
-    height = float(normal @ cut.point)
-    if abs(height) < 1e-9:
-        return ""
-    place = int(np.argmax(np.abs(normal)))
-    if abs(normal[place]) > 1 - 1e-9:
-        return f", at {'xyz'[place]} = {cut.point[place]:.4g}"
-    return f", through ({', '.join(f'{v:.4g}' for v in cut.point + 0.0)})"
 
 
 def _title(cut: FieldCut) -> str:
@@ -334,25 +238,3 @@ def _title(cut: FieldCut) -> str:
 def _page(cut: FieldCut) -> tuple[float, float]:
     share = float(np.ptp(cut.up) / np.ptp(cut.across))
     return PAGE, float(np.clip(0.74 * PAGE * share + 1.0, 2.4, 9.0))
-
-
-def _add_legend(cut: FieldCut, ax: Any, *, fresh: bool) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    handles: list[Any] = []
-    if np.any(~cut.outside):
-        handles.append(Patch(facecolor=SECTION, edgecolor="#111111", label="body"))
-    if len(cut.shadow_points()):
-        look: dict[str, Any] = {"color": "#111111", "markeredgecolor": "#ffffff", "markersize": 5}
-        handles.append(Line2D([], [], marker="o", linestyle="none", label="shadow line", **look))
-    if words := status_words(cut):
-        face, edge = (NOTHING, HATCHED) if np.any(_missing(cut)) else DOUBTFUL
-        handles.append(Patch(facecolor=face, edgecolor=edge, linewidth=0, hatch=HATCH, label=f"not OK: {words}"))
-    if any(np.any(_below(cut, cut.magnitude(name))) for name in cut.quantities):
-        handles.append(Patch(facecolor="#2b2140", edgecolor=DOTTED, linewidth=0, hatch=DOTS, label="below its error"))
-    columns = len(handles) if sum(len(one.get_label()) for one in handles) < 70 else 2
-    if handles and fresh:
-        ax.figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
-    elif handles:
-        ax.legend(handles=handles, frameon=True, fontsize=8)
