@@ -56,8 +56,8 @@ class FieldCut(Drawn):
     >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=3.2, n_rays=24)
     >>> cut = cr.field_cut(fan, wavenumber=8.0, boundary="hard", extent=(3.0, 3.0), step=0.5)
     >>> cut.points.shape, cut.axes.round(6).tolist(), cut.status_counts
-    ((7, 7, 3), [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], {'OK': 40})
-    >>> bool(abs(cut.wave()[3, 6]) < abs(cut.wave()[3, 0])), int((~cut.outside).sum())         # dark, lit
+    ((7, 7, 3), [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], {'OK': 39, 'UNRESOLVED': 1})
+    >>> bool(abs(cut.wave()[4, 5]) < abs(cut.wave()[4, 1])), int((~cut.outside).sum())         # dark, lit
     (True, 9)
     """
 

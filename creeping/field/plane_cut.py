@@ -94,7 +94,7 @@ def field_cut(
     >>> fan = cr.launch(cr.DirectFlow(egg, rtol=1e-8), cr.shadow_line(egg, (1, 0, 0)), length=3.0, n_rays=24)
     >>> cut = cr.field_cut(fan, wavenumber=8.0, boundary="pec", extent=(3.0, 2.5), step=0.4, polarisation=(0, 0, 1))
     >>> cut.quantities, cut.magnitude("H").shape, cut.to_xarray()["E"].dims
-    (('E', 'H'), (7, 9), ('up', 'across', 'component'))
+    (('E', 'H'), (9, 9), ('up', 'across', 'component'))
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body, smooth="the near field")
