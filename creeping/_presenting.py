@@ -48,7 +48,7 @@ class Drawn(Shown):
             as the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
         **options
             ``legend=True`` adds a legend to axes that were given; a new figure has one. All others depend on the type,
-            see `creeping.plotting.line_plots` and `creeping.plotting.level_plots`:
+            see `line_plots`, `level_plots` and `plane_pictures` of `creeping.plotting`:
 
             - `ShadowLine`, `ShadowCurve`, `RayFan` (``plot_line``): ``kind="parameters"``, the plane of (theta, phi) in
               degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;
@@ -56,6 +56,8 @@ class Drawn(Shown):
             - `IsoPhaseCurve` (``plot_curve``): ``kind=``.
             - `FarField` (``plot_far``): ``quantity="rcs"``, in dBsm, or ``"amplitude"``; ``parts=True`` for the
               creeping, reflected and forward part; ``components=``, ``angles=``, ``unit=``, ``span=``.
+            - `FieldCut` (``plot_field_cut``): ``show="level"``, ``"magnitude"`` or ``"wave"``, Re(u e^{-i phase});
+              ``quantity=``, ``fronts=``, ``phase=``, ``span=``.
             - `PhaseMap` (``plot_growth``): ``tolerance=``.
 
         Returns

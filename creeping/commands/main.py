@@ -121,6 +121,16 @@ def run(
         str | None,
         Parameter(group=_field, help="Of a conductor in far.png: HH, VV, HV, VH, joined by commas. HH,VV."),
     ] = None,
+    plane: Annotated[
+        list[str] | None,
+        Parameter(
+            group=_field,
+            negative="",
+            help="Planes through the middle of the body on which the total field is wanted; may be repeated: incidence "
+            "(the direction of the wave and the body's longest side), xy, xz, yz, with :STEP for a spacing of points "
+            "of your own. Gives plane.csv and plane.png.",
+        ),
+    ] = None,
     cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
     pictures: Annotated[bool, Parameter(group=_output, help="Draw pictures; --no-pictures leaves them out.")] = True,
     backend: Annotated[
@@ -133,6 +143,7 @@ def run(
 
     import creeping as cr
     from creeping.commands import run_field as _field_run
+    from creeping.commands import run_plane as _plane_run
     from creeping.commands import run_report as _run_results
     from creeping.rays.reach import ray_length
 
@@ -145,6 +156,7 @@ def run(
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with _Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
+        planes = _plane_run.asked_planes(plane, job, shape)
         if job:
             job = job.fitted(shape)
         progress("shadow line")
@@ -166,6 +178,10 @@ def run(
         if job:
             summary["field"], names = job.write(far, fan, output, backend, title_of(body), pictures=pictures)
             summary["field"]["seconds"] = field_seconds
+            summary["files"][-1:-1] = names
+        if job and planes:
+            asked = planes, job, fan, output, title_of(body), progress
+            summary["planes"], names = _plane_run.write_planes(*asked, pictures=pictures)
             summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)
         from creeping.files import write_text

@@ -112,6 +112,7 @@ def _level(field: dict[str, Any]) -> str:
 
 def readable(summary: dict[str, Any], output: Path) -> str:
     """The summary as a person reads it."""
+    from creeping.commands.run_plane import plane_words
     from creeping.field.validity_range import Validity, validity_words
 
     rows = [f"{summary['body']}, d = ({', '.join(f'{v:.4f}' for v in summary['direction'])})"]
@@ -167,6 +168,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             off = f["uncertain_by"]
             known = off["reason"] or f"rms {off['rms']:.1e}, max {off['max']:.1e}"
             rows.append(f"error of the field because of the body: {known}")
+    rows.extend(plane_words(entry) for entry in summary.get("planes", ()))
     drawn = f"3-D picture by {summary['drawn_by']}" if summary["drawn_by"] else "no pictures"
     rows.append(f"{summary['iso_phase_curves']} iso-phase curves; {drawn}")
     rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")

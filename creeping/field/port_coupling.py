@@ -88,6 +88,14 @@ def coupling(
     >>> np.abs(u[0, 1:]).round(4).tolist(), bool(np.all(u[0, 1:] == u[1:, 0]))
     ([0.1065, 0.0173], True)
     """
+    k = checked_wave(body, wavenumber, boundary, order)
+    y = _checked_ports(body, ports)
+    rays = rays_between(body, y, fan_length(body, k, length), pad=merging_pad(body, k))
+    return _result(rays, k, boundary, order)
+
+
+def checked_wave(body: Surface, wavenumber: float, boundary: BoundaryLike, order: int) -> float:
+    """The wavenumber, if coupling is known on the body at it, with the boundary and to the order."""
     checked_body(body)
     checked_plain(body, smooth="the coupling of ports")
     k = checked(wavenumber, order)
@@ -95,10 +103,12 @@ def coupling(
         raise InvalidInputError(
             f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard'"
         )
-    y = _checked_ports(body, ports)
-    far = _length(body, k) if isinstance(length, str) and length == AUTO else positive_number(length, "length")
-    rays = rays_between(body, y, far, pad=NEAR * np.cbrt(size(body) / k**2))
-    return _result(rays, k, boundary, order)
+    return k
+
+
+def merging_pad(body: Surface, k: float) -> float:
+    """How far from a caustic a port counts as close to it, L."""
+    return float(NEAR * np.cbrt(size(body) / k**2))
 
 
 def _checked_ports(body: Surface, ports: ArrayLike) -> FloatArray:
@@ -117,8 +127,10 @@ def _checked_ports(body: Surface, ports: ArrayLike) -> FloatArray:
     return y
 
 
-def _length(body: Surface, k: float) -> float:
-    """Length of geodesics by the decay of the first mode at the root mean square curvature, L."""
+def fan_length(body: Surface, k: float, length: float | Literal["auto"]) -> float:
+    """Length of geodesics, L: "auto" is by the decay of the first mode at the root mean square curvature."""
+    if not (isinstance(length, str) and length == AUTO):
+        return positive_number(length, "length")
     box = np.asarray(body.bounds, dtype=float)
     girth = np.pi * float(np.max(box[1] - box[0]))
     typical = float(np.median(curvature_norms(body, points_of_charts(body)))) / np.sqrt(2)

@@ -1,4 +1,4 @@
-"""Files of shadow lines, fans, iso-phase curves and far fields for other programs: VTK PolyData (.vtp) and CSV.
+"""Files of lines, fans, iso-phase curves, far fields and fields on planes for other programs: VTK (.vtp) and CSV.
 
 Numbers keep all 17 digits, so that what is read back is what was written.
 """
@@ -11,6 +11,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.files import cut_table as _cut_table
 from creeping.files import far_table as _far_table
 from creeping.files.polylines import polydata
 from creeping.rays.fan import RayFan
@@ -19,6 +20,7 @@ from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
+    from creeping.field.cut_result import FieldCut
     from creeping.field.far_result import FarField
 
 _RAY_COLUMNS = ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
@@ -82,6 +84,7 @@ def write_csv(
     fan: RayFan | None = None,
     curves: Sequence[IsoPhaseCurve] | None = None,
     far: "FarField | None" = None,
+    cut: "FieldCut | None" = None,
     observed: tuple[Sequence[str], FloatArray] | None = None,
 ) -> None:
     """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
@@ -90,7 +93,7 @@ def write_csv(
     ----------
     path : str or path
         File to write; replaced at once when complete.
-    line, fan, curves, far
+    line, fan, curves, far, cut
         Exactly one of them: they have different columns.
     observed : (texts, angles), optional
         Of a far field: what each direction was asked for as, and its angle along the cut (m,), degrees.
@@ -102,7 +105,7 @@ def write_csv(
     CreepingError
         If the file cannot be written.
     """
-    parts = {"line": line, "fan": fan, "curves": curves, "far": far}
+    parts = {"line": line, "fan": fan, "curves": curves, "far": far, "cut": cut}
     given = [name for name, value in parts.items() if value is not None]
     if len(given) != 1:
         raise InvalidInputError(
@@ -117,6 +120,8 @@ def write_csv(
             _write_table(stream, _CURVE_NOTES, _curve_rows(curves))
         elif far is not None:
             _write_table(stream, _far_table.notes(far, observed=observed is not None), _far_table.rows(far, observed))
+        elif cut is not None:
+            _write_table(stream, _cut_table.notes(cut), _cut_table.rows(cut))
 
 
 _POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}

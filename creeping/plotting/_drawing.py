@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.errors import InvalidInputError
 from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import Triangulation
@@ -66,8 +67,8 @@ class Drawing:
     Attributes
     ----------
     body : Surface
-    direction : (3,)
-        Incidence.
+    direction : (3,) or None
+        Incidence, None where no wave falls in.
     view : View
     mesh : Triangulation
     normals : (n, 3)
@@ -79,7 +80,7 @@ class Drawing:
     """
 
     body: Surface
-    direction: FloatArray
+    direction: FloatArray | None
     view: View
     mesh: Triangulation
     normals: FloatArray
@@ -94,6 +95,8 @@ class Drawing:
         In space it stands where the wave comes from; in the picture that is behind the body, so it is moved across
         the direction, to the left, until it is clear of the body's outline.
         """
+        if self.direction is None:
+            raise InvalidInputError("this picture has no incidence; it is of a source on the body")
         low, high = self.view.frame(self.mesh.vertices, margin=0.0)
         extent = float(np.max(high - low))
         along = 0.38 * extent * self.direction
@@ -115,10 +118,15 @@ class Drawing:
         )
         return [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
 
+    @property
+    def marks(self) -> list[Mark]:
+        """All arrows."""
+        return self.triad if self.direction is None else [self.incidence, *self.triad]
+
     @cached_property
     def frame(self) -> tuple[FloatArray, FloatArray]:
         """Lower left and upper right corner (2,) of the picture, L."""
-        ends = [point for mark in (self.incidence, *self.triad) for point in (mark.foot, mark.tip)]
+        ends = [point for mark in self.marks for point in (mark.foot, mark.tip)]
         return self.view.frame(np.concatenate([self.mesh.vertices, np.stack(ends)]))
 
     @property

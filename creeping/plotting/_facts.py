@@ -11,6 +11,7 @@ from creeping._typing import Any, FloatArray
 from creeping.files.far_table import angles_of
 
 if TYPE_CHECKING:
+    from creeping.field.cut_result import FieldCut
     from creeping.field.far_result import FarField
     from creeping.field.point_result import PointData
     from creeping.geodesics.direct_flow import DirectFlow
@@ -134,6 +135,16 @@ def of_points(field: "PointData") -> Facts:
         yield "largest where OK", f"{field.magnitude[field.ok].max():.6g} {field.unit}"
         off = field.error[field.ok]
         yield "error where OK", f"{np.median(off):.2g} in the median, {off.max():.2g} at most"
+
+
+def of_cut(cut: "FieldCut") -> Facts:
+    """Facts of a field on a plane."""
+    unit = cut.field.length_unit
+    yield "grid", f"{len(cut.across)} x {len(cut.up)}, {cut.step:.6g} {unit} apart, {np.sum(~cut.outside)} inside"
+    for name, axis in zip(("across", "up"), cut.axes, strict=True):
+        yield name, _direction(axis)
+    yield from of_points(cut.field)
+    yield "seconds", f"{cut.seconds:.3g}"
 
 
 def of_map(flow: "PhaseMap") -> Facts:

@@ -41,6 +41,8 @@ class Stroke:
         Entry of the legend, empty for none.
     rank : int
         Strokes of higher rank are drawn over those of lower.
+    through : bool
+        Whether it shows faintly where the body hides it.
     """
 
     lines: list[FloatArray] = field(repr=False)
@@ -49,6 +51,7 @@ class Stroke:
     alpha: float = 1.0
     label: str = ""
     rank: int = 0
+    through: bool = True
 
 
 def strokes(

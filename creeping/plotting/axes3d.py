@@ -113,8 +113,8 @@ def _draw_stroke(ax: Any, drawing: Drawing, stroke: Stroke) -> None:
         for points, mask in zip(stroke.lines, seen, strict=True)
         for piece in runs(points, ~mask | np.append(~mask[1:], False) | np.append(False, ~mask[:-1]))
     ]
-    for pieces, share, above in ((hidden, HIDDEN, 0), (visible, 1.0, 10)):
-        if pieces:
+    for pieces, share, above in ((hidden, HIDDEN if stroke.through else 0.0, 0), (visible, 1.0, 10)):
+        if pieces and share > 0:
             lines = Line3DCollection(
                 pieces,
                 colors=stroke.colour,
@@ -131,7 +131,7 @@ def _draw_marks(ax: Any, drawing: Drawing) -> None:
     """Draw the arrow of incidence and the triad of the coordinate axes."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    marks = (drawing.incidence, *drawing.triad)
+    marks = drawing.marks
     # not quiver: its heads are flat in space and vanish when seen from the side
     outlines = [mark.outline(drawing.view) for mark in marks]
     ax.add_collection3d(Poly3DCollection(outlines, facecolors=ARROW_COLOUR, linewidths=0, zorder=30))

@@ -6,6 +6,7 @@ Sources: Derivations, F9 and F16.
 """
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,10 +16,12 @@ from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
 from creeping.field.decibels import decibels, shown_range
 from creeping.field.on_body import surface_field
+from creeping.field.point_result import SurfaceField
 from creeping.field.surface import scalar_boundary
 from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays
 from creeping.plotting._view import View
+from creeping.plotting.body_fronts import front_strokes
 from creeping.plotting.coloured_body import NOTHING, cells_of, painted
 from creeping.plotting.palette import curve_style
 from creeping.plotting.pictures import chosen_backend, new_figure, save_figure
@@ -37,6 +40,8 @@ def surface_field_picture(
     backend: str = "auto",
     view: View | None = None,
     span: float = 60.0,
+    fronts: bool = False,
+    phase: float = 0.0,
     cells: int | None = None,
     dpi: int = 300,
 ) -> str:
@@ -57,6 +62,10 @@ def surface_field_picture(
         Camera; by default on the shadow side.
     span : float, dB
         Range of the colours below the highest level.
+    fronts : bool
+        Whether to draw wave fronts, Re(u e^{-i phase}) = 0, where the field is OK.
+    phase : float, radians
+        omega t.
     cells : int, optional
         Fineness of the body, cells along each side of its box; by default eight a wavelength, within 48 to 96.
     dpi : int
@@ -69,7 +78,8 @@ def surface_field_picture(
     Raises
     ------
     InvalidInputError
-        On a bad wavenumber, boundary, order, backend or span, and for a weighted body.
+        On a bad wavenumber, boundary, order, backend or span, for a weighted body, and if the mesh is too coarse
+        for the fronts asked for.
     CreepingError
         If pyvista is asked for and cannot draw here, or the file cannot be written.
     """
@@ -77,7 +87,12 @@ def surface_field_picture(
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     drawing = compose(fan.line, view=view, cells=cells or cells_of(fan.body, k))
-    levels = surface_levels(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
+    field = surface_field(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
+    if fronts:
+        known = field.ok & np.isfinite(field.values)
+        curves = front_strokes(fan.body, drawing.mesh, field.values, known, wavenumber=k, phase=phase)
+        drawing = replace(drawing, strokes=curves + drawing.strokes)
+    levels = _levels(field, kind)
     label = f"{_name(kind)}\nk = {k:g}/L, {_boundary_name(kind)}"
     figure = painted(drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
     save_figure(figure, path, dpi)
@@ -91,9 +106,12 @@ def surface_levels(
 
     |u|, or |du/dn|/k of the soft boundary; NaN in the shadow where no ray passes, inf on a caustic.
     """
-    kind = scalar_boundary(boundary)
     field = surface_field(fan, points, wavenumber=wavenumber, boundary=boundary, order=order)
-    size = np.abs(field.values) / (wavenumber if kind.kind == "soft" else 1.0)
+    return _levels(field, scalar_boundary(boundary))
+
+
+def _levels(field: SurfaceField, kind: Boundary) -> FloatArray:
+    size = np.abs(field.values) / (field.wavenumber if kind.kind == "soft" else 1.0)
     size = np.where(np.isnan(size), np.inf, size)
     return decibels(np.where(size > 0, size, np.nan))
 

@@ -198,6 +198,6 @@ def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None
     ax.imshow(image, extent=extent, interpolation="antialiased")
     ax.set_axis_off()
     ax.set_autoscale_on(False)
-    for mark in (drawing.incidence, *drawing.triad):
+    for mark in drawing.marks:
         ax.fill(*drawing.view.project(mark.outline(drawing.view)).T, color=ARROW_COLOUR, linewidth=0)
         ax.text(*drawing.view.project(mark.label(drawing.view)), mark.name, **mark.text)

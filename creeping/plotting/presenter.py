@@ -9,7 +9,7 @@ from html import escape
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.files.polylines import polydata
-from creeping.plotting import _facts, level_plots, line_plots
+from creeping.plotting import _facts, level_plots, line_plots, plane_pictures
 
 _FACTS: dict[str, Callable[..., _facts.Facts]] = {
     "ShadowLine": _facts.of_line,
@@ -18,6 +18,7 @@ _FACTS: dict[str, Callable[..., _facts.Facts]] = {
     "IsoPhaseCurve": _facts.of_curve,
     "FarField": _facts.of_far,
     "PointData": _facts.of_points,
+    "FieldCut": _facts.of_cut,
     "PhaseMap": _facts.of_map,
     "DirectFlow": _facts.of_direct,
 }
@@ -27,6 +28,7 @@ _PLOTS: dict[str, Callable[..., Any]] = {
     "RayFan": line_plots.plot_fan,
     "IsoPhaseCurve": line_plots.plot_curve,
     "FarField": level_plots.plot_far,
+    "FieldCut": plane_pictures.plot_field_cut,
     "PhaseMap": level_plots.plot_growth,
 }
 _POLYDATA: dict[str, Callable[[Any], Any]] = {

@@ -83,8 +83,8 @@ def draw(plotter: Any, drawing: Drawing, *, scale: float = 2.0) -> None:
     """Draw a composed picture without arrow and legend; ``scale`` is the number of pixels per point of line width."""
     plotter.set_background("white")
     _add_body(plotter, drawing)
-    for stroke in drawing.strokes:
-        _add_stroke(plotter, stroke, scale)
+    for number, stroke in enumerate(drawing.strokes):
+        _add_stroke(plotter, stroke, scale, f"stroke {number}")
     _aim(plotter, drawing)
 
 
@@ -102,6 +102,8 @@ def render(drawing: Drawing, pixels: tuple[int, int], *, scale: float) -> NDArra
         draw(plotter, drawing, scale=scale)
         with_body = _image(plotter)
         plotter.actors["body"].visibility = False
+        for number, stroke in enumerate(drawing.strokes):
+            plotter.actors[f"stroke {number}"].visibility = stroke.through
         without = _image(plotter)
     finally:
         plotter.close()
@@ -142,13 +144,14 @@ def _add_body(plotter: Any, drawing: Drawing) -> None:
     plotter.add_mesh(surface, smooth_shading=True, specular=0.0, culling="back", name="body", **look)
 
 
-def _add_stroke(plotter: Any, stroke: Stroke, scale: float) -> None:
+def _add_stroke(plotter: Any, stroke: Stroke, scale: float, name: str) -> None:
     actor = plotter.add_mesh(
         polylines(stroke.lines),
         color=stroke.colour,
         line_width=stroke.width * scale,
         opacity=stroke.alpha,
         lighting=False,
+        name=name,
     )
     # the mesh and the polylines both sag by about the square of their spacing, so lines are drawn a little nearer
     # to the camera, by rank; in depth only: lifting them off the body would bulge its outline

@@ -73,7 +73,7 @@ def test_csv_of_a_vector_field(tmp_path):
 
 def test_csv_wants_exactly_one(tmp_path):
     far = far_of(grid_directions(THETA, PHI), vector=False)
-    with pytest.raises(InvalidInputError, match="got curves and far; give exactly one of line, fan, curves, far"):
+    with pytest.raises(InvalidInputError, match="got curves and far; give exactly one of line, fan, curves, far, cut"):
         write_csv(tmp_path / "x.csv", curves=[], far=far)
 
 

@@ -1,0 +1,129 @@
+"""Fields on planes of one ``creeping run``: what ``--plane`` asks for, and the files that come of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from creeping import files, plotting
+from creeping.commands.run_field import DPI, ORDER, Job
+from creeping.errors import InvalidInputError
+from creeping.field.cut_result import FieldCut
+from creeping.field.plane_cut import field_cut
+from creeping.geometry.creased import is_creased
+from creeping.rays.fan import RayFan
+
+PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+FORMS = "incidence, xy, xz or yz, with :STEP if it is not to fit the wave, e.g. xz:0.02"
+
+
+@dataclass(frozen=True)
+class Plane:
+    """One ``--plane``: its text, the axes that span it (2, 3) or None, and the step if one is given, L."""
+
+    text: str
+    axes: Any
+    step: float | None
+
+
+def parse_plane(text: str) -> Plane:
+    """What one ``--plane`` asks for.
+
+    Raises
+    ------
+    InvalidInputError
+        If the text has none of the known forms.
+    """
+    name, colon, rest = text.partition(":")
+    step = None
+    if colon:
+        try:
+            step = float(rest)
+        except ValueError:
+            step = np.nan
+    if name not in PLANES or (step is not None and not (np.isfinite(step) and step > 0)):
+        raise InvalidInputError(f"--plane {text!r} is unknown; give {FORMS}")
+    numbers = PLANES[name]
+    return Plane(text, None if numbers is None else np.eye(3)[list(numbers)], step)
+
+
+def asked_planes(texts: Sequence[str] | None, job: Job | None, body: Any) -> list[Plane]:
+    """Planes that are asked for.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no field to be shown on them.
+    """
+    planes = [parse_plane(text) for text in texts or ()]
+    if planes and job is None:
+        raise InvalidInputError("--plane needs --wavenumber or --frequency, which ask for the field")
+    if planes and is_creased(body):
+        raise InvalidInputError("--plane is of smooth bodies; leave it out: the far field of this one is known")
+    return planes
+
+
+def write_planes(
+    planes: Sequence[Plane],
+    job: Job,
+    fan: RayFan,
+    output: Path,
+    name: str,
+    progress: Callable[[str], None],
+    *,
+    pictures: bool,
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Compute fields on planes and write their files; returns entries of the summary and the names of the files."""
+    entries, names = [], []
+    for number, plane in enumerate(planes, 1):
+        progress(f"field on the plane {plane.text}")
+        stem = "plane" if number == 1 else f"plane_{number}"
+        cut = _cut(plane, job, fan)
+        files.write_csv(output / f"{stem}.csv", cut=cut)
+        names.append(f"{stem}.csv")
+        if pictures and np.any(cut.field.ok):
+            title = f"{name}\n{job.told(cut.field.length_unit)}, {cut.field.boundary}"
+            plotting.field_cut_picture(output / f"{stem}.png", cut, error=True, title=title, dpi=DPI)
+            names.append(f"{stem}.png")
+        entries.append(_entry(plane, cut))
+    return entries, names
+
+
+def _cut(plane: Plane, job: Job, fan: RayFan) -> FieldCut:
+    options: dict[str, Any] = {"wavenumber": job.wavenumber, "boundary": job.boundary, "order": ORDER}
+    if plane.axes is not None:
+        options |= {"across": plane.axes[0], "up": plane.axes[1]}
+    if job.boundary == "pec":
+        # the transmitted one of the first component that pictures show
+        options["polarisation"] = {"t": "theta", "p": "phi"}[job.components[0][1]]
+    return field_cut(fan, step=plane.step, **options)
+
+
+def _entry(plane: Plane, cut: FieldCut) -> dict[str, Any]:
+    field = cut.field
+    methods, counts = np.unique(field.method, return_counts=True)
+    off = field.error[field.ok]
+    return {
+        "plane": plane.text,
+        "points": [len(cut.across), len(cut.up)],
+        "step": cut.step,
+        "inside": int(np.sum(~cut.outside)),
+        "status": field.status_counts,
+        "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
+        "error_median": float(np.median(off)) if off.size else None,
+        "error_max": float(off.max()) if off.size else None,
+        "seconds": round(cut.seconds, 2),
+    }
+
+
+def plane_words(entry: dict[str, Any]) -> str:
+    """One line on a field on a plane."""
+    states = ", ".join(f"{count} {name}" for name, count in entry["status"].items())
+    error = "" if entry["error_max"] is None else f"; error {entry['error_median']:.1e} in the median, "
+    error += "" if entry["error_max"] is None else f"{entry['error_max']:.1e} at most"
+    return (
+        f"field on the plane {entry['plane']}: {' x '.join(map(str, entry['points']))} points {entry['step']:.3g} "
+        f"apart, {states}{error}; {entry['seconds']:.1f} s"
+    )

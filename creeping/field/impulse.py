@@ -1,0 +1,195 @@
+"""The response to a pulse: the sum over a band of wavenumbers of any complex field, against the delay of its paths.
+
+    h(t) = sum_n w_n u(k_n) e^{-i k_n t} / sum_n w_n          `creeping.field.band_sum`
+    |error of h| <= sum_n w_n e_n / sum_n w_n
+
+with e_n the errors of the values. What the wave does on the way shows as the delay of its group: a creeping wave, whose
+phase has a term in k^{1/3}, comes later than its path is long by that of the mode, some 0.01 of the arc at ka = 40.
+
+Sources: Derivations, F21.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.array_result import ArrayResult
+from creeping.field.band_sum import band_sum
+from creeping.geometry.arguments import number_between, positive_number
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImpulseResponse:
+    """A field against delay, (m, ...).
+
+    Attributes
+    ----------
+    delay : (m,), L or s
+        Ascending; 0 is the phase 0 of the values: of an incident plane wave when it passes the origin.
+    values : (m, ...) complex
+        In the unit of the field; a path that brings a e^{ikt} at all wavenumbers has a at its delay t.
+    error : (...)
+        Bound of the error at any delay by the errors of the field; 0 if none were given.
+    resolution : float, L or s
+        Width of a single path at half its height in power.
+    period : float, L or s
+        After which delays repeat.
+    unit : str
+        "L" or "s".
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> k = np.linspace(20.0, 60.0, 81)
+    >>> found = cr.impulse_response(np.exp(3j * k), k, speed=340.0, window="none")
+    >>> round(float(found.period), 4), round(1e3 * found.resolution, 3), found.unit
+    (0.037, 0.404, 's')
+    """
+
+    delay: FloatArray
+    values: ComplexArray
+    error: FloatArray
+    resolution: float
+    period: float
+    unit: str
+
+    @property
+    def envelope(self) -> FloatArray:
+        """|h| (m, ...)."""
+        return np.abs(self.values)
+
+    def arrivals(self, most: int = 8, *, above: float = 0.05) -> FloatArray:
+        """Delays of the strongest peaks of the envelope of one response, in order of time.
+
+        Parameters
+        ----------
+        most : int
+            Peaks at most.
+        above : float
+            Least height, as a share of the largest; nor are peaks below the error.
+
+        Returns
+        -------
+        (p,), L or s
+            To a share of the resolution: paths that are no further apart than it are not told apart.
+
+        Raises
+        ------
+        InvalidInputError
+            If there are several responses.
+        """
+        from scipy.signal import find_peaks
+
+        if self.values.ndim != 1:
+            raise InvalidInputError(
+                f"arrivals are of one response, values (m,), not {self.values.shape}; transform them one by one"
+            )
+        size = self.envelope
+        # periodic: a peak may stand at either end
+        around = np.concatenate([size[-1:], size, size[:1]])
+        apart = max(1, int(self.resolution / (self.delay[1] - self.delay[0])))
+        peaks, _ = find_peaks(around, height=max(above * float(size.max()), float(self.error)), distance=apart)
+        peaks = peaks[np.argsort(-around[peaks])][:most]
+        left, middle, right = around[peaks - 1], around[peaks], around[peaks + 1]
+        bend = left - 2 * middle + right
+        shift = np.where(bend < 0, 0.5 * (left - right) / np.where(bend < 0, bend, 1.0), 0.0)
+        return np.sort(self.delay[0] + (peaks - 1 + shift) * (self.delay[1] - self.delay[0]))
+
+    def __repr__(self) -> str:
+        shape = " x ".join(map(str, self.values.shape))
+        return (
+            f"ImpulseResponse({shape}, delays {self.delay[0]:.4g} to {self.delay[-1]:.4g} {self.unit})\n"
+            f"  resolution {self.resolution:.3g} {self.unit}, repeats after {self.period:.4g} {self.unit}\n"
+            f"  up to {np.max(self.envelope, initial=0.0):.4g}, error {np.max(self.error, initial=0.0):.2g} at most"
+        )
+
+
+def impulse_response(
+    values: ArrayLike | Sequence[ArrayResult],
+    wavenumbers: ArrayLike,
+    *,
+    error: ArrayLike | None = None,
+    speed: float | None = None,
+    start: float | None = None,
+    window: str = "hann",
+) -> ImpulseResponse:
+    """Response of a field to a pulse that fills a band: its envelope has a peak for each path that is told apart.
+
+    Parameters
+    ----------
+    values : (n, ...) complex, or sequence of results
+        At the wavenumbers: arrays, or `NearField`, `SurfaceField`, `SourcePattern`, whose errors are taken over. Of
+        `Coupling`, whose diagonal is infinite, give ``[c[0, 1] for c in ...]``.
+    wavenumbers : (n,), 1/L
+        Ascending, equally spaced, eight or more.
+    error : (n, ...), optional
+        Of the values, in their unit; taken from results.
+    speed : float, L/s, optional
+        Of the wave: delays are in seconds then, else lengths of paths, L.
+    start : float, L or s, optional
+        First delay; by default minus half of the period 2 pi/dk.
+    window : {"hann", "taylor", "none"}
+
+    Returns
+    -------
+    ImpulseResponse
+
+    Raises
+    ------
+    InvalidInputError
+        If they are not that, or values are not finite.
+
+    Examples
+    --------
+    By a tangent, an arc and a tangent to a point in the shadow of a sphere.
+
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball, k = sc.Sphere(), np.linspace(10.0, 40.0, 61)
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, (0, 0, 1)), length=4.0, n_rays=24)
+    >>> u = [cr.near_field(fan, (0.9, 0.0, 1.5), wavenumber=one, boundary="hard", method="rays") for one in k]
+    >>> found = cr.impulse_response(u, k)
+    >>> found.arrivals(1).round(1).tolist(), bool(found.error < 0.1)
+    ([1.5], True)
+    """
+    if isinstance(values, Sequence) and len(values) and isinstance(values[0], ArrayResult):
+        u, off = _of_results(values, error)
+    else:
+        u = np.asarray(values, dtype=complex)
+        off = np.zeros(u.shape) if error is None else np.asarray(error, dtype=float)
+    bad = ~(np.isfinite(off) & (off >= 0))
+    if off.shape != u.shape or np.any(bad):
+        raise InvalidInputError(
+            f"error has shape {off.shape}, {int(bad.sum())} of it not finite or negative; give one of 0 or more "
+            f"for each of the values {u.shape}"
+        )
+    c = 1.0 if speed is None else positive_number(speed, "speed")
+    first = None if start is None else c * number_between(start, "start", -1e100, 1e100)
+    found = band_sum(u, wavenumbers, window=window, what="an impulse response", start=first)
+    count = len(found.delay)
+    return ImpulseResponse(
+        delay=found.delay / c,
+        values=found.values,
+        error=np.asarray(np.tensordot(found.weights, off, axes=1)),
+        resolution=found.resolution / c,
+        period=float(found.delay[1] - found.delay[0]) * count / c,
+        unit="L" if speed is None else "s",
+    )
+
+
+def _of_results(results: Sequence[Any], error: ArrayLike | None) -> tuple[ComplexArray, FloatArray]:
+    """Values and errors of results, of one shape."""
+    if error is not None:
+        raise InvalidInputError("results have errors of their own; leave out error, or give arrays of values")
+    shapes = {getattr(one, "shape", None) for one in results}
+    if len(shapes) > 1 or not all(isinstance(one, ArrayResult) for one in results):
+        raise InvalidInputError(f"results of shapes {shapes} are not one at each wavenumber; give those of one call")
+    return np.stack([one.values for one in results]), np.stack([one.error for one in results])

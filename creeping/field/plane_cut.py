@@ -1,0 +1,197 @@
+"""The total field on a plane cut through a body: a rectangle of points, those outside the body with their field.
+
+    x = point + a e_1 + b e_2,   a along ``across``, b along ``up``
+
+Sources: Derivations, F17 and F26.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked, checked_plain
+from creeping.field.boundary import BoundaryLike
+from creeping.field.conductor.near import VECTOR, conductor_field
+from creeping.field.conductor.result import ConductorField
+from creeping.field.currents.kept import affordable
+from creeping.field.cut_result import FieldCut, grid_points
+from creeping.field.near import near_field
+from creeping.field.point_result import NearField
+from creeping.geometry.arguments import number_between, one_of, positive_number, real_array
+from creeping.geometry.directions import unit_direction
+from creeping.rays.fan import RayFan
+
+FINE, COARSE = 8, 5
+"""Points a wavelength where no step is given; the fewer where more would cost too much."""
+ENOUGH, MOST = 60_000, 400_000
+"""Points of a cut that is given no step, and of any."""
+AROUND = 0.75
+"""Room beside the body of a cut that is given no extent, in the body's longest side."""
+ALONG = np.cos(np.radians(30.0))
+"""Cosine from which an axis counts as along a direction, and spans no plane with it."""
+
+
+def field_cut(
+    fan: RayFan,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    point: ArrayLike | None = None,
+    across: ArrayLike | None = None,
+    up: ArrayLike | None = None,
+    extent: ArrayLike | None = None,
+    step: float | None = None,
+    order: int = 2,
+    method: str = "auto",
+    polarisation: str | ArrayLike | None = None,
+) -> FieldCut:
+    """Total field on a rectangle of a plane, at the points outside the body: `near_field` or `conductor_field`.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Long enough to pass where rays leave towards the points.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard", ImpedanceBoundary or "pec"
+    point : (3,), L, optional
+        In the middle; by default that of the body's box.
+    across, up : (3,), optional
+        Directions that span the plane. By default that of the wave, and the body's longest side that is not along it;
+        ``up`` is taken at right angles to ``across``.
+    extent : (width, height), L, optional
+        By default the body with 0.75 of its longest side all round.
+    step : float, L, optional
+        Spacing of points. By default an eighth of a wavelength; coarser, down to a fifth, where currents would cost
+        more than `near_field` takes them for, and coarser than that where there would be more than 60 000 points.
+    order, method
+        As of `near_field`; 2 and "auto" of a conductor.
+    polarisation : "theta", "phi" or (3,) complex, optional
+        Of the wave that falls on a conductor, by default "theta".
+
+    Returns
+    -------
+    FieldCut
+        ``plot()`` draws it, `creeping.plotting.field_cut_picture` writes a picture.
+
+    Raises
+    ------
+    InvalidInputError
+        On directions that span no plane, a bad extent or step, one that makes more than 400 000 points, a rectangle
+        within the body, and as `near_field` and `conductor_field`.
+    SurfaceError
+        As `near_field`.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> egg = sc.Ellipsoid(1.0, 0.8, 0.6)
+    >>> fan = cr.launch(cr.DirectFlow(egg, rtol=1e-8), cr.shadow_line(egg, (1, 0, 0)), length=3.0, n_rays=24)
+    >>> cut = cr.field_cut(fan, wavenumber=8.0, boundary="pec", extent=(3.0, 2.5), step=0.4, polarisation=(0, 0, 1))
+    >>> cut.quantities, cut.magnitude("H").shape, cut.to_xarray()["E"].dims
+    (('E', 'H'), (9, 9), ('up', 'across', 'component'))
+    """
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    checked_plain(fan.body, smooth="the near field")
+    k = checked(wavenumber, order)
+    conductor = isinstance(boundary, str) and boundary == "pec"
+    if conductor and (order, method) != (2, "auto"):
+        raise InvalidInputError("a conductor's field has order 2 and method 'auto'; leave them out")
+    if not conductor and polarisation is not None:
+        raise InvalidInputError("polarisation is of a conductor's field; give it with boundary='pec'")
+    box = np.asarray(fan.body.bounds, dtype=float)
+    middle = 0.5 * (box[0] + box[1]) if point is None else real_array(point, "point")
+    if middle.shape != (3,) or not np.all(np.isfinite(middle)):
+        raise InvalidInputError(f"point has shape {middle.shape}; give three finite coordinates")
+    axes = _axes(fan.line.direction, across, up, box[1] - box[0])
+    sides = _sides(extent, axes, box)
+    spacing = _spacing(fan, sides, step, k, conductor=conductor, method=method)
+    a, b = (_steps(side, spacing) for side in sides)
+    points = grid_points(middle, axes, a, b)
+    # NaN of a level is deep inside
+    outside = np.asarray(fan.body.level(points.reshape(-1, 3)) >= 0).reshape(points.shape[:2])
+    if not np.any(outside):
+        raise InvalidInputError(f"all {outside.size} points are inside the body; give a larger extent")
+    started = time.perf_counter()
+    field: NearField | ConductorField
+    if conductor:
+        wave = "theta" if polarisation is None else polarisation
+        field = conductor_field(fan, points[outside], wavenumber=k, polarisation=wave)
+    else:
+        field = near_field(fan, points[outside], wavenumber=k, boundary=boundary, order=order, method=method)
+    return FieldCut(
+        line=fan.line,
+        point=middle.copy(),
+        axes=axes,
+        across=a,
+        up=b,
+        outside=outside,
+        field=field,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _axes(direction: FloatArray, across: ArrayLike | None, up: ArrayLike | None, box: FloatArray) -> FloatArray:
+    """Unit vectors of a plane (2, 3)."""
+    one = np.asarray(direction if across is None else unit_direction(across))
+    if up is None:
+        along = np.abs(one) > ALONG
+        other = np.eye(3)[np.argmax(np.where(along, -1.0, box))]
+    else:
+        other = np.asarray(unit_direction(up))
+        if abs(one @ other) > 1 - 1e-9:
+            raise InvalidInputError(f"across and up are both along ({', '.join(f'{v:.4g}' for v in one)}); turn one")
+    other = other - (one @ other) * one
+    return np.stack([one, other / np.linalg.norm(other)])
+
+
+def _sides(extent: ArrayLike | None, axes: FloatArray, box: FloatArray) -> FloatArray:
+    """Width and height of the rectangle (2,), L."""
+    if extent is None:
+        edges = box[1] - box[0]
+        return np.asarray(np.abs(axes) @ edges + 2 * AROUND * float(edges.max()))
+    sides = real_array(extent, "extent")
+    if sides.shape != (2,) or not (np.all(np.isfinite(sides)) and np.all(sides > 0)):
+        raise InvalidInputError(f"extent = {extent!r}: give a width and a height, positive and finite")
+    return sides
+
+
+def _steps(side: float, spacing: float) -> FloatArray:
+    """Places along a side, no further apart than the spacing, the middle among them."""
+    half = max(1, int(np.ceil(0.5 * side / spacing * (1 - 1e-9))))
+    return np.asarray(0.5 * side * np.arange(-half, half + 1) / half)
+
+
+def _count(sides: FloatArray, spacing: float) -> float:
+    return float(np.prod(sides / spacing + 1))
+
+
+def _spacing(fan: RayFan, sides: FloatArray, step: float | None, k: float, *, conductor: bool, method: str) -> float:
+    """Spacing of points, L."""
+    if step is not None:
+        given = positive_number(step, "step")
+        if _count(sides, given) > MOST:
+            least = float(np.sqrt(np.prod(sides) / MOST))
+            raise InvalidInputError(
+                f"step = {given:g} makes {_count(sides, given):.3g} points; {MOST} are the most: "
+                f"give {1.01 * least:.2g} or more, or a smaller extent"
+            )
+        return number_between(given, "step", 0.0, float(np.min(sides)))
+    wavelength = 2 * np.pi / k
+    spacing = wavelength / FINE
+    weight = VECTOR if conductor else 1.0
+    while (
+        method == "auto"
+        and spacing < wavelength / COARSE
+        and not affordable(fan, int(weight * _count(sides, spacing)), k)
+    ):
+        spacing = min(1.1 * spacing, wavelength / COARSE)
+    if _count(sides, spacing) > ENOUGH:
+        spacing = float(np.sqrt(np.prod(sides) / ENOUGH)) * 1.01
+    # a few points even where the wave is longer than the rectangle
+    return min(spacing, 0.125 * float(np.min(sides)))

@@ -1,0 +1,83 @@
+"""Wave fronts on a body: where Re(u e^{-i phase}) = 0 on the triangles of its mesh, joined to polylines.
+
+On an edge of a triangle the real part is taken as linear; fronts are half a wavelength of the wave on the body apart.
+"""
+
+import numpy as np
+
+from creeping._typing import BoolArray, ComplexArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.geometry.surface import Surface, project
+from creeping.geometry.triangulation import Triangulation
+from creeping.plotting._strokes import Stroke
+
+COLOUR, FRONT_WIDTH = "#00c2d1", 0.6
+LEAST_EDGES = 4.5
+"""Edges of triangles a wavelength from which fronts can be told."""
+
+
+def front_strokes(
+    body: Surface,
+    mesh: Triangulation,
+    wave: ComplexArray,
+    known: BoolArray,
+    *,
+    wavenumber: float,
+    phase: float = 0.0,
+) -> list[Stroke]:
+    """Wave fronts of values (n,) at the vertices of a body's mesh, on triangles whose corners are all known (n,).
+
+    Raises
+    ------
+    InvalidInputError
+        If the mesh is too coarse for the wavelength.
+    """
+    edges = mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]]
+    length = float(np.median(np.linalg.norm(np.diff(mesh.vertices[edges], axis=2), axis=-1)))
+    there = 2 * np.pi / (wavenumber * length)
+    if there < LEAST_EDGES:
+        raise InvalidInputError(
+            f"wave fronts on a mesh of {there:.2g} edges a wavelength; {LEAST_EDGES:g} are the least: give "
+            f"{LEAST_EDGES / there:.2g} times the cells, or leave fronts out"
+        )
+    real = (np.where(known, wave, 0.0) * np.exp(-1j * phase)).real
+    edges = edges[np.all(known[mesh.triangles], axis=1)]
+    # a corner at 0 counts as positive: each triangle is crossed by none of its edges or by two
+    crossed = (real[edges[..., 0]] < 0) != (real[edges[..., 1]] < 0)
+    pairs = np.sort(edges[crossed], axis=1).reshape(-1, 2, 2)
+    if not len(pairs):
+        return []
+    ends, place = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    low, high = real[ends[:, 0]], real[ends[:, 1]]
+    share = (low / (low - high))[:, None]
+    points = project(body, (1 - share) * mesh.vertices[ends[:, 0]] + share * mesh.vertices[ends[:, 1]])
+    lines = [points[chain] for chain in chains(place.reshape(-1, 2))]
+    return [Stroke(lines, COLOUR, FRONT_WIDTH, alpha=0.8, label="wave fronts", rank=1, through=False)]
+
+
+def chains(segments: IntArray) -> list[IntArray]:
+    """Polylines of segments (m, 2) between nodes that belong to two of them at most; a closed one ends as it begins.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> [chain.tolist() for chain in chains(np.array([[4, 7], [1, 2], [2, 4], [8, 9], [9, 5], [5, 8]]))]
+    [[1, 2, 4, 7], [8, 9, 5, 8]]
+    """
+    at: dict[int, list[int]] = {}
+    for number, (one, other) in enumerate(segments.tolist()):
+        at.setdefault(one, []).append(number)
+        at.setdefault(other, []).append(number)
+    left = np.ones(len(segments), dtype=bool)
+    found = []
+    # open ones from their ends, then what is closed
+    starts = [node for node, here in at.items() if len(here) == 1]
+    for start in sorted(starts) + segments[:, 0].tolist():
+        nodes = [start]
+        while ahead := [number for number in at[nodes[-1]] if left[number]]:
+            left[ahead[0]] = False
+            one, other = segments[ahead[0]].tolist()
+            nodes.append(other if one == nodes[-1] else one)
+        if len(nodes) > 1:
+            found.append(np.array(nodes))
+    return found
