@@ -20,11 +20,11 @@ from creeping.geodesics.states import END, WITH_END, WITH_JACOBI
 from creeping.geometry.creased import is_creased
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
-from creeping.geometry.surface import normal, project, size
+from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.observer_contour import HorizonRays, MidHorizon, forward_nodes
 from creeping.rays.quantities import RayPoints
-from creeping.rays.shedding import ShedRays
+from creeping.rays.shedding import ShedRays, free_ways
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
 from creeping.rays.tracer import TURN, RayTracer, same_within
@@ -32,7 +32,6 @@ from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.nodes import prepared, shares_of
-from creeping.shadow.occlusion import occluded
 from creeping.shadow.status import ATTACHED, NO_RAY
 from creeping.storage.memory import within_budget
 
@@ -377,8 +376,7 @@ class FarGeometry:
     @cached_property
     def leaves(self) -> BoolArray:
         """Whether a shed ray misses the body on its way out (s,)."""
-        # interpolated points may lie below the surface by their error
-        return ~occluded(self.body, project(self.body, self.shed.rays.points), -self.shed.rays.directions)
+        return free_ways(self.body, self.shed.rays)
 
     def normals_of(self, points: FloatArray) -> FloatArray:
         """N at points (s, 3)."""

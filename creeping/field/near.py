@@ -38,7 +38,7 @@ from creeping.geometry.arguments import one_of
 from creeping.geometry.surface import normal, size
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
-from creeping.rays.shedding import shed_near
+from creeping.rays.shedding import free_ways, shed_near
 from creeping.shadow.occlusion import occluded
 
 ON_BODY = 1e-7
@@ -112,10 +112,12 @@ def near_field(
     dark = np.zeros(len(flat), dtype=bool)
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
     field = zero_field(len(flat), "boundary")
-    if len(off) and kind.varies:
-        field = field.put(off, _no_rays(~dark[off]))
-    elif len(off):
-        field = field.put(off, _rays_off(fan, flat[off], ~dark[off], k, kind, order))
+    by_currents = method != "rays" and order == 2 and (method == "currents" or affordable(fan, len(off), k))
+    # of rays on the lit side nothing is known that currents do not know better
+    plain = kind.varies | (by_currents & ~dark)
+    without, rays = off[plain[off]], off[~plain[off]]
+    field = field.put(without, _no_rays(~dark[without]))
+    field = field.put(rays, _rays_off(fan, flat[rays], ~dark[rays], k, kind, order)) if len(rays) else field
     if len(at) and kind.kind != "soft":
         parts = _rays_alone_on if method == "rays" else total_on
         field = field.put(at, parts(fan, flat[at], k, kind, order))
@@ -123,6 +125,9 @@ def near_field(
     if method != "rays" and order == 2 and len(asked):
         must = method == "currents" or kind.varies
         field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=must)
+    left = without[field.method[without] == "none"]
+    if len(left) and not kind.varies:
+        field = field.put(left, _rays_off(fan, flat[left], ~dark[left], k, kind, order))
     return _result(field, fan, y, k, boundary, order)
 
 
@@ -130,7 +135,7 @@ def _result(field: Served, fan: RayFan, points: FloatArray, k: float, boundary: 
     """The field at points (..., 3), judged, in the parts that a reader wants."""
     shape = points.shape[:-1]
     phase = np.exp(1j * k * (points @ fan.line.direction))
-    incident = np.where(np.isin(field.method, ("rays", "boundary")).reshape(shape), 0.0, phase)
+    incident = np.where(np.isin(field.method, ("rays", "boundary", "none")).reshape(shape), 0.0, phase)
     scattered, creeping = field.wave.reshape(shape) - incident, field.creeping.reshape(shape)
     return NearField(
         points=points.copy(),
@@ -169,14 +174,14 @@ def checked_height(fan: RayFan, points: FloatArray) -> FloatArray:
 def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: Boundary, order: int) -> Served:
     """Creeping rays at points off the body (n, 3)."""
     shed = shed_near(fan_strips(fan), fan.body, points)
-    shed = shed[~occluded(fan.body, shed.rays.points, -shed.rays.directions, shed.reach)]
+    shed = shed[free_ways(fan.body, shed.rays, shed.reach)]
     waves, other = (shed_waves(shed.rays, shed.reach, k, kind, o) for o in (order, 3 - order))
     error = own_error(shed.rays, (waves, other), k, kind, order, on=False)
     return rays_alone(ray_sum(fan, shed, len(points), waves, error, k, kind), lit)
 
 
 def _no_rays(lit: BoolArray) -> Served:
-    """The field where creeping modes are not known (n,)."""
+    """The field where no rays were asked (n,)."""
     nothing = np.zeros(len(lit), dtype=complex)
     status = np.where(lit, FieldStatus.LIT, FieldStatus.NO_RAY)
     return Served(
@@ -185,7 +190,7 @@ def _no_rays(lit: BoolArray) -> Served:
         error=np.where(lit, MISSING, 1.0),
         error_by=np.full(len(lit), "bound"),
         status=status.astype(np.int64),
-        method=np.full(len(lit), "rays"),
+        method=np.full(len(lit), "none"),
     )
 
 

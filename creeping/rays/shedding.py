@@ -16,9 +16,10 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.distinct import first_of_equals
-from creeping.geometry.surface import Surface, normal, size
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
+from creeping.shadow.occlusion import occluded
 
 BLOCK = 4_000_000
 """Values of a function on a strip for several observers that are held at once."""
@@ -55,6 +56,17 @@ class ShedRays:
     def __getitem__(self, index: Any) -> "ShedRays":
         """Some of them."""
         return ShedRays(self.observer[index], self.strip[index], self.sigma[index], self.rays[index], self.reach[index])
+
+
+def free_ways(body: Surface, rays: RayPoints, reach: FloatArray | float = np.inf) -> BoolArray:
+    """Whether the tangents of rays (n,) get clear of the body up to a distance, L: (n,).
+
+    Splines between rays leave points inside the body and tangents that dip into it by their error: both are put right.
+    """
+    x = project(body, rays.points)
+    n = normal(body, x)
+    along = rays.directions - np.sum(rays.directions * n, axis=-1, keepdims=True) * n
+    return ~occluded(body, x, -along, reach)
 
 
 def shed_near(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> ShedRays:

@@ -22,8 +22,7 @@ from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.field.shed_wave import scales
 from creeping.geometry.surface import normal
 from creeping.rays.fan import RayFan
-from creeping.rays.shedding import ShedRays, shed_near
-from creeping.shadow.occlusion import occluded
+from creeping.rays.shedding import ShedRays, free_ways, shed_near
 
 ALONG, COUPLED = 1.5, 0.5
 """Error by what E and H have along the ray beside the term in kappa_t1, over m/(k l), and of that term."""
@@ -32,7 +31,7 @@ ALONG, COUPLED = 1.5, 0.5
 def shed_sums(fan: RayFan, points: FloatArray, k: float, electric: ComplexArray) -> list[RaySum]:
     """Sums over rays of E and H (n, 6) at points off the body (n, 3), L, for each incident E0 (3, p)."""
     shed = shed_near(fan_strips(fan), fan.body, points)
-    shed = shed[~occluded(fan.body, shed.rays.points, -shed.rays.directions, shed.reach)]
+    shed = shed[free_ways(fan.body, shed.rays, shed.reach)]
     pair = [_vectors(fan, shed, k, electric, order) for order in (2, 1)]
     coupled = np.linalg.norm(np.sum(pair[0][:, 3:] * shed.rays.directions[:, :, None], axis=1, keepdims=True), axis=1)
     m = scales(shed.rays, k)[1]
