@@ -114,7 +114,7 @@ class PortBeams:
             return np.stack([start.ravel(), known[..., of].ravel()], axis=1)
 
         curvature = np.abs(ends(lane.CURVATURE))
-        integrals = known[..., lane.INTEGRALS : lane.INTEGRALS + 4].reshape(-1, 4)
+        integrals = known[..., lane.INTEGRALS : lane.INTEGRALS + lane.PARTS].reshape(-1, lane.PARTS)
         y = PathTerms(self.k, s, curvature, ends(lane.TORSION), ends(lane.BEND), integrals).wave(order)
         y = (np.where(np.abs(y) > 0, y, 1e-300) * np.sqrt(s)).reshape(known.shape[:2])
         smooth = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y), axis=1)
