@@ -31,6 +31,7 @@ from .field.point_result import SurfaceField as SurfaceField
 from .field.port_coupling import coupling as coupling
 from .field.slant_range import RangeProfile as RangeProfile
 from .field.slant_range import range_profile as range_profile
+from .field.slots import slot_coupling as slot_coupling
 from .field.sources import SourcePattern as SourcePattern
 from .field.sources import source_pattern as source_pattern
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty

@@ -18,6 +18,7 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.coupling_result import Coupling
 from creeping.field.point_result import FieldStatus
+from creeping.field.port_sources import PortSources, point_sources
 from creeping.field.port_sums import port_sums
 from creeping.field.special.airy import hard_modes
 from creeping.geodesics.bundle import as_points, on_body
@@ -93,12 +94,18 @@ def coupling(
     k = checked(wavenumber, order)
     if scalar_boundaries(boundary)[0].kind != "hard" or boundary == "pec":
         raise InvalidInputError(
-            f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard'"
+            f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard', or use "
+            "slot_coupling for slots in a conductor"
         )
+    rays = port_geodesics(body, ports, k, length)
+    return coupled(rays, point_sources(rays, k, order), k, boundary_name(boundary), order)
+
+
+def port_geodesics(body: Surface, ports: ArrayLike, k: float, length: float | Literal["auto"]) -> PortRays:
+    """All between checked ports (n, 3), L, up to a length, L."""
     y = _checked_ports(body, ports)
     far = _length(body, k) if isinstance(length, str) and length == AUTO else positive_number(length, "length")
-    rays = rays_between(body, y, far, pad=NEAR * np.cbrt(size(body) / k**2))
-    return _result(rays, k, boundary, order)
+    return rays_between(body, y, far, pad=NEAR * np.cbrt(size(body) / k**2))
 
 
 def _checked_ports(body: Surface, ports: ArrayLike) -> FloatArray:
@@ -126,9 +133,11 @@ def _length(body: Surface, k: float) -> float:
     return float(np.clip(DECAY / decay, GIRTHS[0] * girth, GIRTHS[1] * girth))
 
 
-def _result(rays: PortRays, k: float, boundary: BoundaryLike, order: int) -> Coupling:
+def coupled(
+    rays: PortRays, sources: PortSources, k: float, boundary: str, order: int, axes: FloatArray | None = None
+) -> Coupling:
     """The matrix, symmetric, with what has no meaning on its diagonal."""
-    found, n = port_sums(rays, k, order), len(rays.ports)
+    found, n = port_sums(rays, sources, k), len(rays.ports)
 
     def square(upper: Any, diagonal: Any) -> Any:
         out = np.where(np.triu(np.ones((n, n), dtype=bool)), upper, upper.T)
@@ -144,10 +153,11 @@ def _result(rays: PortRays, k: float, boundary: BoundaryLike, order: int) -> Cou
         status=square(found.status, int(FieldStatus.CAUSTIC)),
         method=square(found.method, "none"),
         wavenumber=k,
-        boundary=boundary_name(boundary),
+        boundary=boundary,
         order=order,
         length=rays.length,
         length_unit=unit_of(rays.body),
+        axes=axes,
         _rays=rays,
         _waves=found.waves,
     )

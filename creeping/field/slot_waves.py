@@ -32,6 +32,9 @@ from creeping.field.special.airy import MODES, soft_modes
 from creeping.field.special.coupling_function import coupling_function, soft_coupling_function
 from creeping.rays.port_rays import PortRays
 
+NEAR, TWIST = 0.5, 0.3
+"""Shares of the difference of both lengths of the near field, and of the torsion at the ends, that are unsure."""
+
 
 @dataclass(frozen=True, eq=False)
 class SlotWaves:
@@ -43,17 +46,30 @@ class SlotWaves:
         Along b and t at the receiver, the second port, of moments along b and t at the source.
     frames : (m, 2, 2, 3)
         b and t at both ends.
+    missing : (m, 2, 2), 1/L^2
+        Bounds of what was not derived in each component.
     """
 
     components: ComplexArray
     frames: FloatArray
+    missing: FloatArray
 
     def along(self, source: FloatArray, receiver: FloatArray) -> ComplexArray:
         """Fields (m,) along axes at the receiver (m, 3) of moments along axes at the source (m, 3), 1/L^2."""
-        there = np.einsum("mad,md->ma", self.frames[:, 0], source)
-        here = np.einsum("mad,md->ma", self.frames[:, 1], receiver)
+        there, here = self._ends(source, receiver)
         with np.errstate(invalid="ignore"):
             return np.asarray(np.einsum("ma,mac,mc->m", here, self.components, there))
+
+    def bounds(self, source: FloatArray, receiver: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Sum of magnitudes of the terms of `along`, and their error by what was not derived (m,), (m,), 1/L^2."""
+        there, here = np.abs(self._ends(source, receiver))
+        with np.errstate(invalid="ignore"):
+            sizes, missing = (np.einsum("ma,mac,mc->m", here, of, there) for of in (np.abs(self.components), self.missing))
+        return np.asarray(sizes), np.asarray(missing)
+
+    def _ends(self, source: FloatArray, receiver: FloatArray) -> FloatArray:
+        """Components of axes along b and t (2, m, 2)."""
+        return np.einsum("meac,emc->ema", self.frames, np.stack([source, receiver]))
 
 
 class SlotTerms:
@@ -74,10 +90,11 @@ class SlotTerms:
         electric = integrals.copy()
         electric[:, 2] -= 0.5 * integrals[:, 4]
         self.hard = PathTerms(wavenumber, arclength, curvature, torsion, bend, electric)
+        self.k, self.arclength = wavenumber, arclength
         self.xi, self.square, self.E = self.hard.xi, self.hard.square, self.hard.E
         root = np.cbrt(wavenumber / 2)
         with np.errstate(divide="ignore", invalid="ignore"):
-            self.T0 = torsion / curvature
+            self.T0, self.near = torsion / curvature, 0.5 / (self.xi * self.square)
             ends = np.mean((1 + self.T0**2) / 6 - bend / 9, axis=1) / self.square
             self.L = 2 * root * integrals[:, 3] / (wavenumber * arclength) + ends
             self.P = 3.75 * self.E / self.xi - 1.5 * self.L
@@ -111,36 +128,57 @@ class SlotTerms:
         return np.asarray(2 * np.exp(-0.25j * np.pi) * np.sqrt(np.pi) * self.xi[some] ** 1.5 * total)
 
 
+    def carried(self, order: int) -> ComplexArray:
+        """Components along b and t without w, J2'/J2 and 1/J2 (m, 2, 2), 1/L."""
+        k, xi, M, (source, receiver) = self.k, self.xi, self.square, self.T0.T
+        V, V1, near = coupling_function(xi), coupling_function(xi, 1), self.near
+        S0 = k * near * soft_coupling_function(xi)
+        X = 1j * k * (V1 / (3 * M) + 2j / 3 * near * V)
+        across = 1j * k * (self.hard.wave(order) / self.hard.factor + source * receiver * V1 / M)
+        rows = [
+            [across + source * receiver * S0, receiver * S0 + source * X],
+            [source * S0 + receiver * X, k * near * self.soft(order)],
+        ]
+        return np.moveaxis(np.array(rows), -1, 0)
+
+    def near_field(self, spreading: FloatArray, cot: FloatArray, order: int) -> ComplexArray:
+        """What J2, L, and J2'/J2, 1/L, add to the components without w (m, 2, 2), 1/L."""
+        k, xi, M, near = self.k, self.xi, self.square, self.near
+        V, U = coupling_function(xi), soft_coupling_function(xi)
+        f, g = V, U
+        if order == 2:
+            V1, U1 = coupling_function(xi, 1), soft_coupling_function(xi, 1)
+            turned = limited(0.5j / k * (cot - 1 / self.arclength), LIMIT)
+            f = self.hard.wave(2) / self.hard.factor - limited((V1 - 0.5j * V / xi) / (2 * M), LIMIT * np.abs(V))
+            g = self.soft(2) - limited((U1 - 1.5j * U / xi) / (2 * M), LIMIT * np.abs(U))
+            f, g = f + turned * V, g + turned * U
+        f, g, none = -1j * f, near * g, np.zeros_like(f)
+        rows = [
+            [-1j * cot * f - 1j * g / spreading, none],
+            [none, 1j * k * near**2 * U + 1j * cot * g + 1j * f / spreading],
+        ]
+        return np.moveaxis(np.array(rows), -1, 0)
+
+    def missing(self) -> FloatArray:
+        """Bounds of what was not derived in the components without w (m, 2, 2), 1/L."""
+        V, V1 = np.abs(coupling_function(self.xi)), np.abs(coupling_function(self.xi, 1))
+        lengths = NEAR * np.abs(2 * self.near - 2 / (self.k * self.arclength)) * V
+        varies = np.abs(self.T0[:, 0] - self.T0[:, 1]) * V1 / self.square
+        turning = TWIST * np.max(np.abs(self.T0), axis=1) * V1 / self.square
+        return np.asarray(self.k * np.moveaxis(np.array([[0 * V, varies + turning], [varies + turning, lengths]]), -1, 0))
+
+
 def slot_waves(rays: PortRays, wavenumber: float, order: int) -> SlotWaves:
     """Of all geodesics (m,)."""
     k, s = wavenumber, rays.arclength
     terms = SlotTerms(k, s, rays.curvature, rays.torsion, rays.bend, rays.integrals)
-    xi, M, (source, receiver) = terms.xi, terms.square, terms.T0.T
-    V, V1 = coupling_function(xi), coupling_function(xi, 1)
-    U, U1 = soft_coupling_function(xi), soft_coupling_function(xi, 1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         w = terms.hard.factor * np.exp(1j * (k * s - 0.5 * np.pi * rays.caustics)) / np.sqrt(np.abs(rays.spreading))
         cot = np.mean(rays.rates, axis=1) / rays.spreading
-        hard, soft = terms.hard.wave(order) / terms.hard.factor, terms.soft(order)
-        f, g = hard, soft
+        components = terms.carried(order) + terms.near_field(rays.spreading, cot, order)
         if order == 2:
-            along = cot - 1 / s
-            for_all = 1 + limited(-0.125j / k * along, LIMIT)
-            hard, soft = hard * for_all, soft * for_all
-            turned = limited(0.5j / k * along, LIMIT)
-            f = hard - limited((V1 - 0.5j * V / xi) / (2 * M), LIMIT * np.abs(V)) + turned * V
-            g = soft - limited((U1 - 1.5j * U / xi) / (2 * M), LIMIT * np.abs(U)) + turned * U
-        near = 1 / (2 * xi * M)
-        f, g = -1j * f, near * g
-        S0, S = k * near * U, k * near * (soft + 1j * near * U)
-        X = 1j * k * (V1 / (3 * M) + 2j / 3 * near * V)
-        across = 1j * k * (hard + source * receiver * V1 / M) - 1j * cot * f - 1j * g / rays.spreading
-        straight = S + 1j * cot * g + 1j * f / rays.spreading
-        rows = [
-            [across + source * receiver * S0, receiver * S0 + source * X],
-            [source * S0 + receiver * X, straight],
-        ]
-        components = np.moveaxis(np.array(rows), -1, 0) * w[:, None, None]
+            w = w * (1 + limited(-0.125j / k * (cot - 1 / s), LIMIT))
+        components, missing = (of * size[:, None, None] for of, size in ((components, w), (terms.missing(), np.abs(w))))
     normals = np.stack([rays.normals[rays.first], rays.normals[rays.second]], axis=1)
-    frames = np.stack([np.cross(normals, rays.directions), rays.directions], axis=2)
-    return SlotWaves(components, frames)
+    ends = np.stack([np.cross(normals, rays.directions), rays.directions], axis=2)
+    return SlotWaves(components, ends, missing)
