@@ -203,7 +203,12 @@ class Coupling(ArrayResult, Shown):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The same as a ``pandas.DataFrame``, one row an entry."""
-        return self.to_xarray().drop_vars(["port", "slot"], errors="ignore").drop_dims("axis", errors="ignore").to_dataframe()
+        return (
+            self.to_xarray()
+            .drop_vars(["port", "slot"], errors="ignore")
+            .drop_dims("axis", errors="ignore")
+            .to_dataframe()
+        )
 
     def __repr__(self) -> str:
         names, counts = np.unique(self.method[~np.eye(len(self.ports), dtype=bool)], return_counts=True)

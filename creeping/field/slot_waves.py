@@ -32,8 +32,8 @@ from creeping.field.special.airy import MODES, soft_modes
 from creeping.field.special.coupling_function import coupling_function, soft_coupling_function
 from creeping.rays.port_rays import PortRays
 
-NEAR, TWIST = 0.5, 0.3
-"""Shares of the difference of both lengths of the near field, and of the torsion at the ends, that are unsure."""
+NEAR, VARIES, TWIST = 0.5, 0.3, 0.15
+"""Shares of the difference of both lengths of the near field, of that of T0 at both ends, and of T0, that are unsure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,9 @@ class SlotWaves:
         """Sum of magnitudes of the terms of `along`, and their error by what was not derived (m,), (m,), 1/L^2."""
         there, here = np.abs(self._ends(source, receiver))
         with np.errstate(invalid="ignore"):
-            sizes, missing = (np.einsum("ma,mac,mc->m", here, of, there) for of in (np.abs(self.components), self.missing))
+            sizes, missing = (
+                np.einsum("ma,mac,mc->m", here, of, there) for of in (np.abs(self.components), self.missing)
+            )
         return np.asarray(sizes), np.asarray(missing)
 
     def _ends(self, source: FloatArray, receiver: FloatArray) -> FloatArray:
@@ -127,7 +129,6 @@ class SlotTerms:
         total = np.sum(np.exp(leading) * (np.exp(exponent) * (1 + bracket) - 1), axis=-1)
         return np.asarray(2 * np.exp(-0.25j * np.pi) * np.sqrt(np.pi) * self.xi[some] ** 1.5 * total)
 
-
     def carried(self, order: int) -> ComplexArray:
         """Components along b and t without w, J2'/J2 and 1/J2 (m, 2, 2), 1/L."""
         k, xi, M, (source, receiver) = self.k, self.xi, self.square, self.T0.T
@@ -163,9 +164,9 @@ class SlotTerms:
         """Bounds of what was not derived in the components without w (m, 2, 2), 1/L."""
         V, V1 = np.abs(coupling_function(self.xi)), np.abs(coupling_function(self.xi, 1))
         lengths = NEAR * np.abs(2 * self.near - 2 / (self.k * self.arclength)) * V
-        varies = np.abs(self.T0[:, 0] - self.T0[:, 1]) * V1 / self.square
-        turning = TWIST * np.max(np.abs(self.T0), axis=1) * V1 / self.square
-        return np.asarray(self.k * np.moveaxis(np.array([[0 * V, varies + turning], [varies + turning, lengths]]), -1, 0))
+        turning = VARIES * np.abs(self.T0[:, 0] - self.T0[:, 1]) + TWIST * np.max(np.abs(self.T0), axis=1)
+        turning = turning * V1 / self.square
+        return np.asarray(self.k * np.moveaxis(np.array([[0 * V, turning], [turning, lengths]]), -1, 0))
 
 
 def slot_waves(rays: PortRays, wavenumber: float, order: int) -> SlotWaves:

@@ -18,7 +18,7 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.coupling_result import Coupling
 from creeping.field.port_coupling import coupled, port_geodesics
 from creeping.field.slot_sources import slot_sources
-from creeping.geometry.arguments import checked_body
+from creeping.geometry.arguments import checked_body, real_array
 from creeping.geometry.surface import Surface
 from creeping.rays.reach import AUTO
 
@@ -80,7 +80,7 @@ def slot_coupling(
     >>> abreast = cr.slot_coupling(sc.Sphere(), ports, (0, 1, 0), wavenumber=30.0)
     >>> in_line = cr.slot_coupling(sc.Sphere(), ports, np.cross((0, 1, 0), ports), wavenumber=30.0)
     >>> np.abs(abreast[0, 1:]).round(3).tolist(), np.abs(in_line[0, 1:]).round(3).tolist()
-    ([], [])
+    ([3.76, 0.689], [0.256, 0.022])
     """
     checked_body(body)
     checked_plain(body, smooth="the coupling of slots")
@@ -92,13 +92,12 @@ def slot_coupling(
 
 def _tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
     """Unit tangents (n, 3) along given axes."""
-    try:
-        given = np.broadcast_to(np.asarray(axes, dtype=float), normals.shape)
-    except (ValueError, TypeError):
-        shape = np.shape(np.asarray(axes, dtype=object))
+    given = real_array(axes, "axes")
+    if given.shape not in ((3,), normals.shape):
         raise InvalidInputError(
-            f"axes have shape {shape} for {len(normals)} ports; give ({len(normals)}, 3) numbers or one axis for all"
-        ) from None
+            f"axes have shape {given.shape} for {len(normals)} ports; give ({len(normals)}, 3) or one axis (3,) for all"
+        )
+    given = np.broadcast_to(given, normals.shape)
     long = np.linalg.norm(given, axis=1)
     flat = given - np.sum(given * normals, axis=1, keepdims=True) * normals
     rest = np.linalg.norm(flat, axis=1)
@@ -106,7 +105,7 @@ def _tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
     if np.any(bad):
         worst = int(np.flatnonzero(bad)[0])
         raise InvalidInputError(
-            f"{np.sum(bad)} of {len(normals)} axes have no tangential part (first: {worst}, {given[worst].tolist()} where "
+            f"{np.sum(bad)} of {len(normals)} axes are not finite or have no tangential part (first: {worst}, {given[worst].tolist()} where "
             f"the normal is {normals[worst].round(3).tolist()}); give directions along the surface"
         )
     return np.asarray(flat / rest[:, None])
