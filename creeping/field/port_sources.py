@@ -5,7 +5,8 @@ Error of a wave u as a share of it, what second order leaves out being of order 
 
     share^2 = (A/m^4)^2 + (C xi/m^4)^2 (D + (r - 1)^2 + (B/2)^2 + rho^4 T^4) + (k ds)^2
 
-Sources: Derivations, F20 and F25. The factors were set on a sphere and on the ellipsoids (1, 0.8, 0.6) and (1.2, 1, 0.8).
+Sources: Derivations, F20 and F25. The factors were set on a sphere and on the ellipsoids (1, 0.8, 0.6) and
+(1.2, 1, 0.8).
 """
 
 from collections.abc import Callable

@@ -33,7 +33,7 @@ from creeping.field.special.coupling_function import coupling_function, soft_cou
 from creeping.rays.port_rays import PortRays
 
 NEAR, VARIES, TWIST = 0.5, 0.3, 0.15
-"""Shares of the difference of both lengths of the near field, of that of T0 at both ends, and of T0, that are unsure."""
+"""Shares that are unsure: of the difference of both lengths of the near field, of that of T0 at both ends, of T0."""
 
 
 @dataclass(frozen=True, eq=False)

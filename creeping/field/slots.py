@@ -105,7 +105,8 @@ def _tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
     if np.any(bad):
         worst = int(np.flatnonzero(bad)[0])
         raise InvalidInputError(
-            f"{np.sum(bad)} of {len(normals)} axes are not finite or have no tangential part (first: {worst}, {given[worst].tolist()} where "
-            f"the normal is {normals[worst].round(3).tolist()}); give directions along the surface"
+            f"{np.sum(bad)} of {len(normals)} axes are not finite or have no tangential part (first: {worst}, "
+            f"{given[worst].tolist()} where the normal is {normals[worst].round(3).tolist()}); give directions along "
+            "the surface"
         )
     return np.asarray(flat / rest[:, None])

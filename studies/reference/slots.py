@@ -1,13 +1,14 @@
 """The magnetic field on a conductor of a slot in it: a tangential magnetic dipole on its surface.
 
-On a sphere of radius a, by Debye potentials E = ∇×(x u) + ∇×∇×(x v)/k, ξₙ = x hₙ(x), x = ka, outgoing, and n × E = -p δ on the surface, give the
-tangential field at angle s from the dipole, per unit of p, a voltage times a length, times the impedance of free space
+On a sphere of radius a, by Debye potentials E = ∇×(x u) + ∇×∇×(x v)/k, ξₙ = x hₙ(x), x = ka, outgoing, and
+n × E = -p δ on the surface, the tangential field at angle s from the dipole, per unit of p, a voltage times a length,
+times the impedance of free space, is
 
     across (p and H along b)    -(i/a²) [F'/sin s - D'']        F = Σ cₙ (ξₙ'/ξₙ) Pₙ(cos s)
-    along (along the path)      -(i/a²) [F'' - D'/sin s]        D = Σ cₙ (ξₙ/ξₙ') Pₙ(cos s),   cₙ = (2n+1)/(4π n(n+1))
+    along (along the path)      -(i/a²) [F'' - D'/sin s]        D = Σ cₙ (ξₙ/ξₙ') Pₙ(cos s)
 
-On the plane it is twice ik (1 + ∇∇/k²) e^{ikr}/(4πr). Terms grow like n^(3/2); faded out smoothly to all orders they sum to
-Abel's limit.
+with cₙ = (2n+1)/(4π n(n+1)). On the plane it is twice ik (1 + ∇∇/k²) e^{ikr}/(4πr). Terms grow like n^(3/2); faded out
+smoothly to all orders they sum to Abel's limit.
 
 On other bodies by electric dipoles inside (`studies.reference.dipoles`), with magnetic dipoles at some heights h above
 their ports, and their images: the field is H(0) + H₁ h + H₂ h² + ....
@@ -22,7 +23,7 @@ from studies.reference._boundary import ComplexArray, FloatArray, positive
 from studies.reference.clouds import Body, Cloud, images
 from studies.reference.dipoles import _matrix, _tangential, _tangents
 from studies.reference.fundamental import least_squares
-from studies.reference.ports import _around
+from studies.reference.ports import AROUND, CENTRE, FIT_RINGS, RINGS, _around
 
 TERMS = 6_000
 """Partial waves: with twice as many nothing changes by 1e-9 at 5 degrees and ka = 100."""
@@ -89,12 +90,6 @@ class CoupledSlots:
     tangents: FloatArray
     values: ComplexArray
     spread: FloatArray
-
-
-RINGS, FIT_RINGS = 0.5 * 1.45 ** np.arange(8), 0.25 * 1.25 ** np.arange(16)
-"""Radii around a port, in the least height, of dipoles inside and of points of the condition."""
-AROUND, CENTRE = 10, (0.7, 1.0, 1.5, 2.2)
-"""Dipoles on a ring, and depths of those below the port itself, in the least height."""
 
 
 def coupled_slots(

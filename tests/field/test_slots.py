@@ -73,7 +73,7 @@ def test_close_slots_are_on_a_plane(distance):
     body, k = sc.Ellipsoid(1.0, 0.8, 0.6), 40.0
     u = np.linspace(0, 2 * np.pi, 7, endpoint=False)
     ends = distance * np.stack([np.cos(u), np.sin(u), 0 * u], axis=1)
-    ports = np.concatenate([[[0, 0, 0.6]], project(body, ends + [0, 0, 0.6])])
+    ports = np.concatenate([[[0, 0, 0.6]], project(body, ends + np.array([0, 0, 0.6]))])
     axis = np.array([0.6, 0.8, 0.0])
     found = cr.slot_coupling(body, ports, axis, wavenumber=k)
     for j in range(1, len(ports)):
@@ -88,7 +88,7 @@ def test_close_slots_are_on_a_plane(distance):
 def solved():
     """Ports of an ellipsoid, and of two tangents at both ends: fields found, by the reference, errors, OK, by rays."""
     rng, k, axes = np.random.default_rng(1), 12.0, (0.75, 0.9, 1.15)
-    sources, points = rng.normal(size=(2, 3)), rng.normal(size=(40, 3))
+    sources, points = rng.normal(size=(1, 3)), rng.normal(size=(60, 3))
     sources, points = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (sources, points))
     # off the planes of symmetry, where the reference's dipoles would meet their images
     sources = np.sign(sources) * np.maximum(np.abs(sources), 0.3)
@@ -106,7 +106,7 @@ def solved():
     ]
 
     def part(of):
-        return np.array([value[:2, 2:].T for value in of]).reshape(want.shape)
+        return np.array([value[:1, 1:].T for value in of]).reshape(want.shape)
 
     told, fine = part([one.error for one in found]), part([one.ok for one in found])
     rays, values = part([one.method == "rays" for one in found]), part([one.values for one in found])
@@ -126,23 +126,23 @@ def test_ellipsoid_against_dipoles_inside(solved):
 
 
 def test_torsion_turns_the_field(solved):
-    """Across the path at one end and along it at the other there is what the torsion brings, and nothing on a sphere."""
+    """Across the path at one end and along it at the other: what the torsion brings, and nothing on a sphere."""
     body, k, ports, there, here, values, want, _, _, rays = solved
     paths, seen = cr.coupling(body, ports, wavenumber=k), []
-    for s in range(2):
-        for n in range(len(here)):
-            path = paths.paths(s, 2 + n)
-            if not rays[..., n, s].all() or not len(path) or path.arclength[0] > 1.5:
-                continue
-            b = np.cross(normal(body, ports[s]), path.departure[0])
-            # parts of slots across at the source, and along at the receiver
-            parts = np.multiply.outer(there[s] @ b, here[n] @ path.arrival[0])
-            larger = np.linalg.norm(want[..., n, s])
-            seen.append([np.sum(parts * of[..., n, s]) / larger for of in (values, want)])
+    for n in range(len(here)):
+        path = paths.paths(0, 1 + n)
+        if not rays[..., n, 0].all() or not len(path) or path.arclength[0] > 1.5:
+            continue
+        b = np.cross(normal(body, ports[0]), path.departure[0])
+        # parts of slots across at the source, and along at the receiver
+        parts = np.multiply.outer(there[0] @ b, here[n] @ path.arrival[0])
+        larger = np.linalg.norm(want[..., n, 0])
+        seen.append([np.sum(parts * of[..., n, 0]) / larger for of in (values, want)])
     mine, its = np.array(seen).T
     strong = np.abs(its) > 0.03
     assert strong.sum() >= 5
     assert np.median(np.abs(mine - its)[strong] / np.abs(its)[strong]) < 0.5
+    print(np.round(np.abs(its), 3), np.round(np.abs(mine - its), 3))
     assert np.sqrt(np.mean(np.abs(mine - its) ** 2)) < 0.5 * np.sqrt(np.mean(np.abs(its) ** 2))
 
 

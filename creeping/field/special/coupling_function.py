@@ -4,8 +4,8 @@
     U(ξ) = -iξ e^{-iπ/4} √(ξ/π) ∫ S e^{iξt} dt = 2 e^{-iπ/4} √π ξ^(3/2) Σ_p e^{iξτ_p},     S = w₁'/w₁ = 1/R,   U(0) = 1
     powers n of t under the integral, (-i d/dξ)^n,   and R² in the place of R
 
-By R' = 1 - tR², R = t^(-1/2) Σ a_n t^(-3n/2), by S' = t - S², S = t^(1/2) Σ s_n t^(-3n/2), and term by term, by Hankel's
-integral for 1/Γ,
+By R' = 1 - tR², R = t^(-1/2) Σ a_n t^(-3n/2), by S' = t - S², S = t^(1/2) Σ s_n t^(-3n/2), and term by term, by
+Hankel's integral for 1/Γ,
 
     V_n = √π e^{-iπ/4} Σ_j a_j e^{iπμ/2} ξ^(μ-1/2)/Γ(μ),   μ = 1/2 + 3j/2 - n
     U_n = -2i √π e^{-iπ/4} Σ_j s_j e^{iπμ/2} ξ^(μ+1/2)/Γ(μ),   μ = -1/2 + 3j/2 - n
