@@ -32,7 +32,7 @@ from creeping.field.special.airy import MODES, soft_modes
 from creeping.field.special.coupling_function import coupling_function, soft_coupling_function
 from creeping.rays.port_rays import PortRays
 
-NEAR, VARIES, TWIST = 0.5, 0.3, 0.15
+NEAR, VARIES, TWIST = 0.5, 0.4, 0.2
 """Shares that are unsure: of the difference of both lengths of the near field, of that of T0 at both ends, of T0."""
 
 
@@ -71,7 +71,7 @@ class SlotWaves:
 
     def _ends(self, source: FloatArray, receiver: FloatArray) -> FloatArray:
         """Components of axes along b and t (2, m, 2)."""
-        return np.einsum("meac,emc->ema", self.frames, np.stack([source, receiver]))
+        return np.asarray(np.einsum("meac,emc->ema", self.frames, np.stack([source, receiver])))
 
 
 class SlotTerms:
@@ -149,7 +149,7 @@ class SlotTerms:
         f, g = V, U
         if order == 2:
             V1, U1 = coupling_function(xi, 1), soft_coupling_function(xi, 1)
-            turned = limited(0.5j / k * (cot - 1 / self.arclength), LIMIT)
+            turned = limited(np.asarray(0.5j / k * (cot - 1 / self.arclength), dtype=np.complex128), LIMIT)
             f = self.hard.wave(2) / self.hard.factor - limited((V1 - 0.5j * V / xi) / (2 * M), LIMIT * np.abs(V))
             g = self.soft(2) - limited((U1 - 1.5j * U / xi) / (2 * M), LIMIT * np.abs(U))
             f, g = f + turned * V, g + turned * U
