@@ -33,10 +33,11 @@ from .field.point_result import FieldStatus as FieldStatus
 from .field.point_result import NearField as NearField
 from .field.point_result import SurfaceField as SurfaceField
 from .field.port_coupling import coupling as coupling
-from .field.port_source import PortField as PortField
-from .field.port_source import port_field as port_field
+from .field.port_map import PortField as PortField
+from .field.port_map import port_field as port_field
 from .field.slant_range import RangeProfile as RangeProfile
 from .field.slant_range import range_profile as range_profile
+from .field.slots import slot_coupling as slot_coupling
 from .field.sources import SourcePattern as SourcePattern
 from .field.sources import source_pattern as source_pattern
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty

@@ -1,6 +1,6 @@
 """What the coupling of ports is: a matrix of complex values with their error, and the geodesics that gave them.
 
-Sources: Derivations, F25.
+Sources: Derivations, F25 and F28.
 """
 
 # help() shows names of types instead of what they stand for
@@ -43,7 +43,7 @@ class CouplingPaths:
         xi = (k/2)^(1/3) int kappa_n^(2/3) ds.
     caustics : (m,)
         Zeros of J2 passed.
-    wave : (m,) complex, 1/L
+    wave : (m,) complex, 1/L, or 1/L^2 between slots
         What each contributes; infinite on its caustic.
 
     Examples
@@ -70,15 +70,17 @@ class CouplingPaths:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Coupling(ArrayResult, Shown):
-    """Fields between ports on a body, u at port j of a unit source e^{ikr}/(4 pi r) at port i; acts as their matrix.
+    """Fields between ports on a body, at port j of a unit source at port i; acts as their matrix.
+
+    Of `coupling` u of e^{ikr}/(4 pi r); of `slot_coupling` H along slot j of a dipole along slot i.
 
     Attributes
     ----------
     body : Surface
     ports, normals : (n, 3), L and 1
-    values : (n, n) complex, 1/L
+    values : (n, n) complex, 1/L, or 1/L^2 between slots
         Symmetric; infinite on the diagonal, where source and receiver are one.
-    error : (n, n), 1/L
+    error : (n, n)
         Of the values, meant to hold for 95 of 100 whose status is OK; at others a bound.
     status : (n, n) of int
         Codes of `FieldStatus`.
@@ -91,6 +93,8 @@ class Coupling(ArrayResult, Shown):
         Up to which geodesics were followed.
     length_unit : str
         "m" where the body knows it, else "L".
+    axes : (n, 3) or None
+        Unit tangents along the slots; None of `coupling`.
 
     Examples
     --------
@@ -116,6 +120,7 @@ class Coupling(ArrayResult, Shown):
     order: int
     length: float
     length_unit: str
+    axes: FloatArray | None
     _rays: PortRays
     _waves: ComplexArray
 
@@ -167,28 +172,43 @@ class Coupling(ArrayResult, Shown):
             wave=self._waves[mine],
         )
 
+    @property
+    def _kind(self) -> tuple[str, str]:
+        """Unit of the values, and what they are."""
+        if self.axes is None:
+            return power(self.length_unit, -1), "u of a unit source e^{ikr}/(4 pi r)"
+        return power(self.length_unit, -2), "H of a unit magnetic dipole, times the impedance of free space"
+
     def to_xarray(self) -> xarray.Dataset:
         """Values, error, status and method with names, by source and receiver: an ``xarray.Dataset``."""
         library = required("xarray", use="labelled results need", extra="sweep")
         dims = ("source", "receiver")
         inverse = {"units": power(self.length_unit, -1)}
+        units, meaning = self._kind
         coordinates: dict[str, Any] = {name: ((name,), np.arange(len(self.ports))) for name in dims}
         coordinates["axis"] = (("axis",), ["x", "y", "z"])
         coordinates["wavenumber"] = ((), self.wavenumber, {**inverse, "long_name": "k"})
         variables: dict[str, Any] = {
-            "total": (dims, self.values, {**inverse, "long_name": "u of a unit source e^{ikr}/(4 pi r)"}),
-            "error": (dims, self.error, inverse),
+            "total": (dims, self.values, {"units": units, "long_name": meaning}),
+            "error": (dims, self.error, {"units": units}),
             "status": (dims, self.status, {"long_name": "code of FieldStatus"}),
             "method": (dims, self.method, {"long_name": "what served"}),
             "port": (("source", "axis"), self.ports, {"units": self.length_unit}),
         }
+        if self.axes is not None:
+            variables["slot"] = (("source", "axis"), self.axes, {"long_name": "unit tangent along the slot"})
         words = {"boundary": self.boundary, "order": self.order, "conventions": "time factor exp(-i omega t)"}
         found: xarray.Dataset = library.Dataset(variables, coordinates, words)
         return found
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The same as a ``pandas.DataFrame``, one row an entry."""
-        return self.to_xarray().drop_vars("port").drop_dims("axis", errors="ignore").to_dataframe()
+        return (
+            self.to_xarray()
+            .drop_vars(["port", "slot"], errors="ignore")
+            .drop_dims("axis", errors="ignore")
+            .to_dataframe()
+        )
 
     def __repr__(self) -> str:
         names, counts = np.unique(self.method[~np.eye(len(self.ports), dtype=bool)], return_counts=True)
@@ -203,5 +223,5 @@ class Coupling(ArrayResult, Shown):
             f"on {brief(self.body)})\n"
             f"  {served or 'none'}; {states or 'no status'}\n"
             f"  {len(self._rays)} geodesics up to {self.length:.4g} {self.length_unit}; where OK up to "
-            f"{np.max(np.abs(self.values[good]), initial=0.0):.4g} {power(self.length_unit, -1)}{error}"
+            f"{np.max(np.abs(self.values[good]), initial=0.0):.4g} {self._kind[0]}{error}"
         )

@@ -30,14 +30,16 @@ def power(unit: str, exponent: int) -> str:
 
     Examples
     --------
-    >>> power("m", 2), power("L", -1), power("m", 1)
-    ('m2', '1/L', 'm')
+    >>> power("m", 2), power("L", -1), power("L", -2), power("m", 1)
+    ('m2', '1/L', '1/L^2', 'm')
     """
     if exponent == 1:
         return unit
     if exponent > 0:
         return f"{unit}{exponent}" if unit == "m" else f"{unit}^{exponent}"
-    return f"{unit}{exponent}" if unit == "m" else f"1/{unit}"
+    if unit == "m":
+        return f"{unit}{exponent}"
+    return f"1/{unit}" if exponent == -1 else f"1/{unit}^{-exponent}"
 
 
 def _directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str, Any]:

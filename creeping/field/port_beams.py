@@ -11,7 +11,7 @@ Sources: [P82], [CPP82]; Derivations, F24 and F25.
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.port_waves import PathTerms
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geometry.evaluators import evaluators
@@ -88,6 +88,9 @@ class PortBeams:
         spans = -(-(count - 1) // SPAN)
         self.balls = np.empty((rays, spans, 3)), np.empty((rays, spans))
         spans_of(x, *self.balls)
+        # what is carried along, and what beams off their rays add to it
+        self.carried = np.ones((1, 1, 1), dtype=complex)
+        self.leaning = np.zeros((1, 1, 1), dtype=complex)
 
     def _turns(self, body: Surface) -> float:
         """Largest angle, radians, by which a ray turns along a length a."""
@@ -114,17 +117,22 @@ class PortBeams:
             return np.stack([start.ravel(), known[..., of].ravel()], axis=1)
 
         curvature = np.abs(ends(lane.CURVATURE))
-        integrals = known[..., lane.INTEGRALS : lane.INTEGRALS + 4].reshape(-1, 4)
-        y = PathTerms(self.k, s, curvature, ends(lane.TORSION), ends(lane.BEND), integrals).wave(order)
+        integrals = known[..., lane.INTEGRALS : lane.INTEGRALS + lane.PARTS].reshape(-1, lane.PARTS)
+        y = self._wave((self.k, s, curvature, ends(lane.TORSION), ends(lane.BEND), integrals), order)
         y = (np.where(np.abs(y) > 0, y, 1e-300) * np.sqrt(s)).reshape(known.shape[:2])
         smooth = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y), axis=1)
         curve = CubicSpline(steps * self.step, smooth, axis=1)
         # at the port itself y is infinite; beams begin behind it
         at = self.step * np.maximum(np.arange(count), 1)
+        self.known, self.at = steps * self.step, at
         return curve(at) - 0.5 * np.log(at), curve(at, 1) - 0.5 / at
 
+    def _wave(self, path: tuple[Any, ...], order: int) -> ComplexArray:
+        """Y of paths (m,), what `PathTerms` asks for."""
+        return PathTerms(*path).wave(order)
+
     def sums(self, points: FloatArray, beyond: float) -> tuple[ComplexArray, ComplexArray]:
-        """Sums at points (n, 3) by feet farther along than ``beyond``, L, for both ε: (n,), (n,), 1/L."""
+        """Sums at points (n, 3) by feet farther along than ``beyond``, L, for both ε: (n, c), (n, c), 1/L."""
         from creeping.field.kernels.beams import add_beams
 
         found = []
@@ -135,11 +143,9 @@ class PortBeams:
             weight = 0.5 * np.log(self.k * eps / (2 * np.pi)) + np.log(self.apart)
             strength = self.size - 0.5 * np.log(np.abs(q)) + weight
             phase = self.phase - 0.5 * np.unwrap(np.angle(q), axis=1)
-            early, late = np.zeros((2, len(points), 1), dtype=complex)
+            early, late = np.zeros((2, len(points), self.carried.shape[2]), dtype=complex)
             cut = max(2, round(beyond / self.step))
             table = (*self.rays, strength, phase, rate / q * self.turned, self.k, cut, REACH * self.a, *self.balls)
-            add_beams(
-                points, *table, np.ones((1, 1, 1), dtype=complex), np.zeros((1, 1, 1), dtype=complex), early, late
-            )
-            found.append(late[:, 0])
+            add_beams(points, *table, self.carried, self.leaning, early, late)
+            found.append(late)
         return found[0], found[1]

@@ -18,6 +18,7 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.coupling_result import Coupling
 from creeping.field.point_result import FieldStatus
+from creeping.field.port_sources import PortSources, point_sources
 from creeping.field.port_sums import port_sums
 from creeping.field.special.airy import hard_modes
 from creeping.geodesics.bundle import as_points, on_body
@@ -89,9 +90,8 @@ def coupling(
     ([0.1065, 0.0173], True)
     """
     k = checked_wave(body, wavenumber, boundary, order)
-    y = _checked_ports(body, ports)
-    rays = rays_between(body, y, fan_length(body, k, length), pad=merging_pad(body, k))
-    return _result(rays, k, boundary, order)
+    rays = port_geodesics(body, ports, k, length)
+    return coupled(rays, point_sources(rays, k, order), k, boundary_name(boundary), order)
 
 
 def checked_wave(body: Surface, wavenumber: float, boundary: BoundaryLike, order: int) -> float:
@@ -101,9 +101,16 @@ def checked_wave(body: Surface, wavenumber: float, boundary: BoundaryLike, order
     k = checked(wavenumber, order)
     if scalar_boundaries(boundary)[0].kind != "hard" or boundary == "pec":
         raise InvalidInputError(
-            f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard'"
+            f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard', or use "
+            "slot_coupling for slots in a conductor"
         )
     return k
+
+
+def port_geodesics(body: Surface, ports: ArrayLike, k: float, length: float | Literal["auto"]) -> PortRays:
+    """All between checked ports (n, 3), L, up to a length, L."""
+    y = _checked_ports(body, ports)
+    return rays_between(body, y, fan_length(body, k, length), pad=merging_pad(body, k))
 
 
 def merging_pad(body: Surface, k: float) -> float:
@@ -138,9 +145,11 @@ def fan_length(body: Surface, k: float, length: float | Literal["auto"]) -> floa
     return float(np.clip(DECAY / decay, GIRTHS[0] * girth, GIRTHS[1] * girth))
 
 
-def _result(rays: PortRays, k: float, boundary: BoundaryLike, order: int) -> Coupling:
+def coupled(
+    rays: PortRays, sources: PortSources, k: float, boundary: str, order: int, axes: FloatArray | None = None
+) -> Coupling:
     """The matrix, symmetric, with what has no meaning on its diagonal."""
-    found, n = port_sums(rays, k, order), len(rays.ports)
+    found, n = port_sums(rays, sources, k), len(rays.ports)
 
     def square(upper: Any, diagonal: Any) -> Any:
         out = np.where(np.triu(np.ones((n, n), dtype=bool)), upper, upper.T)
@@ -156,10 +165,11 @@ def _result(rays: PortRays, k: float, boundary: BoundaryLike, order: int) -> Cou
         status=square(found.status, int(FieldStatus.CAUSTIC)),
         method=square(found.method, "none"),
         wavenumber=k,
-        boundary=boundary_name(boundary),
+        boundary=boundary,
         order=order,
         length=rays.length,
         length_unit=unit_of(rays.body),
+        axes=axes,
         _rays=rays,
         _waves=found.waves,
     )

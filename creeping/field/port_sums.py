@@ -1,15 +1,13 @@
 """Sums over the geodesics of each pair of ports, their error, what is the matter, and beams where they merge.
 
-Error of an entry, what second order leaves out being of order 1/m^4; r, B and T as in `creeping.field.port_waves`:
+Error of an entry, from those of its waves by `creeping.field.port_sources`:
 
-    error^2 = (sum |u| [(A/m^4)^2 + (C xi/m^4)^2 (D + (r - 1)^2 + (B/2)^2 + rho^4 T^4) + (k ds)^2]^(1/2))^2
-            + (sum_pairs P (|u_i| + |u_j|)/(k |s_i - s_j|))^2 + lost^2
+    error^2 = (sum own)^2 + (sum_pairs P (|u_i| + |u_j|)/(k |s_i - s_j|))^2 + lost^2
 
 P is over pairs of waves of which one has touched a caustic that the other has not; lost is what geodesics beyond the
 end of the fans, and those that have ended where kappa_n <= 0, would bring by the decay of the first mode.
 
-Sources: [P82]; Derivations, F20 and F25. The factors were set on a sphere and on the ellipsoids (1, 0.8, 0.6) and
-(1.2, 1, 0.8).
+Sources: [P82]; Derivations, F20 and F25.
 """
 
 from dataclasses import dataclass
@@ -18,8 +16,8 @@ import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.point_result import FieldStatus
-from creeping.field.port_beams import PortBeams, beam_width
-from creeping.field.port_waves import PathTerms, path_terms, port_waves
+from creeping.field.port_beams import beam_width
+from creeping.field.port_sources import PortSources
 from creeping.field.ray_sums import LOST, MERGING, NARROW
 from creeping.field.served import Words
 from creeping.field.special.airy import hard_modes
@@ -27,12 +25,8 @@ from creeping.geometry.surface import size
 from creeping.rays.port_rays import PortRays
 from creeping.rays.reach import SPARED
 
-FLOOR, GROWING, ROUND = 0.2, 0.4, 0.1
-"""A, C and D; on a sphere third order is known, and D is more than it needs."""
 SUMMED = 0.3
 """Error of beams, over m^2, as a share of their sum: on spheres a tenth of it."""
-COARSER = 0.02
-"""Error of polynomials of degree 5, in that of degree 3."""
 MERGED, FOLDED = 0.03, 0.1
 """Shares of the waves from which merging of geodesics at a port, and close to it, asks for beams."""
 CUTS = (2.5, 3.8, 1.6)
@@ -49,11 +43,11 @@ class PortSums:
 
     Attributes
     ----------
-    values : (n, n) complex, 1/L
-    error : (n, n), 1/L
+    values : (n, n) complex
+    error : (n, n)
     status : (n, n) of int
     method : (n, n) of str
-    waves : (m,) complex, 1/L
+    waves : (m,) complex
         Of each geodesic.
     """
 
@@ -64,20 +58,18 @@ class PortSums:
     waves: ComplexArray
 
 
-def port_sums(rays: PortRays, k: float, order: int) -> PortSums:
+def port_sums(rays: PortRays, sources: PortSources, k: float) -> PortSums:
     """What geodesics bring, judged, or beams in their place."""
     n = len(rays.ports)
-    terms = path_terms(rays, k)
-    waves = port_waves(rays, terms, k, order)
     pair = rays.first * n + rays.second
-    size_of = np.abs(waves)
-    own = _own_error(rays, terms, waves, k, order)
-    merging = _merging(pair, rays, size_of, k, n * n)
-    lost, ended = _lost(rays, k)
+    merging = _merging(pair, rays, sources.sizes, k, n * n)
+    lost, ended = (sources.scale * wave for wave in _lost(rays, k))
     with np.errstate(invalid="ignore"):
-        values = _sums(pair, waves, n * n)
-        strength, error = (np.asarray(np.bincount(pair, one, n * n), dtype=float) for one in (size_of, own))
-        folds = _first_mode(rays, rays.folds.ravel(), k)
+        values = _sums(pair, sources.waves, n * n)
+        strength, error = (
+            np.asarray(np.bincount(pair, one, n * n), dtype=float) for one in (sources.sizes, sources.own)
+        )
+        folds = sources.scale * _first_mode(rays, rays.folds.ravel(), k)
         merges = (merging > MERGED * strength) | (folds > FOLDED * strength)
         narrow = _narrow(rays, k)
         merges[pair[narrow]] = True
@@ -89,9 +81,7 @@ def port_sums(rays: PortRays, k: float, order: int) -> PortSums:
     bound = strength + folds * np.sqrt(k * size(rays.body))
     error = np.where(merges, np.maximum(error, bound), error)
     upper = np.triu(np.ones((n, n), dtype=bool), 1).ravel()
-    _put_beams(rays, terms, waves, own, k, order, np.flatnonzero(merges & upper), values, error, status, method)
-    # what beams have brought, or rays: nothing that is known
-    strength = np.where(method == "beams", np.abs(values), strength)
+    _put_beams(rays, sources, k, np.flatnonzero(merges & upper), values, error, status, method, strength)
     none = strength == 0
     status[none] = np.where(ended[none] > 0, FieldStatus.DETACHED, FieldStatus.NO_RAY)
     fine = status == FieldStatus.OK
@@ -99,32 +89,16 @@ def port_sums(rays: PortRays, k: float, order: int) -> PortSums:
     status[fine & (ended > LOST * strength)] = FieldStatus.DETACHED
     fine = status == FieldStatus.OK
     with np.errstate(invalid="ignore"):
-        status[fine & ~(error <= UNRESOLVED * np.abs(values))] = FieldStatus.UNRESOLVED
+        level = np.maximum(np.abs(values), strength) if sources.polarised else np.abs(values)
+        status[fine & ~(error <= UNRESOLVED * level)] = FieldStatus.UNRESOLVED
     shape = n, n
     return PortSums(
-        values.reshape(shape), error.reshape(shape), status.reshape(shape), np.reshape(method, shape), waves
+        values.reshape(shape), error.reshape(shape), status.reshape(shape), np.reshape(method, shape), sources.waves
     )
 
 
 def _sums(pair: IntArray, waves: ComplexArray, count: int) -> ComplexArray:
     return np.asarray(np.bincount(pair, waves.real, count) + 1j * np.bincount(pair, waves.imag, count))
-
-
-def _own_error(rays: PortRays, terms: PathTerms, waves: ComplexArray, k: float, order: int) -> FloatArray:
-    """Error of each wave by itself (m,), 1/L."""
-    strength = np.abs(waves)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        bend, lean = np.mean(rays.bend, axis=1), np.mean((rays.torsion / rays.curvature) ** 2, axis=1)
-        # r of the whole path, from its second exponent
-        r = 4 * (terms.H / terms.xi * terms.square - 0.1 + bend / 60 + 0.15 * lean)
-        growing = GROWING * terms.xi * np.sqrt(ROUND + (r - 1) ** 2 + (bend / 2) ** 2 + lean**2)
-        parts = (FLOOR / terms.square**2, growing / terms.square**2, COARSER * k * rays.error)
-        total = np.sqrt(sum(part**2 for part in parts))
-    out = strength * np.minimum(total, 1.0)
-    if order == 1:
-        with np.errstate(invalid="ignore"):
-            out = out + np.abs(port_waves(rays, terms, k, 2) - waves)
-    return np.asarray(np.where(np.isfinite(strength), out, 0.0))
 
 
 def _narrow(rays: PortRays, k: float) -> BoolArray:
@@ -171,22 +145,21 @@ def _lost(rays: PortRays, k: float) -> tuple[FloatArray, FloatArray]:
 
 def _put_beams(
     rays: PortRays,
-    terms: PathTerms,
-    waves: ComplexArray,
-    own: FloatArray,
+    sources: PortSources,
     k: float,
-    order: int,
     asked: IntArray,
     values: ComplexArray,
     error: FloatArray,
     status: IntArray,
     method: Words,
+    strength: FloatArray,
 ) -> None:
     """Beams in place of rays for the pairs asked for (numbers i n + j), where these can be told from young rays."""
     n = len(rays.ports)
+    waves, own = sources.waves, sources.own
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.nan_to_num(own / np.abs(waves), nan=0.0)
-    small = float(np.median(1 / terms.square)) if len(rays) else 1.0
+        share = np.nan_to_num(own / sources.sizes, nan=0.0)
+    small = float(np.median(1 / sources.square)) if len(rays) else 1.0
     for number in np.unique(asked // n):
         targets = asked[asked // n == number] % n
         begin, end = np.searchsorted(rays.first, [number, number + 1])
@@ -199,11 +172,12 @@ def _put_beams(
         cuts = _best_cuts(place, rays.arclength[members], len(targets), beam_width(rays.body, k))
         if not np.any(cuts > 0):
             continue
-        beams = PortBeams(rays.body, rays.ports[number], rays.normals[number], rays.length, k, order)
+        beams = sources.beams(int(number))
         found, again = np.zeros((2, len(targets)), dtype=complex)
+        largest = np.zeros(len(targets))
         for cut in np.unique(cuts[cuts > 0]):
             some = cuts == cut
-            found[some], again[some] = beams.sums(rays.ports[targets[some]], cut)
+            found[some], again[some], largest[some] = beams(targets[some], float(cut))
         young = rays.arclength[members] < cuts[place]
         # at a focus no ray is singled out
         worst = np.full(len(targets), float(np.quantile(share[here], 0.9)) if end > begin else 1.0)
@@ -212,12 +186,13 @@ def _put_beams(
         worst = np.where(later > 0, later, worst)
         known = _sums(place[young], waves[members[young]], len(targets))
         unsure = np.bincount(place[young], own[members[young]], len(targets))
-        off = np.hypot(np.abs(found - again) + np.abs(found) * np.hypot(worst, SUMMED * small), unsure)
+        off = np.hypot(np.abs(found - again) + largest * np.hypot(worst, SUMMED * small), unsure)
         entry = number * n + targets
         better = (cuts > 0) & (off < error[entry])
         entry = entry[better]
         values[entry], error[entry] = (known + found)[better], off[better]
         status[entry], method[entry] = FieldStatus.OK, "beams"
+        strength[entry] = np.maximum(np.abs(values[entry]), largest[better] if sources.polarised else 0.0)
 
 
 def _best_cuts(place: IntArray, arclength: FloatArray, count: int, width: float) -> FloatArray:

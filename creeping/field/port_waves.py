@@ -45,7 +45,8 @@ class PathTerms:
     arclength : (m,), L
     curvature, torsion, bend : (m, 2), 1/L, 1/L and 1
         Of both ends, as of `creeping.rays.port_rays.PortRays`.
-    integrals : (m, 4)
+    integrals : (m, 4), or more
+        The first four of them.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """Pictures of how a port on a hard body couples to the rest of it: decibels as colours of the surface.
 
-Shown is |u| of a unit point source e^{ikr}/(4 pi r) at the port, as `creeping.field.port_source` has it.
+Shown is |u| of a unit point source e^{ikr}/(4 pi r) at the port, as `creeping.field.port_map` has it.
 
 Sources: Derivations, F25.
 """
@@ -14,7 +14,7 @@ from creeping.field.boundary import BoundaryLike
 from creeping.field.decibels import decibels
 from creeping.field.labelled import power
 from creeping.field.point_result import FieldStatus
-from creeping.field.port_source import PortField, port_field
+from creeping.field.port_map import PortField, port_field
 from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.plotting._drawing import Drawing

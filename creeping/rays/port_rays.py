@@ -59,8 +59,8 @@ class PortRays:
         kappa_n and p.Hb/|grad F| at both ends.
     bend : (m, 2)
         rho rho'' - (2/3) rho'^2 at both ends.
-    integrals : (m, 4), L^(1/3), L^(-1/3), L^(-1/3), L^(1/3)
-        Of A and of the second order; see `creeping.rays.kernels.port_fans`.
+    integrals : (m, 5), L^(1/3), L^(-1/3), L^(-1/3), L^(1/3), L^(-1/3)
+        Of A, of the second order, and of the Gaussian curvature; see `creeping.rays.kernels.port_fans`.
     error : (m,), L
         Of the arclength, by polynomials of lower degree.
     folds, ended : (n, n), L^(1/3)
@@ -272,7 +272,7 @@ def _assembled(
         curvature=ends(lane.CURVATURE),
         torsion=ends(lane.TORSION),
         bend=ends(lane.BEND),
-        integrals=known[:, lane.INTEGRALS : lane.INTEGRALS + 4],
+        integrals=known[:, lane.INTEGRALS : lane.INTEGRALS + lane.PARTS],
         error=start[:, lane.START],
         folds=folds[0],
         ended=folds[1],

@@ -8,6 +8,7 @@ ray is the opposite one, run backwards. Between the nodes everything is a polyno
     int kappa^(4/3) [1/60 - (2/45) B - rho^2 (g^2/4 - (2/3) g T + (2/5) T^2)] ds
     int kappa^(4/3) [1/10 + r/4 - B/60 - (3/20) rho^2 T^2] ds
     int kappa^(2/3) [-1/12 + r/3 - (5/18) rho^2 T^2] ds
+    int kappa^(-2/3) (kappa kappa_t - T^2) ds
 
 with T = b.Hp/|grad F|, b = n x p, r = rho kappa_t, B = rho rho'' - (2/3) rho'^2. A_theta is the change of A with the
 direction of launch; T' = d/ds T is by Codazzi the change of kappa across the ray.
@@ -28,9 +29,10 @@ BEHIND, AHEAD = 2, 3
 """Nodes that polynomials take before and behind an interval."""
 GUARD = 7
 """Steps traced beyond the last interval: three for its polynomial, one for each integral, two for derivatives."""
-SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS, ACROSS = 6, 7, 8, 9, 10, 11, 12, 13, 17
-"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, four integrals, kappa_t."""
-LANES = 18
+SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS, ACROSS = 6, 7, 8, 9, 10, 11, 12, 13, 18
+"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, the integrals, kappa_t."""
+LANES, PARTS = 19, 5
+"""Their number, and that of the integrals."""
 START = 3
 """Of the port itself: kappa, T and B."""
 STEEPEST, SHARPEST, TURNED = 4.0, 20.0, 1.5
@@ -74,7 +76,7 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             across[ray, k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
             hx, hy, hz = xx * px + xy * py + xz * pz, xy * px + yy * py + yz * pz, xz * px + yz * py + zz * pz
             torsion[ray, k] = (hx * bx + hy * by + hz * bz) * inverse
-    rates = np.empty((5, J))
+    rates = np.empty((6, J))
     leaning = np.empty(J)
     for ray in range(rays):
         opposite = (ray + half) % rays
@@ -105,8 +107,8 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
                 rates[3, k],
                 across[ray, k],
             )
-            for q in range(4):
-                row = (0, 1, 2, 4)[q]
+            for q in range(PARTS):
+                row = (0, 1, 2, 4, 5)[q]
                 so_far = line[BEHIND + k - 1, INTEGRALS + q] if k > 0 else 0.0
                 to[INTEGRALS + q] = so_far + (_stretch(rates, row, k - 1, step, k > 1) if k > 0 else 0.0)
     for ray in range(rays):
@@ -117,20 +119,20 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             for lane in range(3, 6):
                 to[lane] = -source[lane]
             to[SPREADING], to[ANGLE] = -source[SPREADING], -source[ANGLE]
-            for q in range(4):
+            for q in range(PARTS):
                 to[INTEGRALS + q] = -source[INTEGRALS + q]
 
 
 @njit(**options)
 def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, rates):
-    """Integrands at node k: of A, of both exponents without g, B, and of A_theta in row 4."""
+    """Integrands at node k: of A, of both exponents without g, B, of A_theta in row 4, and of the last one."""
     before, behind = kappa[k - 1] if k > 0 else kappa_back[1], kappa[k - 2] if k > 1 else kappa_back[2 - k]
     slope = (8 * (kappa[k + 1] - before) - (kappa[k + 2] - behind)) / (12 * step)
     bend = (16 * (kappa[k + 1] + before) - 30 * kappa[k] - kappa[k + 2] - behind) / (12 * step * step)
     before, behind = torsion[k - 1] if k > 0 else torsion_back[1], torsion[k - 2] if k > 1 else torsion_back[2 - k]
     twist = (8 * (torsion[k + 1] - before) - (torsion[k + 2] - behind)) / (12 * step)
     if not kappa[k] > 0.0:
-        for row in range(5):
+        for row in range(6):
             rates[row, k] = 0.0
         return
     rho = 1.0 / kappa[k]
@@ -143,6 +145,7 @@ def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, ra
     rates[1, k] = root**4 * (1 / 60 - 2 / 45 * varies)
     rates[2, k] = root**4 * (0.1 + 0.25 * across[k] * rho - varies / 60 - 0.15 * t)
     rates[3, k] = varies
+    rates[5, k] = (kappa[k] * across[k] - torsion[k] ** 2) / (root * root)
     rates[4, k] = 2 / 3 / root * (states[k, 8] * twist + 2 * states[k, 9] * torsion[k])
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from creeping.field.special.airy import hard_modes
-from creeping.field.special.coupling_function import DEEP, SERIES, coupling_function
+from creeping.field.special.airy import hard_modes, soft_modes
+from creeping.field.special.coupling_function import DEEP, SERIES, coupling_function, soft_coupling_function
 
 
 @pytest.mark.parametrize("power", [0, 1, 2])
@@ -36,3 +36,34 @@ def test_squares_obey_riccati(xi):
     slope = (square[0] - 8 * square[1] + 8 * square[2] - square[3]) / (12 * h)
     # t R² under the integral is -i times the slope; the integral of 1 is zero
     assert np.isclose(1j * xi * coupling_function(np.array(xi)) / np.sqrt(xi), -1j * slope, rtol=1e-8)
+
+
+@pytest.mark.parametrize("power", [0, 1, 2])
+def test_soft_series_is_the_sum_of_two_hundred_modes(power):
+    xi, tau = np.linspace(0.5, SERIES, 9), soft_modes(200).tau
+    sums = 2 * np.exp(-0.25j * np.pi) * np.sqrt(np.pi) * xi**1.5 * (np.exp(1j * xi[:, None] * tau) @ tau**power)
+    assert np.allclose(soft_coupling_function(xi, power), sums, rtol=1e-11)
+
+
+@pytest.mark.parametrize("power", [0, 1, 2])
+@pytest.mark.parametrize("seam", [SERIES, DEEP])
+def test_no_jump_of_soft_ones_where_modes_take_over(power, seam):
+    below, above = soft_coupling_function(np.array([seam, np.nextafter(seam, 9)]), power)
+    assert abs(above - below) < 1e-7 * abs(below)
+
+
+def test_soft_plane_limit_and_first_term():
+    """w1'/w1 = t^(1/2) - 1/(4t) + ..., by the expansion of Airy functions."""
+    xi = np.array([1e-6, 1e-4])
+    first = 1 - np.sqrt(np.pi) / 2 * np.exp(-0.25j * np.pi) * xi**1.5
+    assert np.allclose(soft_coupling_function(xi), first, rtol=1e-12)
+
+
+@pytest.mark.parametrize("xi", [0.3, 1.2, 2.2])
+def test_powers_are_derivatives(xi):
+    """(-i d/dxi) of the integral of S, which is U/xi^(3/2)."""
+    h = 1e-4
+    at = xi + h * np.array([-2, -1, 1, 2])
+    plain = soft_coupling_function(at) / at**1.5
+    slope = (plain[0] - 8 * plain[1] + 8 * plain[2] - plain[3]) / (12 * h)
+    assert np.isclose(soft_coupling_function(np.array(xi), 1) / xi**1.5, -1j * slope, rtol=1e-8)

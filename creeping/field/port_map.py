@@ -21,6 +21,7 @@ from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.labelled import point_dataset, power
 from creeping.field.point_result import FieldStatus, PointField
 from creeping.field.port_coupling import CLOSEST, checked_wave, fan_length, merging_pad
+from creeping.field.port_sources import point_sources
 from creeping.field.port_sums import port_sums
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.surface import Surface, size
@@ -128,7 +129,8 @@ def port_field(
     away = np.flatnonzero(np.linalg.norm(x - x0, axis=1) > CLOSEST * size(body))
     for first in range(0, len(away), BLOCK):
         rows = away[first : first + BLOCK]
-        found = port_sums(rays_between(body, np.concatenate([x0[None], x[rows]]), far, pad=pad, sources=1), k, order)
+        rays = rays_between(body, np.concatenate([x0[None], x[rows]]), far, pad=pad, sources=1)
+        found = port_sums(rays, point_sources(rays, k, order), k)
         values[rows], error[rows] = found.values[0, 1:], found.error[0, 1:]
         status[rows], method[rows] = found.status[0, 1:], found.method[0, 1:]
     shape = given.shape[:-1]

@@ -1,0 +1,185 @@
+"""The field of each geodesic between two slots in a conductor: its components along b and t at both ends.
+
+Per unit of the moment and times the impedance of free space, with w the wave of `creeping.field.port_waves` without its
+V, T0 = T/kappa_n at source (s) and receiver (r), M = m1 m2 and c = J2'/J2, the mean of both ends,
+
+    H_b from b   ik [w V + T0s T0r w V_1/M] - i c f - (i/J2) g + T0s T0r S0
+    H_t from t   S + i c g + (i/J2) f
+    H_b from t   T0r S0 + T0s X,       H_t from b   T0s S0 + T0r X,       X = ik w [V_1/(3M) + iV/(3 xi M)]
+    S = (k/(2 xi M)) w [U + (i/(2 xi M)) U],   S0 = (k/(2 xi M)) w U
+    f = -i w [V - (V_1 - iV/(2 xi))/(2M) + (i/2k) (c - 1/s) V]
+    g = (1/(2 xi M)) w [U - (U_1 - 3iU/(2 xi))/(2M) + (i/2k) (c - 1/s) U]
+
+V and the first U of S and g to second order, that of "electric hard" and "electric soft" waves: V with H less
+(1/2) (2/k)^(1/3) int kappa_n^(-2/3) K ds, K the Gaussian curvature, and U, under its integral and in its modes, with
+
+    i E t^2 + L t + i P/xi,          exp{i E tau^2} [1 + L tau + i P/xi],       P = (15/4) E/xi - (3/2) L
+    L = (2/ks) (k/2)^(1/3) int kappa_n^(2/3) [r/3 - 1/12 - (5/18) rho^2 T^2] ds + [(1 + rho^2 T^2)/6 - B/9]/M
+
+and, third order, the exponent i xi (-tau^3/1400 - 1/140)/M^2. On a plane, with 2 xi M = ks, this is exact.
+
+Sources: [PW81] for leading order; Derivations, F28.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.field.port_waves import DEEP, FEW, LIMIT, PathTerms
+from creeping.field.shed_wave import SECOND_ORDER, limited, smoothstep
+from creeping.field.special.airy import MODES, soft_modes
+from creeping.field.special.coupling_function import coupling_function, soft_coupling_function
+from creeping.rays.port_rays import PortRays
+
+NEAR, VARIES, TWIST = 0.5, 0.4, 0.2
+"""Shares that are unsure: of the difference of both lengths of the near field, of that of T0 at both ends, of T0."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlotWaves:
+    """Fields of geodesics (m,), infinite on their caustics.
+
+    Attributes
+    ----------
+    components : (m, 2, 2) complex, 1/L^2
+        Along b and t at the receiver, the second port, of moments along b and t at the source.
+    frames : (m, 2, 2, 3)
+        b and t at both ends.
+    missing : (m, 2, 2), 1/L^2
+        Bounds of what was not derived in each component.
+    """
+
+    components: ComplexArray
+    frames: FloatArray
+    missing: FloatArray
+
+    def along(self, source: FloatArray, receiver: FloatArray) -> ComplexArray:
+        """Fields (m,) along axes at the receiver (m, 3) of moments along axes at the source (m, 3), 1/L^2."""
+        there, here = self._ends(source, receiver)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.einsum("ma,mac,mc->m", here, self.components, there))
+
+    def bounds(self, source: FloatArray, receiver: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Sum of magnitudes of the terms of `along`, and their error by what was not derived (m,), (m,), 1/L^2."""
+        there, here = np.abs(self._ends(source, receiver))
+        with np.errstate(invalid="ignore"):
+            sizes, missing = (
+                np.einsum("ma,mac,mc->m", here, of, there) for of in (np.abs(self.components), self.missing)
+            )
+        return np.asarray(sizes), np.asarray(missing)
+
+    def _ends(self, source: FloatArray, receiver: FloatArray) -> FloatArray:
+        """Components of axes along b and t (2, m, 2)."""
+        return np.asarray(np.einsum("meac,emc->ema", self.frames, np.stack([source, receiver])))
+
+
+class SlotTerms:
+    """What the waves of geodesics (m,) depend on beside length and spreading, at one wavenumber.
+
+    Parameters as of `creeping.field.port_waves.PathTerms`, with all five integrals (m, 5).
+    """
+
+    def __init__(
+        self,
+        wavenumber: float,
+        arclength: FloatArray,
+        curvature: FloatArray,
+        torsion: FloatArray,
+        bend: FloatArray,
+        integrals: FloatArray,
+    ) -> None:
+        electric = integrals.copy()
+        electric[:, 2] -= 0.5 * integrals[:, 4]
+        self.hard = PathTerms(wavenumber, arclength, curvature, torsion, bend, electric)
+        self.k, self.arclength = wavenumber, arclength
+        self.xi, self.square, self.E = self.hard.xi, self.hard.square, self.hard.E
+        root = np.cbrt(wavenumber / 2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.T0, self.near = torsion / curvature, 0.5 / (self.xi * self.square)
+            ends = np.mean((1 + self.T0**2) / 6 - bend / 9, axis=1) / self.square
+            self.L = 2 * root * integrals[:, 3] / (wavenumber * arclength) + ends
+            self.P = 3.75 * self.E / self.xi - 1.5 * self.L
+
+    def soft(self, order: int) -> ComplexArray:
+        """U to second order, without the factor of the wave (m,)."""
+        plain = soft_coupling_function(self.xi)
+        if order == 1:
+            return plain
+        weight = smoothstep(self.xi, *SECOND_ORDER)
+        early, late = np.flatnonzero(weight < 1), np.flatnonzero(weight > 0)
+        change = np.zeros_like(plain)
+        change[early] = (1 - weight[early]) * limited(self._early(early, plain[early]), LIMIT * np.abs(plain[early]))
+        for some, count in ((late[self.xi[late] <= DEEP], MODES), (late[self.xi[late] > DEEP], FEW)):
+            change[some] += weight[some] * self._late(some, count)
+        return np.asarray(plain + change)
+
+    def _early(self, some: IntArray, plain: ComplexArray) -> ComplexArray:
+        xi, E, L, P = (values[some] for values in (self.xi, self.E, self.L, self.P))
+        first, second = (soft_coupling_function(xi, power) for power in (1, 2))
+        return np.asarray(1j * E * second + L * first + 1j * P / xi * plain)
+
+    def _late(self, some: IntArray, count: int) -> ComplexArray:
+        tau = soft_modes(count).tau
+        xi, E, L, P = (values[some, None] for values in (self.xi, self.E, self.L, self.P))
+        leading = 1j * xi * tau
+        third = -xi / self.square[some, None] ** 2 * (tau**3 / 1400 + 1 / 140)
+        exponent = limited(1j * (E * tau**2 + third), 0.5 * np.abs(leading))
+        bracket = limited(L * tau + 1j * P / xi, 2.0)
+        total = np.sum(np.exp(leading) * (np.exp(exponent) * (1 + bracket) - 1), axis=-1)
+        return np.asarray(2 * np.exp(-0.25j * np.pi) * np.sqrt(np.pi) * self.xi[some] ** 1.5 * total)
+
+    def carried(self, order: int) -> ComplexArray:
+        """Components along b and t without w, J2'/J2 and 1/J2 (m, 2, 2), 1/L."""
+        k, xi, M, (source, receiver) = self.k, self.xi, self.square, self.T0.T
+        V, V1, near = coupling_function(xi), coupling_function(xi, 1), self.near
+        S0 = k * near * soft_coupling_function(xi)
+        X = 1j * k * (V1 / (3 * M) + 2j / 3 * near * V)
+        across = 1j * k * (self.hard.wave(order) / self.hard.factor + source * receiver * V1 / M)
+        rows = [
+            [across + source * receiver * S0, receiver * S0 + source * X],
+            [source * S0 + receiver * X, k * near * self.soft(order)],
+        ]
+        return np.moveaxis(np.array(rows), -1, 0)
+
+    def near_field(self, spreading: FloatArray, cot: FloatArray, order: int) -> ComplexArray:
+        """What J2, L, and J2'/J2, 1/L, add to the components without w (m, 2, 2), 1/L."""
+        k, xi, M, near = self.k, self.xi, self.square, self.near
+        V, U = coupling_function(xi), soft_coupling_function(xi)
+        f, g = V, U
+        if order == 2:
+            V1, U1 = coupling_function(xi, 1), soft_coupling_function(xi, 1)
+            turned = limited(np.asarray(0.5j / k * (cot - 1 / self.arclength), dtype=np.complex128), LIMIT)
+            f = self.hard.wave(2) / self.hard.factor - limited((V1 - 0.5j * V / xi) / (2 * M), LIMIT * np.abs(V))
+            g = self.soft(2) - limited((U1 - 1.5j * U / xi) / (2 * M), LIMIT * np.abs(U))
+            f, g = f + turned * V, g + turned * U
+        f, g, none = -1j * f, near * g, np.zeros_like(f)
+        rows = [
+            [-1j * cot * f - 1j * g / spreading, none],
+            [none, 1j * k * near**2 * U + 1j * cot * g + 1j * f / spreading],
+        ]
+        return np.moveaxis(np.array(rows), -1, 0)
+
+    def missing(self) -> FloatArray:
+        """Bounds of what was not derived in the components without w (m, 2, 2), 1/L."""
+        V, V1 = np.abs(coupling_function(self.xi)), np.abs(coupling_function(self.xi, 1))
+        lengths = NEAR * np.abs(2 * self.near - 2 / (self.k * self.arclength)) * V
+        turning = VARIES * np.abs(self.T0[:, 0] - self.T0[:, 1]) + TWIST * np.max(np.abs(self.T0), axis=1)
+        turning = turning * V1 / self.square
+        return np.asarray(self.k * np.moveaxis(np.array([[0 * V, turning], [turning, lengths]]), -1, 0))
+
+
+def slot_waves(rays: PortRays, wavenumber: float, order: int) -> SlotWaves:
+    """Of all geodesics (m,)."""
+    k, s = wavenumber, rays.arclength
+    terms = SlotTerms(k, s, rays.curvature, rays.torsion, rays.bend, rays.integrals)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        w = terms.hard.factor * np.exp(1j * (k * s - 0.5 * np.pi * rays.caustics)) / np.sqrt(np.abs(rays.spreading))
+        cot = np.mean(rays.rates, axis=1) / rays.spreading
+        components = terms.carried(order) + terms.near_field(rays.spreading, cot, order)
+        if order == 2:
+            w = w * (1 + limited(-0.125j / k * (cot - 1 / s), LIMIT))
+        components, missing = (of * size[:, None, None] for of, size in ((components, w), (terms.missing(), np.abs(w))))
+    normals = np.stack([rays.normals[rays.first], rays.normals[rays.second]], axis=1)
+    ends = np.stack([np.cross(normals, rays.directions), rays.directions], axis=2)
+    return SlotWaves(components, ends, missing)
