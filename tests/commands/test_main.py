@@ -150,7 +150,7 @@ _FIELD = [*_SPHERE, "--wavenumber", 20]
         ([*_SPHERE, "--boundary", "hard", "--observe", "cut:0"], "--boundary and --observe need --wavenumber"),
         ([*_SPHERE, "--wavenumber", -3], "--wavenumber = -3.0 is not a positive"),
         ([*_FIELD, "--boundary", "firm"], "'firm' is not soft, hard, pec or impedance:ETA"),
-        ([*_FIELD, "--boundary", "impedance:x"], "'x' is not a complex number"),
+        ([*_FIELD, "--boundary", "impedance:q"], "contains 'q'"),
         ([*_FIELD, "--boundary", "impedance:-1"], "--boundary 'impedance:-1': admittance"),
         (["check", "ellipsoid:q=1"], "ellipsoid has no parameter 'q'; it has a, b, c"),
         (["check", "ellipsoid:a=1,a=2,b=1,c=1"], "parameter 'a' of ellipsoid is given twice: 1 and 2"),

@@ -8,6 +8,9 @@
 Sources: [CK13, sec. 6.2]; Derivations, F18, F20 and F26.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
