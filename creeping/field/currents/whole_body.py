@@ -206,11 +206,13 @@ class SurfaceCurrents:
 
     def changed(self, points: ArrayLike) -> FloatArray:
         """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
-        return self.scattered_and_changed(points)[1]
+        return self._with_change(as_points(points).reshape(-1, 3))[1]
 
     def scattered_and_changed(self, points: ArrayLike) -> tuple[ComplexArray, FloatArray]:
         """`scattered` and `changed` at points (m, 3), L, by one sum over the nodes: (m, ...) each."""
-        x = self._off_the_body(points)
+        return self._with_change(self._off_the_body(points))
+
+    def _with_change(self, x: FloatArray) -> tuple[ComplexArray, FloatArray]:
         lit, dark = (self._parts_of_field(part, x) for part in (self.lit, ~self.lit))
         return lit[0] + dark[0], np.asarray(np.hypot(np.abs(lit[1]), np.abs(dark[1])) / self._change_inside)
 
