@@ -44,8 +44,6 @@ class FieldCut(Drawn):
     outside : (ny, nx) bool
     field : NearField or ConductorField
         At the points outside (m,), in the order of the grid's rows.
-    seconds : float
-        What it took.
 
     Examples
     --------
@@ -68,7 +66,6 @@ class FieldCut(Drawn):
     up: FloatArray
     outside: BoolArray
     field: NearField | ConductorField
-    seconds: float
 
     @property
     def body(self) -> Surface:
@@ -183,7 +180,7 @@ class FieldCut(Drawn):
         return (
             f"FieldCut({len(self.across)} x {len(self.up)} points {self.step:.3g} {field.length_unit} apart, "
             f"k = {field.wavenumber:g}, {field.boundary}, on {brief(self.body)})\n"
-            f"  across {one}, up {other}; {np.sum(~self.outside)} points inside; {self.seconds:.1f} s\n"
+            f"  across {one}, up {other}; {np.sum(~self.outside)} points inside\n"
             f"{rows[1]}\n{rows[2]}"
         )
 

@@ -8,8 +8,6 @@ Sources: Derivations, F17 and F26.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
@@ -117,7 +115,6 @@ def field_cut(
     outside = np.asarray(fan.body.level(points.reshape(-1, 3)) >= 0).reshape(points.shape[:2])
     if not np.any(outside):
         raise InvalidInputError(f"all {outside.size} points are inside the body; give a larger extent")
-    started = time.perf_counter()
     field: NearField | ConductorField
     if conductor:
         wave = "theta" if polarisation is None else polarisation
@@ -132,7 +129,6 @@ def field_cut(
         up=b,
         outside=outside,
         field=field,
-        seconds=time.perf_counter() - started,
     )
 
 

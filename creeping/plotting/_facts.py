@@ -144,7 +144,6 @@ def of_cut(cut: "FieldCut") -> Facts:
     for name, axis in zip(("across", "up"), cut.axes, strict=True):
         yield name, _direction(axis)
     yield from of_points(cut.field)
-    yield "seconds", f"{cut.seconds:.3g}"
 
 
 def of_map(flow: "PhaseMap") -> Facts:
