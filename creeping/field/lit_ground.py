@@ -79,6 +79,9 @@ def composed(
     )
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
+    # next to the line rays have hardly a share: what ends with the fan is less there than lit ground is off by
+    harmless = np.isin(status, (FieldStatus.TRUNCATED, FieldStatus.CAUSTIC)) & ~bare & (share > 0) & (error <= lit_off)
+    status = np.where(harmless, FieldStatus.OK, status)
     error = np.where(bare, unit, error)
     # on lit ground rays that come from afar have decayed: those that are not to be trusted are left out, and no more
     # than what an axis makes of them, sqrt(2 pi k a)

@@ -153,3 +153,16 @@ def test_ground_that_is_flat_or_concave_is_not_exact(across):
     u, other = (lit_currents(cosine, along, across + zero, zero, zero, zero, 30.0, HARD, o) for o in (2, 1))
     low, high = (lit_error(part, np.abs(u), np.abs(u - other), k, HARD, 2, 1.7) for k in (30.0, 60.0))
     assert np.all(low > 0.01) and np.all(high < low)
+
+
+def test_rays_without_a_share_are_no_trouble_next_to_the_line():
+    ball, d = sc.Sphere(), np.array([0.8, 0.0, 0.6])
+    fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, direction=d), length=3.5, n_rays=48)
+    around = np.linspace(0, 2 * np.pi, 12, endpoint=False)[:, None]
+    rim = np.cos(around) * np.array([0.6, 0.0, -0.8]) + np.sin(around) * np.array([0.0, 1.0, 0.0])
+    for behind in (5e-4, 1.5e-3, 2.5e-3):
+        x = np.cos(behind) * rim + np.sin(behind) * d
+        u = cr.surface_field(fan, x, wavenumber=20.0, boundary="hard")
+        assert np.all(u.ok)
+        exact = sphere.surface_field(20.0, 1.0, x @ d, "hard")
+        assert np.all(np.abs(u - exact) <= u.error)
