@@ -26,8 +26,8 @@ def test_great_circles():
     assert np.allclose(rays.spreading, np.sin(exact), atol=1e-5)
     assert np.allclose(rays.rates, np.cos(exact)[:, None], atol=1e-5)
     assert np.array_equal(rays.caustics, (~there).astype(int))
-    # A, and 1/60, 7/20, 1/4 of second order, per length
-    assert np.allclose(rays.integrals / exact[:, None], [1, 1 / 60, 0.35, 0.25], atol=1e-6)
+    # A, and 1/60, 7/20, 1/4 of second order, and K, per length
+    assert np.allclose(rays.integrals / exact[:, None], [1, 1 / 60, 0.35, 0.25, 1], atol=1e-6)
 
 
 def test_rays_arrive_where_they_should():

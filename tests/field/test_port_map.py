@@ -5,7 +5,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field import port_source as module
+from creeping.field import port_map as module
 from creeping.geometry.surface import project
 
 EGG = sc.Ellipsoid(1.2, 1.0, 0.8)
