@@ -109,7 +109,10 @@ class ImpedanceBoundary:
                 raise TypeError("it is none")
             admittance = complex(given)
         except (TypeError, ValueError, OverflowError, RecursionError) as error:
-            raise InvalidInputError(f"admittance = {shown(given)} is not a complex number") from error
+            raise InvalidInputError(
+                f"admittance = {shown(given)} is not a complex number, nor a function of points; of a text in x, y, z "
+                "scatterers.Coating makes one"
+            ) from error
         if not np.isfinite(admittance):
             raise InvalidInputError(f"admittance = {self.admittance!r} is not finite; for an infinite one use 'soft'")
         if admittance.real < 0:

@@ -7,10 +7,9 @@ The error of lit ground, as a share of u1 and with u2 of second order, is
 
 r is kappa_b/kappa_a, of a conductor its root. E is for ground that is flat by the measure of the body's size a: the
 second order kappa_a/(2kc^3) of optics knows nothing there of the curvature at its end, which on a closed body is 1/a in
-the mean. Where rays end or the body hides
-part of its line, 2 epsilon more: waves that come to lit ground from elsewhere on the body are left out, and what
-currents leave inside (`creeping.field.currents.whole_body`) tells how large they are; where that cannot be measured the
-error is a bound.
+the mean. Where rays end or the body hides part of its line, 2 epsilon more: not all waves that come to lit ground from
+elsewhere on the body are known, and what currents leave inside (`creeping.field.currents.whole_body`) tells how large
+the others are; where that cannot be measured the error is a bound.
 
 Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies (`studies.near_coverage`), F on
 x^4 + y^4 + z^4 = 1 at k = 8 and 14.

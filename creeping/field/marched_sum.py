@@ -11,7 +11,7 @@ from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import Boundary
 from creeping.field.far_geometry import fan_strips
-from creeping.field.marching.fan_waves import FanWaves, fan_waves, marchable
+from creeping.field.marching.fan_waves import FanWaves, fan_waves, marchable, spread_out
 from creeping.field.ray_sums import RaySum
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays
@@ -44,8 +44,8 @@ def marched_sum(
     waves = fan_waves(fan, wavenumber=k, boundary=boundary)
     y, slope, off = _on_rays(waves, shed)
     rays, observer = shed.rays, shed.observer
+    own = spread_out(y, rays, k)
     with np.errstate(divide="ignore", invalid="ignore"):
-        own = y / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * (k * rays.eikonal - 0.5 * np.pi * rays.caustics))
         part = np.where(np.abs(y) > 0, off / np.abs(y), 0.0)
     share = np.ones(count) if share is None else share
     # an infinite wave is that of a caustic: beams serve there

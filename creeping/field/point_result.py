@@ -196,8 +196,9 @@ class NearField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; ``method`` is "currents", "layer" between them and the
-        body, or "rays"; on the body "lit", "rays", "march" and both with "lit+", or "boundary", where u = 0.
+        As of every field at points; ``method`` is "currents", "layer" between them and the body, "rays", or, where an
+        admittance varies and neither serves, "none"; on the body "lit", "rays", "march" and both with "lit+", or
+        "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
         Parts, whose sum the values are: where currents or lit ground served, the incident wave and the rest; where rays
         did, the sum over them, which in the shadow is the whole field.

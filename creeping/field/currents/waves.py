@@ -16,7 +16,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary
 from creeping.field.currents.lit import lit_currents
 from creeping.field.currents.nodes import STEP, LitNodes, RayNodes
-from creeping.field.marching.fan_waves import fan_waves, marchable
+from creeping.field.marching.fan_waves import fan_waves, marchable, spread_out
 from creeping.field.surface import surface_waves
 
 
@@ -55,9 +55,9 @@ def _marched(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, C
         order[rows] = np.arange(len(rows))
         mine = np.flatnonzero(order[nodes.rows] >= 0)
         sigma, rays = marched.strips[number].positions[order[nodes.rows[mine]]], nodes.rays[mine]
-        y, error = (part(number, sigma, rays.time) for part in (marched.at, marched.error))
+        y, error = marched.at(number, sigma, rays.time), marched.error(number, sigma, rays.time)
+        wave = spread_out(y, rays, k)
         with np.errstate(divide="ignore", invalid="ignore"):
-            wave = y / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * (k * rays.eikonal - 0.5 * np.pi * rays.caustics))
             off = wave * np.minimum(error / np.abs(y), 1.0)
         known = np.isfinite(error) & np.isfinite(wave) & np.isfinite(off)
         values[mine], change[mine] = np.where(known, wave, 0.0), np.where(known, off, 0.0)

@@ -27,6 +27,7 @@ from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.strip_waves import StripTable, around, modes_on_strip
 from creeping.rays.fan import RayFan
+from creeping.rays.quantities import RayPoints
 from creeping.rays.status import RayStatus
 from creeping.rays.strips import Strip
 
@@ -149,6 +150,13 @@ class FanWaves:
             places, values = around(strip, values)
             found.append(RectBivariateSpline(places, self.times, values, kx=min(3, len(places) - 1)))
         return found
+
+
+def spread_out(y: ComplexArray, rays: RayPoints, wavenumber: float) -> ComplexArray:
+    """The wave u of y on rays (n,), infinite on their caustics."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        phase = wavenumber * rays.eikonal - 0.5 * np.pi * rays.caustics
+        return np.asarray(y / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * phase))
 
 
 def marchable(fan: RayFan, boundary: Boundary, order: int) -> bool:
