@@ -22,6 +22,7 @@ def written(path, body=BODY, request=REQUEST):
     return export_page(path, cr.DirectFlow(body, rtol=1e-9), request)
 
 
+@pytest.mark.slow
 def test_the_page_opens_from_its_file(tmp_path, browser):
     from creeping.explorer.preview import preview_of, step_of
 
@@ -89,6 +90,7 @@ def test_the_command_refuses(arguments, code, tmp_path, capsys):
     assert caught.value.code == code and list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_notebook_holds_the_page(tmp_path, browser):
     from creeping.explorer.notebook import page
 
@@ -123,6 +125,7 @@ def test_names_are_titles(tmp_path):
     assert caught.value.code == 0 and "<title>sphere</title>" in page and "1 GHz" in page and "dBsm" in page
 
 
+@pytest.mark.slow
 def test_a_body_with_joints_has_rays_and_a_cut():
     """Its field at points of the body is not known; that of each ray, and the far field, are."""
     from creeping.explorer.preview import preview_of, step_of

@@ -123,6 +123,7 @@ def test_a_weighted_body_has_rays_and_no_field():
     assert plane_svg(found).count("<path") > 3
 
 
+@pytest.mark.slow
 def test_a_torus_is_drawn_all_the_way_round():
     _, _, found = found_of(sc.Torus(), REQUEST.changed(theta=70.0))
     assert "psi (degrees)" in plane_svg(found)

@@ -66,6 +66,7 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
     assert browser.requests_outside(urlsplit(page.address).netloc) == []
 
 
+@pytest.mark.slow
 def test_the_plane_and_the_cut_follow_the_hand(page, monkeypatch):
     from creeping.explorer import page as module
 
@@ -103,6 +104,7 @@ def test_the_wave_and_the_boundary_are_set_by_hand(page):
     assert page.request.wavenumber == 42.0
 
 
+@pytest.mark.slow
 def test_the_title_is_that_of_the_body(browser):
     from creeping.explorer.page import Explorer
 
@@ -134,6 +136,7 @@ def test_the_arrow_turns_the_sliders_and_the_program_turns_nothing(page):
     assert page.request.theta == pytest.approx(90.0)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_shown_is_told_and_the_page_lives_on(page):
     page.ask(length=float("nan"))
     assert "length" in page.status.content and page.request == REQUEST

@@ -45,6 +45,7 @@ def test_field_on_the_body_is_that_of_the_exact_sphere(fan):
     assert set(found.method) <= {"lit", "march", "lit+march"}
 
 
+@pytest.mark.slow
 def test_far_and_near_fields_are_those_of_the_exact_sphere(fan):
     boundary = cr.ImpedanceBoundary(coated)
     r = spread(200)

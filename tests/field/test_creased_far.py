@@ -27,6 +27,7 @@ def fan_of(body, direction, n_rays=48, length=4.0):
     return cr.launch(flow, cr.shadow_line(body, direction), length=length, n_rays=n_rays, max_gap=np.inf)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard", "pec"])
 def test_ball_of_two_halves_is_the_ball(boundary, fans):
     """Across a joint that changes nothing the field is that of the smooth body, and the stated error holds."""
@@ -59,6 +60,7 @@ def test_facet_has_its_lobe(boundary, facing):
     assert np.all(found.error < 2.0) and found.error[0] > 0.1
 
 
+@pytest.mark.slow
 def test_forward_lobe_is_that_of_the_outline():
     for body, d, area in (
         (cut_sphere(0.5), (1, 0, 0), np.pi - (np.arccos(0.5) - 0.5 * np.sqrt(0.75))),
@@ -80,6 +82,7 @@ def test_cylinder_broadside():
     assert not found.unresolved[0]
 
 
+@pytest.mark.slow
 def test_what_is_lost_makes_directions_unresolved(facing):
     """Of a lit edge aside of every lobe the error is the whole of an edge's wave, and says so."""
     k = 25.0

@@ -15,6 +15,7 @@ def fan():
     return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, direction=(0.3, -0.5, 0.8)), n_rays=128)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(0.5), "pec"], ids=str)
 def test_it_covers_rays_at_a_wavenumber_that_it_did_not_see(fan, boundary):
     k, r = 90.0, fibonacci_directions(151)

@@ -56,6 +56,7 @@ def test_cusped_caustic_of_an_ellipsoid(boundary):
     assert np.mean(error <= found.error) > 0.93 and np.mean(found.ok) > 0.97
 
 
+@pytest.mark.slow
 def test_where_rays_have_ended(monkeypatch):
     """On the twisted ellipsoid marching goes on past detachment, where modes have nothing."""
     body, k = sc.TwistedEllipsoid(), 30.0

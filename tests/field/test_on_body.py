@@ -98,6 +98,7 @@ def torus():
     return cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1.0, 0.1, 0.3)), length=3.0, n_rays=64)
 
 
+@pytest.mark.slow
 def test_what_comes_from_elsewhere_is_bounded_where_it_cannot_be_measured(torus):
     """2026-11: at wavenumbers at which currents cost too much it counted as nothing, and the status was OK."""
     x = [(-1.5, 0.0, 0.0), (1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
@@ -122,6 +123,7 @@ def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
     assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound" and u.error[0] >= 2 * 30.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("d", "boundary"), [((0.02, 0.05, 1), "hard"), ((0.5, 0.1, 1), "soft"), ((1.5, 0.3, 1), "hard")]
 )

@@ -21,6 +21,7 @@ def far_of(length, wavenumber, boundary="hard"):
     return fan, cr.far_field(fan, ALONG, wavenumber=wavenumber, boundary=boundary, method="rays")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["hard", "soft"])
 @pytest.mark.parametrize("wavenumber", [10.0, 30.0])
 @pytest.mark.parametrize("length", [0.1, 0.2, 0.5, 1.0, 2.0, "auto"])

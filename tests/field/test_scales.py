@@ -72,6 +72,7 @@ def at_points(s, kind):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("kind", ["soft", "hard", "impedance"])
 def test_fields_at_points(kind, scale):

@@ -31,6 +31,7 @@ def test_sphere_at_all_distances(flow, boundary):
     assert np.all(found.ok)
 
 
+@pytest.mark.slow
 def test_twisted_ellipsoid_against_fundamental_solutions():
     body, cloud, depth = bodies()["twisted"]
     points = [(0.0, 0.9, 0.3), (1.5, -0.2, 0.4)]

@@ -50,6 +50,7 @@ def test_bad_wavenumbers_are_named(ball_fan):
         cr.validity(ball_fan, wavenumber=-1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "body", [sc.TwistedEllipsoid(), sc.Ellipsoid(1.0, 0.6, 0.4), sc.Ellipsoid(2.0, 0.4, 0.4), sc.Torus()], ids=repr
 )

@@ -53,6 +53,7 @@ def by_quadrature(body, state, length):
     return total, end
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NON_CONVEX)
 def test_carried_by_the_map_through_detachment(name, rng):
     body = NON_CONVEX[name]

@@ -50,6 +50,7 @@ def test_kernel_equals_numpy_twin(body, degree, precision, bound, rng):
     np.testing.assert_allclose(flow.leap(states, 1), oracle(flow, states), rtol=2 * bound, atol=bound)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [3, 5])
 def test_kernel_equals_numpy_twin_in_space(body, degree, rng):
     options = {"time_step": 2**-6, "stages": 2, "method": "tower"}

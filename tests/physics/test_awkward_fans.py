@@ -15,6 +15,7 @@ FANS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fan", FANS)
 @pytest.mark.parametrize("body", [sc.Torus(), sc.TwistedEllipsoid()], ids=lambda body: type(body).__name__)
 def test_fields_are_finite(body, fan):

@@ -20,6 +20,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("boundary", "k", "incidence"), CASES)
 def test_far_field_of_the_triaxial_ellipsoid(boundary, k, incidence):
     assert bodies.reference("triaxial", boundary, k).residual.max() < 4e-5

@@ -108,6 +108,7 @@ HIGH = (290.0, 320.0, 350.0, 380.0, 400.0)
 LOW = (20.0, 24.0, 30.0, 38.0, 50.0, 60.0, 80.0, 100.0, 120.0, 150.0, 200.0, 250.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["sphere", "spheroid"])
 @pytest.mark.parametrize("kind", ["hard", "soft"])
 def test_backscatter_of_high_frequencies(shape, kind):
@@ -118,6 +119,7 @@ def test_backscatter_of_high_frequencies(shape, kind):
     assert np.abs(currents).mean() < BACK and np.abs(currents).max() < WORST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["sphere", "spheroid"])
 @pytest.mark.parametrize("kind", ["hard", "soft"])
 def test_errors_stated_for_backscatter(shape, kind):

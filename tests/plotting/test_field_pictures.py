@@ -61,6 +61,7 @@ def test_shadow_without_rays_is_nan():
     assert np.isfinite(levels).tolist() == [True, False]
 
 
+@pytest.mark.slow
 def test_inner_equator_of_a_torus_is_not_lit_behind_its_tube():
     body = sc.Torus()
     line = cr.shadow_line(body, (1, 0, 0.2))

@@ -70,6 +70,7 @@ def body_of(name):
     return sc.Implicit(TEXTS[name])
 
 
+@pytest.mark.slow
 @every
 def test_pieces_and_creases(name):
     body = body_of(name)

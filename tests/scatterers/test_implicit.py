@@ -65,6 +65,7 @@ def directions(rng, n):
     return s / np.linalg.norm(s, axis=-1, keepdims=True)
 
 
+@pytest.mark.slow
 @every
 def test_check_passes_and_counts_handles(name):
     report = cr.check_surface(body_of(name))

@@ -79,6 +79,7 @@ def repacked(content, **changed):
     return packed.getvalue()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", SIGNED)
 def test_a_stored_fit_that_is_signed_and_none_is_made_anew(which, tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3)

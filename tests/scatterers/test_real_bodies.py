@@ -22,6 +22,7 @@ def opened(name, **options):
     return sc.Mesh(path, "m", cache=False, **options)
 
 
+@pytest.mark.slow
 @needs
 @pytest.mark.parametrize(
     ("name", "options", "pieces"),

@@ -32,6 +32,7 @@ def directions(n, rng):
     return d / np.linalg.norm(d, axis=1, keepdims=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BODIES)
 def test_is_the_shadow_line_of_each_and_that_of_panels(name, rng):
     body = BODIES[name]
@@ -97,6 +98,7 @@ def test_neighbouring_rays_are_a_spacing_apart(rng):
     assert np.all(np.abs(gap / lines.launch.spacing[:, 1:] - 1)[same] < 1e-2)
 
 
+@pytest.mark.slow
 def test_singular_incidences_are_refused_and_those_near_reported():
     body = BODIES["torus"]
     near = [unit(1, 0, v) for v in (1e-8, 1e-5, 1e-3, 0.3)]

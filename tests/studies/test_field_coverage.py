@@ -19,6 +19,7 @@ def test_the_frames_of_the_conducting_ball(rng):
     np.testing.assert_allclose(coverage.conducting_ball(3.0, d, r), solution.far_field(r)[:, 0], atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.7, "pec"])
 def test_references_reach_every_body(boundary, rng):
     for name in coverage.bodies():

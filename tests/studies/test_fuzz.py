@@ -41,6 +41,7 @@ def test_bad_input_is_refused_or_taken_as_it_is(name, tmp_path):
     assert any(found.kind == REFUSED for found in verdicts)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_bad_arguments_are_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -5,6 +5,7 @@ import pytest
 from studies import near_coverage
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["hard", 0.7])
 def test_errors_are_covered_on_the_sphere(boundary):
     found = near_coverage.row("sphere", 10.0, boundary, 10)

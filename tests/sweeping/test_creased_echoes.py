@@ -35,6 +35,7 @@ def flow():
     return cr.DirectFlow(CAPSULE, rtol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["monostatic", "bistatic"])
 def test_each_value_is_that_of_the_far_field(flow, quantity):
     d, seen = np.array([[-1, 0, -0.4], [0.3, 0.2, -1]]), np.array([[0, 1.0, 0], [0.6, 0, 0.8]])

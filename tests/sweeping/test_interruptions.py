@@ -100,6 +100,7 @@ def test_kill_9_while_the_store_is_made_leaves_none(tmp_path):
     assert fill(fake.plan(60, 3), open_store(fake.plan(60, 3), folder, resume=True))
 
 
+@pytest.mark.slow
 def test_one_interrupt_ends_the_command_with_4_and_tells_how_to_go_on(tmp_path):
     (tmp_path / "a study.toml").write_text(STUDY)
     folder = tmp_path / "a study.zarr"

@@ -146,6 +146,7 @@ def test_very_long_rays_of_a_sphere():
     np.testing.assert_allclose(found["creeping"], once["creeping"], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_currents_serve_the_incidences_that_rays_do_not_resolve():
     # on the twisted ellipsoid the reflected field folds over, on the triaxial one it does not
     seen = cr.fibonacci_directions(40)

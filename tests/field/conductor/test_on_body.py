@@ -23,6 +23,7 @@ def wrong(current, x, E, H):
     return np.linalg.norm(current - J, axis=1), np.abs(current.charge - q)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k, limit", [(30.0, 0.025), (100.0, 0.006)])
 def test_sphere_at_all_angles(ball, mie, rng, k, limit):
     x = np.concatenate([vectors(rng, 200), OBLIQUE + 0.2 * rng.normal(size=(40, 3))])

@@ -45,6 +45,7 @@ def test_convex_body_receives_nothing():
     assert np.max(np.abs(received(pair, pair, ones, ones, K, soft=False))) < 1e-12 * len(ones)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_peanut_against_fundamental_solutions(boundary, monkeypatch):
     body, cloud, depth = bodies()["peanut"]

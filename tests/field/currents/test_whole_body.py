@@ -47,6 +47,7 @@ def test_sphere(ball_fan, boundary, rng):
         assert 0.4 < rms(off) / rms(exact) / currents.extinction < 2.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_a_body_that_is_not_convex(boundary, rng):
     # isolated rays are off by more than 3 % in a tenth of the directions: the reflected field has a caustic

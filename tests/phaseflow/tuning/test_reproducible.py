@@ -39,6 +39,7 @@ def built(folder, clock):
     return done.stdout, {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
+@pytest.mark.slow
 def test_two_builds_are_equal_bit_for_bit(tmp_path):
     first = built(tmp_path / "a", "true")
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])

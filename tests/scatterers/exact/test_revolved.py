@@ -286,6 +286,7 @@ def test_geodesics_on_a_cone_are_lines_of_its_plane(rng):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ogive", "double ogive", "cone-sphere"])
 def test_rays_keep_clairauts_constant(name, rng):
     body, phi = BODIES[name], rng.uniform(-3, 3, 10)

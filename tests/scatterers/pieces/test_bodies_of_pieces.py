@@ -71,6 +71,7 @@ def outside(name, x):
     return np.max(np.abs(x) - half, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, pieces", [("box", 6), ("L", 8), ("plate", 6), ("rod", 3), ("half torus", None)])
 def test_the_level_has_the_sign_of_the_body(name, pieces):
     body = opened(name)
@@ -154,6 +155,7 @@ def test_a_torus_cut_in_half_is_known_up_to_its_rims():
     assert bool(body.non_smooth(points[0])) == bool(body.non_smooth(points)[0])
 
 
+@pytest.mark.slow
 def test_stored_pieces_are_the_same_to_the_bit(tmp_path):
     made, messages = sc.Mesh(SOURCES["rod"](), cache=tmp_path), []
     again = sc.Mesh(SOURCES["rod"](), cache=tmp_path, progress=messages.append)

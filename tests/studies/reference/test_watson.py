@@ -20,6 +20,7 @@ def test_shadow_is_all_residues(ka, boundary):
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.5 - 0.3j, "across", "within"])
 def test_total_less_creeping_is_one_smooth_reflected_wave(boundary):
     wavenumbers, theta = np.linspace(8.0, 12.0, 13), np.radians([90.0])

@@ -76,6 +76,7 @@ def test_results_do_not_depend_on_tasks_or_order(asked):
         assert whole[name].values[order].tobytes() == mixed[name].values.tobytes(), name
 
 
+@pytest.mark.slow
 def test_what_is_computed_is_what_it_was():
     # the forward lobe is no sum of sheets, and nothing is interpolated there
     asked = {"quantity": "bistatic", "observation": [(1, 0, 0), (0, 0, -1)], "boundary": "hard", **FIELD}

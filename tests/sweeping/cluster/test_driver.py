@@ -111,6 +111,7 @@ def test_a_sweep_whose_first_task_fails_as_one_ends(two, tmp_path):
     assert store.dataset().attrs["incidences_failed"] == 4
 
 
+@pytest.mark.slow
 def test_a_client_is_an_option_of_the_public_function(two, tmp_path):
     asked = {"quantity": "rays", "n_rays": 4, "length": 1.0, "chunk": 2}
     here = sweep_directions(fake.FLOW, fibonacci_directions(6), **asked)
