@@ -5,7 +5,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import positive_number, real_array, shown
-from creeping.geometry.creased import checked_smooth
+from creeping.geometry.creased import checked_smooth, has_edges
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
@@ -32,12 +32,15 @@ def observers_of(observation: ArrayLike) -> FloatArray:
     return unit_directions(looks, "observation directions").reshape(-1, 3)
 
 
-def checked_plain(body: Surface, *, smooth: str = "") -> None:
-    """Refuse a weighted body; and one with edges, joints or tips where ``smooth`` says what needs a smooth one."""
+def checked_plain(body: Surface, *, smooth: str = "", edgeless: str = "") -> None:
+    """Refuse a weighted body; and one with edges, joints or tips where ``smooth`` says what needs a smooth one.
+
+    ``edgeless`` says what does not mind joints and tips, but edges.
+    """
     if speed_of(body) is not None:
         raise InvalidInputError(f"{body!r} has a speed; the diffracted field is that of a plain body")
-    if smooth:
-        checked_smooth(body, smooth, "its far field is known, by creeping.far_field")
+    if smooth or (edgeless and has_edges(body)):
+        checked_smooth(body, smooth or edgeless, "its far field is known, by creeping.far_field")
 
 
 def checked(wavenumber: float, order: int) -> float:

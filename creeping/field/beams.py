@@ -24,7 +24,9 @@ from scipy.integrate import cumulative_trapezoid
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
+from creeping.geometry.creased import is_creased
 from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import normal, project, size
 from creeping.kernels.threads import in_threads
@@ -148,7 +150,12 @@ class _Beams:
         self.k, self.a = waves.wavenumber, length_scale(fan)
         first = waves.strips[number].at(sigma, np.zeros(count))
         launched = pack(project(body, first.points), first.directions, jacobi=True)
-        self.states = trace_states(body, launched, times, rtol=RTOL)
+        ended = np.zeros((count, len(times)), dtype=bool)
+        if is_creased(body):
+            trace = trace_pieces(body, launched, times, rtol=RTOL)
+            self.states, ended = trace.states, trace.end[:, None] <= times
+        else:
+            self.states = trace_states(body, launched, times, rtol=RTOL)
         x, p = (np.ascontiguousarray(self.states[..., part]) for part in (X, P))
         flat = x.reshape(-1, 3)
         nodes = nodes_at(body, flat, normal(body, flat))
@@ -163,7 +170,9 @@ class _Beams:
         known = 0.5j * self.k * cumulative_trapezoid(known, times, axis=1, initial=0)
         self.turned = 1 + turned
         self.weight = apart * np.abs(first.width)
-        self.size = np.log(np.maximum(np.abs(y), 1e-300)) + 0.5 * np.log(np.abs(self.turned)) + known.real
+        # a ray that has come to a tip ends there
+        strength = np.where(ended, 0.0, np.abs(y))
+        self.size = np.log(np.maximum(strength, 1e-300)) + 0.5 * np.log(np.abs(self.turned)) + known.real
         self.phase = np.unwrap(np.angle(y), axis=1) + 0.5 * np.angle(self.turned) + known.imag
         S = first.eikonal[:, None] + times
         self.rays = (x, p, b.reshape(x.shape), nodes.curvature(b).reshape(S.shape), S)

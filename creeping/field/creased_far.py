@@ -110,7 +110,7 @@ class CreasedParts(Parts):
             edges,
             ended,
             between * np.ones(m),
-            _tips(fan, wavenumber) * np.ones(m),
+            tip_waves(fan, wavenumber) * np.ones(m),
             (1 - self.in_forward) * np.max(ends, axis=0),
         ]
         self.specular = []
@@ -285,7 +285,7 @@ def _between(fan: RayFan, k: float, kind: Boundary) -> float:
     return float(np.sum(left * fan.spacing[one]) / (2 * np.pi))
 
 
-def _tips(fan: RayFan, k: float) -> float:
+def tip_waves(fan: RayFan, k: float) -> float:
     """Waves of the tips that the wave comes to, L."""
     body: Any = fan.body
     tips = np.array([np.ravel(c.points)[:3] for c in body.creases if c.kind == "tip"]).reshape(-1, 3)

@@ -19,7 +19,7 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import UNRESOLVED, checked, checked_method, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.creased_far import creased_far_field
+from creeping.field.creased_far import creased_far_field, tip_waves
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.extrapolated import measured_level
@@ -28,7 +28,7 @@ from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.geometry.arguments import one_of
-from creeping.geometry.creased import is_creased
+from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 
@@ -56,8 +56,8 @@ def far_field(
         Second-order creeping waves, or the leading order, which is by rays.
     method : {"auto", "currents", "rays"}
         The currents of the whole body, or isolated rays. "auto" takes currents unless they cost more than some ten
-        seconds or the order is 1. A body with edges, joints or tips has isolated rays and physical optics, whatever
-        the method (`creeping.field.creased_far`): "rays+optics" in the result.
+        seconds or the order is 1. A body with edges, and a conductor with joints or tips, has isolated rays and
+        physical optics, whatever the method (`creeping.field.creased_far`): "rays+optics" in the result.
 
     Returns
     -------
@@ -88,20 +88,24 @@ def far_field(
     k = checked(wavenumber, order)
     checked_method(method, order)
     r = observers_of(observation)
-    if is_creased(fan.body):
-        far = creased_far_field(fan, r, k, boundary, order)
-        return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
+    creased = is_creased(fan.body)
+    # currents go across joints, by marching, not round edges
+    marches = not creased or (len(kinds) == 1 and order == 2 and not has_edges(fan.body))
     # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
     # there are no modes of an admittance that varies
-    must = method == "currents" or (method == "auto" and kinds[0].varies)
-    if must or cheap:
+    must = not creased and (method == "currents" or (method == "auto" and kinds[0].varies))
+    if marches and (must or cheap or method == "currents"):
         try:
-            far = _by_currents(kept_currents(fan, k, boundary), r, boundary)
+            left_out = tip_waves(fan, k) if creased else 0.0
+            far = _by_currents(kept_currents(fan, k, boundary), r, boundary, left_out)
             return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
         except SurfaceError:
             if must:
                 raise
+    if creased:
+        far = creased_far_field(fan, r, k, boundary, order)
+        return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     geometry = far_geometry(fan, r)
     far = field_of(geometry, k, boundary, order)
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
@@ -109,9 +113,10 @@ def far_field(
     return level.applied(far) if level else far
 
 
-def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike) -> FarField:
+def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike, left_out: float) -> FarField:
+    """Far field in unit directions (m, 3), with what is ``left_out``, L, of every direction in its error."""
     lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
-    error = currents.error(r)
+    error = np.hypot(currents.error(r), left_out)
     largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
     off = ~(error < UNRESOLVED * largest)
     return FarField(

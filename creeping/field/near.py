@@ -25,6 +25,7 @@ from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough, total_at
 from creeping.field.far_geometry import fan_strips
+from creeping.field.marching.fan_waves import march_alone
 from creeping.field.near_layer import layer_field
 from creeping.field.near_wave import shed_waves
 from creeping.field.on_body import rays_on, total_on
@@ -101,7 +102,7 @@ def near_field(
     ((2,), 0.04, ['rays', 'currents'])
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, smooth="the near field")
+    checked_plain(fan.body, edgeless="the near field")
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     checked_method(method, order)
@@ -114,7 +115,8 @@ def near_field(
     field = zero_field(len(flat), "boundary")
     by_currents = method != "rays" and order == 2 and (method == "currents" or affordable(fan, len(off), k))
     # of rays on the lit side nothing is known that currents do not know better
-    plain = kind.varies | (by_currents & ~dark)
+    marched = march_alone(fan.body, kind)
+    plain = marched | (by_currents & ~dark)
     without, rays = off[plain[off]], off[~plain[off]]
     field = field.put(without, _no_rays(~dark[without]))
     field = field.put(rays, _rays_off(fan, flat[rays], ~dark[rays], k, kind, order)) if len(rays) else field
@@ -123,10 +125,10 @@ def near_field(
         field = field.put(at, parts(fan, flat[at], k, kind, order))
     asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents")))
     if method != "rays" and order == 2 and len(asked):
-        must = method == "currents" or kind.varies
+        must = method == "currents" or marched
         field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=must)
     left = without[field.method[without] == "none"]
-    if len(left) and not kind.varies:
+    if len(left) and not marched:
         field = field.put(left, _rays_off(fan, flat[left], ~dark[left], k, kind, order))
     return _result(field, fan, y, k, boundary, order)
 

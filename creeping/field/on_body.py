@@ -19,26 +19,29 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
+from creeping.field.currents.second_kind import across_joints
 from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
 from creeping.field.marched_sum import marched_sum, marches
+from creeping.field.marching.fan_waves import march_alone
+from creeping.field.own_waves import own_waves
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
-from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
+from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.field.served import Served, Words
-from creeping.field.shed_wave import fock_parameter, scales
+from creeping.field.shed_wave import fock_parameter
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
+from creeping.geometry.creased import is_creased
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal, size
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_on
-from creeping.rays.tracer import ray_points
 
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 
@@ -65,8 +68,9 @@ def surface_field(
     Returns
     -------
     SurfaceField
-        Of shape (rays, steps): each ray's own contribution, infinite at its caustics (status CAUSTIC) and 0 where it
-        has ended (DETACHED) or was never launched by the wave (NO_RAY). With points (...): the total field; all rays
+        Of shape (rays, steps): each ray's own contribution, by creeping modes up to where the ray detaches and by
+        marching beyond (``method``), infinite at its caustics (status CAUSTIC); 0 where it has ended otherwise
+        (DETACHED) or was never launched by the wave (NO_RAY). With points (...): the total field; all rays
         through each of them summed in the shadow, 0 where none passes (NO_RAY or TRUNCATED); by creeping modes or by
         marching and beams (``method``), whichever errs less: these go on across caustics and where rays have ended.
 
@@ -95,8 +99,8 @@ def surface_field(
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     if points is None:
-        return _along_rays(fan, k, boundary, kind, order)
-    checked_plain(fan.body, smooth="the field at points of the body")
+        return own_waves(fan, k, boundary, kind, order)
+    checked_plain(fan.body, edgeless="the field at points of the body")
     y = as_points(points)
     shape = y.shape[:-1]
     total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)
@@ -118,41 +122,6 @@ def surface_field(
     )
 
 
-def _along_rays(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, order: int) -> SurfaceField:
-    """Each ray's own contribution (rays, steps)."""
-    rays = ray_points(fan, fan.travel_time)[1]
-    waves, other = (surface_waves(rays, k, kind, o) for o in (order, 3 - order))
-    m = scales(rays, k)[1]
-    with np.errstate(invalid="ignore"):
-        caustic = tube_share(rays, np.zeros(waves.shape)) * m < NARROW_ALONE
-    launched = fan.launched
-    status = np.select(
-        [np.broadcast_to(~launched[:, None], waves.shape), ~rays.alive, caustic],
-        [FieldStatus.NO_RAY, FieldStatus.DETACHED, FieldStatus.CAUSTIC],
-        FieldStatus.OK,
-    )
-    ok = status == FieldStatus.OK
-    unit = k if kind.kind == "soft" else 1.0
-    error = own_error(rays, (waves, other), k, kind, order, on=True)
-    error = np.where(ok, error, np.where(rays.alive, np.abs(waves), unit))
-    error_by = np.where(ok, "expansion", "bound")
-    return SurfaceField(
-        points=rays.points.copy(),
-        values=waves,
-        error=error,
-        error_by=error_by,
-        status=judged(status, waves, error, error_by, unit),
-        method=np.full(waves.shape, "rays"),
-        lit=np.zeros(waves.shape, dtype=complex),
-        creeping=waves,
-        wavenumber=k,
-        boundary=boundary_name(boundary),
-        order=order,
-        validity=validity(fan, wavenumber=k),
-        length_unit=unit_of(fan.body),
-    )
-
-
 def rays_on(
     fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int, share: FloatArray | None = None
 ) -> tuple[RaySum, Words]:
@@ -164,7 +133,7 @@ def rays_on(
     young = np.zeros(len(found.observer), dtype=bool)
     if share is not None:
         young = fock_parameter(found.rays, k) < TAKEN_OVER
-    if kind.varies:
+    if march_alone(fan.body, kind):
         if marches(fan, kind, order, len(points), k):
             return marched_sum(fan, found, points, share, young, k, kind), np.full(len(points), "march")
         nothing = np.zeros(len(points))
@@ -205,14 +174,15 @@ def total_on(
     """
     lit = _lit_at(fan, points, k, kind, order)
     rays, by = rays_on(fan, points, k, kind, order, 1 - lit[2])
-    left = 0.0
-    if not convex(fan):
+    left, jointed = 0.0, is_creased(fan.body)
+    if jointed or not convex(fan):
         currents = currents or _currents_of(fan, k, kind)
         left = currents.extinction if currents else np.nan
-        if currents and order == 2 and kind.kind in ("soft", "hard"):
+        if currents and order == 2 and kind.kind in ("soft", "hard") and not jointed:
             lit = lit[0] + _thrown(currents, points, lit[2]), *lit[1:]
     unit = k if kind.kind == "soft" else 1.0
-    return composed(fan, lit, rays, by, left, k, kind, unit)
+    field = composed(fan, lit, rays, by, left, k, kind, unit)
+    return across_joints(field, currents, points, lit[2], unit) if jointed and currents and order == 2 else field
 
 
 def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:

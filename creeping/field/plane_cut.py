@@ -95,7 +95,7 @@ def field_cut(
     (('E', 'H'), (9, 9), ('up', 'across', 'component'))
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, smooth="the near field")
+    checked_plain(fan.body, edgeless="the near field")
     k = checked(wavenumber, order)
     conductor = isinstance(boundary, str) and boundary == "pec"
     if conductor and (order, method) != (2, "auto"):

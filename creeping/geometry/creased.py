@@ -86,6 +86,18 @@ def is_creased(body: Any) -> bool:
     return not isinstance(body, type) and len(getattr(body, "creases", ())) > 0
 
 
+def has_edges(body: Any) -> bool:
+    """Whether the normal of a body jumps somewhere along a curve.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> has_edges(sc.Capsule(1.0, 4.0)), has_edges(sc.Cylinder(1.0, 4.0))
+    (False, True)
+    """
+    return is_creased(body) and any(crease.kind == "edge" for crease in body.creases)
+
+
 def checked_smooth(body: Any, what: str, remedy: str) -> None:
     """Refuse a body with creases where only a smooth one will do.
 

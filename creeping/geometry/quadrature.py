@@ -10,6 +10,8 @@ its error. For integrands as fast as e^{i a u} on a tile of -1 < u < 1 a rule of
 
     2^(2p) (p!)^4 a^(2p)/((2p + 1) (2p)!^3).
 
+A body of smooth pieces is tiled by triangles, each mapped onto its own piece, with conical products of Gauss's rules.
+
 Sources: [G98], [DR84, sec. 2.7]; Derivations, B11.
 """
 
@@ -21,6 +23,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
+from creeping.geometry.creased import is_creased, pieces_of, tiles_of
 from creeping.geometry.curvature import adjugate_form, principal_curvature_bound, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
 from creeping.geometry.kept import kept
@@ -42,6 +45,14 @@ SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 """Where xx, yy, zz, yz, xz, xy stand in a matrix."""
 STEPS = 12
 """Newton steps to the nearest point."""
+ON_PIECES = 6
+"""Points of Gauss's rules on triangles,"""
+LONGEST = 0.2
+"""and their longest sides, in body sizes."""
+SMALLER = 3.7
+"""Triangles of bodies over the square of their longest sides."""
+STRETCH = (0.1, 10.0)
+"""Bounds of (1 + h kappa_1)(1 + h kappa_2); at a tip, where curvatures are infinite, a triangle counts as flat."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +126,8 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     >>> round(float(nodes.weights.sum()), 6), round(float(4 * np.pi**2 * 0.5), 6)
     (19.739209, 19.739209)
     """
+    if is_creased(body):
+        return _on_pieces(body, rate)
     found = kept(body, "quadratures", lambda: _Rules(body))
     while found.cells:
         cells, points, tiles = found.rule(body, rate)
@@ -152,6 +165,9 @@ def node_count(body: Surface, rate: float) -> int:
     >>> node_count(ball, 20.0) == len(body_nodes(ball, 20.0).points)
     True
     """
+    if is_creased(body):
+        area = float(np.sum(tiles_of(body, LONGEST).areas))
+        return int(area / _side(body, rate) ** 2 * SMALLER * ON_PIECES**2)
     found = kept(body, "quadratures", lambda: _Rules(body))
     if not found.cells:
         return MOST_NODES + 1
@@ -230,18 +246,66 @@ def _nodes(body: Surface, mesh: tuple[FloatArray, IntArray], points: int) -> Bod
     by_v = 0.5 * np.stack([np.outer(a, s * one) for a, s in ((low, -1), (high, -1), (high, 1), (low, 1))])
     corners = vertices[tiles]
     y, yu, yv = (np.einsum("kuv,qkx->quvx", part, corners).reshape(-1, 3) for part in (shape, by_u, by_v))
-    x, n, hessians, height = nearest_points(body, y)
+    areas = np.cross(yu, yv) * np.tile(np.outer(w, w).ravel(), len(tiles))[:, None]
+    return _onto(body, y, areas)
+
+
+def _onto(body: Surface, points: FloatArray, areas: FloatArray) -> BodyNodes:
+    """Nodes of a body nearest to points with vectors of area (n, 3), L and L^2."""
+    x, n, hessians, height = nearest_points(body, points)
     nodes = BodyNodes(x, n, np.ones(len(x)), hessians, 0.0)
-    total = nodes.total_curvature
     gauss = adjugate_form(n, hessians[:, SYMMETRIC])
-    stretch = 1 + height * total + height**2 * gauss
-    area = np.sum(np.cross(yu, yv) * n, axis=1) * np.tile(np.outer(w, w).ravel(), len(tiles))
-    weights = area / stretch
+    stretch = 1 + height * nodes.total_curvature + height**2 * gauss
+    weights = np.sum(areas * n, axis=1) / stretch
     whole = float(np.sum(weights))
     # beyond the centres of curvature the map is not one to one
-    folded = not np.all(stretch > 0.1) or not np.all(np.isfinite(weights))
+    folded = not np.all(stretch > STRETCH[0]) or not np.all(np.isfinite(weights))
     error = np.inf if folded else float(np.linalg.norm(weights @ n)) / whole
     return BodyNodes(x, n, weights, hessians, error)
+
+
+def _side(body: Any, rate: float) -> float:
+    """Sides, L, of the triangles of a body of pieces for a rate, 1/L."""
+    half = max(value for value in np.arange(0.05, 20.0, 0.05) if _points_for(value) <= ON_PIECES)
+    return min(2 * float(half) / rate, LONGEST * size(body))
+
+
+def _on_pieces(body: Any, rate: float) -> BodyNodes:
+    """Nodes of a body of smooth pieces."""
+    if node_count(body, rate) > MOST_NODES:
+        raise SurfaceError(
+            f"a phase that turns once in {2 * np.pi / rate:.3g} L asks for more than {MOST_NODES} nodes; "
+            "take a lower wavenumber, or rays"
+        )
+    side = _side(body, rate)
+    return kept(body, f"quadrature {side:.3g}", lambda: _piece_nodes(body, side))
+
+
+def _piece_nodes(body: Any, side: float) -> BodyNodes:
+    tiles = tiles_of(body, side / size(body))
+    u, w = np.polynomial.legendre.leggauss(ON_PIECES)
+    u, w = 0.5 * (1 + u), 0.5 * w
+    # barycentric places of the conical product
+    first, second = (part.ravel() for part in np.meshgrid(u, u, indexing="ij"))
+    places = np.stack([1 - first, first * (1 - second), first * second], axis=1)
+    share = np.outer(w * u, w).ravel()
+    y = np.einsum("pk,qkx->qpx", places, tiles.corners).reshape(-1, 3)
+    a, b, c = np.moveaxis(tiles.corners, 1, 0)
+    areas = (np.cross(b - a, c - a)[:, None] * share[:, None]).reshape(-1, 3)
+    owner = np.repeat(tiles.pieces, len(share))
+    lanes = [np.empty((len(y), 3)), np.empty((len(y), 3)), np.empty(len(y)), np.empty((len(y), 6))]
+    for number, piece in enumerate(pieces_of(body)):
+        mine = np.flatnonzero(owner == number)
+        if len(mine):
+            found = _onto(piece, y[mine], areas[mine])
+            flat = np.linalg.norm(areas[mine], axis=1)
+            sound = (found.weights > STRETCH[0] * flat) & (found.weights < STRETCH[1] * flat)
+            for lane, values in zip(lanes, (found.points, found.normals, found.weights, found.hessians), strict=True):
+                lane[mine] = values
+            lanes[2][mine[~sound]] = flat[~sound]
+    x, n, weights, hessians = lanes
+    whole = float(np.sum(weights))
+    return BodyNodes(x, n, weights, hessians, float(np.linalg.norm(weights @ n)) / whole)
 
 
 def nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:

@@ -101,5 +101,15 @@ def test_bad_coatings_are_named(fan, given, told):
 def test_what_goes_by_modes_says_what_does_not(fan):
     with pytest.raises(cr.InvalidInputError, match="method='currents'"):
         cr.far_field(fan, [(0, 0, 1)], wavenumber=K, boundary=cr.ImpedanceBoundary(coated), method="rays")
-    with pytest.raises(cr.InvalidInputError, match="varies"):
-        cr.surface_field(fan, wavenumber=K, boundary=cr.ImpedanceBoundary(coated))
+    with pytest.raises(cr.InvalidInputError, match="order=2"):
+        cr.surface_field(fan, wavenumber=K, boundary=cr.ImpedanceBoundary(coated), order=1)
+
+
+def test_each_ray_is_marched(fan):
+    """Where a single ray passes, its own wave is the field."""
+    own = cr.surface_field(fan, wavenumber=K, boundary=cr.ImpedanceBoundary(coated))
+    step = int(np.searchsorted(fan.travel_time, 0.8))
+    ok = own.ok[:, step]
+    whole = cr.surface_field(fan, fan.points[ok, step], wavenumber=K, boundary=cr.ImpedanceBoundary(coated))
+    assert ok.any() and set(own.method[own.ok]) == {"march"}
+    np.testing.assert_allclose(own.values[ok, step], whole.values, atol=0.02)

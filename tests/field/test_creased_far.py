@@ -99,6 +99,7 @@ def test_other_fields_are_refused_by_name():
     for ask in (
         lambda: cr.near_field(fan, [(0, 0, 3.0)], wavenumber=20.0, boundary="soft"),
         lambda: cr.surface_field(fan, [(0, 0, -1.0)], wavenumber=20.0, boundary="soft"),
+        lambda: cr.surface_currents(fan, wavenumber=20.0, boundary="soft"),
     ):
         with pytest.raises(InvalidInputError, match="creases"):
             ask()

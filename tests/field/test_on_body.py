@@ -63,8 +63,25 @@ def test_each_ray_has_its_own_status():
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 1, 1)), length=2.0, n_rays=24)
     u = cr.surface_field(fan, wavenumber=20.0, boundary="hard")
     ended = fan.travel_time > fan.detachment[:, None]
-    assert ended.any() and np.all(u.status[ended] == FieldStatus.DETACHED) and np.all(u[ended] == 0)
+    assert np.all(u.method[~ended] == "rays") and np.mean(u.method[ended] == "march") > 0.9
     assert np.all(np.isfinite(u.error[u.ok])) and np.all(np.isfinite(u[u.ok]))
+    # of first order there are only modes
+    u = cr.surface_field(fan, wavenumber=20.0, boundary="hard", order=1)
+    assert np.all(u.status[ended] == FieldStatus.DETACHED) and np.all(u[ended] == 0)
+
+
+def test_each_ray_goes_on_where_it_detaches():
+    """What is marched takes over from creeping modes without a jump."""
+    body = sc.TwistedEllipsoid()
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 1, 1)), length=2.0, n_rays=48)
+    u = cr.surface_field(fan, wavenumber=20.0, boundary="hard")
+    # the wave without the phase that the ray has on its way
+    plain = u.values * np.exp(-20j * fan.eikonal)
+    last = np.sum(u.method == "rays", axis=1) - 1
+    jumps = []
+    for ray in np.flatnonzero((last > 3) & (last < len(fan.travel_time) - 1)):
+        jumps.append(abs(plain[ray, last[ray] + 1] / plain[ray, last[ray]]))
+    assert len(jumps) > 10 and 0.6 < np.median(jumps) < 1.3
 
 
 def test_ground_without_rays_is_not_zero_in_silence(monkeypatch):

@@ -7,7 +7,7 @@ import scatterers as sc
 from creeping.errors import SurfaceError
 from creeping.geometry.curvature import gaussian_curvature
 from creeping.geometry.depth import inner_points
-from creeping.geometry.quadrature import body_nodes, nearest_points
+from creeping.geometry.quadrature import body_nodes, nearest_points, node_count
 
 BODIES = {
     "sphere": sc.Sphere(radius=2.0),
@@ -107,3 +107,25 @@ def test_distances_are_from_nodes_sorted_once(monkeypatch):
     assert found == pytest.approx([1.0, 0.7], rel=0.01)
     monkeypatch.setattr(scipy.spatial, "cKDTree", None)
     np.testing.assert_array_equal(body_nodes(body, 20.0).distance(points), found)
+
+
+def test_bodies_of_pieces():
+    """Area and volume of a capsule, area of a cone-sphere, and a wave through a closed surface."""
+    pill, cone = sc.Capsule(1.0, 4.0), sc.ConeSphere(1.0, 4.0)
+    alpha = cone.half_angle
+    areas = {
+        "capsule": (pill, 8 * np.pi, 1e-10),
+        "cone": (cone, np.pi / np.tan(alpha) * np.cos(alpha) + 2 * np.pi * (1 + np.sin(alpha)), 3e-5),
+    }
+    for body, area, close in areas.values():
+        nodes = body_nodes(body, 30.0)
+        assert nodes.error < close
+        assert nodes.weights.sum() == pytest.approx(area, rel=close)
+        assert node_count(body, 30.0) == pytest.approx(len(nodes.points), rel=0.3)
+    nodes = body_nodes(pill, 30.0)
+    through = np.sum(nodes.weights * np.sum(nodes.points * nodes.normals, axis=1)) / 3
+    assert through == pytest.approx(2 * np.pi + 4 / 3 * np.pi, rel=1e-9)
+    # int n e^{ik q.x} dS is ik q times an integral over the volume: it has no component but along q
+    q = np.array([0.36, 0.48, 0.8])
+    flux = nodes.normals.T @ (nodes.weights * np.exp(15j * nodes.points @ q))
+    assert np.linalg.norm(np.cross(flux, q)) < 2e-4

@@ -52,8 +52,10 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
     (True, True)
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, smooth="the method of currents")
     kinds = scalar_boundaries(boundary)
+    checked_plain(
+        fan.body, smooth="the current of a conductor" if len(kinds) == 2 else "", edgeless="the method of currents"
+    )
     k = checked(wavenumber, 2)
     # a conductor's rays are as long as its wave that decays less
     lit, shadow = lit_nodes(fan.body, fan.line, k), ray_nodes(fan, k, kinds[-1])

@@ -16,7 +16,9 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, slowest_decay
+from creeping.field.marching.fan_waves import march_alone
 from creeping.field.shed_wave import smoothstep
+from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
@@ -181,7 +183,17 @@ def _out_of_the_wave(line: ShadowLine, points: FloatArray, dark: BoolArray) -> B
 def radius_rates(
     body: Surface, points: FloatArray, direction: FloatArray, along: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """rho' and rho rho'' (n,) of rho = 1/kappa_a along the plane of incidence at points (n, 3), L."""
+    """rho' and rho rho'' (n,) of rho = 1/kappa_a along the plane of incidence at points (n, 3), L.
+
+    Next to a joint those of its own piece.
+    """
+    if is_creased(body):
+        rate, bend = np.empty((2, len(points)))
+        numbers = piece_ahead(body, points, np.zeros(3))
+        for number in np.unique(numbers):
+            mine = numbers == number
+            rate[mine], bend[mine] = radius_rates(pieces_of(body)[number], points[mine], direction, along[mine])
+        return rate, bend
     n = normal(body, points)
     t = direction - np.sum(n * direction, axis=1, keepdims=True) * n
     t /= np.maximum(np.linalg.norm(t, axis=1, keepdims=True), 1e-300)
@@ -212,7 +224,8 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     normals = normal(fan.body, points).reshape(*shape, 3)
     weights = weights * _share_of_rays(fan.body, rays, normals, fan.line.direction, wavenumber)
     # marched waves go on where creeping modes have ended
-    there = (rays.alive | (boundary.varies & dense.launched[:, None])) & np.isfinite(weights) & (weights > 0)
+    goes_on = march_alone(fan.body, boundary) & dense.launched[:, None]
+    there = (rays.alive | goes_on) & np.isfinite(weights) & (weights > 0)
     rays, normals, weights = rays[there], normals[there], weights[there]
     twist = nodes_at(fan.body, rays.points, normals).twist(rays.directions)
     return RayNodes(dense, np.nonzero(there)[0], rays, normals, weights, twist)

@@ -12,11 +12,11 @@ Source: Derivations, F16 and F22.
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.errors import InvalidInputError
+from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.boundary import Boundary
 from creeping.field.currents.lit import lit_currents
 from creeping.field.currents.nodes import STEP, LitNodes, RayNodes
-from creeping.field.marching.fan_waves import fan_waves, marchable, spread_out
+from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.surface import surface_waves
 
 
@@ -34,7 +34,7 @@ def lit_waves(
 
 def ray_waves(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, ComplexArray]:
     """Wave at nodes of rays, 0 where there is none, and what of it is of second order (n,)."""
-    if kind.varies:
+    if march_alone(nodes.fan.body, kind):
         return _marched(nodes, k, kind)
     waves, first = (surface_waves(nodes.rays, k, kind, order) for order in (2, 1))
     # on a caustic of the body the current is infinite and its weight 0
@@ -44,9 +44,11 @@ def ray_waves(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, 
 
 def _marched(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, ComplexArray]:
     if not marchable(nodes.fan, kind, 2):
+        some = f"of {len(nodes.fan.status)} rays of this incidence some stand alone, where no wave can be marched"
+        if not kind.varies:
+            raise SurfaceError(f"the body has joints, and {some}; its far field by rays is known, or another incidence")
         raise InvalidInputError(
-            f"the admittance {kind.coating} varies, and of {len(nodes.fan.status)} rays of this incidence some stand "
-            "alone, where no wave can be marched; give a constant admittance, or another incidence"
+            f"the admittance {kind.coating} varies, and {some}; give a constant admittance, or another incidence"
         )
     marched = fan_waves(nodes.fan, wavenumber=k, boundary=kind)
     values, change = np.zeros((2, len(nodes.rows)), dtype=complex)

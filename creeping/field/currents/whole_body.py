@@ -31,7 +31,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary
@@ -231,6 +231,12 @@ class SurfaceCurrents:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.points)
+
+    def beside(self, points: FloatArray, distance: float) -> tuple[IntArray, IntArray]:
+        """Numbers of the nodes within a distance, L, of points (m, 3), point by point, and where each ends (m,)."""
+        found = self._nodes.query_ball_point(points, distance, return_sorted=True)
+        ends = np.cumsum([len(near) for near in found], dtype=np.int64)
+        return np.concatenate([np.zeros(0, np.int64), *found]).astype(np.int64), ends
 
     @cached_property
     def _left(self) -> FloatArray:

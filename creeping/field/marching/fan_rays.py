@@ -10,7 +10,7 @@ Lambda = D y/y_s is that of the incident wave where it drives the layer, behind 
 
 Both are tau/kappa_n on the line. It fades out where kappa_n falls below FLAT of that on the line, for good: there no
 single xi tells the wave; and it levels off at 1, where J falls to 0. Rays are traced both ways from the shadow line,
-beyond detachment too: marching goes on where creeping modes end.
+beyond detachment and across joints too: marching goes on where creeping modes end.
 
 Sources: Derivations, R1, R3 and F22.
 """
@@ -21,13 +21,15 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.field.arguments import checked_plain
 from creeping.field.boundary import HARD, Boundary
 from creeping.field.far_geometry import fan_strips
+from creeping.field.marching.jointed_rays import jointed_rays, piece_nodes
 from creeping.field.marching.profile import RayProfiles
 from creeping.field.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M11, M21, P, X, pack
+from creeping.geometry.creased import is_creased
 from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.quadrature import nodes_at
-from creeping.geometry.surface import Surface, normal, size
+from creeping.geometry.quadrature import BodyNodes, nodes_at
+from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.strips import Strip, strip_rows
 
@@ -68,22 +70,33 @@ def fan_profiles(
     Raises
     ------
     InvalidInputError
-        If the body has a speed, or edges, joints or tips.
+        If the body has a speed, or edges.
     """
-    checked_plain(fan.body, smooth="marching along rays of a fan")
+    checked_plain(fan.body, edgeless="marching along rays of a fan")
     body, d = fan.body, fan.line.direction
     x0, p0 = fan.points[:, 0], fan.directions[:, 0]
     least = 1 / size(body)
     kappa = normal_curvature(body, x0, p0)
-    back = float(np.median(BEHIND / np.maximum(kappa, least))) if behind is None else behind
+    jointed = is_creased(body)
+    # beyond a joint rays may be straighter than their neighbours
+    typical = np.max if jointed else np.median
+    back = float(typical(BEHIND / np.maximum(kappa, least))) if behind is None else behind
     ahead = fan.length if length is None else length
     sharpest = max(float(np.max(np.abs(fan.curvature))), least)
     ways = []
     for way, sense in ((back, -1.0), (ahead, 1.0)):
         count = int(np.clip(np.ceil(way * sharpest / TURN), FEWEST, MOST))
         times = np.linspace(0, way, count + 1)
-        states = trace_states(body, pack(x0, sense * p0, jacobi=True), times, rtol=RTOL)
-        ways.append(_along(body, d, x0, sense * times, states, sense, boundary))
+        begin = pack(x0, sense * p0, jacobi=True)
+        if jointed:
+            found = jointed_rays(body, begin, times, rtol=RTOL)
+            own, states = found.times, found.states
+            nodes = piece_nodes(body, states[..., X].reshape(-1, 3), found.pieces.ravel())
+        else:
+            states = trace_states(body, begin, times, rtol=RTOL)
+            own, x = np.broadcast_to(times, states.shape[:2]), states[..., X].reshape(-1, 3)
+            nodes = nodes_at(body, x, normal(body, x))
+        ways.append(_along(d, x0, sense * own, nodes, states, sense, boundary))
     first, second = ways
     whole = {name: np.concatenate([first[name][:, :0:-1], second[name]], axis=1) for name in first}
     gauss = whole["curvature"] * whole["transverse"] - whole["torsion"] ** 2
@@ -98,22 +111,21 @@ def fan_profiles(
 
 
 def _along(
-    body: Surface,
     d: FloatArray,
     x0: FloatArray,
     s: FloatArray,
+    nodes: BodyNodes,
     states: FloatArray,
     sense: float,
     boundary: Boundary,
 ) -> dict[str, Any]:
     """What the states of rays (rays, steps, 10) say, each (rays, steps)."""
     shape = states.shape[:2]
-    x, p = states[..., X].reshape(-1, 3), sense * states[..., P].reshape(-1, 3)
-    nodes = nodes_at(body, x, normal(body, x))
+    x, p = nodes.points, sense * states[..., P].reshape(-1, 3)
     b = np.cross(nodes.normals, p)
     away = x.reshape(*shape, 3) - x0[:, None]
     found: dict[str, Any] = {
-        "s": np.broadcast_to(s, shape),
+        "s": s,
         "curvature": nodes.curvature(p),
         "transverse": nodes.curvature(b),
         "torsion": nodes.twist(p),
@@ -131,9 +143,10 @@ def _along(
 
 def _lean(fan: RayFan, whole: dict[str, Any]) -> FloatArray:
     """Lambda (rays, m)."""
-    s, kappa, J = whole["s"][0], whole["curvature"], whole["spreading"]
-    start = int(np.argmax(s == 0))
-    lit, shadow = s < 0, s > 0
+    s, kappa, J = whole["s"], whole["curvature"], whole["spreading"]
+    # rays may have nodes of their own, but as many of them behind the line
+    start = int(np.argmax(s[0] == 0))
+    lit, shadow = slice(0, start), slice(start + 1, None)
     on_line = whole["torsion"][:, start] / kappa[:, start]
     out = np.zeros(kappa.shape)
     # 1 - d.p without cancellation
@@ -141,9 +154,9 @@ def _lean(fan: RayFan, whole: dict[str, Any]) -> FloatArray:
     out[:, lit] = (-whole["aside"] * (1 + whole["forward"]) / np.maximum(slope, 1e-300))[:, lit]
     out[:, start] = on_line
     inverse = J / (J**2 + LEAST_SPREADING**2 * np.exp(-((J / LEAST_SPREADING) ** 2)))
-    late = np.repeat(on_line[:, None], np.sum(shadow), axis=1)
+    late = np.repeat(on_line[:, None], s.shape[1] - start - 1, axis=1)
     for strip, mine in zip(fan_strips(fan), wide_rows(fan), strict=True):
-        at = np.minimum(s[shadow], strip.times[-1])
+        at = np.minimum(s[mine][:, shadow], strip.times[-1])
         change = _attenuation_slopes(strip, at)
         late[mine] += change / np.maximum(kappa[mine][:, shadow], 1e-9) ** (2 / 3)
     share = np.minimum.accumulate(smoothstep(kappa[:, shadow] / kappa[:, start, None], 0.0, FLAT), axis=1)
@@ -157,10 +170,9 @@ def wide_rows(fan: RayFan) -> list[IntArray]:
 
 
 def _attenuation_slopes(strip: Strip, times: FloatArray) -> FloatArray:
-    """dA/dsigma_perp (rays, times) of a strip, sigma_perp along b."""
+    """dA/dsigma_perp of the rays of a strip at times of their own (rays, m), sigma_perp along b."""
     sigma = strip.positions
-    rows, columns = (part.ravel() for part in np.meshgrid(sigma, times, indexing="ij"))
-    slopes = strip.attenuation_slopes(rows, columns).reshape(len(sigma), len(times))
+    slopes = strip.attenuation_slopes(np.repeat(sigma, times.shape[1]), times.ravel()).reshape(times.shape)
     along = strip.slopes(sigma, np.zeros(len(sigma)))[0][:, :3]
     b = np.cross(strip.first_normals(sigma), strip.rays.directions[:, 0])
     return np.asarray(slopes / np.sum(along * b, axis=1)[:, None])

@@ -26,9 +26,11 @@ from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.strip_waves import StripTable, around, modes_on_strip
+from creeping.geometry.creased import has_edges, is_creased
+from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
-from creeping.rays.status import RayStatus
+from creeping.rays.status import AT_CREASES, RayStatus
 from creeping.rays.strips import Strip
 
 KEPT = 2
@@ -57,6 +59,10 @@ class FanWaves:
     times : (steps,), L
         At which waves are kept.
     boundary : Boundary
+    alone : bool
+        Whether no creeping modes stand beside them.
+    ends : (rays,), L
+        Where rays end for good, at edges and tips; inf for others.
     """
 
     strips: tuple[Strip, ...]
@@ -64,6 +70,8 @@ class FanWaves:
     marched: MarchedRays
     times: FloatArray
     boundary: Boundary
+    alone: bool
+    ends: FloatArray
 
     @property
     def wavenumber(self) -> float:
@@ -93,7 +101,7 @@ class FanWaves:
         found = []
         for strip, rows in zip(self.strips, self.rows, strict=True):
             y, error = self._by_marching(rows)
-            if self.boundary.varies:
+            if self.alone:
                 found.append((np.where(np.isfinite(error), y, 0.0), error))
                 continue
             modes, other = modes_on_strip(strip, self.times, self.wavenumber, self.boundary)
@@ -117,7 +125,7 @@ class FanWaves:
         # in space what is left out goes like the next power of what the twist adds
         error = error + TWISTED * np.sqrt(self._twist(rows, y)) * np.abs(y)
         lacking = np.isin(m.status[rows], (MarchStatus.UNLIT, MarchStatus.UNSTABLE))
-        return y, np.where(lacking[:, None], np.inf, error)
+        return y, np.where(lacking[:, None] | (self.times > self.ends[rows, None]), np.inf, error)
 
     def _twist(self, rows: IntArray, y: ComplexArray) -> FloatArray:
         """(k/2) int |k_c/k - 1|^2 (Lambda^2 + tau^2/kappa_n^2) ds of rays (rows, steps)."""
@@ -159,16 +167,22 @@ def spread_out(y: ComplexArray, rays: RayPoints, wavenumber: float) -> ComplexAr
         return np.asarray(y / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * phase))
 
 
-def marchable(fan: RayFan, boundary: Boundary, order: int) -> bool:
-    """Whether the waves of a fan can be marched."""
+def march_alone(body: Surface, boundary: Boundary) -> bool:
+    """Whether marching alone knows the waves: of an admittance that varies, and across joints."""
+    return boundary.varies or (is_creased(body) and not has_edges(body))
+
+
+def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = FEWEST_RAYS) -> bool:
+    """Whether the waves of a fan can be marched, with at least so many rays on each of its strips."""
     strips = fan_strips(fan)
     return (
         order == 2
         and boundary.kind in ("soft", "hard", "impedance")
         and len(strips) > 0
         and sum(len(strip.positions) for strip in strips) == len(fan.status)
-        and min(len(strip.positions) for strip in strips) >= FEWEST_RAYS
-        and bool(np.all(np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED))))
+        and min(len(strip.positions) for strip in strips) >= fewest
+        and not has_edges(fan.body)
+        and bool(np.all(np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, *AT_CREASES))))
     )
 
 
@@ -181,5 +195,7 @@ def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves
             kept.pop(next(iter(kept)))
         marched = march_rays(fan_profiles(fan, boundary=boundary), wavenumber=wavenumber, boundary=boundary)
         times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=FEWEST)) + 1)
-        kept[key] = FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary)
+        ends = np.where(np.isin(fan.status, AT_CREASES), fan.detachment, np.inf)
+        alone = march_alone(fan.body, boundary)
+        kept[key] = FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary, alone, ends)
     return kept[key]

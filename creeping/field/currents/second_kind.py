@@ -1,0 +1,120 @@
+"""Lit ground next to joints: one step of the integral equation from the currents of the whole body.
+
+    hard        u = 2 u_inc + 2 int u dG/dn_y dS_y
+    soft        du/dn = 2 du_inc/dn - 2 int du/dn dG/dn_x dS_y
+    impedance   (1 + eta/c) u = 2 u_inc + 2 int u (dG/dn_y + ik eta_y G) dS_y + (eta/c) u,   c = -n.d
+
+The expansions of lit ground know its curvature at a place and no more; where it jumps the true field passes from one to
+the other over the paths by which waves come from either side. The right side, with the expansions in it, holds these
+waves. On lit ground a step makes what is wrong smaller, by what a wave that grazes less than c suffers from one place
+to the next, kappa/(k c^3); behind the line it does not, and there rays serve. With t = eta/c that of a plane mirror is
+taken over to the left.
+
+Next to x the integrals are weakly singular. With chi = e^{-(R/a)^2}, a = 2/k, kappa = (kappa_1 + kappa_2)/2,
+
+    int chi dG_0/dn dS = -(sqrt(pi)/8) a kappa,   int chi G_0 dS = (sqrt(pi)/4) a
+
+are taken off from the sums over nodes, with the current at x, and put back.
+
+Source: Derivations, F30.
+"""
+
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.served import Served
+from creeping.field.shed_wave import smoothstep
+from creeping.geometry.quadrature import nodes_at
+from creeping.geometry.surface import normal
+from creeping.kernels.threads import in_threads
+
+NEAR = 2.0
+"""A, over 1/k."""
+NEIGHBOURS = 4.5
+"""Distance, over a, of nodes that are next to a point: chi is 1e-9 there."""
+EACH = 2.5e-9
+"""Seconds of one pair, about."""
+MOST_PAIRS = 1e10
+"""Pairs of a point and a node up to which it is done."""
+LEAST = 0.05
+"""C from which the wave of an impedance is taken apart."""
+OWN, EVERYWHERE, STILL = 1.5, 2.0, 0.25
+"""Error of a step, in what currents leave of the incident wave inside, and in what it changes everywhere; and what it
+leaves of the error before."""
+SAMPLE, CLEAR, QUARTER = 128, 0.3, 0.25
+"""Nodes, of c above this, by which that is judged, and the quantile."""
+WHOLE = 0.5
+"""Share of lit ground from which on the step is taken whole: behind the line its error grows."""
+_EVERYWHERE: "WeakKeyDictionary[SurfaceCurrents, float]" = WeakKeyDictionary()
+
+
+def across_joints(
+    field: Served, currents: SurfaceCurrents, points: FloatArray, share: FloatArray, unit: float
+) -> Served:
+    """The field on a body, at points (n, 3), L, of which ``share`` (n,) is lit ground, with what joints make of that.
+
+    A step is taken as far as it changes more than it errs by itself, as a share of the incident wave's ``unit``.
+    """
+    at = np.flatnonzero(share > 0)
+    if not 0 < len(at) * len(currents.points) < MOST_PAIRS:
+        return field
+    values = field.values[at]
+    change = stepped(currents, points[at], normal(currents.body, points[at]), values) - values
+    size, own = np.abs(change), unit * np.hypot(OWN * currents.extinction, EVERYWHERE * _everywhere(currents, unit))
+    taken = size**2 / np.maximum(size**2 + own**2, 1e-300)
+    reach = smoothstep(share[at], 0.0, WHOLE)
+    wave, error = field.wave.copy(), field.error.copy()
+    wave[at] += reach * taken * change
+    error[at] = np.hypot(error[at], reach * size * (1 - taken + STILL * taken))
+    return replace(field, wave=wave, error=error)
+
+
+def _everywhere(currents: SurfaceCurrents, unit: float) -> float:
+    """What a step changes far from joints too, over the incident wave: where currents elsewhere are wrong."""
+    if currents not in _EVERYWHERE:
+        clear = np.flatnonzero(currents.lit & (currents.normals @ currents.direction < -CLEAR))
+        some = clear[:: max(1, len(clear) // SAMPLE)]
+        points, normals, values = currents.points[some], currents.normals[some], currents.values[some]
+        change = np.abs(stepped(currents, points, normals, values) - values)
+        _EVERYWHERE[currents] = float(np.quantile(change, QUARTER)) / unit if len(some) else 0.0
+    return _EVERYWHERE[currents]
+
+
+def stepped(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, values: ComplexArray) -> ComplexArray:
+    """Field u, or du/dn if soft, at points of the body with normals (m, 3) by one step from ``values`` (m,)."""
+    from creeping.field.kernels.second_kind import from_afar, from_beside
+
+    k, kind, d = currents.wavenumber, currents.boundary, currents.direction
+    soft, a = kind.kind == "soft", NEAR / currents.wavenumber
+    eta, ours = (
+        np.zeros(len(x)) if soft else np.broadcast_to(kind.at(x).admittance, (len(x),))
+        for x in (points, currents.points)
+    )
+    # of the sums: at nodes, and of each point itself
+    double = currents.weights * currents.values / (4 * np.pi)
+    both = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (1j * k * ours * double, double)]
+    here = 1j * k * eta * values
+    own = np.stack([here.real, here.imag, values.real, values.imag]) / (4 * np.pi)
+    x, n, y, sides = (np.ascontiguousarray(part.T) for part in (points, normals, currents.points, currents.normals))
+    out = np.zeros((len(points), 4))
+    bends = 0.5 * nodes_at(currents.body, currents.points, currents.normals).total_curvature
+    beside = currents.beside(points, NEIGHBOURS * a)
+
+    def work(part: slice) -> None:
+        from_afar(x, n, y, sides, *both, k, NEIGHBOURS * a, soft, part.start, part.stop, out)
+
+    in_threads(work, len(points), least=16, multiple=1, seconds=EACH * len(double))
+    from_beside(x, n, own, *beside, y, sides, currents.weights, bends, currents.lit, *both, k, a, soft, out)
+    cover, bent = out[:, 2] / (np.pi * a**2), out[:, 3] / (np.pi * a**2)
+    sign = 1 if soft else -1
+    put_back = here * cover * np.sqrt(np.pi) / 4 * a + sign * values * bent * np.sqrt(np.pi) / 8 * a
+    rest = 2 * (out[:, 0] + 1j * out[:, 1] + put_back)
+    wave = 2 * np.exp(1j * k * (points @ d))
+    if soft:
+        return np.asarray(1j * k * (normals @ d) * wave + rest)
+    share = eta / np.maximum(-normals @ d, LEAST)
+    return np.asarray((wave + rest + share * values) / (1 + share))

@@ -1,0 +1,87 @@
+"""Compiled sums over currents at nodes y of what the rest of a body sends to points x of its surface.
+
+    u(x) = sum_y h [a_y + b_y n.(x - y) (1/R - ik)/R] e^{ikR}/R - chi w_y [a + b n.(x - y)/R^2]/R,   R = |x - y|
+
+with n that of y, or of x for du/dn of a soft body, which asks for -dG/dn_x.
+
+chi = e^{-(R/a)^2} takes off the static part of what stands next to x, as if the current there were that of x, over
+nodes that share its phase; of others h = 1 - e^{-(kR)^2} leaves out those that x stands on. What is taken off is put
+back in closed form: sums of chi w and chi w kappa_y tell how much of the surface there it was.
+
+Source: Derivations, F30.
+"""
+
+import math
+
+from numba import njit
+
+from creeping.field.kernels.radiation import cosine_sine
+from creeping.kernels.block import entry_options
+
+TOUCHING = 1e-6
+"""Distance, over 1/k, below which a node is the point itself."""
+
+
+@njit(**entry_options)
+def from_afar(x, normals, y, sides, single, double, k, near, soft, first, last, out):
+    """Fill rows first..last of out (m, 4), the first two columns, with the sums over nodes farther than ``near``.
+
+    Points x and their normals (3, m), nodes y and theirs ``sides`` (3, n), single and double (2, n) the weights a and
+    b, real before imaginary parts.
+    """
+    per, least = k / (2 * math.pi), near * near
+    for j in range(first, last):
+        x0, x1, x2 = x[0, j], x[1, j], x[2, j]
+        n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
+        p, q = 0.0, 0.0
+        for i in range(y.shape[1]):
+            dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
+            square = dx * dx + dy * dy + dz * dz
+            inverse = 1.0 / math.sqrt(max(square, least))
+            w = inverse if square > least else 0.0
+            across = sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz
+            lean = (n0 * dx + n1 * dy + n2 * dz if soft else across) * inverse
+            c, s = cosine_sine(per / inverse)
+            a = single[0, i] + lean * (double[0, i] * inverse + double[1, i] * k)
+            b = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
+            p += w * (a * c - b * s)
+            q += w * (a * s + b * c)
+        out[j, 0], out[j, 1] = p, q
+
+
+@njit(**entry_options)
+def from_beside(
+    x, normals, own, neighbours, ends, y, sides, weights, bends, alike, single, double, k, reach, soft, out
+):
+    """Add what nodes near each point give, numbers ``neighbours`` up to ``ends`` (m,), to all columns of out (m, 4).
+
+    The last two are the sums of chi w and chi w kappa, of w and kappa (n,) of the nodes that are ``alike`` (n,) the
+    points in phase. ``own`` (4, m) are the weights a and b of the points themselves, over w, by twos.
+    """
+    per, least, wide = k / (2 * math.pi), (TOUCHING / k) ** 2, 1.0 / reach**2
+    first = 0
+    for j in range(len(ends)):
+        p, q, area, bent = 0.0, 0.0, 0.0, 0.0
+        for place in range(first, ends[j]):
+            i = neighbours[place]
+            dx, dy, dz = x[0, j] - y[0, i], x[1, j] - y[1, i], x[2, j] - y[2, i]
+            square = dx * dx + dy * dy + dz * dz
+            chi = math.exp(-square * wide) * weights[i] if alike[i] else 0.0
+            area += chi
+            bent += chi * bends[i]
+            if square < least:
+                continue
+            inverse = 1.0 / math.sqrt(square)
+            across = sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz
+            lean = (normals[0, j] * dx + normals[1, j] * dy + normals[2, j] * dz if soft else across) * inverse
+            c, s = cosine_sine(per / inverse)
+            a = single[0, i] + lean * (double[0, i] * inverse + double[1, i] * k)
+            b = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
+            h = inverse * (1.0 if alike[i] else 1.0 - math.exp(-square * k * k))
+            still = chi * inverse
+            p += h * (a * c - b * s) - still * (own[0, j] + lean * inverse * own[2, j])
+            q += h * (a * s + b * c) - still * (own[1, j] + lean * inverse * own[3, j])
+        out[j, 0] += p
+        out[j, 1] += q
+        out[j, 2], out[j, 3] = area, bent
+        first = ends[j]
