@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.building import Plan, Progress, build_direct, curvature_reach, with_errors
+from creeping.phaseflow.building import Plan, Progress, Reference, build_direct, curvature_reach, with_errors
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
@@ -104,7 +104,7 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
         progress("probing horizons and grids")
         found = candidates(spec, model, cost)
     best: tuple[float, PhaseMap] | None = None
-    spent = 0.0
+    spent, known = 0.0, dict[Any, Reference]()
     for candidate in found[:3]:
         plan, before = candidate.plan, np.inf
         if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
@@ -112,7 +112,7 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
         for _ in range(6):
             progress(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
             built = build_direct(body, model, plan, progress, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
-            result, measuring = _measured(built, spec, cost)
+            result, measuring = _measured(built, spec, cost, known)
             spent += build_seconds(plan, model, cost) + measuring
             assert result.growth is not None
             reached = result.growth.bound if spec.length else result.error.rms
@@ -150,7 +150,7 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
     )
 
 
-def _measured(built: PhaseMap, spec: "MapSpec", cost: float) -> tuple[PhaseMap, float]:
+def _measured(built: PhaseMap, spec: "MapSpec", cost: float, known: dict[Any, Reference]) -> tuple[PhaseMap, float]:
     """The map with its errors, and nominal seconds of measuring them.
 
     Where F is expensive it is done on fewer rays, and against a reference only so much better.
@@ -161,7 +161,7 @@ def _measured(built: PhaseMap, spec: "MapSpec", cost: float) -> tuple[PhaseMap, 
     samples = int(np.clip(budget / (cost * length), 400, 2000))
     expensive = 4 * cost * length * samples > budget
     rtol = 1e-3 * spec.tolerance if expensive else 1e-12
-    result = with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16)
+    result = with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16, known=known)
     return result, measuring_seconds(cost, length, result.error.samples, rtol)
 
 
