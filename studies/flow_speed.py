@@ -199,7 +199,7 @@ def two_threads(names: tuple[str, ...] = ("ellipsoid", "twisted"), count: int = 
 def sizes(
     numbers: tuple[int, ...] = (1000, 10_000, 100_000, 1_000_000), nodes: Any = (20, 30, 40, 50, 60)
 ) -> list[Row]:
-    """Table 7: cost against rays of the ellipsoid, error and build against nodes of a triaxial one; fitted exponents."""
+    """Table 7: cost against rays of the ellipsoid, error and build against nodes of a triaxial one, fitted."""
     flow, shape = cases.built("ellipsoid").flow, body("ellipsoid")
     rays = [n * seconds_each(flow, cases.random_rays(shape, n)) for n in numbers]
     errors, builds, totals = [], [], []
