@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scatterers.atlas.charts import PeriodicAtlas, PeriodicChart
 from scatterers.base.body import Body, positive
 from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.trigonometry import cos_pi, sin_pi
+from scatterers.kernels.trigonometry import cos_pi, sin_pi, turns
 
 FloatArray = NDArray[np.float64]
 
@@ -63,6 +63,11 @@ class Torus(Body):
         """Box (2, 3) that contains the body, L."""
         half = np.array([self.R + self.r, self.R + self.r, self.r])
         return np.stack([-half, half])
+
+    @property
+    def axis_of_revolution(self) -> tuple[float, float, float]:
+        """Unit vector along the axis."""
+        return 0.0, 0.0, 1.0
 
     def level(self, points: FloatArray) -> FloatArray:
         """F, without unit, positive outside: points (..., 3), L, to (...)."""
@@ -184,23 +189,43 @@ def _forward(chart, points, derivatives, parameters):  # type: ignore[no-untyped
     """Points and tangents of a block; the compiled twin of the chart's point and tangents."""
     major, minor = parameters[0], parameters[1]
     turn = 2 * math.pi
-    for i in range(chart.shape[1]):
-        # the period of the chart variables is 1, that of cos_pi is 2
-        cos_psi, sin_psi = cos_pi(2 * chart[0, i]), sin_pi(2 * chart[0, i])
-        cos_theta, sin_theta = cos_pi(2 * chart[1, i]), sin_pi(2 * chart[1, i])
-        rho, height = major + minor * cos_theta, minor * sin_theta
-        points[0, i], points[1, i], points[2, i] = rho * cos_psi, rho * sin_psi, height
-        derivatives[0, i], derivatives[3, i], derivatives[6, i] = -turn * rho * sin_psi, turn * rho * cos_psi, 0.0
-        derivatives[1, i], derivatives[4, i] = -turn * height * cos_psi, -turn * height * sin_psi
-        derivatives[7, i] = turn * minor * cos_theta
+    n = chart.shape[1]
+    # while they are not yet wanted, rows of the derivative hold cosines and sines; the period of the chart variables is
+    # 1, that of cos_pi is 2. Few rows a loop, as in `_evaluate`
+    for i in range(n):
+        derivatives[2, i] = cos_pi(2 * chart[0, i])
+        derivatives[5, i] = sin_pi(2 * chart[0, i])
+    for i in range(n):
+        derivatives[7, i] = cos_pi(2 * chart[1, i])
+        points[2, i] = minor * sin_pi(2 * chart[1, i])
+    for i in range(n):
+        rho = major + minor * derivatives[7, i]
+        points[0, i] = rho * derivatives[2, i]
+        points[1, i] = rho * derivatives[5, i]
+    for i in range(n):
+        derivatives[0, i] = -turn * points[1, i]
+        derivatives[3, i] = turn * points[0, i]
+    for i in range(n):
+        height = -turn * points[2, i]
+        derivatives[1, i] = height * derivatives[2, i]
+        derivatives[4, i] = height * derivatives[5, i]
+    for i in range(n):
+        derivatives[7, i] *= turn * minor
+        derivatives[6, i] = 0.0
+    for i in range(n):
         derivatives[2, i], derivatives[5, i], derivatives[8, i] = 0.0, 0.0, 0.0
 
 
 def _inverse(points, chart, parameters):  # type: ignore[no-untyped-def]
     """Chart variables of a block, in turns."""
-    turn = 1 / (2 * math.pi)
-    for i in range(points.shape[1]):
+    major = parameters[0]
+    n = points.shape[1]
+    for i in range(n):
+        chart[0, i] = turns(points[1, i], points[0, i])
+    for i in range(n):
         x, y = points[0, i], points[1, i]
-        chart[0, i] = math.atan2(y, x) * turn
-        chart[1, i] = math.atan2(points[2, i], math.sqrt(x * x + y * y) - parameters[0]) * turn
+        chart[2, i] = math.sqrt(x * x + y * y) - major
+    for i in range(n):
+        chart[1, i] = turns(points[2, i], chart[2, i])
+    for i in range(n):
         chart[2, i] = 0.0

@@ -199,17 +199,17 @@ def two_threads(names: tuple[str, ...] = ("ellipsoid", "twisted"), count: int = 
 def sizes(
     numbers: tuple[int, ...] = (1000, 10_000, 100_000, 1_000_000), nodes: Any = (20, 30, 40, 50, 60)
 ) -> list[Row]:
-    """Table 7: ellipsoid; cost against rays, error of one leap and build against nodes, with fitted exponents."""
+    """Table 7: cost against rays of the ellipsoid, error and build against nodes of a triaxial one, fitted."""
     flow, shape = cases.built("ellipsoid").flow, body("ellipsoid")
     rays = [n * seconds_each(flow, cases.random_rays(shape, n)) for n in numbers]
     errors, builds, totals = [], [], []
     for n in nodes:
         grid: Any = {"grid": (n, 2 * n), "horizon": 1.0, "degree": 5, "precision": "double", "carry_jacobi": False}
         started = time.process_time()
-        one = cr.build_phase_map(shape, cache=False, **grid)
+        one = cr.build_phase_map(body("triaxial"), cache=False, **grid)
         builds.append(time.process_time() - started)
         errors.append(one.error.rms)
-        totals.append(6 * n * n * 2 * n)
+        totals.append(len(one.leaps[-1].state) * int(np.prod(one.grid.nodes)))
     found = (
         ("rays", "map s", numbers, rays),
         ("side", "leap error", nodes, errors),

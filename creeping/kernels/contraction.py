@@ -21,12 +21,14 @@ _double, _index = ir.DoubleType(), ir.IntType(64)
 _wide = ir.VectorType(_double, WIDTH)
 
 
-def contraction(degree: int, lanes: int) -> Any:
+def contraction(degree: int, lanes: int, *, flat: bool = False) -> Any:
     """Make ``f(table, offset, stride_u, stride_v, wu, wv, wa, place, step, out, out_place)`` for kernels.
 
     ``table`` is a C-contiguous float32 or float64 array seen as flat memory; the stencil's first coefficient starts at
     ``offset``, rows are ``stride_v`` and planes ``stride_u`` values apart. Weight j lies at ``place + j * step`` of
     its array. Writes ``lanes`` (4 or 8) values to ``out`` from ``out_place`` on.
+
+    Flat, the stencil is one plane: it has no axis u, and neither ``stride_u`` nor ``wu`` is read.
     """
     points = degree + 1
     vectors = points * lanes // WIDTH
@@ -65,17 +67,19 @@ def contraction(degree: int, lanes: int) -> Any:
 
             along_v = [builder.fptrunc(w, narrow) if single else w for w in weights(weight_v)]
             sums: list[Any] = [None] * vectors
-            for i, w_i in enumerate(weights(weight_u)):
+            for i, w_i in enumerate([None] if flat else weights(weight_u)):
                 plane = builder.add(start, builder.mul(stride_u, ir.Constant(_index, i)))
                 inner: list[Any] = [None] * vectors
                 for j, w_j in enumerate(along_v):
                     row = builder.add(plane, builder.mul(stride_v, ir.Constant(_index, j)))
-                    weight = _spread(builder, w_j if single else builder.fmul(w_i, w_j))
+                    weight = _spread(builder, w_j if single or flat else builder.fmul(w_i, w_j))
                     into = inner if single else sums
                     for k in range(vectors):
                         value = _load(builder, builder.gep(rows, [builder.add(row, ir.Constant(_index, WIDTH * k))]))
                         into[k] = multiply_add(into[k], weight, value)
-                if single:
+                if single and flat:
+                    sums = [builder.fpext(part, _wide) for part in inner]
+                elif single:
                     weight = _spread(builder, w_i)
                     sums = [
                         multiply_add(total, weight, builder.fpext(part, _wide))

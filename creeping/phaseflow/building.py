@@ -6,6 +6,7 @@ to T0/2^d by the order-8 pair, and the map is composed with itself at the nodes 
 expensive. The error is C (tau^4 + h^(p+1)) and C h^(p+1) respectively.
 """
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -199,26 +200,36 @@ def _leap(
 
 def measure(flow: PhaseMap, *, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> ErrorEstimate:
     """Error of one g_T0 against `trace` at 1e-12, over random points of T1Q (seed 0 without ``rng``)."""
-    errors = _errors(flow, np.array([flow.horizon]), samples, rng or np.random.default_rng(0), 1e-12)[:, 0]
+    rays = Reference(flow.body, np.array([flow.horizon]), flow.horizon / 8, 1e-12, rng)
+    errors = rays.errors(flow, 0, samples)[:, 0]
     return ErrorEstimate(float(np.sqrt(np.mean(errors**2))), float(errors.max()), samples)
 
 
 def with_errors(
-    flow: PhaseMap, length: float | None = None, *, samples: int = SAMPLES, rtol: float = 1e-12, most: int = 1
+    flow: PhaseMap,
+    length: float | None = None,
+    *,
+    samples: int = SAMPLES,
+    rtol: float = 1e-12,
+    most: int = 1,
+    known: "dict[Any, Reference] | None" = None,
 ) -> PhaseMap:
     """The map with its error of one g_T0 and of rays up to ``length``, 8 horizons if not given.
 
-    Where few of the rays carry most of the error, up to ``most`` times as many are taken.
+    Where few of the rays carry most of the error, up to ``most`` times as many are taken. ``known`` keeps the traced
+    rays for the next map of the body with the same horizon.
     """
     count = max(1, round(length / flow.horizon)) if length else 8
     leaps = [m for m in (1, 2, 4, 8, 16, 32, 64, 128, 256) if m < count] + [count]
     times = flow.horizon * np.array(leaps, dtype=float)
     if length:
         times[-1] = length
-    rng = np.random.default_rng(0)
+    fresh = Reference(flow.body, times, flow.horizon / 8, rtol)
+    rays = fresh if known is None else known.setdefault((flow.horizon, *times.tolist(), rtol, samples), fresh)
+    draws = itertools.count()
     # what the tolerance is asked for: the ends of rays, or one g_T0
     errors = sampled_errors(
-        lambda number: _errors(flow, times, number, rng, rtol), samples, most, column=-1 if length else 0
+        lambda number: rays.errors(flow, next(draws), number), samples, most, column=-1 if length else 0
     )
     rms, largest = np.sqrt(np.mean(errors**2, axis=0)), errors.max(axis=0)
     growth = ErrorGrowth(
@@ -245,11 +256,24 @@ def upper_bound(errors: FloatArray) -> float:
     return float(np.sqrt(np.mean(square) + 2 * np.std(square) / np.sqrt(len(square))))
 
 
-def _errors(flow: PhaseMap, times: FloatArray, samples: int, rng: np.random.Generator, rtol: float) -> FloatArray:
-    """|(x, p) - (x, p)_traced| of random rays: (samples, m)."""
-    states = pack(*random_bundle_points(flow.body, samples, rng=rng))
-    exact = trace_states(flow.body, states, times, rtol=rtol, step=flow.horizon / 8)
-    return np.asarray(np.linalg.norm(flow.transport(states, times) - exact, axis=2))
+class Reference:
+    """Random rays of a body and where they are at times (m,), L, traced once; seed 0 without ``rng``."""
+
+    def __init__(
+        self, body: Surface, times: FloatArray, step: float, rtol: float, rng: np.random.Generator | None = None
+    ) -> None:
+        self._body, self._times, self._step, self._rtol = body, times, step, rtol
+        self._rng = rng or np.random.default_rng(0)
+        self._drawn: list[tuple[FloatArray, FloatArray]] = []
+
+    def errors(self, flow: PhaseMap, draw: int, samples: int) -> FloatArray:
+        """|(x, p) - (x, p)_traced| of the rays of a draw, of which there are so many: (samples, m)."""
+        if draw == len(self._drawn):
+            states = pack(*random_bundle_points(self._body, samples, rng=self._rng))
+            exact = trace_states(self._body, states, self._times, rtol=self._rtol, step=self._step)
+            self._drawn.append((states, exact))
+        states, exact = self._drawn[draw]
+        return np.asarray(np.linalg.norm(flow.transport(states, self._times) - exact, axis=2))
 
 
 _CHECKED: set[str] = set()

@@ -95,7 +95,11 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
 
 def _grid_of(content: dict[str, Any]) -> Grid:
     nodes, degree, periodic = tuple(content["nodes"]), content["degree"], tuple(content["periodic"])
-    if len(nodes) != 3 or any(type(n) is not int or n < 2 for n in nodes) or degree not in (3, 5):
+    if (
+        len(nodes) != 3
+        or any(type(n) is not int or n < least for n, least in zip(nodes, (1, 2, 2), strict=True))
+        or degree not in (3, 5)
+    ):
         raise ValueError(f"a grid of {nodes} with degree {degree}")
     if len(periodic) != 2 or any(type(wraps) is not bool for wraps in periodic):
         raise ValueError(f"a grid whose periods are {periodic}")
@@ -109,7 +113,8 @@ def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Mode
     """Kernels trust shapes and types, so they must follow from the grid."""
     whole = (model.charts, *grid.sides)
     for leap in leaps:
-        fits = leap.state.shape == (*whole, model.lanes) and grid.degree in (3, 5)
+        fits = grid.is_flat == model.is_flat and grid.periodic == model.periodic
+        fits &= leap.state.shape == (*whole, model.lanes) and grid.degree in (3, 5)
         fits &= leap.centre.shape == (model.lanes,)
         fits &= leap.curvature.shape in ((*whole, 8), (0, *grid.sides, 8)) and leap.curvature.dtype == leap.state.dtype
         packed = leap.is_packed and leap.has_curvature and isinstance(model, CompiledModel)

@@ -16,7 +16,10 @@ PACKED = 8
 
 @dataclass(frozen=True)
 class Grid:
-    """Nodes of a map along u, v and the angle; MARGIN of them lie outside the unit square on each side."""
+    """Nodes of a map along u, v and the angle; MARGIN of them lie outside the unit square on each side.
+
+    One node along u stands for all of them: the map is that of a body of revolution, and u its azimuth.
+    """
 
     nodes: tuple[int, int, int]
     degree: int
@@ -28,6 +31,11 @@ class Grid:
         return np.array([0.0 if wraps else float(MARGIN) for wraps in self.periodic])
 
     @property
+    def is_flat(self) -> bool:
+        """Whether the map does not depend on u."""
+        return self.nodes[0] == 1
+
+    @property
     def cells(self) -> FloatArray:
         """Cells per unit of u, v and per turn of the angle."""
         sides = [n if wraps else n - 1 - 2 * MARGIN for n, wraps in zip(self.nodes[:2], self.periodic, strict=True)]
@@ -37,7 +45,8 @@ class Grid:
     def sides(self) -> tuple[int, ...]:
         """Coefficients along each axis: periodic ones are continued by the degree."""
         p, wraps = self.degree, (*self.periodic, True)
-        return tuple(n + p if around else n + p - 1 for n, around in zip(self.nodes, wraps, strict=True))
+        sides = [n + p if around else n + p - 1 for n, around in zip(self.nodes, wraps, strict=True)]
+        return (1 if self.is_flat else sides[0], *sides[1:])
 
     def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Node values of u, v and the angle (radians)."""
@@ -53,7 +62,7 @@ class Leap:
     ----------
     time : float
     state : (charts, nu, nv, na, lanes), float64 or float32
-        Coefficients of the displacement less its mean.
+        Coefficients of the displacement less its mean; nu = 1 if the map does not depend on u.
     centre : (lanes,)
         The mean: float32 coefficients resolve what is left of it.
     jacobi : (charts, nu, nv, na, 4 or 8), of the same type

@@ -22,7 +22,7 @@ from creeping._typing import Any, FloatArray
 from creeping.geodesics.attenuation import kernel_rules
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, pack
 from creeping.geometry.surface import size
-from creeping.phaseflow.coordinates.rotation import CompiledModel
+from creeping.phaseflow.coordinates.rotation import AngleModel, CompiledModel
 from creeping.phaseflow.grid import Grid, Leap
 
 SHORTEST = 0.2
@@ -36,7 +36,7 @@ TESTED = 4
 def packed_lanes(model: CompiledModel, values: FloatArray, matrices: FloatArray, bent: FloatArray, time: float) -> Any:
     """Lanes (n, 8) at the nodes of displacements, matrices (n, 4) and curvatures (n, 8); None if they are too long."""
     q = values[:, :3]
-    if model.name != "angles":
+    if not isinstance(model, AngleModel):
         turned = np.where(values[:, :1] < 0, -values, values)
         if turned[:, 0].min() < SHORTEST:
             return None

@@ -81,8 +81,13 @@ def thinning_operator(n: int, stride: int, degree: int, periodic: bool) -> Float
 
 
 def prefilter(values: FloatArray, degree: int, periodic: tuple[bool, bool]) -> FloatArray:
-    """Node values (charts, nu, nv, na, lanes) to coefficients; the last grid axis is periodic."""
+    """Node values (charts, nu, nv, na, lanes) to coefficients; the last grid axis is periodic.
+
+    With nu = 1 they do not depend on u.
+    """
     for axis, wraps in ((1, periodic[0]), (2, periodic[1]), (3, True)):
+        if axis == 1 and values.shape[1] == 1:
+            continue
         operator = interpolation_operator(values.shape[axis], degree, wraps)
         values = np.moveaxis(np.tensordot(operator, values, axes=(1, axis)), 0, axis)
     return np.ascontiguousarray(values)

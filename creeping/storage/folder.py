@@ -16,7 +16,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError, StoredMapError
 
-SCHEMA = 3
+SCHEMA = 4
 MANIFEST = "manifest.json"
 _MAX_MANIFEST = 1_000_000
 

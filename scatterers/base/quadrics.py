@@ -95,6 +95,14 @@ class BentEllipsoid(Body):
         """Whether the three coordinate planes are mirrors of the body and of its sphere map."""
         return self._shape()[3] == 0.0
 
+    @property
+    def axis_of_revolution(self) -> tuple[float, float, float] | None:
+        """Unit vector along the axis of a spheroid, z of a sphere; None of any other body."""
+        a, b, c, d = self._shape()
+        if d != 0.0 or not (a == b or b == c or c == a):
+            return None
+        return (0.0, 0.0, 1.0) if a == b else (1.0, 0.0, 0.0) if b == c else (0.0, 1.0, 0.0)
+
     @cached_property
     def compiled(self) -> Compiled:
         """Compiled level evaluator."""

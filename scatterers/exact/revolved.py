@@ -63,6 +63,14 @@ class Revolved(CreasedBody):
             Piece(Compiled(evaluate, "level", self._packed([s], whole=False)), self._box([s])) for s in self._profile
         ]
 
+    @property
+    def axis_of_revolution(self) -> tuple[float, float, float] | None:
+        """Unit vector along the axis, None of an affine image that has none."""
+        if self._stretch != 1.0:
+            return None
+        x, y, z = (float(self._axes[2] == k) for k in range(3))
+        return x, y, z
+
     @cached_property
     def bounds(self) -> FloatArray:
         """Box (2, 3) that contains the body, L."""

@@ -12,6 +12,9 @@ from oracles.attenuation import extend
 
 def evaluate(table, chart, grid, degree):
     """Evaluate at charts (n,) and grid coordinates (n, 3): (n, lanes). The numpy twin of the compiled contraction."""
+    if table.shape[1] == 1:
+        # a table without azimuth is that of any azimuth; B-spline weights add up to 1
+        table = np.repeat(table, degree + 1, axis=1)
     cells = np.array([table.shape[1] - degree, table.shape[2] - degree, table.shape[3] - degree])
     cell = np.clip(np.floor(grid).astype(np.int64), 0, cells - 1)
     w = uniform_weights(grid - cell, degree)
@@ -37,7 +40,7 @@ def carry_jacobi_and_curvatures(grid, leap, chart, place, states, out):
         trusted = np.zeros(len(states), dtype=bool)
         if leap.is_packed:
             cell = np.floor(place).astype(int)
-            cells = np.array(leap.jacobi.shape[1:4]) - grid.degree
+            cells = np.maximum(np.array(leap.jacobi.shape[1:4]) - grid.degree, 1)
             trusted = leap.flagged[chart, *np.clip(cell, 0, cells - 1).T] == 0
             m, attenuation = m[:, 3:7], m[:, 7]
         for first in (6, 8):
@@ -63,15 +66,18 @@ def leap(flow, states):
         "rotation": (_locate_rotation, _move_rotation),
         "octant": (_locate_octant, _move_octant),
         "angles": (_locate_angles, _move_angles),
+        "meridian": (_locate_meridian, _move_rotation),
+        "ring": (_locate_angles, _move_angles),
     }[model.name]
     inner, chart, located = locate(model, states)
     scale, shift = model.placement(grid)
-    place = shift + scale * located
+    # the axis of revolution may follow the shift
+    place = shift[:3] + scale * located
     d = evaluate(table.state, chart, place, grid.degree) + table.centre
     if table.is_packed and states.shape[1] > 6:
         q = (evaluate(table.jacobi, chart, place, grid.degree) + table.matrix)[:, :3]
         first = np.sqrt(1 - np.sum(q**2, axis=1, keepdims=True))
-        d = np.concatenate([q, 0 * first] if model.name == "angles" else [first, q], axis=1)
+        d = np.concatenate([q, 0 * first] if model.name in ("angles", "ring") else [first, q], axis=1)
     out = np.empty_like(states)
     out[:, :3], out[:, 3:6] = move(model, inner, d)
     carry_jacobi_and_curvatures(grid, table, chart, place, states, out)
@@ -141,6 +147,20 @@ def _move_octant(model, inner, d):
     own = d.copy()
     own[:, 1:3] *= parity[:, None]
     return _move_rotation(model, rotation, own)
+
+
+def _locate_meridian(model, states):
+    inner, chart, _ = _locate_rotation(model, states)
+    w, x, y, z = inner.T
+    s = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
+    q = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1)
+    # away from the axis, the direction in which theta grows and the one across it
+    across = np.cross(model.axis, s)
+    theta = np.arctan2(np.linalg.norm(across, axis=1), s @ model.axis)
+    south = np.cross(across, s)
+    angle = np.arctan2(np.sum(q * across, axis=1) * np.linalg.norm(s, axis=1), np.sum(q * south, axis=1))
+    located = np.stack([0 * theta, theta / np.pi, angle / (2 * np.pi) % 1.0], axis=1)
+    return inner, 0 * chart, located
 
 
 def _locate_angles(model, states):

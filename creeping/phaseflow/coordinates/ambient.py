@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
+from creeping.errors import SurfaceError
 from creeping.geometry.evaluators import evaluators, locator
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface, size
@@ -30,11 +31,30 @@ class AmbientModel:
     body: Surface
     name: str = "ambient"
     lanes: int = 8
+    is_flat: bool = False
+    unit: float = 1.0
 
     @property
     def charts(self) -> int:
         """Charts of the atlas."""
         return len(self.body.atlas.charts)
+
+    @property
+    def periodic(self) -> tuple[bool, bool]:
+        """Whether u and v of the charts have period 1.
+
+        Raises
+        ------
+        SurfaceError
+            If they differ from chart to chart.
+        """
+        kinds = {tuple(chart.periodic) for chart in self.body.atlas.charts}
+        if len(kinds) != 1:
+            raise SurfaceError(
+                f"the charts of the atlas differ in periodicity ({sorted(kinds)}); use charts of one kind"
+            )
+        first, second = kinds.pop()
+        return first, second
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
         """See `Model`; coordinates are states."""

@@ -6,8 +6,9 @@ A model says where a ray lies on the grid, what displacement is stored there, an
     RotationModel   x = psi(s), s on the unit sphere: the rotation R = [s, q, s x q]. Stored: the quaternion of R^-1 R'.
     OctantModel     the same on an eighth of the sphere, if the coordinate planes are mirrors of the body.
     AngleModel      one doubly periodic chart: (u, v, angle) in turns. Stored: their differences.
+    MeridianModel, RingModel    rotations and angles of bodies of revolution: the table has no axis u, the azimuth.
 
-The last three stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
+All but the first stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
 
 Sources: Derivations, R15.
 """
@@ -18,14 +19,21 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.geometry.evaluators import is_compiled
+from creeping.geometry.revolution import charted_axis
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.coordinates.ambient import AmbientModel
+from creeping.phaseflow.coordinates.revolution import MeridianModel, RingModel
 from creeping.phaseflow.coordinates.rotation import AngleModel, OctantModel, RotationModel
 from creeping.phaseflow.grid import Grid, Leap
 
 
 class Model(Protocol):
     """What a map needs of its coordinates; see the module head."""
+
+    @property
+    def body(self) -> Surface:
+        """The body whose flow it is."""
+        ...
 
     @property
     def name(self) -> str:
@@ -40,6 +48,21 @@ class Model(Protocol):
     @property
     def charts(self) -> int:
         """Charts of the grid."""
+        ...
+
+    @property
+    def periodic(self) -> tuple[bool, bool]:
+        """Whether u and v of the charts have period 1."""
+        ...
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether displacements do not depend on u."""
+        ...
+
+    @property
+    def unit(self) -> float:
+        """Error of (x, p), x in body sizes, that an error of 1 of a displacement makes at most."""
         ...
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
@@ -69,11 +92,14 @@ def model_of(body: Surface, name: str | None = None) -> Model:
     """Model of a body: the one named, or the fastest it allows."""
     if name != "ambient" and is_compiled(body):
         atlas: Any = body.atlas
+        revolved = name in (None, "meridian", "ring") and charted_axis(body) is not None
         if hasattr(getattr(atlas, "sphere_map", None), "compiled_forward"):
+            if revolved:
+                return MeridianModel(body)
             folds = name == "octant" or (name is None and has_mirrors(body))
             return OctantModel(body) if folds else RotationModel(body)
         if getattr(atlas, "compiled_forward", None) is not None and all(atlas.charts[0].periodic):
-            return AngleModel(body)
+            return RingModel(body) if revolved else AngleModel(body)
     return AmbientModel(body)
 
 

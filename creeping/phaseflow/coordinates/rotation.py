@@ -42,6 +42,9 @@ class CompiledModel:
     lanes = 4
     kind: int
     charts: int
+    periodic: tuple[bool, bool]
+    is_flat = False
+    unit: float
 
     def __init__(self, body: Surface) -> None:
         self.body = body
@@ -153,6 +156,8 @@ class RotationModel(CompiledModel):
     name = "rotation"
     kind = 0
     charts = 6
+    periodic = (False, False)
+    unit = 2.0
 
     @cached_property
     def _surface_table(self) -> FloatArray:
@@ -210,6 +215,8 @@ class AngleModel(CompiledModel):
     name = "angles"
     kind = 1
     charts = 1
+    periodic = (True, True)
+    unit = 2 * np.pi
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""

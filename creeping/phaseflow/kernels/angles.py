@@ -14,7 +14,7 @@ from numba import njit
 
 from creeping.kernels.block import BLOCK, options
 from creeping.kernels.curvature import inverse_root
-from creeping.phaseflow.kernels.stencil import turns
+from creeping.kernels.turns import cosine_sine, turns
 
 
 @njit(**options)
@@ -73,9 +73,11 @@ def from_coordinates(forward, forward_par, r, work, x, p):
     frame = work[18:24]
     forward(r[0:3], x, work[9:18], forward_par)
     _frame(work[9:18], frame)
+    cosine, sine = work[24], work[25]
     for i in range(BLOCK):
-        angle = 2 * math.pi * r[2, i]
-        c, s = math.cos(angle), math.sin(angle)
+        cosine[i], sine[i] = cosine_sine(r[2, i])
+    for i in range(BLOCK):
+        c, s = cosine[i], sine[i]
         p[0, i] = c * frame[0, i] + s * frame[3, i]
         p[1, i] = c * frame[1, i] + s * frame[4, i]
         p[2, i] = c * frame[2, i] + s * frame[5, i]

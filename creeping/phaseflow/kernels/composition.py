@@ -2,7 +2,8 @@
 
 Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`rotation`), and ANGLES, turns (`angles`). A map
 is a table of their displacement; a ray is converted to the model once, is composed there, and is converted back for an
-output. FOLDED are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes.
+output. FOLDED are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes, MERIDIAN
+those of bodies of revolution (`meridian`). The table of a body of revolution has one plane: no axis u.
 """
 
 import math
@@ -14,11 +15,12 @@ from creeping.geodesics.kernels.attenuation import SAMPLES, extend
 from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.splines import cells_and_fractions, weights
 from creeping.phaseflow.kernels import angles as _angles
+from creeping.phaseflow.kernels import meridian as _meridian
 from creeping.phaseflow.kernels import rotation as _rotations
 from creeping.phaseflow.kernels import surface_table as _surface_table
 from creeping.phaseflow.kernels.stencil import interpolate, interpolate_some
 
-ROTATION, ANGLES, FOLDED = 0, 1, 2
+ROTATION, ANGLES, FOLDED, MERIDIAN = 0, 1, 2, 3
 WORK = 48
 """Rows of work space for a block."""
 INTERPOLATED = 6 * BLOCK
@@ -30,7 +32,7 @@ _to_rotation, _to_angles = _rotations.to_coordinates, _angles.to_coordinates
 _from_rotation, _from_angles = _rotations.from_coordinates, _angles.from_coordinates
 _to_rotation_by_table = _surface_table.to_coordinates
 _from_rotation_by_table = _surface_table.from_coordinates
-_locate_rotation, _locate_angles = _rotations.locate, _angles.locate
+_locate_rotation, _locate_angles, _locate_meridian = _rotations.locate, _angles.locate, _meridian.locate
 _move_rotation, _move_angles, _unfold = _rotations.move, _angles.move, _rotations.unfold
 
 
@@ -69,17 +71,20 @@ def from_coordinates(kind, surface_table, there, there_par, r, work, x, p):
 def place_block(kind, r, work, table, degree, scale, shift, uva, place, cell):
     """Number of the first coefficient of a block's stencils and, in uva (3, BLOCK), the fractions of their cells.
 
-    Grid coordinates are shift + scale times the coordinates of `locate`.
+    Grid coordinates are shift + scale times the coordinates of `locate`; ``shift`` goes on by the axis of revolution.
     """
     u, v, angle = uva[0], uva[1], uva[2]
-    if kind == ANGLES:
-        _locate_angles(r, place, u, v, angle)
+    if kind == ANGLES or kind == MERIDIAN:
+        if kind == ANGLES:
+            _locate_angles(r, place, u, v, angle)
+        else:
+            _locate_meridian(r, shift, work, place, u, v, angle)
         # no mirrors
         for i in range(BLOCK):
             work[7, i] = 0.0
     else:
         _locate_rotation(r, work, place, u, v, angle, kind == FOLDED)
-    for axis in range(3):
+    for axis in range(1 if table.shape[1] == 1 else 0, 3):
         t, a, b = uva[axis], scale[axis], shift[axis]
         for i in range(BLOCK):
             t[i] = b + a * t[i]
@@ -100,7 +105,8 @@ def leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d, m
     table, centre, jacobi, matrix, curvature, flagged = leap
     rf, df, ef = r.reshape(-1), d[:BLOCK].reshape(-1), d[BLOCK : 2 * BLOCK].reshape(-1)
     wu, wv, wa = w[0:6].reshape(-1), w[6:12].reshape(-1), w[12:18].reshape(-1)
-    weights(uva[0], degree, wu)
+    if table.shape[1] > 1:
+        weights(uva[0], degree, wu)
     weights(uva[1], degree, wv)
     weights(uva[2], degree, wa)
     packed = extras > 0 and jacobi.shape[4] == 8

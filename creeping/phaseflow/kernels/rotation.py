@@ -20,7 +20,7 @@ from numba import njit
 
 from creeping.kernels.block import BLOCK, options
 from creeping.kernels.curvature import inverse_root
-from creeping.phaseflow.kernels.stencil import turns
+from creeping.kernels.turns import turns
 
 REACH = math.sqrt(2) - 1
 """Largest |u|, |v| that a chart must cover."""

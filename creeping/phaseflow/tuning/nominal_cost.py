@@ -102,18 +102,21 @@ def _steps(length: float, step: float) -> int:
 def map_seconds(flow: PhaseMap, length: float, *, carry_jacobi: bool) -> float:
     """Nominal seconds of a ray by a map."""
     leap = flow.leaps[-1]
-    each = leap_seconds(flow.grid.degree, float(leap.state.nbytes), carry_jacobi=carry_jacobi)
+    flat = flow.grid.is_flat
+    each = leap_seconds(flow.grid.degree, float(leap.state.nbytes), carry_jacobi=carry_jacobi, flat=flat)
     return float(length / flow.horizon * each + ENTRY)
 
 
-def leap_seconds(degree: int, nbytes: float, *, carry_jacobi: bool = False) -> float:
+def leap_seconds(degree: int, nbytes: float, *, carry_jacobi: bool = False, flat: bool = False) -> float:
     """Nominal seconds of one leap of a ray anywhere on the body, for a table of (x, p) of so many bytes.
 
     20 (cubic) and 40 ns in the nearest cache, more by the logarithm of the table beyond 1 MB, where a stencil's cache
-    lines come from farther away.
+    lines come from farther away. A table without azimuth has 4 or 6 rows where another has 16 or 36.
     """
-    base, lines = (20.0, 0.6) if degree == 3 else (40.0, 1.0)
-    leap = 1e-9 * (base + 27.0 * lines * float(np.log2(max(nbytes / 1e6, 1.0))))
+    base, farther = (20.0, 16.0) if degree == 3 else (40.0, 27.0)
+    if flat:
+        base, farther = (10.0, 4.0) if degree == 3 else (16.0, 5.0)
+    leap = 1e-9 * (base + farther * float(np.log2(max(nbytes / 1e6, 1.0))))
     # tables of Jacobi matrix and curvatures are three times as large, and the attenuation is summed
     return 4 * leap + 40e-9 if carry_jacobi else leap
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from creeping._typing import Any
-from creeping.errors import InvalidInputError, SurfaceError, ToleranceError
+from creeping.errors import InvalidInputError, ToleranceError
 from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.arguments import (
     checked_body,
@@ -30,7 +30,8 @@ from creeping.phaseflow.building import (
     with_errors,
 )
 from creeping.phaseflow.cache import cached_phase_map
-from creeping.phaseflow.coordinates.base import model_of
+from creeping.phaseflow.coordinates.ambient import AmbientModel
+from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.tuning.search import RAYS, tuned_map
@@ -77,7 +78,8 @@ def build_phase_map(
     horizon : float, optional
         T0, L (travel time for a weighted body).
     grid : (nodes, angles) or (nodes_u, nodes_v, angles), optional
-        Nodes per chart, margin included, and on the circle.
+        Nodes per chart, margin included, and on the circle. The chart of a body of revolution is a meridian, from pole
+        to pole where it has poles: ``nodes_u``, of the azimuth, is not used.
     degree : int, optional
         Degree of the splines, 3 or 5.
     precision : {"single", "double"}, optional
@@ -219,14 +221,14 @@ class MapSpec:
             object.__setattr__(self, name, value)
 
     @cached_property
-    def periodic(self) -> tuple[bool, bool]:
-        """Whether u and v of the charts wrap."""
-        return _common_periodicity(self.body)
+    def model(self) -> Model:
+        """Coordinates of the map."""
+        return AmbientModel(self.body) if self.method == "tower" else model_of(self.body)
 
     @cached_property
     def nodes(self) -> tuple[int, int, int] | None:
         """Nodes of the grid along u, v and the angle, if it is given."""
-        return None if self.grid is None else _nodes(self.grid, self.degree or 5, self.periodic, least_cells(self.body))
+        return None if self.grid is None else _nodes(self.grid, self.degree or 5, self.model)
 
     @cached_property
     def tower(self) -> tuple[float, int, int] | None:
@@ -267,12 +269,12 @@ class MapSpec:
         require_checked(self.body)
         if self.nodes is None:
             return tuned_map(self, progress)
-        grid = Grid(self.nodes, self.degree or 5, self.periodic)
+        grid = Grid(self.nodes, self.degree or 5, self.model.periodic)
         if self.tower:
             result = build_tower(self.body, grid, *self.tower, progress)
         else:
             plan = Plan(self.horizon or natural_horizon(self.body), grid, self.precision == "single", self.carry_jacobi)
-            result = build_direct(self.body, model_of(self.body), plan, progress, rtol=1e-11)
+            result = build_direct(self.body, self.model, plan, progress, rtol=1e-11)
         result = with_errors(result, self.length)
         reached = result.growth.rms[-1] if self.length and result.growth else result.error.rms
         if self.tolerance is not None and reached > self.tolerance:
@@ -286,15 +288,7 @@ class MapSpec:
         return result
 
 
-def _common_periodicity(body: Surface) -> tuple[bool, bool]:
-    kinds = {tuple(chart.periodic) for chart in body.atlas.charts}
-    if len(kinds) != 1:
-        raise SurfaceError(f"the charts of the atlas differ in periodicity ({sorted(kinds)}); use charts of one kind")
-    first, second = kinds.pop()
-    return first, second
-
-
-def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool], cells: int) -> tuple[int, int, int]:
+def _nodes(grid: tuple[int, ...], degree: int, model: Model) -> tuple[int, int, int]:
     try:
         if not isinstance(grid, (tuple, list, np.ndarray)) or len(grid) > 3:
             raise TypeError
@@ -304,7 +298,11 @@ def _nodes(grid: tuple[int, ...], degree: int, periodic: tuple[bool, bool], cell
         nodes, whole = (), False
     if len(nodes) == 2:
         nodes = (nodes[0], *nodes)
-    least = [degree + 1 if wraps else max(degree + 5, cells + 1 + 2 * MARGIN) for wraps in periodic] + [degree + 1]
+    if model.is_flat and len(nodes) == 3:
+        nodes = (1, *nodes[1:])
+    cells = least_cells(model.body)
+    least = [degree + 1 if wraps else max(degree + 5, cells + 1 + 2 * MARGIN) for wraps in model.periodic]
+    least = [*([1] if model.is_flat else least[:1]), least[1], degree + 1]
     if len(nodes) != 3 or not whole or any(n < m for n, m in zip(nodes, least, strict=True)):
         raise InvalidInputError(
             f"grid = {shown(grid)}: give two or three whole numbers of at least {least} for degree {degree}"

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.building import Plan, Progress, build_direct, curvature_reach, with_errors
+from creeping.phaseflow.building import Plan, Progress, Reference, build_direct, curvature_reach, with_errors
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
@@ -104,7 +104,7 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
         progress("probing horizons and grids")
         found = candidates(spec, model, cost)
     best: tuple[float, PhaseMap] | None = None
-    spent = 0.0
+    spent, known = 0.0, dict[Any, Reference]()
     for candidate in found[:3]:
         plan, before = candidate.plan, np.inf
         if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
@@ -112,7 +112,7 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
         for _ in range(6):
             progress(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
             built = build_direct(body, model, plan, progress, rtol=float(np.clip(0.02 * candidate.target, 1e-12, 1e-7)))
-            result, measuring = _measured(built, spec, cost)
+            result, measuring = _measured(built, spec, cost, known)
             spent += build_seconds(plan, model, cost) + measuring
             assert result.growth is not None
             reached = result.growth.bound if spec.length else result.error.rms
@@ -150,7 +150,7 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
     )
 
 
-def _measured(built: PhaseMap, spec: "MapSpec", cost: float) -> tuple[PhaseMap, float]:
+def _measured(built: PhaseMap, spec: "MapSpec", cost: float, known: dict[Any, Reference]) -> tuple[PhaseMap, float]:
     """The map with its errors, and nominal seconds of measuring them.
 
     Where F is expensive it is done on fewer rays, and against a reference only so much better.
@@ -161,7 +161,7 @@ def _measured(built: PhaseMap, spec: "MapSpec", cost: float) -> tuple[PhaseMap, 
     samples = int(np.clip(budget / (cost * length), 400, 2000))
     expensive = 4 * cost * length * samples > budget
     rtol = 1e-3 * spec.tolerance if expensive else 1e-12
-    result = with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16)
+    result = with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16, known=known)
     return result, measuring_seconds(cost, length, result.error.samples, rtol)
 
 
@@ -182,7 +182,7 @@ def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
     assert tolerance is not None
     natural = natural_horizon(body)
     horizons = _horizons(spec, natural, cost)
-    probe = _Probe(body, model, horizons, spec.periodic)
+    probe = _Probe(body, model, horizons)
     degrees = (spec.degree,) if spec.degree else (3, 5)
     rays = int(np.clip(_budget(spec, cost) / (2 * cost * (spec.length or natural)), 48, 512))
     stretch = amplification(body, spec.length or natural, rays)
@@ -210,7 +210,7 @@ def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
                 curvature_reach(tolerance),
                 tolerance,
             )
-            leap = leap_seconds(degree, nbytes, carry_jacobi=spec.carry_jacobi)
+            leap = leap_seconds(degree, nbytes, carry_jacobi=spec.carry_jacobi, flat=model.is_flat)
             build = build_seconds(plan, model, cost) + 2 * _budget(spec, cost)
             found.append(Candidate(plan, leap / horizon, build, target))
     if not found:
@@ -266,14 +266,14 @@ def growth_factor(times: FloatArray, stretch: FloatArray, horizon: float) -> flo
 class _Probe:
     """Interpolation errors of rows of points along each axis, for several horizons."""
 
-    def __init__(self, body: Surface, model: Model, horizons: list[float], periodic: tuple[bool, bool]) -> None:
-        self.body, self.periodic = body, (*periodic, True)
+    def __init__(self, body: Surface, model: Model, horizons: list[float]) -> None:
+        self.body, self.periodic = body, (*model.periodic, True)
+        self.axes = (1, 2) if model.is_flat else (0, 1, 2)
         # errors in the units of (x, p) from those of the coordinates
-        unit = {"ambient": 1.0, "rotation": 2.0, "octant": 2.0, "angles": 2 * np.pi}[model.name]
-        self.scale = unit * (1.0 if model.name == "ambient" else float(np.hypot(1, size(body))))
+        self.scale = model.unit * (1.0 if model.name == "ambient" else float(np.hypot(1, size(body))))
         step = horizons[0] / max(1, np.ceil(horizons[0] / (0.5 * size(body))))
         times = step * np.arange(1, round(horizons[-1] / step) + 1)
-        self.rows = [self._row(body, model, axis, np.array(horizons), times) for axis in range(3)]
+        self.rows = {axis: self._row(body, model, axis, np.array(horizons), times) for axis in self.axes}
 
     def _row(self, body: Surface, model: Model, axis: int, horizons: FloatArray, times: FloatArray) -> FloatArray:
         """Displacements along one axis: (horizons, lines, points, lanes)."""
@@ -310,28 +310,30 @@ class _Probe:
         return np.array(cells), np.array(errors)
 
     def grid(self, k: int, degree: int, target: float) -> Grid:
-        """Fewest nodes whose three errors together are the target."""
-        cells = []
-        for axis in range(3):
+        """Fewest nodes whose errors along the axes together are the target."""
+        cells = [1.0] * (3 - len(self.axes))
+        for axis in self.axes:
             n, e = self.errors(k, axis, degree)
             # the error that rows of finer cells would have, where tracing itself is no longer exact enough
             e = np.maximum.accumulate(e[::-1])[::-1]
-            wanted = target / np.sqrt(3)
+            wanted = target / np.sqrt(len(self.axes))
             if wanted >= e[0]:
                 cells.append(float(n[0]) * max((e[0] / wanted) ** (1 / (degree + 1)), 0.5))
             elif wanted <= e[-1]:
                 cells.append(float(n[-1]) * (e[-1] / wanted) ** (1 / (degree + 1)))
             else:
                 cells.append(float(np.exp(np.interp(-np.log(wanted), -np.log(e), np.log(n)))))
-        return _grid(cells, degree, self.periodic[:2], least_cells(self.body))
+        return _grid(cells, degree, self.periodic[:2], least_cells(self.body), 0 not in self.axes)
 
 
-def _grid(cells: list[float], degree: int, periodic: tuple[bool, ...], least: int) -> Grid:
+def _grid(cells: list[float], degree: int, periodic: tuple[bool, ...], least: int, flat: bool) -> Grid:
     sides = [
         max(int(np.ceil(c)) if wraps else max(int(np.ceil(c)), least) + 1 + 2 * MARGIN, degree + (1 if wraps else 5))
         for c, wraps in zip(cells, periodic, strict=False)
     ]
-    return Grid((sides[0], sides[1], max(4 * int(np.ceil(cells[2] / 4)), 8)), degree, (periodic[0], periodic[1]))
+    return Grid(
+        (1 if flat else sides[0], sides[1], max(4 * int(np.ceil(cells[2] / 4)), 8)), degree, (periodic[0], periodic[1])
+    )
 
 
 def _finer(plan: Plan, excess: float) -> Plan:
@@ -341,4 +343,5 @@ def _finer(plan: Plan, excess: float) -> Plan:
 
 def _scaled(plan: Plan, factor: float) -> Plan:
     grid = plan.grid
-    return replace(plan, grid=_grid([factor * c for c in grid.cells], grid.degree, grid.periodic, plan.least_cells))
+    cells = [factor * c for c in grid.cells]
+    return replace(plan, grid=_grid(cells, grid.degree, grid.periodic, plan.least_cells, grid.is_flat))
