@@ -35,7 +35,9 @@ def sphere_line():
     direction = np.array([1.0, 1.0, 1.0]) / np.sqrt(3)
     points, angle = great_circle(direction, 96)
     status = np.array(["attached"] * 60 + ["occluded"] * 20 + ["concave"] * 16)
-    curve = SimpleNamespace(points=points, normals=points, arclength=angle, length=2 * np.pi, status=status)
+    curve = SimpleNamespace(
+        closed=True, points=points, normals=points, arclength=angle, length=2 * np.pi, status=status
+    )
     return SimpleNamespace(body=sc.Sphere(), direction=direction, curves=[curve])
 
 

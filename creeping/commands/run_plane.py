@@ -13,7 +13,7 @@ from creeping.commands.run_field import DPI, ORDER, Job
 from creeping.errors import InvalidInputError
 from creeping.field.cut_result import FieldCut
 from creeping.field.plane_cut import field_cut
-from creeping.geometry.creased import is_creased
+from creeping.geometry.creased import has_edges, is_creased
 from creeping.rays.fan import RayFan
 
 PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -61,8 +61,11 @@ def asked_planes(texts: Sequence[str] | None, job: Job | None, body: Any) -> lis
     planes = [parse_plane(text) for text in texts or ()]
     if planes and job is None:
         raise InvalidInputError("--plane needs --wavenumber or --frequency, which ask for the field")
-    if planes and is_creased(body):
-        raise InvalidInputError("--plane is of smooth bodies; leave it out: the far field of this one is known")
+    if planes and (has_edges(body) or (is_creased(body) and job is not None and job.boundary == "pec")):
+        raise InvalidInputError(
+            "--plane is of bodies without edges, of conductors without joints and tips too; leave it out: the far "
+            "field of this one is known"
+        )
     return planes
 
 

@@ -14,7 +14,7 @@ from creeping.explorer.request import ViewRequest
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
-from creeping.geometry.creased import is_creased
+from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.speed import speed_of
 from creeping.plotting.coloured_body import current_levels
@@ -44,7 +44,7 @@ class Refined:
         With rays inserted where neighbours part: that of the fields.
     body_levels : (n,) or None
         20 log10 of the total field on the vertices of the mesh, of a conductor of |n x H|, the root mean square of both
-        polarisations; NaN where no ray passes, None on a weighted body, one with creases, and where it costs too much.
+        polarisations; NaN where no ray passes, None on a weighted body, one with edges, and where it costs too much.
     cut_angles : (m,), degrees
         Theta of the cut, from -180 to 180 through the directions of azimuth ``request.cut`` and its opposite.
     far : FarField or None
@@ -90,10 +90,10 @@ def far_cut(fan: RayFan, request: ViewRequest, angles: FloatArray) -> FarField:
 
 
 def _body_levels(fan: RayFan, request: ViewRequest, vertices: FloatArray, stale: IsStale) -> FloatArray | None:
-    """Levels of the total field at points of the body (n, 3); None with creases, and of currents that cost too much."""
+    """Levels of the total field at points of the body (n, 3); None with edges, and of currents that cost too much."""
     k = request.wavenumber
-    if is_creased(fan.body):
-        # the rays carry their own; that of all of them at a point needs a smooth body
+    if has_edges(fan.body) or (is_creased(fan.body) and request.boundary == "pec"):
+        # the rays carry their own; that of all of them at a point needs a body without edges
         return None
     if request.boundary == "pec":
         # the far-field cut takes the same currents

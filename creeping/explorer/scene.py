@@ -16,7 +16,7 @@ from creeping.field.on_rays import creeps
 from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, status_pieces
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, line_pieces
 from creeping.plotting._view import shadow_view
 
 CELLS = 44
@@ -156,7 +156,7 @@ class Scene:
         """Draw what takes longer, with what `painted_mesh` has made."""
         with self.server.atomic():
             for status, colour in STATUS_COLOURS.items():
-                pieces = [p for c in found.line.curves for p in status_pieces(c.points, c.status, status)]
+                pieces = line_pieces(found.line, status)
                 self._line(f"line/{status}", joined([segments(p[None]) for p in pieces]), colour)
             self._line("outline", NOTHING, RAY_COLOUR)
             if paint is not None:

@@ -17,7 +17,7 @@ from creeping.explorer.request import ViewRequest
 from creeping.explorer.units import far_levels, far_name
 from creeping.field.decibels import shown_range
 from creeping.field.far_result import FarField
-from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, status_pieces
+from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, line_pieces
 from creeping.plotting.palette import COLOURS, EXACT
 from creeping.plotting.parameter_plane import is_torus
 from creeping.rays.angle_seams import split_at_seam
@@ -88,10 +88,7 @@ class _Axes:
 
 def plane_svg(found: Refined) -> str:
     """Shadow line, rays and iso-phase curves over (phi, theta), degrees."""
-    lines = {
-        status: [piece for c in found.line.curves for piece in status_pieces(c.points, c.status, status)]
-        for status in STATUS_COLOURS
-    }
+    lines = {status: line_pieces(found.line, status) for status in STATUS_COLOURS}
     body, fan = found.fan.body, found.fan
     rays = _flat(body.parameters(fan.points[k]) for k in _some(fan, DRAWN))
     curves = [

@@ -85,7 +85,7 @@ def strokes(
         found += [Stroke(bound, colour, 0.9, label=label, rank=1)] if bound else []
         found += [Stroke(free, colour, FADED_WIDTH, alpha=FADED, rank=1)] if free else []
     for status in STATUSES:
-        pieces = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
+        pieces = line_pieces(line, status)
         if pieces:
             found.append(Stroke(pieces, STATUS_COLOURS[status], 1.8, label=f"shadow line, {status}", rank=2))
     return found
@@ -185,11 +185,21 @@ def closed(points: FloatArray) -> FloatArray:
     return np.concatenate([points, points[:1]])
 
 
-def status_pieces(points: FloatArray, status: Any, wanted: str) -> Iterator[FloatArray]:
-    """Pieces of a closed curve with one status; each runs on to the next point, so that no gap is left."""
+def line_pieces(line: ShadowLine, wanted: str) -> list[FloatArray]:
+    """Pieces (k, 3) of all curves of a shadow line with one status."""
+    parts = [status_pieces(curve.points, curve.status, wanted, ring=curve.closed) for curve in line.curves]
+    return [piece for part in parts for piece in part]
+
+
+def status_pieces(points: FloatArray, status: Any, wanted: str, *, ring: bool = True) -> Iterator[FloatArray]:
+    """Pieces of a curve, closed if a ``ring``, with one status; each runs on to the next point: no gap is left."""
     mask = np.asarray(status) == wanted
     if mask.all():
-        yield closed(points)
+        yield closed(points) if ring else points
+        return
+    if not ring:
+        mask[1:] |= mask[:-1].copy()
+        yield from runs(points, mask)
         return
     # start where the status changes, so that no piece is cut at the curve's first point
     start = int(np.argmax(mask & ~np.roll(mask, 1)))

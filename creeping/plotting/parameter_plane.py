@@ -11,8 +11,8 @@ from creeping.plotting._strokes import (
     STATUS_COLOURS,
     LevelColours,
     curve_pieces,
+    line_pieces,
     ray_strokes,
-    status_pieces,
 )
 from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
@@ -65,8 +65,7 @@ def plot_parameters(
             _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
     colours = draw_curves(ax, curves, fan)
     for status in STATUSES:
-        lines = [piece for curve in line.curves for piece in status_pieces(curve.points, curve.status, status)]
-        pieces = _in_plane(body, lines)
+        pieces = _in_plane(body, line_pieces(line, status))
         _add(ax, pieces, color=STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
     frame(ax, torus=is_torus(line))
     if legend:

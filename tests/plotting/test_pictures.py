@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import creeping as cr
 import scatterers as sc
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
-from creeping.plotting._strokes import chosen_rays, refined, runs, status_pieces, strokes
+from creeping.plotting._strokes import chosen_rays, line_pieces, refined, runs, status_pieces, strokes
 from creeping.plotting._view import View, shadow_view
 from creeping.plotting.display import GLProbe
 from creeping.plotting.parameter_plane import plot_parameters
@@ -85,7 +86,7 @@ def test_axes_of_the_parameter_plane(sphere_line, body, name, span):
     from matplotlib.figure import Figure
 
     points = np.stack([body.bounds[0] * [1, 0, 0], [0.0, 1.0, -0.5 if name == "psi" else 0.0]])
-    curve = type(sphere_line)(points=points, status=np.array(["attached"] * 2))
+    curve = type(sphere_line)(closed=True, points=points, status=np.array(["attached"] * 2))
     line = type(sphere_line)(body=body, direction=sphere_line.direction, curves=[curve])
     ax = plot_parameters(line, ax=Figure().add_subplot())
     assert name in ax.get_xlabel()
@@ -102,6 +103,15 @@ def test_status_pieces_join_and_close(sphere_line):
     (whole,) = status_pieces(curve.points, np.full(96, "attached"), "attached")
     np.testing.assert_array_equal(whole[0], whole[-1])
     assert not list(status_pieces(curve.points, np.full(96, "attached"), "concave"))
+
+
+def test_open_curves_of_a_line_are_not_closed():
+    """On a body of pieces a shadow line is of arcs: no chord joins the ends of one."""
+    pill = sc.Capsule(1.0, 4.0)
+    pieces = line_pieces(cr.shadow_line(pill, (0.6, 0, 0.8)), "attached")
+    assert len(pieces) == 4
+    for piece in pieces:
+        assert np.max(np.linalg.norm(np.diff(piece, axis=0), axis=1)) < 0.1
 
 
 def test_refined_ray_stays_on_the_great_circle(sphere_fan):
