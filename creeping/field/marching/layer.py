@@ -229,9 +229,9 @@ class _March:
 
         grid = layer_grid(self.plan.specs[block[0]])
         data = _BlockData(max(len(self.edges[ray]) for ray in block) - 1, len(grid.nodes), LANES)
-        # empty lanes march the first ray once more
-        for lane in range(LANES):
-            self._load(block[lane] if lane < len(block) else block[0], lane, grid, data)
+        for lane, ray in enumerate(block):
+            self._load(ray, lane, grid, data)
+        data.fill_from_first(len(block))
         out = np.empty((len(data.beta) + 1, 2, 2 * LANES))
         march_block(
             *(grid.matrices, grid.levels, grid.cut, grid.scale, self.k, self.soft, data.steps),
@@ -300,3 +300,12 @@ class _BlockData:
         self.beta = np.zeros((steps, 2 * lanes))
         self.switch = np.zeros(lanes, dtype=np.int64)
         self.incident, self.wave = np.zeros((2 * nodes, 2 * lanes)), np.zeros((2 * nodes, 2 * lanes))
+        self.lanes = lanes
+
+    def fill_from_first(self, count: int) -> None:
+        """Let the lanes from ``count`` on, which have no ray, march the first once more."""
+        n = self.lanes
+        self.steps[..., count:] = self.steps[..., :1]
+        self.switch[count:] = self.switch[0]
+        for part in (self.poles, self.weights, self.drive, self.beta, self.incident, self.wave):
+            part[..., count:n], part[..., n + count :] = part[..., :1], part[..., n : n + 1]
