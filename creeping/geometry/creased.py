@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.kept import kept
-from creeping.geometry.surface import normal, project, size
+from creeping.geometry.surface import jet, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 
 SAMPLE = 0.1
@@ -57,6 +57,10 @@ class Piece:
     def hessian(self, points: FloatArray) -> FloatArray:
         """Hessian of F_i: (..., 3) -> (..., 3, 3)."""
         return np.asarray(self._surface.hessian(points), dtype=float)
+
+    def jet(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """F_i, its gradient and its Hessian."""
+        return jet(self._surface, points)
 
 
 class Tiles(NamedTuple):

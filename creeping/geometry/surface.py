@@ -82,7 +82,7 @@ class Surface(Protocol):
     """A smooth closed body.
 
     Optional members: ``speed`` (a `Speed`), ``compiled`` (a `Compiled` level), ``fingerprint`` (a string that
-    changes with the body), of its atlas ``compiled`` (a locator) and ``margin`` (how far charts reach beyond their unit
+    changes with the body), ``jet(points)`` (F, its gradient and its Hessian at once), of its atlas ``compiled`` (a locator) and ``margin`` (how far charts reach beyond their unit
     squares, in half widths; without bound if not given), ``non_smooth(points)`` (where it is not smooth enough for
     creeping rays, (..., 3) -> (...)), ``axis_of_revolution`` (a unit vector (3,) along the axis, through the origin, of
     a body of revolution, whose phase map then has no azimuth; None of others), and ``coarse_fit`` (the same body known
@@ -185,6 +185,23 @@ def size(body: Surface) -> float:
     """
     box = np.asarray(body.bounds, dtype=float)
     return float(0.5 * np.linalg.norm(box[1] - box[0]))
+
+
+def jet(body: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """F (...), its gradient (..., 3) and its Hessian (..., 3, 3) at points (..., 3), L, at once where the body can.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> level, gradient, hessian = jet(sc.Capsule(1.0, 4.0), np.array([1.0, 0.0, 0.5]))
+    >>> abs(round(float(level), 12)), gradient.round(6).tolist(), hessian.shape
+    (0.0, [1.0, 0.0, 0.0], (3, 3))
+    """
+    at_once = getattr(body, "jet", None)
+    if at_once is not None:
+        found: tuple[FloatArray, FloatArray, FloatArray] = at_once(points)
+        return found
+    return body.level(points), body.gradient(points), body.hessian(points)
 
 
 def normal(body: Surface, points: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 
 from creeping._typing import BoolArray, FloatArray
 from creeping.errors import SingularIncidenceError
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, jet, size
 
 ORDER = 16
 """Gauss points of a panel."""
@@ -42,8 +42,8 @@ def newton_step(
     Without an axis it is the tangent, and the step is that of least norm. Inverse rows of (grad F, Hd, axis) are cross
     products over the determinant axis.(grad F x Hd).
     """
-    F, gradient = body.level(points), body.gradient(points)
-    Hd = (body.hessian(points) @ direction[..., None])[..., 0]
+    F, gradient, hessian = jet(body, points)
+    Hd = (hessian @ direction[..., None])[..., 0]
     G = np.sum(gradient * direction, axis=-1)
     W = np.cross(gradient, Hd)
     if axis is None:

@@ -31,6 +31,8 @@ ALIKE = 0.1
 """Distance from a curve, in its steps, up to which a seed lies on it: chords leave it by a third of that."""
 EDGE_ON = 1e-7
 """|n.d| on a whole piece up to which it lies edge-on and has no line of its own."""
+HALVINGS, CLOSE = 60, 1e-3
+"""Halvings of the way to where a curve leaves its piece, and the distance, in body sizes, below which two steps do."""
 MOST = 20_000
 """Nodes of a curve at most."""
 CLOSE = 1e-11
@@ -189,9 +191,9 @@ class _Walk:
         with np.errstate(all="ignore"):
             return np.asarray(newton_step(self.piece, self.direction, x[None])[1][0])
 
-    def _corrected(self, guess: FloatArray, reach: float) -> FloatArray:
+    def _corrected(self, guess: FloatArray, reach: float, iterations: int = 6) -> FloatArray:
         with np.errstate(all="ignore"):
-            return onto_line(self.piece, self.direction, guess, reach=reach, iterations=6)
+            return onto_line(self.piece, self.direction, guess, reach=reach, iterations=iterations)
 
     def _followed(self, start: FloatArray, T0: FloatArray, sign: float) -> tuple[FloatArray, bool, int, float]:
         """Nodes from the start along sign T, whether they come round, the crease they end at, and the gap to it."""
@@ -230,14 +232,17 @@ class _Walk:
     def _bisected(self, x: FloatArray, chord: FloatArray, low: float, high: float) -> FloatArray:
         """Last point of the piece between shares of a chord of the curve."""
         long = float(np.linalg.norm(chord))
-        best = x
-        while (high - low) * long > 1e-14 * self.size and high - low > 1e-15:
-            middle = 0.5 * (low + high)
-            y = self._corrected((x + middle * chord)[None], 0.3 * long)
+        best, other = self._corrected(x + np.array([[low], [high]]) * chord, 0.3 * long)
+        for _ in range(HALVINGS):
+            gap = float(np.linalg.norm(other - best))
+            if gap <= 1e-14 * self.size:
+                break
+            # the middle of two points of the curve is off it by the square of their distance
+            y = self._corrected(0.5 * (best + other)[None], 0.3 * gap, 2 if gap < CLOSE * self.size else 6)
             if self.inside(y)[0]:
-                low, best = middle, y[0]
+                best = y[0]
             else:
-                high = middle
+                other = y[0]
         return best
 
     def _end(self, x: FloatArray, gap: float) -> tuple[int, float]:

@@ -44,7 +44,8 @@ def fill_creased(
         for name, which, suffix in request.problems:
             boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
-                field = far_field(fan, observers, wavenumber=wavenumber, boundary=boundary, order=request.order)
+                asked: dict[str, Any] = {"boundary": boundary, "order": request.order, "method": request.method}
+                field = far_field(fan, observers, wavenumber=wavenumber, **asked)
                 for part, values in FieldArrays.of(field, 1).arrays.items():
                     if part + suffix in out:
                         out[part + suffix][(row, *which, k)] = values[0] if bistatic else values[0, 0]

@@ -28,7 +28,8 @@ class FieldArrays:
         """Arrays of a far field whose rows are the observers of one incidence after the other."""
         arrays = {name: getattr(field, name) for name in PARTS}
         arrays = {name: np.array(v).reshape(incidences, -1, *v.shape[1:]) for name, v in arrays.items()}
-        return cls(arrays | {"by_currents": np.zeros(arrays["unresolved"].shape, dtype=bool)})
+        by_currents = np.reshape(field.method == "currents", arrays["unresolved"].shape)
+        return cls(arrays | {"by_currents": by_currents.copy()})
 
     @property
     def unclear(self) -> IntArray:

@@ -50,6 +50,11 @@ class Levelled:
         """Hessian of F, unit of F over L^2: points (..., 3), L, to (..., 3, 3)."""
         return evaluated(self.compiled, points)[2][..., SYMMETRIC]
 
+    def jet(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """F, its gradient and its Hessian, by one evaluation: points (..., 3), L."""
+        level, gradient, entries = evaluated(self.compiled, points)
+        return level, gradient, entries[..., SYMMETRIC]
+
     def parameters(self, points: FloatArray) -> FloatArray:
         """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi], radians: (..., 3) -> (..., 2).
 
