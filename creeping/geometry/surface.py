@@ -82,11 +82,12 @@ class Surface(Protocol):
     """A smooth closed body.
 
     Optional members: ``speed`` (a `Speed`), ``compiled`` (a `Compiled` level), ``fingerprint`` (a string that
-    changes with the body), ``jet(points)`` (F, its gradient and its Hessian at once), of its atlas ``compiled`` (a locator) and ``margin`` (how far charts reach beyond their unit
-    squares, in half widths; without bound if not given), ``non_smooth(points)`` (where it is not smooth enough for
-    creeping rays, (..., 3) -> (...)), ``axis_of_revolution`` (a unit vector (3,) along the axis, through the origin, of
-    a body of revolution, whose phase map then has no azimuth; None of others), and ``coarse_fit`` (the same body known
-    less well, a `Surface`: what differs on it is uncertain).
+    changes with the body), ``jet(points)`` (F, its gradient and its Hessian at once), of its atlas ``compiled`` (a
+    locator) and ``margin`` (how far charts reach beyond their unit squares, in half widths; without bound if not
+    given), ``non_smooth(points)`` (where it is not smooth enough for creeping rays, (..., 3) -> (...)),
+    ``axis_of_revolution`` (a unit vector (3,) along the axis, through the origin, of a body of revolution, whose phase
+    map then has no azimuth; None of others), and ``coarse_fit`` (the same body known less well, a `Surface`: what
+    differs on it is uncertain).
     """
 
     @property

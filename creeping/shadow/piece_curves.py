@@ -243,7 +243,7 @@ class _Walk:
                 best = y[0]
             else:
                 other = y[0]
-        return best
+        return np.asarray(best)
 
     def _end(self, x: FloatArray, gap: float) -> tuple[int, float]:
         """The crease at which a curve ends, and what is left to it if that is a tip."""

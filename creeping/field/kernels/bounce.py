@@ -13,8 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.field.kernels.radiation import cosine_sine
 from creeping.kernels.block import entry_options
+from creeping.kernels.turns import cosine_sine
 
 TOUCHING = 1e-6
 """Distance, over 1/k, below which a node is the point itself."""

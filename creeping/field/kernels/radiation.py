@@ -6,8 +6,7 @@
     electric  E(y) = sum_n (ik - 1/R + w) e^{ikR}/R J_n - (ik - 3/R + 3w) e^{ikR}/R^3 (y - x_n) (y - x_n).J_n
               w = 1/(ik R^2) = -i/(k R^2)
 
-Phases are taken in turns and reduced to t of -1/2..1/2; cos 2 pi t = 1 - 2 s^2 and sin 2 pi t = 2 s c with
-s = sin(pi t) and c = cos(pi t) by their Taylor polynomials, good to rounding there, since libm's do not vectorise.
+Phases are taken in turns, for polynomials vectorise (`creeping.kernels.turns`).
 
 Sources: [CK13, sec. 2.2 and 6.2]; Derivations, F16.
 """
@@ -17,26 +16,11 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import entry_options, options
+from creeping.kernels.block import entry_options
+from creeping.kernels.turns import cosine_sine
 
-_S = np.array([(-1.0) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(10)])
-_C = np.array([(-1.0) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(11)])
-S0, S1, S2, S3, S4, S5, S6, S7, S8, S9 = (float(v) for v in _S)
-C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10 = (float(v) for v in _C)
 PART = 1024
 """Nodes whose phases are held at a time."""
-
-
-@njit(**options)
-def cosine_sine(turns):
-    """Cosine and sine of an angle in turns."""
-    t = turns - math.floor(turns + 0.5)
-    z = t * t
-    s = S0 + z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * (S6 + z * (S7 + z * (S8 + z * S9))))))))
-    c = C5 + z * (C6 + z * (C7 + z * (C8 + z * (C9 + z * C10))))
-    c = C0 + z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * c))))
-    s *= t
-    return 1.0 - 2.0 * s * s, 2.0 * s * c
 
 
 @njit(**entry_options)

@@ -2,11 +2,10 @@
 
     u(x) = sum_y h [a_y + b_y n.(x - y) (1/R - ik)/R] e^{ikR}/R - chi w_y [a + b n.(x - y)/R^2]/R,   R = |x - y|
 
-with n that of y, or of x for du/dn of a soft body, which asks for -dG/dn_x.
-
-chi = e^{-(R/a)^2} takes off the static part of what stands next to x, as if the current there were that of x, over
-nodes that share its phase; of others h = 1 - e^{-(kR)^2} leaves out those that x stands on. What is taken off is put
-back in closed form: sums of chi w and chi w kappa_y tell how much of the surface there it was.
+with n that of y, or of x for du/dn of a soft body, which asks for -dG/dn_x. chi = e^{-(R/a)^2} takes off the static
+part of what stands next to x, as if the current there were that of x, over nodes that share its phase; of others
+h = 1 - e^{-(kR)^2} leaves out those that x stands on. What is taken off is put back in closed form: sums of chi w and
+chi w kappa_y tell how much of the surface there it was.
 
 Source: Derivations, F30.
 """
@@ -15,8 +14,8 @@ import math
 
 from numba import njit
 
-from creeping.field.kernels.radiation import cosine_sine
 from creeping.kernels.block import entry_options
+from creeping.kernels.turns import cosine_sine
 
 TOUCHING = 1e-6
 """Distance, over 1/k, below which a node is the point itself."""
