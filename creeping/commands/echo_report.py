@@ -1,5 +1,6 @@
 """What ``creeping rcs`` and ``creeping ts`` compute, write and say."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ from creeping.geometry.surface import Surface
 from creeping.shadow.status import FAILED, SINGULAR
 from creeping.sweeping.echoes import backscatter, bistatic
 
-FORMATS = ("csv", "mat")
 TURN = 360.0
 """Degrees after which azimuths repeat."""
 LEAST_BAND = 16
@@ -113,21 +113,6 @@ def compared(
     return found, {"not_compared": refused} if refused else {}
 
 
-def table_formats(text: str) -> tuple[str, ...]:
-    """Kinds of tables that are asked for.
-
-    Raises
-    ------
-    InvalidInputError
-        If one is unknown, or given twice.
-    """
-    names = tuple(name.strip().lower() for name in text.split(","))
-    unknown = [name for name in names if name not in FORMATS]
-    if unknown or len(set(names)) < len(names):
-        raise InvalidInputError(f"--format {text!r}: give some of {', '.join(FORMATS)}, each once")
-    return names
-
-
 def write_results(
     output: Path,
     echo: Echo,
@@ -144,7 +129,7 @@ def write_results(
     except OSError as error:
         raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
     stem = echo.quantity
-    writers = {"csv": write_echo, "mat": write_mat}
+    writers: dict[str, Callable[[Path, Echo], None]] = {"csv": write_echo, "mat": write_mat}
     names = [f"{stem}.{kind}" for kind in formats]
     for kind in formats:
         writers[kind](output / f"{stem}.{kind}", echo)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from creeping import files, plotting
+from creeping import plotting
+from creeping.commands.formats import write_tables
 from creeping.commands.run_field import DPI, ORDER, Job
 from creeping.errors import InvalidInputError
 from creeping.field.cut_result import FieldCut
@@ -75,6 +76,7 @@ def write_planes(
     progress: Callable[[str], None],
     *,
     pictures: bool,
+    formats: Sequence[str] = ("csv",),
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Compute fields on planes and write their files; returns entries of the summary and the names of the files."""
     entries, names = [], []
@@ -84,8 +86,7 @@ def write_planes(
         started = perf_counter()
         cut = _cut(plane, job, fan)
         seconds = perf_counter() - started
-        files.write_csv(output / f"{stem}.csv", cut=cut)
-        names.append(f"{stem}.csv")
+        names += write_tables(output / stem, formats, cut, cut=cut)
         if pictures and np.any(cut.field.ok):
             title = f"{name}\n{job.told(cut.field.length_unit)}, {cut.field.boundary}"
             plotting.field_cut_picture(output / f"{stem}.png", cut, error=True, title=title, dpi=DPI)

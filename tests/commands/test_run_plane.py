@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+import scipy.io
 
 from creeping.commands.main import main
 from creeping.commands.run_plane import parse_plane
@@ -38,6 +39,39 @@ def test_planes_are_written(tmp_path, capsys):
     away = np.linalg.norm(points, axis=1) > 1.4
     exact = sphere.total_field(6.0, 1.0, points[away], (0, 0, 1), "hard")
     assert np.median(np.abs(values[away] - exact)) < 0.03
+
+
+def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 16, "--wavenumber", 6, "--no-pictures"]
+    options += ["--observe", "cut:0:30", "--observe", "backscatter", "--plane", "xz:0.5", "-o", tmp_path]
+    assert ran("run", "sphere", *options, "--format", "csv,mat") == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert sorted(summary["files"]) == sorted(file.name for file in tmp_path.iterdir())
+    tables = {}
+    for stem in ("line", "rays", "curves", "far", "plane"):
+        text = (tmp_path / f"{stem}.csv").read_text().splitlines()
+        rows = list(csv.DictReader(line for line in text if line[0] != "#"))
+        tables[stem] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    back = {stem: scipy.io.loadmat(tmp_path / f"{stem}.mat", simplify_cells=True) for stem in tables}
+    rows = tables["far"]
+    f = rows["re"].astype(float) + 1j * rows["im"].astype(float)
+    np.testing.assert_array_equal(back["far"]["f"], f)
+    np.testing.assert_array_equal(back["far"]["angle"], rows["angle"].astype(float))
+    assert back["far"]["observe"].tolist() == rows["observe"].tolist() == 13 * ["cut:0:30"] + ["backscatter"]
+    rows, outside = tables["plane"], back["plane"]["outside"] != 0
+    np.testing.assert_array_equal(back["plane"]["u"][outside].real, rows["re_u"].astype(float))
+    np.testing.assert_array_equal(back["plane"]["status"][outside], rows["status"].astype(int))
+    np.testing.assert_array_equal(back["rays"]["points"][..., 0].ravel(), tables["rays"]["x"].astype(float))
+    np.testing.assert_array_equal(back["rays"]["spreading"].ravel(), tables["rays"]["J"].astype(float))
+    for stem in ("line", "curves"):
+        np.testing.assert_array_equal(back[stem]["points"][:, 1], tables[stem]["y"].astype(float))
+        np.testing.assert_array_equal(back[stem]["curve"], tables[stem]["curve"].astype(int))
+    # alone, and what there is not
+    assert ran("run", "sphere", *options, "--format", "mat") == 0
+    files = json.loads((tmp_path / "summary.json").read_text())["files"]
+    assert "far.mat" in files and not [name for name in files if name.endswith(".csv")]
+    assert ran("run", "sphere", *options, "--format", "hdf") == 3
+    assert "give some of csv, mat" in capsys.readouterr().err
 
 
 def test_a_plane_needs_a_wave(tmp_path, capsys):
