@@ -72,23 +72,29 @@ def test_ffe_of_others(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [
-        ("5.0  6.0", "5.0  six", "line 13: could not convert"),
-        ("5.0  6.0", "5.0  nan", "line 13: a number is not finite"),
+        ("5.0  6.0", "5.0  six", "line 13: 'six' is no finite number"),
+        ("5.0  6.0", "5.0  nan", "line 13: 'nan' is no finite number"),
         ("8.0  -2.0", "8.0", "line 13: 6 numbers in 7 columns"),
         ('"Re(Ephi)"', '"Re(Ephj)"', r"line 11: no column Re\(Ephi\)"),
         ("Theta Samples: 2", "Theta Samples: 3", "2 rows, not 3 theta x 1 phi"),
-        ("Theta Samples: 2", "Theta Samples: -2", "2 rows, not -2"),
+        ("Theta Samples: 2", "Theta Samples: -2", "no whole number as 'No. of Theta Samples'"),
+        ("Theta Samples: 2", "Theta Samples: \u0662", "no whole number as 'No. of Theta Samples'"),
+        ("5.0  6.0", "5.0  1e999", "line 13: a number is not finite"),
+        ("5.0  6.0", "5.0  6_0", "line 13: '6_0' is no finite number"),
+        ("** written", "** " + 10**6 * "x", "line 3: more than 4096 characters"),
+        ("** written", "# " + 4000 * " " + "x", "line 3: no column Theta"),
+        ("** written", "\n".join(f"#a{n}: 1" for n in range(101)) + "\n** ", "more than 100 keys"),
         ("#No. of Phi Samples: 1", "", "No. of Phi Samples"),
         ("3.0E+08", "0", "no positive number as 'Frequency'"),
         ("#  ", "** ", "line 12: a row before"),
-        ("** written", "** " + 5000 * "x", "line 3: 50.. characters"),
+        ("** written", "** " + 5000 * "x", "line 3: more than 4096 characters"),
         (FOREIGN, "", "has no far field"),
         (FOREIGN, "\x00\xff" * 100, "before the names"),
     ],
 )
 def test_damaged_ffe_is_refused_by_line(old, new, match, tmp_path):
     assert old in FOREIGN
-    (tmp_path / "bad.ffe").write_text(FOREIGN.replace(old, new), encoding="latin-1")
+    (tmp_path / "bad.ffe").write_text(FOREIGN.replace(old, new), encoding="utf-8")
     with pytest.raises(cr.InvalidInputError, match=match):
         read_ffe(tmp_path / "bad.ffe")
 
