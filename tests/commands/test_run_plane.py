@@ -2,11 +2,15 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
 import scipy.io
 
+import creeping as cr
+import scatterers as sc
+from creeping.commands import run_field, run_plane
 from creeping.commands.main import main
 from creeping.commands.run_plane import parse_plane
 from creeping.errors import InvalidInputError
@@ -23,7 +27,7 @@ def test_planes_are_written(tmp_path, capsys):
     options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--wavenumber", 6, "--boundary", "hard"]
     planes = ["--plane", "incidence:0.2", "--plane", "xy:0.25", "--observe", "backscatter"]
     assert ran("run", "sphere", *options, *planes, "--no-pictures", "-o", tmp_path) == 0
-    said = capsys.readouterr().out
+    said, told = capsys.readouterr()
     assert "field on the plane incidence:0.2: " in said and "field on the plane xy:0.25: " in said
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert {"plane.csv", "plane_2.csv"} <= set(summary["files"])
@@ -32,6 +36,10 @@ def test_planes_are_written(tmp_path, capsys):
         sum(summary["planes"][0]["status"].values())
         == np.prod(summary["planes"][0]["points"]) - (summary["planes"][0]["inside"])
     )
+    # its cost beforehand: points outside, no seconds of a few
+    for plane in summary["planes"]:
+        outside = np.prod(plane["points"]) - plane["inside"]
+        assert f"field on the plane {plane['plane']}: {outside} points ...\n" in told
     rows = list(csv.DictReader(line for line in (tmp_path / "plane.csv").read_text().splitlines() if line[0] != "#"))
     points = np.array([[float(row[name]) for name in "xyz"] for row in rows])
     values = np.array([complex(float(row["re_u"]), float(row["im_u"])) for row in rows])
@@ -39,6 +47,48 @@ def test_planes_are_written(tmp_path, capsys):
     away = np.linalg.norm(points, axis=1) > 1.4
     exact = sphere.total_field(6.0, 1.0, points[away], (0, 0, 1), "hard")
     assert np.median(np.abs(values[away] - exact)) < 0.03
+
+
+@pytest.mark.parametrize(("first", "each"), [(60.0, 1e-3), (0.0, 0.02)])
+def test_seconds_are_those_of_all_points_without_what_is_made_once(monkeypatch, first, each):
+    """By a clock of our own: kernels and currents take their time once, points each time."""
+    clock, asked = [0.0], []
+
+    def compute(points):
+        clock[0] += (0.0 if asked else first) + each * len(points)
+        asked.append(points)
+
+    monkeypatch.setattr(run_plane, "perf_counter", lambda: clock[0])
+    points = np.arange(30_000.0).reshape(-1, 3)
+    assert run_plane.expected_seconds(compute, points, 625) == pytest.approx(10_000 * each)
+    # each is one of them, none is taken twice, and they are spread over all
+    assert [len(some) for some in asked] == [312, 313]
+    some = np.concatenate(asked)[:, 0]
+    assert len(np.unique(some)) == 625 and np.all(np.isin(some, points[:, 0]))
+    assert np.all(np.histogram(asked[1][:, 0], bins=8, range=(0, 30_000))[0] > 15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("boundary", ["hard", "pec"])
+def test_the_cost_of_a_plane_is_told_and_true(tmp_path, capsys, boundary):
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--wavenumber", 8, "--boundary", boundary]
+    options += ["--plane", "xz:0.07", "--observe", "backscatter", "--no-pictures", "-o", tmp_path]
+    assert ran("run", "sphere", *options) == 0
+    told = re.search(r"plane xz:0.07: (\d+) points, about (\S+) s \.\.\.", capsys.readouterr().err)
+    entry = json.loads((tmp_path / "summary.json").read_text())["planes"][0]
+    assert int(told[1]) == np.prod(entry["points"]) - entry["inside"] > 2048
+    # a clock of a busy machine, and one in sixteen points
+    assert entry["seconds"] / 4 < float(told[2]) < 4 * entry["seconds"] + 0.5
+
+
+def test_nothing_is_promised_where_many_points_are_served_otherwise(monkeypatch):
+    job, ball, said = run_field.job(8.0, "hard", ["backscatter"], (0, 0, 1)), sc.Sphere(), []
+    fan = cr.launch(cr.DirectFlow(ball, rtol=1e-6), cr.shadow_line(ball, (0, 0, 1)), length=2.0, n_rays=16)
+    monkeypatch.setattr(run_plane, "affordable", lambda fan, places, k: places < 1000)
+    monkeypatch.setattr(run_plane, "near_field", lambda *_, **__: pytest.fail("computed"))
+    run_plane._tell_cost(parse_plane("xz:0.06"), job, fan, said.append)
+    (words,) = said
+    assert words.endswith(" points") and "about" not in words
 
 
 def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):
