@@ -20,10 +20,8 @@ import numpy as np
 
 import creeping as cr
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.errors import SingularIncidenceError
-from creeping.shadow.occlusion import occluded
+from studies._point_coverage import bright, cases, coverage, not_ok, parts_off, places, print_table, random_fan
 from studies.field_coverage import DIPOLE_DEPTHS, bodies
-from studies.near_coverage import places
 from studies.reference import dipoles, sphere
 
 WAVENUMBERS = (10.0, 20.0)
@@ -45,18 +43,9 @@ def exact_fields(name: str, k: float, d: FloatArray, points: FloatArray) -> tupl
 def row(name: str, k: float, seed: int) -> dict[str, float]:
     """Coverage, ratio and true error of each part, and what is not OK, per cent."""
     rng = np.random.default_rng(seed)
-    body: Any = bodies()[name][0]
-    while True:
-        d = rng.normal(size=3)
-        d /= np.linalg.norm(d)
-        try:
-            line = cr.shadow_line(body, direction=d)
-            break
-        except SingularIncidenceError:
-            continue
-    fan = cr.launch(cr.DirectFlow(body), line, length=4.0, n_rays=128)
-    points, on, normals, axis = places(name, d, rng)
-    E, H, residual = exact_fields(name, k, d, np.concatenate([points, on]))
+    fan = random_fan(name, rng)
+    points, on, normals, axis = places(name, fan.line.direction, rng)
+    E, H, residual = exact_fields(name, k, fan.line.direction, np.concatenate([points, on]))
     near = cr.conductor_field(fan, points, wavenumber=k)
     current = cr.conductor_current(fan, on, wavenumber=k)
     count = len(points)
@@ -64,49 +53,28 @@ def row(name: str, k: float, seed: int) -> dict[str, float]:
     J = np.cross(normals[:, :, None], H[count:], axis=1)
     charge = np.einsum("nc,nci->ni", normals, E[count:])
     wrong, mistaken = np.linalg.norm(current - J, axis=1), np.abs(current.charge - charge)
-    dark = occluded(body, points, d)
-    bright = normals @ d < 0
-    bright[bright] = ~occluded(body, on[bright], d)
-    close = near.method == "layer"
-    found = {"off": 100 * float(np.mean(~near.ok)), "on": 100 * float(np.mean(~current.ok)), "residual": residual}
+    lit = bright(fan, on, normals)[:, None] & np.ones(2, bool)
     masks: dict[str, tuple[Any, Any, Any]] = {
-        "lit": (off, near, ~dark[:, None] & ~close),
-        "close": (off, near, close),
-        "shadow": (off, near, (dark & ~axis)[:, None] & ~close),
-        "axis": (off, near, (dark & axis)[:, None] & ~close),
-        "J lit": (wrong, current, bright[:, None] | np.zeros(2, bool)),
-        "J dark": (wrong, current, ~bright[:, None] | np.zeros(2, bool)),
-        "charge": (mistaken, current, np.ones(wrong.shape, bool)),
+        part: (off, near, mask) for part, mask in parts_off(fan, points, axis, near.method == "layer").items()
     }
+    masks |= {"J lit": (wrong, current, lit), "J dark": (wrong, current, ~lit)}
+    masks["charge"] = (mistaken, current, np.ones(wrong.shape, bool))
+    found = not_ok(near, current) | {"residual": residual}
     for part, (true, field, mask) in masks.items():
-        at = mask & field.ok
-        some = bool(np.any(at))
-        # the reference's own error counts for nobody
-        found[part] = 100 * float(np.mean(true[at] <= field.error[at] + residual)) if some else np.nan
-        found[f"{part} ratio"] = float(np.median(field.error[at] / true[at])) if some else np.nan
-        found[f"{part} error"] = 100 * float(np.quantile(true[at], 0.95)) if some else np.nan
-    found["rays"] = 100 * float(np.mean((near.method == "rays") & near.ok))
+        found |= coverage(part, true, field, mask, residual=residual, quantile=0.95)
     return found
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Print the table."""
-    given = sys.argv[1:] if arguments is None else arguments
-    quick = "--quick" in given
-    print("body        k  " + "".join(f"{part + ' (ratio, error)':>24}" for part in PARTS) + "   not OK off, on; rays")
-    every = []
-    for number, name in enumerate(BODIES[:1] if quick else BODIES):
-        for k in WAVENUMBERS[:1] if quick else WAVENUMBERS:
-            found = row(name, k, 100 * number + int(k))
-            every.append(found)
-            cells = "".join(
-                f"{found[part]:10.1f} ({found[f'{part} ratio']:5.1f},{found[f'{part} error']:5.1f})" for part in PARTS
-            )
-            print(f"{name:9} {k:4g} {cells}   {found['off']:5.1f} {found['on']:5.1f} {found['rays']:5.1f}", flush=True)
-    for part in PARTS:
-        covers, ratios = ([found[f"{part}{what}"] for found in every] for what in ("", " ratio"))
-        print(f"{part:8} covered {np.nanmean(covers):.1f} %, least {np.nanmin(covers):.1f}", end="; ")
-        print(f"ratio {np.nanmedian(ratios):.1f}")
+    quick = "--quick" in (sys.argv[1:] if arguments is None else arguments)
+    head = "body        k  " + "".join(f"{part + ' (ratio, error)':>24}" for part in PARTS) + "   not OK off, on; rays"
+    rows = ((f"{name:9} {k:4g}", row(name, k, seed)) for seed, (name, k) in cases(BODIES, WAVENUMBERS, quick=quick))
+    print_table(head, PARTS, rows, _cell)
+
+
+def _cell(found: dict[str, float], part: str) -> str:
+    return f"{found[part]:10.1f} ({found[f'{part} ratio']:5.1f},{found[f'{part} error']:5.1f})"
 
 
 if __name__ == "__main__":

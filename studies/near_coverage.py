@@ -20,17 +20,14 @@ import sys
 import numpy as np
 
 import creeping as cr
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
-from creeping.errors import SingularIncidenceError
-from creeping.geometry.quadrature import body_nodes
-from creeping.shadow.occlusion import occluded
+from creeping._typing import Any, ComplexArray, FloatArray
+from studies._point_coverage import bright, cases, coverage, not_ok, parts_off, places, print_table, random_fan
 from studies.field_coverage import bodies
 from studies.reference import fundamental, sphere
 
 WAVENUMBERS = (10.0, 20.0, 30.0)
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7)
 BODIES = ("sphere", "triaxial", "slender", "flat", "twisted", "peanut")
-HEIGHTS = (0.03, 3.0)
 PARTS = ("lit", "close", "shadow", "axis", "on lit", "on dark")
 
 
@@ -47,78 +44,37 @@ def exact_fields(
     return solution.total(points)[:, 0], there[:, 0], float(solution.residual[0])
 
 
-def places(name: str, d: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Points off the body, points on it with their normals, and which of the first are about the axis."""
-    body = bodies()[name][0]
-    nodes = body_nodes(body, 20.0)
-    pick = rng.choice(len(nodes.points), 700, p=nodes.weights / nodes.weights.sum())
-    on, normals = nodes.points[pick], nodes.normals[pick]
-    height = np.exp(rng.uniform(np.log(HEIGHTS[0]), np.log(HEIGHTS[1]), 600))
-    off = on[:600] + height[:, None] * normals[:600]
-    axis = rng.uniform(1.1, 4.0, 100)[:, None] * d + 0.1 * rng.normal(size=(100, 3))
-    points = np.concatenate([off, axis])
-    outside = body.level(points) > 0
-    return points[outside], on, normals, (np.arange(700) >= 600)[outside]
-
-
 def row(name: str, k: float, boundary: Any, seed: int) -> dict[str, float]:
-    """Coverage, per cent, and ratio of each part, what is not OK, and epsilon, per cent."""
+    """Coverage, per cent, and ratio of each part, what is not OK, and the median of the true error, per cent."""
     rng = np.random.default_rng(seed)
-    body = bodies()[name][0]
     kind: Any = boundary if isinstance(boundary, str) else cr.ImpedanceBoundary(boundary)
-    while True:
-        d = rng.normal(size=3)
-        d /= np.linalg.norm(d)
-        try:
-            line = cr.shadow_line(body, direction=d)
-            break
-        except SingularIncidenceError:
-            continue
-    fan = cr.launch(cr.DirectFlow(body), line, length=4.0, n_rays=128)
-    points, on, normals, axis = places(name, d, rng)
-    exact, there, residual = exact_fields(name, k, boundary, d, points, on, normals)
+    fan = random_fan(name, rng)
+    points, on, normals, axis = places(name, fan.line.direction, rng)
+    exact, there, residual = exact_fields(name, k, boundary, fan.line.direction, points, on, normals)
     near = cr.near_field(fan, points, wavenumber=k, boundary=kind)
     surface = cr.surface_field(fan, on, wavenumber=k, boundary=kind)
-    dark = occluded(body, points, d)
-    bright = normals @ d < 0
-    bright[bright] = ~occluded(body, on[bright], d)
-    found = {"off": 100 * float(np.mean(~near.ok)), "on": 100 * float(np.mean(~surface.ok))}
-    close = near.method == "layer"
-    parts = {"lit": ~dark & ~close, "close": close, "shadow": dark & ~axis & ~close, "axis": dark & axis & ~close}
+    lit = bright(fan, on, normals)
     unit = k if boundary == "soft" else 1.0
+    found = not_ok(near, surface)
     for field, truth, scale, masks in (
-        (near, exact, 1.0, parts),
-        (surface, there, unit, {"on lit": bright, "on dark": ~bright}),
+        (near, exact, 1.0, parts_off(fan, points, axis, near.method == "layer")),
+        (surface, there, unit, {"on lit": lit, "on dark": ~lit}),
     ):
         off = np.abs(field - truth)
         for part, mask in masks.items():
-            at = mask & field.ok
-            # the reference's own error counts for nobody
-            covered = off[at] <= field.error[at] + residual * scale
-            found[part] = 100 * float(np.mean(covered)) if np.any(at) else np.nan
-            found[f"{part} ratio"] = float(np.median(field.error[at] / off[at])) if np.any(at) else np.nan
-            found[f"{part} error"] = 100 * float(np.median(off[at] / scale)) if np.any(at) else np.nan
-    found["rays"] = 100 * float(np.mean((near.method == "rays") & near.ok))
+            found |= coverage(part, off, field, mask, residual=residual * scale, unit=scale, quantile=0.5)
     return found
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Print the table."""
-    given = sys.argv[1:] if arguments is None else arguments
-    quick = "--quick" in given
-    print("body      boundary   k  " + "".join(f"{part + ' (ratio)':>17}" for part in PARTS) + "   not OK off, on")
-    every = []
-    for number, name in enumerate(BODIES[:1] if quick else BODIES):
-        for boundary in BOUNDARIES:
-            for k in WAVENUMBERS[:1] if quick else WAVENUMBERS:
-                found = row(name, k, boundary, 100 * number + int(k))
-                every.append(found)
-                cells = "".join(f"{found[part]:8.1f} ({found[f'{part} ratio']:5.1f}) " for part in PARTS)
-                print(f"{name:9} {boundary!s:8} {k:4g} {cells}   {found['off']:5.1f} {found['on']:5.1f}", flush=True)
-    for part in PARTS:
-        covers, ratios = ([found[f"{part}{what}"] for found in every] for what in ("", " ratio"))
-        print(f"{part:8} covered {np.nanmean(covers):.1f} %, least {np.nanmin(covers):.1f}", end="; ")
-        print(f"ratio {np.nanmedian(ratios):.1f}")
+    quick = "--quick" in (sys.argv[1:] if arguments is None else arguments)
+    head = "body      boundary   k  " + "".join(f"{part + ' (ratio)':>17}" for part in PARTS) + "   not OK off, on"
+    rows = (
+        (f"{name:9} {boundary!s:8} {k:4g}", row(name, k, boundary, seed))
+        for seed, (name, boundary, k) in cases(BODIES, BOUNDARIES, WAVENUMBERS, quick=quick)
+    )
+    print_table(head, PARTS, rows, lambda found, part: f"{found[part]:8.1f} ({found[f'{part} ratio']:5.1f}) ")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from cyclopts import Group, Parameter
 
 from creeping.commands.body import AS_IT_IS, Body, FileOptions, parse_body
+from creeping.commands.formats import HELP, table_formats
 
 _angles = Group("Angles")
 _output = Group("Output")
@@ -48,9 +49,7 @@ Column = Annotated[
 Align = Annotated[float, Parameter(group=_output, help="Largest shift of the measured angles that is tried, degrees.")]
 Folder = Annotated[Path | None, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
 Pictures = Annotated[bool, Parameter(group=_output, help="Draw pictures; --no-pictures leaves them out.")]
-Formats = Annotated[
-    str, Parameter(name="--format", group=_output, help="Tables: csv or mat (MATLAB), or both joined by a comma.")
-]
+Formats = Annotated[str, Parameter(name="--format", group=_output, help=HELP)]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
 Cache = Annotated[bool, Parameter(help="Keep the phase map for the next run.")]
 
@@ -142,7 +141,7 @@ def _echo(
     started = time.perf_counter()
     request = echo_request(quantity, **asked)
     boundary = parse_boundary(request.boundary)
-    written["formats"] = echo_report.table_formats(written["formats"])
+    written["formats"] = table_formats(written["formats"])
     # before the time is spent
     reference = echo_report.reference_of(request, *measured)
 

@@ -1,5 +1,6 @@
 """What ``creeping rcs`` and ``creeping ts`` compute, write and say."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,8 @@ from creeping.geometry.surface import Surface
 from creeping.shadow.status import FAILED, SINGULAR
 from creeping.sweeping.echoes import backscatter, bistatic
 
-FORMATS = ("csv", "mat")
+TURN = 360.0
+"""Degrees after which azimuths repeat."""
 LEAST_BAND = 16
 """Frequencies from which a band has a range profile."""
 
@@ -100,28 +102,15 @@ def compared(
         c = echo.channels.index(channel)
         at = (c, 0, slice(None)) if cut.over == "frequency" else (c, slice(None), 0)
         values = echo.hertz if cut.over == "frequency" else echo.angles
-        most = align if cut.over == "angle" else 0.0
+        options: dict[str, Any] = {"align": align if cut.over == "angle" else 0.0}
+        if cut.over == "angle" and echo.angle_name == "azimuth" and not cut.polar:
+            options["period"] = TURN
         try:
-            found[channel] = compare(values, levels[at], cut.values, given, low=low[at], high=high[at], align=most)
+            found[channel] = compare(values, levels[at], cut.values, given, low=low[at], high=high[at], **options)
         except InvalidInputError as error:
             # the results are written all the same
             refused[channel] = str(error)
     return found, {"not_compared": refused} if refused else {}
-
-
-def table_formats(text: str) -> tuple[str, ...]:
-    """Kinds of tables that are asked for.
-
-    Raises
-    ------
-    InvalidInputError
-        If one is unknown, or given twice.
-    """
-    names = tuple(name.strip().lower() for name in text.split(","))
-    unknown = [name for name in names if name not in FORMATS]
-    if unknown or len(set(names)) < len(names):
-        raise InvalidInputError(f"--format {text!r}: give some of {', '.join(FORMATS)}, each once")
-    return names
 
 
 def write_results(
@@ -140,7 +129,7 @@ def write_results(
     except OSError as error:
         raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
     stem = echo.quantity
-    writers = {"csv": write_echo, "mat": write_mat}
+    writers: dict[str, Callable[[Path, Echo], None]] = {"csv": write_echo, "mat": write_mat}
     names = [f"{stem}.{kind}" for kind in formats]
     for kind in formats:
         writers[kind](output / f"{stem}.{kind}", echo)
@@ -279,6 +268,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             f"{off['rms_db']:.3g} dB, largest {off['largest_db']:.3g} dB, Austin measure {off['austin_db']:.3g} dB"
         )
         shift = f"; shifted by {off['shift']:g} degrees" if off["shift"] else ""
-        rows.append(f"  {100 * off['within_error']:.0f} % within the stated error{shift}")
+        wrapped = f"; {off['wrapped']:g} of its azimuths by whole turns" if off["wrapped"] else ""
+        rows.append(f"  {100 * off['within_error']:.0f} % within the stated error{shift}{wrapped}")
     rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
     return "\n".join(rows)

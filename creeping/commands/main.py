@@ -20,6 +20,7 @@ from creeping.commands import explore as _explore_command
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
 from creeping.commands.body import AS_IT_IS, Body, FileOptions, SpeedOption, parse_body, title_of
+from creeping.commands.formats import HELP, table_formats
 
 app = App(
     name="creeping",
@@ -136,6 +137,7 @@ def run(
     backend: Annotated[
         Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")
     ] = "auto",
+    formats: Annotated[str, Parameter(name="--format", group=_output, help=HELP)] = "csv",
     json_: Json = False,
 ) -> int:
     """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
@@ -148,6 +150,7 @@ def run(
     from creeping.rays.reach import ray_length
 
     started = time.perf_counter()
+    tables = table_formats(formats)
     for name, value in (("length", length), ("spacing", spacing)):
         if isinstance(value, float) and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
@@ -174,14 +177,17 @@ def run(
             far, field_seconds = job.far_field(fan)
         progress("pictures and files" if pictures else "files")
         drawn_with = backend if pictures else None
-        summary["files"], summary["drawn_by"] = _run_results.write_results(output, line, fan, curves, drawn_with)
+        summary["files"], summary["drawn_by"] = _run_results.write_results(
+            output, line, fan, curves, drawn_with, tables
+        )
+        written: dict[str, Any] = {"pictures": pictures, "formats": tables}
         if job:
-            summary["field"], names = job.write(far, fan, output, backend, title_of(body), pictures=pictures)
+            summary["field"], names = job.write(far, fan, output, backend, title_of(body), **written)
             summary["field"]["seconds"] = field_seconds
             summary["files"][-1:-1] = names
         if job and planes:
             asked = planes, job, fan, output, title_of(body), progress
-            summary["planes"], names = _plane_run.write_planes(*asked, pictures=pictures)
+            summary["planes"], names = _plane_run.write_planes(*asked, **written)
             summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)
         from creeping.files import write_text

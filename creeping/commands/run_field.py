@@ -10,6 +10,7 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import FloatArray
+from creeping.commands.formats import write_tables
 from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike, parse_boundary
@@ -116,10 +117,18 @@ class Job:
         return far, round(time.perf_counter() - started, 2)
 
     def write(
-        self, far: FarField, fan: RayFan, output: Path, backend: str, name: str, *, pictures: bool = True
+        self,
+        far: FarField,
+        fan: RayFan,
+        output: Path,
+        backend: str,
+        name: str,
+        *,
+        pictures: bool = True,
+        formats: Sequence[str] = ("csv",),
     ) -> tuple[dict[str, Any], list[str]]:
         """Write the files of a far field of the body ``name``; returns the entry of the summary and their names."""
-        names = self._tables(far, fan, output)
+        names = self._tables(far, fan, output, formats)
         if pictures:
             names += self._pictures(far, fan, output, backend, name)
         methods, counts = np.unique(far.method, return_counts=True)
@@ -163,11 +172,10 @@ class Job:
         ends = np.cumsum([len(target.directions) for target in self.targets])
         return [_part(far, end - len(t.directions), end) for t, end in zip(self.targets, ends, strict=True)]
 
-    def _tables(self, far: FarField, fan: RayFan, output: Path) -> list[str]:
-        names = ["far.csv"]
+    def _tables(self, far: FarField, fan: RayFan, output: Path, formats: Sequence[str]) -> list[str]:
         texts = [target.text for target in self.targets for _ in target.directions]
         angles = np.concatenate([target.angles for target in self.targets])
-        files.write_csv(output / "far.csv", far=far, observed=(texts, angles))
+        names = write_tables(output / "far", formats, far, observed=(texts, angles), far=far)
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
             # a .ffe file holds no infinity; the table does
             if target.kind == "grid" and np.all(np.isfinite(piece.total)):

@@ -8,15 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from creeping import files, plotting
+from creeping import plotting
+from creeping._typing import FloatArray
+from creeping.commands.formats import write_tables
 from creeping.commands.run_field import DPI, ORDER, Job
 from creeping.errors import InvalidInputError
+from creeping.field.conductor.near import conductor_field
+from creeping.field.currents.kept import affordable
 from creeping.field.cut_result import FieldCut
-from creeping.field.plane_cut import field_cut
+from creeping.field.near import near_field
+from creeping.field.plane_cut import cut_grid, field_cut
 from creeping.geometry.creased import has_edges, is_creased
 from creeping.rays.fan import RayFan
 
 PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+TRIED, LEAST_TRIED, MOST_TRIED = 16, 128, 1536
+"""One in so many points is computed to know how long all take; so many at least, and at most."""
 FORMS = "incidence, xy, xz or yz, with :STEP if it is not to fit the wave, e.g. xz:0.02"
 
 
@@ -78,17 +85,17 @@ def write_planes(
     progress: Callable[[str], None],
     *,
     pictures: bool,
+    formats: Sequence[str] = ("csv",),
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Compute fields on planes and write their files; returns entries of the summary and the names of the files."""
     entries, names = [], []
     for number, plane in enumerate(planes, 1):
-        progress(f"field on the plane {plane.text}")
         stem = "plane" if number == 1 else f"plane_{number}"
+        _tell_cost(plane, job, fan, progress)
         started = perf_counter()
-        cut = _cut(plane, job, fan)
+        cut = field_cut(fan, **_options(plane, job), **_polarisation(job))
         seconds = perf_counter() - started
-        files.write_csv(output / f"{stem}.csv", cut=cut)
-        names.append(f"{stem}.csv")
+        names += write_tables(output / stem, formats, cut, cut=cut)
         if pictures and np.any(cut.field.ok):
             title = f"{name}\n{job.told(cut.field.length_unit)}, {cut.field.boundary}"
             plotting.field_cut_picture(output / f"{stem}.png", cut, error=True, title=title, dpi=DPI)
@@ -97,14 +104,51 @@ def write_planes(
     return entries, names
 
 
-def _cut(plane: Plane, job: Job, fan: RayFan) -> FieldCut:
+def _options(plane: Plane, job: Job) -> dict[str, Any]:
+    """Arguments of `field_cut`, and of `cut_grid`."""
     options: dict[str, Any] = {"wavenumber": job.wavenumber, "boundary": job.boundary, "order": ORDER}
     if plane.axes is not None:
         options |= {"across": plane.axes[0], "up": plane.axes[1]}
-    if job.boundary == "pec":
-        # the transmitted one of the first component that pictures show
-        options["polarisation"] = {"t": "theta", "p": "phi"}[job.components[0][1]]
-    return field_cut(fan, step=plane.step, **options)
+    return options | {"step": plane.step}
+
+
+def _polarisation(job: Job) -> dict[str, Any]:
+    """Of a conductor the transmitted one of the first component that pictures show."""
+    return {"polarisation": {"t": "theta", "p": "phi"}[job.components[0][1]]} if job.boundary == "pec" else {}
+
+
+def _tell_cost(plane: Plane, job: Job, fan: RayFan, progress: Callable[[str], None]) -> None:
+    """Say how many points a plane has, and how long they take."""
+    grid = cut_grid(fan, **_options(plane, job))
+    points, words = grid.points, f"field on the plane {plane.text}: {len(grid.points)} points"
+    progress(words)
+    k = job.wavenumber
+    count = max(LEAST_TRIED, min(MOST_TRIED, len(points) // TRIED))
+    # of many points currents may cost too much where they serve a few
+    if len(points) < TRIED * LEAST_TRIED or affordable(fan, count, k) != affordable(fan, len(points), k):
+        return
+
+    def compute(some: FloatArray) -> None:
+        if job.boundary == "pec":
+            conductor_field(fan, some, wavenumber=k, **_polarisation(job))
+        else:
+            near_field(fan, some, wavenumber=k, boundary=job.boundary, order=ORDER)
+
+    seconds = expected_seconds(compute, points, count)
+    progress(f"{words}, about {seconds:.{0 if seconds >= 10 else 1}f} s")
+
+
+def expected_seconds(compute: Callable[[FloatArray], None], points: FloatArray, count: int) -> float:
+    """Seconds that all points (n, 3) take, by ``count`` of them spread over all.
+
+    What is made once and kept, kernels and currents, is made with the first half of these; the second is timed.
+    """
+    some = points[np.random.default_rng(0).choice(len(points), count, replace=False)]
+    before, timed = some[: count // 2], some[count // 2 :]
+    compute(before)
+    started = perf_counter()
+    compute(timed)
+    return (perf_counter() - started) * len(points) / len(timed)
 
 
 def _entry(plane: Plane, cut: FieldCut) -> dict[str, Any]:

@@ -1,9 +1,11 @@
 """What one ``creeping run`` says and writes. Part of the command line."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from creeping._version import __version__
+from creeping.commands.formats import write_tables
 
 
 def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any]) -> dict[str, Any]:
@@ -70,7 +72,7 @@ DPI = 200
 
 
 def write_results(
-    output: Path, line: Any, fan: Any, curves: list[Any], backend: str | None
+    output: Path, line: Any, fan: Any, curves: list[Any], backend: str | None, formats: Sequence[str] = ("csv",)
 ) -> tuple[list[str], str | None]:
     """Write data files and pictures, none without a backend; their names, and what drew the pictures."""
     from creeping import files, plotting
@@ -84,10 +86,10 @@ def write_results(
     files.write_vtp(output / "line.vtp", line=line)
     files.write_vtp(output / "rays.vtp", fan=fan)
     files.write_vtp(output / "curves.vtp", curves=curves)
-    files.write_csv(output / "line.csv", line=line)
-    files.write_csv(output / "rays.csv", fan=fan)
-    files.write_csv(output / "curves.csv", curves=curves)
-    names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", "csv") for n in ("line", "rays", "curves")], None
+    tables: dict[str, tuple[str, Any]] = {"line": ("line", line), "rays": ("fan", fan), "curves": ("curves", curves)}
+    for name, (kind, what) in tables.items():
+        write_tables(output / name, formats, what, **{kind: what})
+    names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", *formats) for n in tables], None
     if backend is not None:
         drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend, dpi=DPI)
         plotting.parameter_picture(output / "parameters.png", line, fan, curves, dpi=DPI)

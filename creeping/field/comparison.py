@@ -1,6 +1,6 @@
 """Two cuts of levels compared: the residual, its mean and rms, and the measure of the Austin benchmark suite.
 
-    residual = s - s_ref, dB, at the reference's places
+    residual = s - s_ref, dB, at the reference's places, which may repeat after a period
     austin   = mean |max(s, T) - max(s_ref, T)|,   T = max s_ref - 80 dB
 
 Sources: [KCY20] for the measure.
@@ -36,6 +36,8 @@ class Comparison:
         What was added to the reference's places to bring both together.
     within : float
         Share of the places where the reference lies within the stated error; NaN without one.
+    wrapped : int
+        Places that were brought to the computed ones by whole periods.
 
     Examples
     --------
@@ -50,6 +52,7 @@ class Comparison:
     reference: FloatArray
     shift: float
     within: float
+    wrapped: int = 0
 
     @property
     def residual(self) -> FloatArray:
@@ -82,6 +85,7 @@ class Comparison:
             "within_error": self.within,
             "shift": self.shift,
             "places": float(len(self.values)),
+            "wrapped": float(self.wrapped),
         }
 
 
@@ -94,6 +98,7 @@ def compare(
     low: ArrayLike | None = None,
     high: ArrayLike | None = None,
     align: float = 0.0,
+    period: float | None = None,
 ) -> Comparison:
     """Compare levels with a reference's, over directions or frequencies.
 
@@ -107,6 +112,9 @@ def compare(
         Levels that the stated error allows.
     align : float, degrees or Hz
         Largest shift of the reference that is tried: a turntable has its own zero.
+    period : float, optional
+        What places repeat after: 360 of azimuths in degrees, so that a reference over 0 to 360 fits -180 to 180. Polar
+        angles and frequencies have none.
 
     Raises
     ------
@@ -118,6 +126,9 @@ def compare(
     >>> found = compare([0, 1, 2], [0.0, -3.0, -9.0], [0.5, 1.5], [-1.4, -6.0])
     >>> found.residual.round(2).tolist(), round(found.rms, 3)
     ([-0.1, 0.0], 0.071)
+    >>> found = compare([-90, 0, 90], [-1.0, 0.0, -3.0], [0, 270], [0.0, -1.5], period=360.0)
+    >>> found.values.tolist(), found.residual.tolist(), found.wrapped
+    ([-90.0, 0.0], [0.5, 0.0], 1)
     """
     x, y = _pair(values, levels, "values and levels")
     at, given = _pair(reference_values, reference, "reference")
@@ -125,24 +136,53 @@ def compare(
         raise InvalidInputError("values are not ascending")
     if not (np.isfinite(align) and align >= 0):
         raise InvalidInputError(f"align = {align!r} is not a finite number >= 0")
+    if period is not None and not (np.isfinite(period) and period > 0):
+        raise InvalidInputError(f"period = {period!r} is not a finite number > 0; 360 is that of azimuths in degrees")
+    ends, closed = (float(x[0]), float(x[-1])), _closes(x, period)
+    if closed:
+        x, y = np.append(x, x[0] + (period or 0.0)), np.append(y, y[0])
     # the least shift of those that are as good
     shifts = sorted(np.linspace(-align, align, 201) if align else np.zeros(1), key=abs)
-    least = OVERLAP * np.sum(_usable(x, y, at, given))
-    off = [_spread(x, y, at + shift, given, least) for shift in shifts]
+    least = OVERLAP * np.sum(_usable(x, y, _turned(x, at, period), given))
+    off = [_spread(x, y, _turned(x, at + shift, period), given, least) for shift in shifts]
     shift = float(shifts[int(np.nanargmin(off)) if np.any(np.isfinite(off)) else 0])
-    ok = _usable(x, y, at + shift, given)
+    places = _turned(x, at + shift, period)
+    ok = _usable(x, y, places, given)
     if not np.any(ok):
+        again = "" if period is None else f", whole periods of {period:g} apart or not"
         raise InvalidInputError(
             f"the reference, from {at.min():g} to {at.max():g}, has no place with what was computed, "
-            f"from {x[0]:g} to {x[-1]:g}"
+            f"from {ends[0]:g} to {ends[1]:g}{again}"
         )
-    there = at[ok] + shift
+    there, here = places[ok], given[ok]
+    wrapped = int(np.sum(there != (at + shift)[ok]))
+    if wrapped:
+        # what came round the period stands where it belongs
+        order = np.argsort(there, kind="stable")
+        there, here = there[order], here[order]
     within = np.nan
     if low is not None and high is not None:
-        bottom, top = (np.interp(there, x, np.maximum(_pair(x, v, "bounds")[1], -1e3)) for v in (low, high))
+        bounds = [np.maximum(_pair(values, v, "bounds")[1], -1e3) for v in (low, high)]
+        bottom, top = (np.interp(there, x, np.append(v, v[:1]) if closed else v) for v in bounds)
         known = np.isfinite(bottom) & np.isfinite(top)
-        within = float(np.mean(((given[ok] >= bottom) & (given[ok] <= top))[known])) if np.any(known) else np.nan
-    return Comparison(there, np.interp(there, x, y), given[ok], shift, within)
+        within = float(np.mean(((here >= bottom) & (here <= top))[known])) if np.any(known) else np.nan
+    return Comparison(there, np.interp(there, x, y), here, shift, within, wrapped)
+
+
+def _closes(x: FloatArray, period: float | None) -> bool:
+    """Whether values (n,) go round a period but for the step from the last to the first."""
+    if period is None or len(x) < 2:
+        return False
+    left = x[0] + period - x[-1]
+    return bool(0 < left <= np.max(np.diff(x)) * (1 + 1e-9))
+
+
+def _turned(x: FloatArray, at: FloatArray, period: float | None) -> FloatArray:
+    """Places, those beyond the values (n,) by whole periods within the first one of them."""
+    if period is None:
+        return at
+    beyond = (at < x[0]) | (at > x[-1])
+    return np.where(beyond, x[0] + np.mod(at - x[0], period), at)
 
 
 def _pair(values: ArrayLike, levels: ArrayLike, what: str) -> tuple[FloatArray, FloatArray]:

@@ -8,9 +8,11 @@ Sources: Derivations, F17 and F26.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from creeping._typing import ArrayLike, FloatArray
+from creeping._typing import ArrayLike, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import BoundaryLike
@@ -94,14 +96,75 @@ def field_cut(
     >>> cut.quantities, cut.magnitude("H").shape, cut.to_xarray()["E"].dims
     (('E', 'H'), (9, 9), ('up', 'across', 'component'))
     """
-    one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, edgeless="the near field")
-    k = checked(wavenumber, order)
-    conductor = isinstance(boundary, str) and boundary == "pec"
-    if conductor and (order, method) != (2, "auto"):
-        raise InvalidInputError("a conductor's field has order 2 and method 'auto'; leave them out")
+    k, conductor = _checked(fan, wavenumber, boundary, order, method)
     if not conductor and polarisation is not None:
         raise InvalidInputError("polarisation is of a conductor's field; give it with boundary='pec'")
+    grid = cut_grid(
+        fan,
+        wavenumber=k,
+        boundary=boundary,
+        point=point,
+        across=across,
+        up=up,
+        extent=extent,
+        step=step,
+        order=order,
+        method=method,
+    )
+    field: NearField | ConductorField
+    if conductor:
+        wave = "theta" if polarisation is None else polarisation
+        field = conductor_field(fan, grid.points, wavenumber=k, polarisation=wave)
+    else:
+        field = near_field(fan, grid.points, wavenumber=k, boundary=boundary, order=order, method=method)
+    parts = {name: getattr(grid, name) for name in ("point", "axes", "across", "up", "outside")}
+    return FieldCut(line=fan.line, field=field, **parts)
+
+
+@dataclass(frozen=True, eq=False)
+class CutGrid:
+    """Points of a cut before their field is known.
+
+    Attributes
+    ----------
+    point, axes, across, up, outside
+        As of `FieldCut`.
+    points : (m, 3), L
+        Those outside the body, in the order of the grid's rows.
+    """
+
+    point: FloatArray
+    axes: FloatArray
+    across: FloatArray
+    up: FloatArray
+    outside: BoolArray
+    points: FloatArray
+
+
+def cut_grid(
+    fan: RayFan,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    point: ArrayLike | None = None,
+    across: ArrayLike | None = None,
+    up: ArrayLike | None = None,
+    extent: ArrayLike | None = None,
+    step: float | None = None,
+    order: int = 2,
+    method: str = "auto",
+) -> CutGrid:
+    """Points at which `field_cut` would compute the field; arguments, errors as there.
+
+    Examples
+    --------
+    >>> import creeping as cr, scatterers as sc
+    >>> fan = cr.launch(cr.DirectFlow(sc.Sphere(), rtol=1e-6), cr.shadow_line(sc.Sphere(), (1, 0, 0)), n_rays=16)
+    >>> grid = cut_grid(fan, wavenumber=8.0, extent=(3.0, 3.0), step=0.5)
+    >>> grid.outside.shape, grid.points.shape
+    ((7, 7), (40, 3))
+    """
+    k, conductor = _checked(fan, wavenumber, boundary, order, method)
     box = np.asarray(fan.body.bounds, dtype=float)
     middle = 0.5 * (box[0] + box[1]) if point is None else real_array(point, "point")
     if middle.shape != (3,) or not np.all(np.isfinite(middle)):
@@ -115,21 +178,18 @@ def field_cut(
     outside = np.asarray(fan.body.level(points.reshape(-1, 3)) >= 0).reshape(points.shape[:2])
     if not np.any(outside):
         raise InvalidInputError(f"all {outside.size} points are inside the body; give a larger extent")
-    field: NearField | ConductorField
-    if conductor:
-        wave = "theta" if polarisation is None else polarisation
-        field = conductor_field(fan, points[outside], wavenumber=k, polarisation=wave)
-    else:
-        field = near_field(fan, points[outside], wavenumber=k, boundary=boundary, order=order, method=method)
-    return FieldCut(
-        line=fan.line,
-        point=middle.copy(),
-        axes=axes,
-        across=a,
-        up=b,
-        outside=outside,
-        field=field,
-    )
+    return CutGrid(middle.copy(), axes, a, b, outside, points[outside])
+
+
+def _checked(fan: RayFan, wavenumber: float, boundary: BoundaryLike, order: int, method: str) -> tuple[float, bool]:
+    """The wavenumber, and whether the body is a conductor."""
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    checked_plain(fan.body, edgeless="the near field")
+    conductor = isinstance(boundary, str) and boundary == "pec"
+    k = checked(wavenumber, order)
+    if conductor and (order, method) != (2, "auto"):
+        raise InvalidInputError("a conductor's field has order 2 and method 'auto'; leave them out")
+    return k, conductor
 
 
 def _axes(direction: FloatArray, across: ArrayLike | None, up: ArrayLike | None, box: FloatArray) -> FloatArray:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 import re
+from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -19,10 +21,13 @@ from creeping.field.frequency import wavenumber
 
 MOST_BYTES = 512_000_000
 MOST_BLOCKS = 10_000
+MOST_ROWS, MOST_KEYS = 5_000_000, 100
+"""Rows of a file, and keys of a block."""
 LONGEST = 4096
 """Characters of a line."""
 COLUMNS = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)")
-_KEY = re.compile(r'#\s*([^:"]+?)\s*:\s*(.*)')
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+_WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +67,8 @@ class FfeBlock:
     @property
     def incidence(self) -> tuple[float, float] | None:
         """Where the incident wave comes from: theta and phi, degrees; None if the file does not say."""
-        numbers = re.findall(r"[-+.\dEe]+", self.keys.get("Incident Wave Direction", ""))
-        try:
-            return (float(numbers[0]), float(numbers[1])) if len(numbers) == 2 else None
-        except ValueError:
-            return None
+        numbers = _NUMBER.findall(self.keys.get("Incident Wave Direction", ""))
+        return (float(numbers[0]), float(numbers[1])) if len(numbers) == 2 else None
 
 
 @dataclass
@@ -76,7 +78,7 @@ class _Open:
     keys: dict[str, str] = field(default_factory=dict)
     columns: list[int] = field(default_factory=list)
     count: int = 0
-    rows: list[list[float]] = field(default_factory=list)
+    rows: array[float] = field(default_factory=lambda: array("d"))
 
 
 def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
@@ -124,12 +126,13 @@ def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
     return found
 
 
-def _blocks(file: Path, stream: Iterator[str]) -> Iterator[FfeBlock]:
-    block, number, blocks = _Open(), 0, 0
-    for number, raw in enumerate(stream, 1):
+def _blocks(file: Path, stream: TextIO) -> Iterator[FfeBlock]:
+    block, number, blocks, rows = _Open(), 0, 0, 0
+    # of a line without an end no more is read than is needed to refuse it
+    for number, raw in enumerate(iter(lambda: stream.readline(LONGEST + 2), ""), 1):
+        if len(raw) > LONGEST + 1:
+            raise InvalidInputError(f"{file}, line {number}: more than {LONGEST} characters")
         line = raw.strip()
-        if len(line) > LONGEST:
-            raise InvalidInputError(f"{file}, line {number}: {len(line)} characters, more than {LONGEST}")
         if not line or line.startswith(("##", "**")):
             continue
         if line.startswith("#"):
@@ -140,16 +143,23 @@ def _blocks(file: Path, stream: Iterator[str]) -> Iterator[FfeBlock]:
                     raise InvalidInputError(f"{file}, line {number}: more than {MOST_BLOCKS} blocks")
             _header(file, number, line, block)
         else:
-            block.rows.append(_row(file, number, line, block))
+            rows += 1
+            if rows > MOST_ROWS:
+                raise InvalidInputError(f"{file}, line {number}: more than {MOST_ROWS} rows; split the file")
+            block.rows.extend(_row(file, number, line, block))
     if block.rows:
         yield _closed(file, number, block)
 
 
 def _header(file: Path, number: int, line: str, block: _Open) -> None:
     """Take over a key, or the names of the columns."""
-    key = _KEY.fullmatch(line)
-    if key:
-        block.keys[key[1]] = key[2]
+    key, colon, value = line[1:].partition(":")
+    if colon and key.strip() and '"' not in key:
+        name, told = key.strip(), value.strip()
+        if block.keys.setdefault(name, told) != told:
+            raise InvalidInputError(f"{file}, line {number}: {name[:40]!r} is given twice, with other values")
+        if len(block.keys) > MOST_KEYS:
+            raise InvalidInputError(f"{file}, line {number}: more than {MOST_KEYS} keys of one block")
         return
     names = re.findall(r'"([^"]*)"', line)
     missing = [name for name in COLUMNS if name not in names]
@@ -164,10 +174,11 @@ def _row(file: Path, number: int, line: str, block: _Open) -> list[float]:
         raise InvalidInputError(f"{file}, line {number}: a row before the names of the columns")
     if len(cells) != block.count:
         raise InvalidInputError(f"{file}, line {number}: {len(cells)} numbers in {block.count} columns")
-    try:
-        values = [float(cells[at]) for at in block.columns]
-    except ValueError as error:
-        raise InvalidInputError(f"{file}, line {number}: {error}") from None
+    texts = [cells[at] for at in block.columns]
+    strange = [text for text in texts if not _NUMBER.fullmatch(text)]
+    if strange:
+        raise InvalidInputError(f"{file}, line {number}: {strange[0][:40]!r} is no finite number")
+    values = [float(text) for text in texts]
     if not np.all(np.isfinite(values)):
         raise InvalidInputError(f"{file}, line {number}: a number is not finite")
     return values
@@ -177,21 +188,18 @@ def _closed(file: Path, number: int, block: _Open) -> FfeBlock:
     """The block that ends before a line."""
     sizes = []
     for key in ("No. of Theta Samples", "No. of Phi Samples"):
-        try:
-            sizes.append(int(block.keys[key]))
-        except (KeyError, ValueError):
-            raise InvalidInputError(f"{file}, block before line {number}: no whole number as {key!r}") from None
-    if sizes[0] * sizes[1] != len(block.rows):
+        if not _WHOLE.fullmatch(block.keys.get(key, "")):
+            raise InvalidInputError(f"{file}, block before line {number}: no whole number as {key!r}")
+        sizes.append(int(block.keys[key]))
+    rows = np.array(block.rows).reshape(-1, len(COLUMNS))
+    if sizes[0] * sizes[1] != len(rows):
         raise InvalidInputError(
-            f"{file}, block before line {number}: {len(block.rows)} rows, not {sizes[0]} theta x {sizes[1]} phi"
+            f"{file}, block before line {number}: {len(rows)} rows, not {sizes[0]} theta x {sizes[1]} phi"
         )
-    try:
-        hertz = float(block.keys["Frequency"])
-    except (KeyError, ValueError):
-        hertz = np.nan
+    text = block.keys.get("Frequency", "")
+    hertz = float(text) if _NUMBER.fullmatch(text) else np.nan
     if not (np.isfinite(hertz) and hertz > 0):
         raise InvalidInputError(f"{file}, block before line {number}: no positive number as 'Frequency'")
-    rows = np.array(block.rows)
     e = np.stack([rows[:, 2] + 1j * rows[:, 3], rows[:, 4] + 1j * rows[:, 5]], axis=-1)
     name = block.keys.get("Configuration Name", "")
     return FfeBlock(name, hertz, rows[:, 0], rows[:, 1], np.conj(e), dict(block.keys))

@@ -4,38 +4,55 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any
+from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.labelled import PARTS, power
+from creeping.geometry.speed import speed_of
+from creeping.geometry.unit import UNKNOWN, unit_of
+from creeping.rays.fan import RayFan
+from creeping.rays.isophase import IsoPhaseCurve
+from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
+    from creeping.field.cut_result import FieldCut
     from creeping.field.echo import Echo
     from creeping.field.far_result import FarField
 
 ABOUT = "time factor exp(-i w t); far field f exp(i k r)/r; 4 pi |f|^2 is the cross section"
+Content = tuple[dict[str, Any], dict[str, str]]
+"""Values and units by name."""
 
 
-def write_mat(path: str | os.PathLike[str], result: Echo | FarField) -> None:
-    """Write an echo or a far field for MATLAB, Octave or ``scipy.io.loadmat``.
+def write_mat(
+    path: str | os.PathLike[str],
+    result: Echo | FarField | FieldCut | ShadowLine | RayFan | Sequence[IsoPhaseCurve],
+    *,
+    observed: tuple[Sequence[str], FloatArray] | None = None,
+) -> None:
+    """Write a result for MATLAB, Octave or ``scipy.io.loadmat``.
 
     Parameters
     ----------
     path : str or path
         File to write; replaced at once when complete.
-    result : Echo or FarField
+    result : Echo, FarField, FieldCut, ShadowLine, RayFan or sequence of IsoPhaseCurve
         Arrays keep their axes: channels, angles, frequencies of an echo; directions, scattered and incident θ̂ and φ̂
-        of a far field.
+        of a far field; ``up`` and ``across`` of a field on a plane, NaN and status -1 inside the body; rays and steps
+        of a fan. A line and iso-phase curves are one point a row, with the number of its curve.
+    observed : (texts, angles), optional
+        Of a far field: what each direction was asked for as, and its angle along the cut (m,), degrees.
 
     Raises
     ------
     InvalidInputError
-        If the result is neither.
+        If the result is none of these.
     CreepingError
         If the file cannot be written.
 
@@ -53,15 +70,10 @@ def write_mat(path: str | os.PathLike[str], result: Echo | FarField) -> None:
     """
     from scipy.io import savemat
 
-    from creeping.field.echo import Echo
-    from creeping.field.far_result import FarField
-
-    if isinstance(result, Echo):
-        content, units = _echo(result)
-    elif isinstance(result, FarField):
-        content, units = _far(result)
-    else:
-        raise InvalidInputError(f"{type(result).__name__} is not written to .mat; give an Echo or a FarField")
+    content, units = _content(result)
+    if observed is not None:
+        content |= {"observe": np.array(observed[0], dtype=object), "angle": observed[1]}
+        units |= {"angle": "degree"}
     content |= {"units": units, "about": ABOUT, "creeping_version": __version__}
     # a full disk is an error of Python's own writing
     whole = io.BytesIO()
@@ -70,7 +82,102 @@ def write_mat(path: str | os.PathLike[str], result: Echo | FarField) -> None:
         aside.write_bytes(whole.getvalue())
 
 
-def _far(far: FarField) -> tuple[dict[str, Any], dict[str, str]]:
+def _content(result: Any) -> Content:
+    from creeping.field.cut_result import FieldCut
+    from creeping.field.echo import Echo
+    from creeping.field.far_result import FarField
+
+    makers: dict[type, Callable[[Any], Content]] = {
+        Echo: _echo,
+        FarField: _far,
+        FieldCut: _cut,
+        ShadowLine: _line,
+        RayFan: _fan,
+    }
+    for kind, make in makers.items():
+        if isinstance(result, kind):
+            return make(result)
+    if isinstance(result, Sequence) and all(isinstance(one, IsoPhaseCurve) for one in result):
+        return _curves(result)
+    names = ", ".join(kind.__name__ for kind in makers)
+    raise InvalidInputError(
+        f"{type(result).__name__} is not written to .mat; give one of {names}, or a list of IsoPhaseCurve"
+    )
+
+
+def _line(line: ShadowLine) -> Content:
+    length = unit_of(line.body)
+    content = {
+        "direction": line.direction,
+        "curve": np.repeat(np.arange(len(line.curves)), [len(c.points) for c in line.curves]),
+        **{n: _joined([getattr(c, n) for c in line.curves]) for n in ("arclength", "curvature")},
+        **{n: _joined([getattr(c, n) for c in line.curves], 3) for n in ("points", "normals", "tangents")},
+        "status": np.array([str(s) for c in line.curves for s in c.status], dtype=object),
+        "length": line.length,
+    }
+    units = {"arclength": length, "points": length, "length": length, "curvature": power(length, -1)}
+    return content, units | dict.fromkeys(("direction", "normals", "tangents"), "1")
+
+
+def _fan(fan: RayFan) -> Content:
+    length = unit_of(fan.body)
+    content: dict[str, Any] = {name: np.asarray(getattr(fan, name)) for name in _FAN}
+    content["direction"] = fan.line.direction
+    time = length if speed_of(fan.body) is None else "time"
+    units = dict.fromkeys(("points", "arclength"), length) | dict.fromkeys(
+        ("travel_time", "eikonal", "detachment"), time
+    )
+    units |= dict.fromkeys(("spreading_rate", "curvature"), power(length, -1)) | {"attenuation": f"{length}^(1/3)"}
+    return content, units | dict.fromkeys(("direction", "directions", "spreading"), "1")
+
+
+_FAN = (
+    *("points", "directions", "travel_time", "eikonal", "spreading", "spreading_rate", "curvature", "attenuation"),
+    *("caustic_index", "status", "detachment", "curve_index", "arclength"),
+)
+
+
+def _curves(curves: Sequence[IsoPhaseCurve]) -> Content:
+    content = {
+        "curve": np.repeat(np.arange(len(curves)), [len(c.points) for c in curves]),
+        "points": _joined([c.points for c in curves], 3),
+        "rays": _joined([c.rays for c in curves]),
+        "of": np.array([c.of for c in curves], dtype=object),
+        "level": np.array([c.level for c in curves]),
+        "closed": np.array([c.closed for c in curves], dtype=bool),
+    }
+    # curves do not know their body
+    return content, {"points": UNKNOWN, "level": UNKNOWN}
+
+
+def _joined(arrays: Sequence[Any], width: int | None = None) -> Any:
+    """Rows of all arrays, of ``width`` numbers each if it is given."""
+    return np.concatenate([np.zeros((0, width) if width else 0), *arrays])
+
+
+def _cut(cut: FieldCut) -> Content:
+    field: Any = cut.field
+    length = field.length_unit
+    content: dict[str, Any] = {
+        "across": cut.across,
+        "up": cut.up,
+        "point": cut.point,
+        "axes": cut.axes,
+        "points": cut.points,
+        "outside": cut.outside,
+        **{name: cut.on_grid(field.values if name == "u" else getattr(field, name)) for name in cut.quantities},
+        "error": cut.error,
+        "status": cut.status,
+        "method": cut.on_grid(field.method.astype(object), "inside"),
+        "wavenumber": field.wavenumber,
+        "boundary": field.boundary,
+        "order": field.order,
+    }
+    units = dict.fromkeys(("across", "up", "point", "points"), length) | {"axes": "1"}
+    return content, units | dict.fromkeys((*cut.quantities, "error"), field.unit) | {"wavenumber": power(length, -1)}
+
+
+def _far(far: FarField) -> Content:
     from creeping.files.far_table import angles_of
 
     angles, length = np.degrees(angles_of(far.directions)), far.unit
@@ -95,7 +202,7 @@ def _far(far: FarField) -> tuple[dict[str, Any], dict[str, str]]:
     return content, units | {"cross_section": power(length, 2), "cross_section_dB": area}
 
 
-def _echo(echo: Echo) -> tuple[dict[str, Any], dict[str, str]]:
+def _echo(echo: Echo) -> Content:
     from creeping.field.echo import LEVELS
 
     low, high = echo.bounds()

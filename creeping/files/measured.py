@@ -19,6 +19,7 @@ MOST_BYTES = 200_000_000
 COMMENT = ("#", "%", "!", "//")
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
 _ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
+_POLAR = re.compile(r"(elev|theta|(?<![a-z])el(?![a-z]))")
 _AREA = re.compile(r"(m2|m\^2|sqm|sigma|linear)")
 _OTHER = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
 _RADIANS = re.compile(r"(?<![a-z])rad(ian)?s?(?![a-z])")
@@ -38,12 +39,15 @@ class MeasuredCut:
         Angles, degrees, or frequencies, Hz, ascending.
     levels : dict of str to (m,), dB
         By the name of the column; NaN where there is no number.
+    polar : bool
+        Whether the column's name says that its angles are polar or of elevation, which do not repeat after a turn.
     """
 
     name: str
     over: str
     values: FloatArray
     levels: dict[str, FloatArray]
+    polar: bool = False
 
     def of(self, channel: str) -> FloatArray | None:
         """Levels (m,) of a polarisation or boundary, or of the only column; None if there is none."""
@@ -93,7 +97,9 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
     if not levels:
         raise InvalidInputError(f"{file} has no column of levels; its columns are {', '.join(names)}")
     order = np.argsort(numbers[:, at], kind="stable")
-    return MeasuredCut(file.name, over, scale * numbers[order, at], {name: v[order] for name, v in levels.items()})
+    polar = over == "angle" and bool(_POLAR.search(names[at].lower()))
+    found = {name: v[order] for name, v in levels.items()}
+    return MeasuredCut(file.name, over, scale * numbers[order, at], found, polar)
 
 
 def _table(file: Path, text: str) -> tuple[list[str], list[list[float]]]:

@@ -3,17 +3,21 @@
 On an edge of a triangle the real part is taken as linear; fronts are half a wavelength of the wave on the body apart.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
-from creeping._typing import BoolArray, ComplexArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.field.point_result import PointField
 from creeping.geometry.surface import Surface, project
 from creeping.geometry.triangulation import Triangulation
+from creeping.plotting._drawing import Drawing
 from creeping.plotting._strokes import Stroke
 
 COLOUR, FRONT_WIDTH = "#00c2d1", 0.6
-LEAST_EDGES = 4.5
-"""Edges of triangles a wavelength from which fronts can be told."""
+LEAST_SAMPLES = 4.5
+"""Edges of triangles, or points of a grid, a wavelength from which fronts can be told."""
 
 
 def front_strokes(
@@ -35,10 +39,10 @@ def front_strokes(
     edges = mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]]
     length = float(np.median(np.linalg.norm(np.diff(mesh.vertices[edges], axis=2), axis=-1)))
     there = 2 * np.pi / (wavenumber * length)
-    if there < LEAST_EDGES:
+    if there < LEAST_SAMPLES:
         raise InvalidInputError(
-            f"wave fronts on a mesh of {there:.2g} edges a wavelength; {LEAST_EDGES:g} are the least: give "
-            f"{LEAST_EDGES / there:.2g} times the cells, or leave fronts out"
+            f"wave fronts on a mesh of {there:.2g} edges a wavelength; {LEAST_SAMPLES:g} are the least: give "
+            f"{LEAST_SAMPLES / there:.2g} times the cells, or leave fronts out"
         )
     real = (np.where(known, wave, 0.0) * np.exp(-1j * phase)).real
     edges = edges[np.all(known[mesh.triangles], axis=1)]
@@ -53,6 +57,21 @@ def front_strokes(
     points = project(body, (1 - share) * mesh.vertices[ends[:, 0]] + share * mesh.vertices[ends[:, 1]])
     lines = [points[chain] for chain in chains(place.reshape(-1, 2))]
     return [Stroke(lines, COLOUR, FRONT_WIDTH, alpha=0.8, label="wave fronts", rank=1, through=False)]
+
+
+def with_fronts(drawing: Drawing, field: PointField, phase: float) -> Drawing:
+    """A drawing with the wave fronts of a field at the vertices of its mesh, where that is OK, below its other strokes.
+
+    Raises
+    ------
+    InvalidInputError
+        If the mesh is too coarse for the wavelength.
+    """
+    known = field.ok & np.isfinite(field.values)
+    asked: dict[str, Any] = {"wavenumber": field.wavenumber, "phase": phase}
+    return replace(
+        drawing, strokes=front_strokes(drawing.body, drawing.mesh, field.values, known, **asked) + drawing.strokes
+    )
 
 
 def chains(segments: IntArray) -> list[IntArray]:

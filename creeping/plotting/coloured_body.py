@@ -15,6 +15,7 @@ from creeping.field.decibels import decibels, shown_range
 from creeping.geometry.surface import Surface, normal
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._view import View
+from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.pictures import chosen_backend, drawn_page, save_figure
 from creeping.shadow.line import shadow_line
 
@@ -51,15 +52,8 @@ def currents_picture(
     currents : SurfaceCurrents
     incident : {"theta", "phi"}, optional
         Polarisation of the wave that a conductor's currents belong to; the rms of both if not given.
-    backend : str
-        "pyvista", "matplotlib" or "auto".
-    view : View, optional
-        Camera; by default on the shadow side.
-    span : float, dB
-        Range of the colours below the highest level.
-    cells : int, optional
-        Fineness of the body, cells along each side of its box; by default eight a wavelength, within 48 to 96.
-    dpi : int
+    backend, view, span, cells, dpi
+        As of `surface_field_picture`.
 
     Returns
     -------
@@ -81,10 +75,7 @@ def currents_picture(
     levels = current_levels(currents, drawing.mesh.vertices, incident)
     name = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
     label = f"20 log$_{{10}}${name} (dB)\nk = {k:g}/L, {currents.boundary.kind}"
-    save_figure(
-        painted(drawing, levels, span=span, label=label, bare="no current", backend=backend, dpi=dpi), path, dpi
-    )
-    return backend
+    return save_painted(path, drawing, levels, span=span, label=label, bare="no current", backend=backend, dpi=dpi)
 
 
 def current_levels(currents: SurfaceCurrents, points: FloatArray, incident: str | None = None) -> FloatArray:
@@ -167,13 +158,25 @@ def painted(drawing: Drawing, levels: FloatArray, *, span: float, label: str, ba
         handles.append(Patch(color=NOTHING, label=bare))
     figure, place = drawn_page(replace(drawing, paint=np.asarray(paint)), backend, dpi)
     drawing.add_legend(figure, *handles)
-    beyond = ("min" if np.any(levels < low) else "") + ("max" if np.any(levels > high) else "")
-    extend = {"": "neither", "minmax": "both"}.get(beyond, beyond)
-    bar = figure.colorbar(colours, cax=figure.add_axes(place), extend=extend)
-    bar.set_label(label, fontsize=8)
-    bar.ax.tick_params(labelsize=8, width=0.5)
-    bar.outline.set_linewidth(0.5)
+    add_bar(figure, colours, label, extend=beyond(levels, low, high), fontsize=8, cax=figure.add_axes(place))
     return figure
+
+
+def save_painted(
+    path: str | os.PathLike[str],
+    drawing: Drawing,
+    levels: FloatArray,
+    *,
+    span: float,
+    label: str,
+    bare: str,
+    backend: str,
+    dpi: int,
+) -> str:
+    """Write the figure of `painted`, and return its backend."""
+    figure = painted(drawing, levels, span=span, label=label, bare=bare, backend=backend, dpi=dpi)
+    save_figure(figure, path, dpi)
+    return backend
 
 
 def _colours(low: float, high: float) -> Any:

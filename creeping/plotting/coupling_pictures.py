@@ -20,9 +20,9 @@ from creeping.geometry.surface import Surface, normal, project, size
 from creeping.plotting._drawing import Drawing
 from creeping.plotting._strokes import LevelColours, Stroke
 from creeping.plotting._view import View, shadow_view
-from creeping.plotting.body_fronts import front_strokes
-from creeping.plotting.coloured_body import cells_of, painted
-from creeping.plotting.pictures import chosen_backend, save_figure
+from creeping.plotting.body_fronts import with_fronts
+from creeping.plotting.coloured_body import cells_of, save_painted
+from creeping.plotting.pictures import chosen_backend
 
 RING = 0.05
 """Radius of the ring round the source, in body sizes."""
@@ -58,19 +58,10 @@ def coupling_picture(
     wavenumber : float, 1/L
     boundary : "hard"
     order : 2 or 1
-    backend : str
-        "pyvista", "matplotlib" or "auto".
     view : View, optional
         Camera; by default one that sees the source from aside.
-    span : float, dB
-        Range of the colours below the highest level, which is that of the brightest thousandth.
-    fronts : bool
-        Whether to draw wave fronts, Re(u e^{-i phase}) = 0, where the field is OK.
-    phase : float, radians
-        omega t.
-    cells : int, optional
-        Fineness of the body, cells along each side of its box; by default eight a wavelength, within 48 to 96.
-    dpi : int
+    backend, span, fronts, phase, cells, dpi
+        As of `surface_field_picture`.
 
     Returns
     -------
@@ -89,18 +80,14 @@ def coupling_picture(
     field = port_field(body, source, mesh.vertices, wavenumber=wavenumber, boundary=boundary, order=order)
     n = normal(body, field.source)
     camera = shadow_view(n) if view is None else view
-    strokes = [Stroke([_ring(body, field.source, n)], SOURCE, 2.0, label="source", rank=2)]
+    ring = Stroke([_ring(body, field.source, n)], SOURCE, 2.0, label="source", rank=2)
+    drawing = Drawing(body, None, camera, mesh, normals, [ring], LevelColours.of(()))
     if fronts:
-        known = field.ok & np.isfinite(field.values)
-        strokes = front_strokes(body, mesh, field.values, known, wavenumber=field.wavenumber, phase=phase) + strokes
-    drawing = Drawing(body, None, camera, mesh, normals, strokes, LevelColours.of(()))
+        drawing = with_fronts(drawing, field, phase)
     unit = power(field.length_unit, -1)
     label = f"20 log$_{{10}}$|u| (dB re 1 {unit})\nk = {field.wavenumber:g}/{field.length_unit}, {field.boundary}"
     levels = coupling_levels(field)
-    save_figure(
-        painted(drawing, levels, span=span, label=label, bare=_bare(field), backend=backend, dpi=dpi), path, dpi
-    )
-    return backend
+    return save_painted(path, drawing, levels, span=span, label=label, bare=_bare(field), backend=backend, dpi=dpi)
 
 
 def coupling_levels(field: PortField) -> FloatArray:

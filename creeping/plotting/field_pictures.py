@@ -6,7 +6,6 @@ Sources: Derivations, F9 and F16.
 """
 
 import os
-from dataclasses import replace
 
 import numpy as np
 
@@ -21,8 +20,8 @@ from creeping.field.surface import scalar_boundary
 from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays
 from creeping.plotting._view import View
-from creeping.plotting.body_fronts import front_strokes
-from creeping.plotting.coloured_body import NOTHING, cells_of, painted
+from creeping.plotting.body_fronts import with_fronts
+from creeping.plotting.coloured_body import NOTHING, cells_of, save_painted
 from creeping.plotting.palette import curve_style
 from creeping.plotting.pictures import chosen_backend, new_figure, save_figure
 from creeping.rays.fan import RayFan
@@ -61,7 +60,7 @@ def surface_field_picture(
     view : View, optional
         Camera; by default on the shadow side.
     span : float, dB
-        Range of the colours below the highest level.
+        Range of the colours below the highest level, but for that of a few points.
     fronts : bool
         Whether to draw wave fronts, Re(u e^{-i phase}) = 0, where the field is OK.
     phase : float, radians
@@ -89,14 +88,10 @@ def surface_field_picture(
     drawing = compose(fan.line, view=view, cells=cells or cells_of(fan.body, k))
     field = surface_field(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
     if fronts:
-        known = field.ok & np.isfinite(field.values)
-        curves = front_strokes(fan.body, drawing.mesh, field.values, known, wavenumber=k, phase=phase)
-        drawing = replace(drawing, strokes=curves + drawing.strokes)
+        drawing = with_fronts(drawing, field, phase)
     levels = _levels(field, kind)
     label = f"{_name(kind)}\nk = {k:g}/L, {_boundary_name(kind)}"
-    figure = painted(drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
-    save_figure(figure, path, dpi)
-    return backend
+    return save_painted(path, drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
 
 
 def surface_levels(

@@ -11,6 +11,8 @@ from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.cut_result import FieldCut
 from creeping.field.decibels import decibels, shown_range
+from creeping.plotting.body_fronts import LEAST_SAMPLES
+from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.coloured_body import NOTHING
 from creeping.plotting.pictures import axes_or_new, new_figure, save_figure
 from creeping.plotting.plane_marks import add_cut_legend, dress, hatch, missing_of
@@ -19,8 +21,6 @@ SHOWS = ("level", "magnitude", "wave")
 FRONT = "#ffffff"
 MOST_FRONTS = 40.0
 """Wavelengths across a picture up to which it has wave fronts unless they are asked for."""
-LEAST_POINTS = 4.5
-"""Points a wavelength from which wave fronts can be told."""
 PAGE = 6.4  # inches
 
 
@@ -160,8 +160,7 @@ def _draw(
     else:
         raise InvalidInputError(f"show = {show!r} is not one of {', '.join(SHOWS)}")
     values = np.where(missing, np.nan, np.where(np.isneginf(values), look["vmin"], values))
-    beyond = ("min" if np.any(values < look["vmin"]) else "") + ("max" if np.any(values > look["vmax"]) else "")
-    _paint(cut, ax, values, label, {"": "neither", "minmax": "both"}.get(beyond, beyond), look)
+    _paint(cut, ax, values, label, beyond(values, look["vmin"], look["vmax"]), look)
     if _with_fronts(cut, show, fronts):
         shown = np.where(missing, np.nan, _filled(wave, cut.outside))
         ax.contour(cut.across, cut.up, shown, [0.0], colors=FRONT, linewidths=0.5, alpha=0.6, zorder=1.4)
@@ -175,7 +174,7 @@ def _draw_error(cut: FieldCut, ax: Any, span: float) -> None:
     low, high = shown_range([np.clip(finite, *np.percentile(finite, [0.5, 100.0]))], span)
     look = {"vmin": low, "vmax": high, "cmap": "viridis"}
     shown = np.where(np.isneginf(levels), low, levels)
-    _paint(cut, ax, shown, "20 log$_{10}$ error (dB)", "neither" if np.nanmin(shown) >= low else "min", look)
+    _paint(cut, ax, shown, "20 log$_{10}$ error (dB)", beyond(shown, low, np.inf), look)
     hatch(cut, ax, None)
     dress(cut, ax)
 
@@ -194,10 +193,7 @@ def _paint(cut: FieldCut, ax: Any, values: FloatArray, label: str, extend: str, 
         cover = np.zeros((*unknown.shape, 4))
         cover[unknown] = to_rgba(NOTHING)
         ax.imshow(cover, interpolation="nearest", zorder=1.45, **way)
-    bar = ax.figure.colorbar(image, ax=ax, extend=extend, shrink=0.9, pad=0.02)
-    bar.set_label(label, fontsize=9)
-    bar.ax.tick_params(labelsize=8, width=0.5)
-    bar.outline.set_linewidth(0.5)
+    add_bar(ax.figure, image, label, extend=extend, fontsize=9, ax=ax, shrink=0.9, pad=0.02)
 
 
 def _top(sizes: FloatArray, share: float) -> float:
@@ -217,11 +213,11 @@ def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
 
 def _with_fronts(cut: FieldCut, show: str, fronts: bool | None) -> bool:
     wavelength = 2 * np.pi / cut.field.wavenumber
-    fine = cut.step * LEAST_POINTS <= wavelength
+    fine = cut.step * LEAST_SAMPLES <= wavelength
     if fronts and not fine:
         raise InvalidInputError(
             f"wave fronts of points {cut.step:.3g} apart: a wavelength has {wavelength / cut.step:.2g}; give a step of "
-            f"{wavelength / LEAST_POINTS:.2g} or less, or fronts=False"
+            f"{wavelength / LEAST_SAMPLES:.2g} or less, or fronts=False"
         )
     few = max(np.ptp(cut.across), np.ptp(cut.up)) <= MOST_FRONTS * wavelength
     return bool(fine and few and show != "wave") if fronts is None else fronts

@@ -12,7 +12,7 @@ from creeping._version import __version__
 from creeping.field.labelled import COMPONENTS, power
 from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import angles_of
-from creeping.geometry.unit import unit_of
+from creeping.geometry.unit import UNKNOWN, unit_of
 from creeping.shadow.status import INCIDENCE_STATUSES
 from creeping.storage.extras import required
 from creeping.sweeping.accessor import register
@@ -46,8 +46,19 @@ def require(package: str) -> Any:
     return required(package, use="sweeps need", extra="sweep")
 
 
-def coordinates(request: SweepRequest, incidences: FloatArray) -> dict[str, Coordinate]:
-    """Coordinates by name: dimensions, values, attributes."""
+def in_unit(units: str, unit: str) -> str:
+    """Units that are written in L in a body's own unit of length, as the CF conventions write it.
+
+    Examples
+    --------
+    >>> in_unit("1/L", "m"), in_unit("L^(1/3)", "m"), in_unit("1/L", "L"), in_unit("rad", "m")
+    ('m-1', 'm^(1/3)', '1/L', 'rad')
+    """
+    return power(unit, -1) if units == "1/L" else units.replace("L", unit)
+
+
+def coordinates(request: SweepRequest, incidences: FloatArray, unit: str) -> dict[str, Coordinate]:
+    """Coordinates by name, lengths in ``unit``: dimensions, values, attributes."""
     theta, phi = angles_of(incidences)
     sphere = {
         "theta": ("angle of the direction from z", theta),
@@ -59,10 +70,11 @@ def coordinates(request: SweepRequest, incidences: FloatArray) -> dict[str, Coor
     for name, (text, values) in sphere.items():
         found[name] = (("incidence",), values, {"units": "rad", "description": text})
     if request.quantity == "rays":
-        times = {"units": "L", "description": "travel time of the outputs; time for a weighted body"}
+        times = {"units": unit, "description": "travel time of the outputs; time for a weighted body"}
         found["travel_time"] = (("step",), request.travel_times, times)
         return found
-    found["wavenumber"] = (("wavenumber",), np.array(request.wavenumbers), {"units": "1/L", "description": "k"})
+    numbers = {"units": in_unit("1/L", unit), "description": "k"}
+    found["wavenumber"] = (("wavenumber",), np.array(request.wavenumbers), numbers)
     if request.scalar_boundaries:
         found["boundary"] = (("boundary",), np.array(request.scalar_boundaries), {"description": "on the body"})
     if "pec" in request.boundaries:
@@ -75,22 +87,26 @@ def coordinates(request: SweepRequest, incidences: FloatArray) -> dict[str, Coor
     return found
 
 
-def variable_attributes(request: SweepRequest, name: str) -> dict[str, Any]:
-    """Units and description of a variable; codes and names of the status."""
+def variable_attributes(request: SweepRequest, name: str, unit: str) -> dict[str, Any]:
+    """Units and description of a variable, lengths in ``unit``; codes and names of the status."""
     variable = request.variables[name]
-    words: dict[str, Any] = {"units": variable.units, "description": variable.description}
+    words: dict[str, Any] = {"units": in_unit(variable.units, unit), "description": variable.description}
     if name == "incidence_status":
         words["flag_values"] = list(INCIDENCE_STATUSES)
         words["flag_meanings"] = " ".join(STATUS_NAMES[code].replace(" ", "_") for code in INCIDENCE_STATUSES)
     return words
 
 
-def sweep_attributes(plan: SweepPlan) -> dict[str, Any]:
+def sweep_attributes(plan: SweepPlan, unit: str) -> dict[str, Any]:
     """Attributes of the dataset that are known before anything is computed."""
     request, flow = plan.request, plan.flow_content
+    conventions = CONVENTIONS
+    if unit != UNKNOWN:
+        conventions = CONVENTIONS.replace("the unit L of the body", unit).replace("1/L", power(unit, -1))
+        conventions = conventions.replace("f in L", f"f in {unit}")
     words: dict[str, Any] = {
         "title": f"creeping rays: {request.quantity}",
-        "conventions": CONVENTIONS,
+        "conventions": conventions,
         "creeping_version": __version__,
         "body": repr(plan.body),
         "body_fingerprint": plan.key["body"],
@@ -140,27 +156,15 @@ def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]], s
     errors : list of (incidence, message)
     seconds : float
     """
-    request = plan.request
+    request, unit = plan.request, unit_of(plan.body)
     variables = {
-        name: (("incidence", *variable.dims), arrays[name], variable_attributes(request, name))
+        name: (("incidence", *variable.dims), arrays[name], variable_attributes(request, name, unit))
         for name, variable in request.variables.items()
     }
     counts = count_attributes(arrays["incidence_status"], errors, seconds)
-    words = sweep_attributes(plan) | counts
-    found: xarray.Dataset = register().Dataset(variables, coordinates(request, plan.incidences), words)
-    return in_unit(found, unit_of(plan.body))
-
-
-def in_unit(dataset: "xarray.Dataset", unit: str) -> "xarray.Dataset":
-    """The dataset with attributes for lengths in another unit than L, which the numbers are in: the same object."""
-    if unit == "L":
-        return dataset
-    for values in dataset.variables.values():
-        text = str(values.attrs.get("units", ""))
-        if "L" in text:
-            values.attrs["units"] = power(unit, -1) if text == "1/L" else text.replace("L", unit)
-    dataset.attrs["conventions"] = CONVENTIONS.replace("the unit L of the body", f"{unit}").replace("L", unit)
-    return dataset
+    words = sweep_attributes(plan, unit) | counts
+    found: xarray.Dataset = register().Dataset(variables, coordinates(request, plan.incidences, unit), words)
+    return found
 
 
 def without_complex(dataset: "xarray.Dataset") -> "xarray.Dataset":

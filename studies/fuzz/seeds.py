@@ -180,3 +180,39 @@ def directions_array() -> bytes:
     held = io.BytesIO()
     np.save(held, fibonacci_directions(40))
     return held.getvalue()
+
+
+def far_field_text() -> bytes:
+    """Two blocks of a FEKO far field, five polar angles and six azimuths each."""
+    lines = ["##File Type: Far field", "##File Format: 3", "** an ellipsoid"]
+    for number, name in enumerate(("incident_theta", "incident_phi")):
+        lines += [f"#Configuration Name: {name}", f"#Frequency:   {3 + number}.0E+08", "#Coordinate System: Spherical"]
+        lines += ["#No. of Theta Samples: 5", "#No. of Phi Samples: 6", "#Incident Wave Direction: (180, 0)"]
+        lines += ["#Result Type: RCS", "#No. of Header Lines: 1"]
+        names = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)", "RCS(Total)")
+        lines.append("#" + "".join(f"{chr(34) + one + chr(34):>18}" for one in names))
+        for k in range(30):
+            values = (45.0 * (k % 5), 60.0 * (k // 5), *(np.cos(k + c + number) for c in range(4)), 0.1 * k)
+            lines.append("".join(f"{value:18.9E}" for value in values))
+        lines.append("")
+    return "\n".join(lines).encode()
+
+
+def matlab(*, packed: bool) -> bytes:
+    """A MATLAB file with everything that is read."""
+    from scipy.io import savemat
+
+    held = io.BytesIO()
+    grid = np.arange(24.0).reshape(2, 3, 4)
+    content = {
+        "f": grid * np.exp(1j * grid),
+        "level": np.where(grid > 20, np.nan, -grid),
+        "status": np.array([0, 1, 255], dtype=np.uint8),
+        "unresolved": grid[0, 0] > 1,
+        "method": np.array(["rays", "currents", "inside"], dtype=object),
+        "rows": np.array(["VV ", "HH ", "pec"]),
+        "units": {"f": "m", "level": "dBsm", "more": {"k": "1/m", "n": np.int32(3)}},
+        "about": "caf\u00e9",
+    }
+    savemat(held, content, do_compression=packed, long_field_names=True)
+    return held.getvalue()

@@ -154,6 +154,21 @@ def test_a_comparison_that_fails_costs_no_results(tmp_path, capsys):
         assert "--align" in capsys.readouterr().err
 
 
+def test_azimuths_of_another_turn_are_compared_and_polar_angles_are_not(tmp_path, capsys):
+    """A sphere's echo is the same all round: pi radius^2 by optics, given at -3, -2, -1 degrees as 357, 358, 359."""
+    words = ["sphere:radius=0.15", "--frequency", "9GHz", "--polarisation", "VV", "--no-pictures", "--no-cache"]
+    words += ["--monostatic", "az:-5:5:1", "-o", tmp_path]
+    given = tmp_path / "given.csv"
+    rows = "".join(f"{angle},{10 * np.log10(np.pi * 0.15**2)}\n" for angle in (1, 2, 357, 358, 359))
+    for name, places, wrapped in (("azimuth", 5, 3), ("theta", 2, 0)):
+        given.write_text(f"{name}_deg,VV_dBsm\n{rows}")
+        assert ran("rcs", *words, "--compare", given) == 0
+        said = capsys.readouterr().out
+        assert ("3 of its azimuths by whole turns" in said) == bool(wrapped)
+        off = json.loads((tmp_path / "summary.json").read_text())["compared"]["VV"]
+        assert (off["places"], off["wrapped"]) == (places, wrapped) and off["rms_db"] < 0.3
+
+
 def test_band_of_a_capsule(tmp_path, capsys, monkeypatch):
     """Of a body with joints: rays and physical optics, which table, summary and text say."""
     # twelve incidences would be asked for it

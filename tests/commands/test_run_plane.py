@@ -2,10 +2,15 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
+import scipy.io
 
+import creeping as cr
+import scatterers as sc
+from creeping.commands import run_field, run_plane
 from creeping.commands.main import main
 from creeping.commands.run_plane import parse_plane
 from creeping.errors import InvalidInputError
@@ -22,7 +27,7 @@ def test_planes_are_written(tmp_path, capsys):
     options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--wavenumber", 6, "--boundary", "hard"]
     planes = ["--plane", "incidence:0.2", "--plane", "xy:0.25", "--observe", "backscatter"]
     assert ran("run", "sphere", *options, *planes, "--no-pictures", "-o", tmp_path) == 0
-    said = capsys.readouterr().out
+    said, told = capsys.readouterr()
     assert "field on the plane incidence:0.2: " in said and "field on the plane xy:0.25: " in said
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert {"plane.csv", "plane_2.csv"} <= set(summary["files"])
@@ -31,6 +36,10 @@ def test_planes_are_written(tmp_path, capsys):
         sum(summary["planes"][0]["status"].values())
         == np.prod(summary["planes"][0]["points"]) - (summary["planes"][0]["inside"])
     )
+    # its cost beforehand: points outside, no seconds of a few
+    for plane in summary["planes"]:
+        outside = np.prod(plane["points"]) - plane["inside"]
+        assert f"field on the plane {plane['plane']}: {outside} points ...\n" in told
     rows = list(csv.DictReader(line for line in (tmp_path / "plane.csv").read_text().splitlines() if line[0] != "#"))
     points = np.array([[float(row[name]) for name in "xyz"] for row in rows])
     values = np.array([complex(float(row["re_u"]), float(row["im_u"])) for row in rows])
@@ -38,6 +47,81 @@ def test_planes_are_written(tmp_path, capsys):
     away = np.linalg.norm(points, axis=1) > 1.4
     exact = sphere.total_field(6.0, 1.0, points[away], (0, 0, 1), "hard")
     assert np.median(np.abs(values[away] - exact)) < 0.03
+
+
+@pytest.mark.parametrize(("first", "each"), [(60.0, 1e-3), (0.0, 0.02)])
+def test_seconds_are_those_of_all_points_without_what_is_made_once(monkeypatch, first, each):
+    """By a clock of our own: kernels and currents take their time once, points each time."""
+    clock, asked = [0.0], []
+
+    def compute(points):
+        clock[0] += (0.0 if asked else first) + each * len(points)
+        asked.append(points)
+
+    monkeypatch.setattr(run_plane, "perf_counter", lambda: clock[0])
+    points = np.arange(30_000.0).reshape(-1, 3)
+    assert run_plane.expected_seconds(compute, points, 625) == pytest.approx(10_000 * each)
+    # each is one of them, none is taken twice, and they are spread over all
+    assert [len(some) for some in asked] == [312, 313]
+    some = np.concatenate(asked)[:, 0]
+    assert len(np.unique(some)) == 625 and np.all(np.isin(some, points[:, 0]))
+    assert np.all(np.histogram(asked[1][:, 0], bins=8, range=(0, 30_000))[0] > 15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("boundary", ["hard", "pec"])
+def test_the_cost_of_a_plane_is_told_and_true(tmp_path, capsys, boundary):
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--wavenumber", 8, "--boundary", boundary]
+    options += ["--plane", "xz:0.07", "--observe", "backscatter", "--no-pictures", "-o", tmp_path]
+    assert ran("run", "sphere", *options) == 0
+    told = re.search(r"plane xz:0.07: (\d+) points, about (\S+) s \.\.\.", capsys.readouterr().err)
+    entry = json.loads((tmp_path / "summary.json").read_text())["planes"][0]
+    assert int(told[1]) == np.prod(entry["points"]) - entry["inside"] > 2048
+    # a clock of a busy machine, and one in sixteen points
+    assert entry["seconds"] / 4 < float(told[2]) < 4 * entry["seconds"] + 0.5
+
+
+def test_nothing_is_promised_where_many_points_are_served_otherwise(monkeypatch):
+    job, ball, said = run_field.job(8.0, "hard", ["backscatter"], (0, 0, 1)), sc.Sphere(), []
+    fan = cr.launch(cr.DirectFlow(ball, rtol=1e-6), cr.shadow_line(ball, (0, 0, 1)), length=2.0, n_rays=16)
+    monkeypatch.setattr(run_plane, "affordable", lambda fan, places, k: places < 1000)
+    monkeypatch.setattr(run_plane, "near_field", lambda *_, **__: pytest.fail("computed"))
+    run_plane._tell_cost(parse_plane("xz:0.06"), job, fan, said.append)
+    (words,) = said
+    assert words.endswith(" points") and "about" not in words
+
+
+def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 16, "--wavenumber", 6, "--no-pictures"]
+    options += ["--observe", "cut:0:30", "--observe", "backscatter", "--plane", "xz:0.5", "-o", tmp_path]
+    assert ran("run", "sphere", *options, "--format", "csv,mat") == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert sorted(summary["files"]) == sorted(file.name for file in tmp_path.iterdir())
+    tables = {}
+    for stem in ("line", "rays", "curves", "far", "plane"):
+        text = (tmp_path / f"{stem}.csv").read_text().splitlines()
+        rows = list(csv.DictReader(line for line in text if line[0] != "#"))
+        tables[stem] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    back = {stem: scipy.io.loadmat(tmp_path / f"{stem}.mat", simplify_cells=True) for stem in tables}
+    rows = tables["far"]
+    f = rows["re"].astype(float) + 1j * rows["im"].astype(float)
+    np.testing.assert_array_equal(back["far"]["f"], f)
+    np.testing.assert_array_equal(back["far"]["angle"], rows["angle"].astype(float))
+    assert back["far"]["observe"].tolist() == rows["observe"].tolist() == 13 * ["cut:0:30"] + ["backscatter"]
+    rows, outside = tables["plane"], back["plane"]["outside"] != 0
+    np.testing.assert_array_equal(back["plane"]["u"][outside].real, rows["re_u"].astype(float))
+    np.testing.assert_array_equal(back["plane"]["status"][outside], rows["status"].astype(int))
+    np.testing.assert_array_equal(back["rays"]["points"][..., 0].ravel(), tables["rays"]["x"].astype(float))
+    np.testing.assert_array_equal(back["rays"]["spreading"].ravel(), tables["rays"]["J"].astype(float))
+    for stem in ("line", "curves"):
+        np.testing.assert_array_equal(back[stem]["points"][:, 1], tables[stem]["y"].astype(float))
+        np.testing.assert_array_equal(back[stem]["curve"], tables[stem]["curve"].astype(int))
+    # alone, and what there is not
+    assert ran("run", "sphere", *options, "--format", "mat") == 0
+    files = json.loads((tmp_path / "summary.json").read_text())["files"]
+    assert "far.mat" in files and not [name for name in files if name.endswith(".csv")]
+    assert ran("run", "sphere", *options, "--format", "hdf") == 3
+    assert "give some of csv, mat" in capsys.readouterr().err
 
 
 def test_a_plane_needs_a_wave(tmp_path, capsys):

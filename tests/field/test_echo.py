@@ -100,6 +100,46 @@ def test_alignment_keeps_the_overlap():
     assert cr.compare(x, 0 * x, x[100:200], np.zeros(100), align=5.0).shift == 0
 
 
+def lobes(azimuth):
+    """A cut without symmetry that repeats after a turn, dB."""
+    at = np.radians(azimuth)
+    return 6 * np.cos(at) + 3 * np.sin(2 * at) + np.cos(5 * at + 0.4)
+
+
+@pytest.mark.parametrize(
+    "ours", [np.linspace(-180, 180, 3601), -180 + np.arange(3600) / 10, np.linspace(720, 1080, 3601)]
+)
+@pytest.mark.parametrize("theirs", [np.arange(0, 360.5, 0.5), np.arange(-360, 361.0), np.array([-900.2, 179.97, 5e4])])
+def test_azimuths_are_compared_modulo_a_turn(ours, theirs):
+    """The same function of the angle on both sides: nothing is left over, whatever turn both are given in."""
+    y = lobes(ours)
+    found = cr.compare(ours, y, theirs, lobes(theirs), low=y - 0.1, high=y + 0.1, period=360.0)
+    assert len(found.values) == len(theirs) and np.all(np.diff(found.values) >= 0)
+    np.testing.assert_allclose(found.residual, 0, atol=1e-3)
+    np.testing.assert_allclose(found.reference, lobes(found.values), atol=1e-9)
+    assert found.within == 1.0 and found.summary()["wrapped"] == found.wrapped
+    # a last place without the step to the first is within the turn, not beyond it
+    last = ours[0] + 360
+    assert found.wrapped == np.sum((theirs < ours[0]) | (theirs > last + 1e-9))
+
+
+def test_a_turned_shift_and_a_part_of_a_turn():
+    x = np.linspace(-90, 90, 1801)
+    at = np.arange(0, 360.0)
+    found = cr.compare(x, lobes(x), at, lobes(at + 1.5), align=3.0, period=360.0)
+    assert found.shift == pytest.approx(1.5, abs=0.04) and found.rms < 0.02
+    assert found.values.min() < -85 and found.wrapped == pytest.approx(90, abs=2)
+    # the gap of half a turn is not bridged, nor is any without a period
+    assert np.all(np.abs(found.values) <= 90)
+    plain = cr.compare(x, lobes(x), at, lobes(at))
+    assert plain.wrapped == 0 and plain.values.tolist() == list(range(91))
+    for period in (0.0, -360.0, np.nan):
+        with pytest.raises(cr.InvalidInputError, match="period"):
+            cr.compare(x, lobes(x), at, lobes(at), period=period)
+    with pytest.raises(cr.InvalidInputError, match="whole periods of 360"):
+        cr.compare([0, 1], [0, 0], [5, 6], [0, 0], period=360.0)
+
+
 def test_resolution_of_long_bands():
     for n in (100, 3000, 40_000):
         k = np.linspace(100.0, 200.0, n)

@@ -35,6 +35,21 @@ def test_usual_headers(tmp_path, text):
     assert cut.of("HV") is None
 
 
+@pytest.mark.parametrize(
+    ("name", "polar"),
+    [
+        ("azimuth", False),
+        ("phi", False),
+        ("angle (deg)", False),
+        ("theta", True),
+        ("Elevation (deg)", True),
+        ("el", True),
+    ],
+)
+def test_polar_angles_are_told_by_their_names(tmp_path, name, polar):
+    assert read_cut(written(tmp_path, f"{name},VV\n0,-20\n90,-21\n")).polar is polar
+
+
 def test_frequencies_and_no_header(tmp_path):
     cut = read_cut(written(tmp_path, "Frequency_kHz,Sphere_Rigid\n12,-46.2\n38,NA\n"))
     assert cut.over == "frequency" and cut.values.tolist() == [12e3, 38e3]

@@ -26,6 +26,8 @@ CHEAP = (
     "study",
     "directions-csv",
     "directions-npy",
+    "ffe",
+    "mat",
     "map",
 )
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import CreepingError
+from creeping.geometry.unit import UNKNOWN
 from creeping.sweeping.results import require
 from creeping.sweeping.storage.damage import ROOT
 from creeping.sweeping.storage.layout import ERRORS, STATUS, SUMS, UNDONE
@@ -25,6 +26,8 @@ class StoreArrays:
         self.tasks = -(-self.count // self.chunk)
         self.variables: list[str] = list(content["variables"])
         self.files: dict[str, str] = content["files"]
+        # stores without it were begun when all of them called lengths L
+        self.unit = str(content.get("unit", UNKNOWN))
         self._opened: dict[str, Any] = {}
         self._lock: Any = None
 

@@ -23,12 +23,12 @@ ERROR_BYTES = 256
 COORDINATE_CHUNK = 65_536
 
 
-def write_empty(folder: Path, plan: SweepPlan) -> None:
-    """Write groups, coordinates, and arrays without chunks."""
+def write_empty(folder: Path, plan: SweepPlan, unit: str) -> None:
+    """Write groups, coordinates, and arrays without chunks; lengths are called ``unit``."""
     zarr = require("zarr")
     group = zarr.open_group(folder, mode="w", zarr_format=3)
     request, count = plan.request, len(plan.incidences)
-    beside = coordinates(request, plan.incidences)
+    beside = coordinates(request, plan.incidences, unit)
     for name, (dims, values, words) in beside.items():
         text = values.dtype.kind == "U"
         where = _create(
@@ -37,7 +37,7 @@ def write_empty(folder: Path, plan: SweepPlan) -> None:
         where[:] = values.astype(object) if text else values
     for name, variable in request.variables.items():
         shape = (count, *(request.sizes[d] for d in variable.dims))
-        words, dims = variable_attributes(request, name), ("incidence", *variable.dims)
+        words, dims = variable_attributes(request, name, unit), ("incidence", *variable.dims)
         _create(group, name, shape, variable.dtype, dims, words, first=plan.chunk, fill=variable.fill)
     words = {"description": "0 missing, 1 done, 2 done but for failed incidences; written last"}
     _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=UNDONE)
@@ -47,14 +47,15 @@ def write_empty(folder: Path, plan: SweepPlan) -> None:
     words = {"description": "why an incidence failed, UTF-8, zeros after it"}
     _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
     # as xarray writes it: which arrays are coordinates
-    group.attrs.update(sealed(sweep_attributes(plan) | {"coordinates": " ".join(beside)}))
+    group.attrs.update(sealed(sweep_attributes(plan, unit) | {"coordinates": " ".join(beside)}))
     study = group.create_group(STUDY)
-    content = {"schema": SCHEMA, "key": plan.key, "variables": list(request.variables), "files": file_digests(folder)}
+    content = {"schema": SCHEMA, "key": plan.key, "variables": list(request.variables), "unit": unit}
+    content["files"] = file_digests(folder)
     study.attrs.update({"content": content, "blake2b": content_digest(content)})
 
 
-def write_anew(folder: Path, plan: SweepPlan, names: list[str], known: dict[str, str]) -> None:
-    """Write files of a store as they were; ``known`` are their digests.
+def write_anew(folder: Path, plan: SweepPlan, unit: str, names: list[str], known: dict[str, str]) -> None:
+    """Write files of a store as they were, with the unit that it was begun with; ``known`` are their digests.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def write_anew(folder: Path, plan: SweepPlan, names: list[str], known: dict[str,
     aside = folder.parent / f".{folder.name}-{uuid.uuid4().hex[:12]}"
     try:
         aside.mkdir()
-        write_empty(aside, plan)
+        write_empty(aside, plan, unit)
         for name in names:
             if not is_whole(aside, name, known[name]):
                 raise CreepingError(

@@ -38,7 +38,8 @@ def mended(store: SweepStore, plan: SweepPlan) -> list[str]:
     with store.locked():
         names = damaged_files(store.folder, store.files)
         if names:
-            write_anew(store.folder, plan, [name for name in names if name != STUDY_FILE], store.files)
+            others = [name for name in names if name != STUDY_FILE]
+            write_anew(store.folder, plan, store.unit, others, store.files)
             if STUDY_FILE in names:
                 _write_study(store)
             store.close()

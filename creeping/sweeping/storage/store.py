@@ -20,6 +20,7 @@ import numpy as np
 from creeping._typing import IntArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.geometry.surface import Surface
+from creeping.geometry.unit import unit_of
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
@@ -54,6 +55,8 @@ class SweepStore(StoreArrays):
         What the results depend on; see `SweepPlan.key`.
     files : dict
         Digests of what is the same from beginning to end; see `creeping.sweeping.storage.damage`.
+    unit : str
+        Of lengths in what it says of its arrays: "m" where the body knew it, else "L".
     """
 
     @classmethod
@@ -74,7 +77,7 @@ class SweepStore(StoreArrays):
             if folder.exists():
                 raise InvalidInputError(f"{folder} exists; resume it, or choose another store")
             aside.mkdir(parents=True)
-            write_empty(aside, plan)
+            write_empty(aside, plan, unit_of(plan.body))
             save_flow(plan.flow, aside / STUDY)
             aside.rename(folder)
         except BaseException as error:

@@ -145,7 +145,7 @@ def test_another_installation_does_not_write_what_it_would_not_have_written(whol
     from creeping.sweeping.storage import layout
 
     monkeypatch.setattr(layout, "ERROR_BYTES", 128)
-    monkeypatch.setattr(layout, "variable_attributes", lambda request, name: {"units": "other"})
+    monkeypatch.setattr(layout, "variable_attributes", lambda request, name, unit: {"units": "other"})
     with pytest.raises(cr.CreepingError, match="would write another one; compute the sweep anew"):
         open_store(PLAN, folder, resume=True)
     assert [p.name for p in tmp_path.iterdir()] == ["s.zarr"]

@@ -1,6 +1,8 @@
 """Stores of sweeps: what is marked is whole, what is damaged is found, and what belongs elsewhere is refused."""
 
 import errno
+import json
+import shutil
 from dataclasses import replace
 
 import fake_sweeps as fake
@@ -12,10 +14,12 @@ from filelock import FileLock
 import creeping as cr
 import scatterers as sc
 from creeping.shadow.status import FAILED
+from creeping.storage.folder import content_digest
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
-from creeping.sweeping.results import as_dataset
+from creeping.sweeping.results import as_dataset, without_complex
 from creeping.sweeping.run import fill, in_memory, open_store
+from creeping.sweeping.storage.layout import write_empty
 from creeping.sweeping.storage.store import SweepStore
 
 
@@ -53,6 +57,64 @@ def test_coordinates_are_those_of_memory(tmp_path, quantity):
     for name, values in empty.variables.items():
         assert stored[name].dims == values.dims and stored[name].attrs == values.attrs
         assert name in empty.data_vars or np.array_equal(stored[name].values, values.values)
+
+
+class Metric(sc.Sphere):
+    """A sphere that knows its unit, as bodies from files do."""
+
+    unit = "m"
+
+
+METRIC = cr.DirectFlow(Metric(), rtol=1e-6)
+
+
+@pytest.mark.parametrize("quantity", ["rays", "monostatic"])
+def test_a_body_in_metres_has_stored_sweeps_in_metres(tmp_path, quantity):
+    asked = {"wavenumbers": 3.0, "boundary": ["hard", "pec"]} if quantity == "monostatic" else {}
+    request = sweep_request(quantity, length=1.0, n_steps=3, **asked)
+    plan = SweepPlan(METRIC, request, cr.fibonacci_directions(7), 4)
+    ds = SweepStore.create(tmp_path / "s.zarr", plan).dataset()
+    memory = as_dataset(plan, request.empty(7), [], 0.0)
+    assert {n: v.attrs for n, v in ds.variables.items()} == {n: v.attrs for n, v in memory.variables.items()}
+    # by hand: what is a length, its inverse, or has none
+    expected = {"line_length": "m", "theta": "rad", "direction": "1", "incidence_status": "1"}
+    expected |= {"travel_time": "m", "attenuation": "m^(1/3)"} if quantity == "rays" else {"wavenumber": "m-1"}
+    expected |= {} if quantity == "rays" else {"creeping": "m", "error_pec": "m", "unresolved": "1"}
+    assert {name: ds[name].attrs["units"] for name in expected} == expected
+    assert "lengths in m, wavenumbers in m-1" in ds.attrs["conventions"] and ds.attrs["conventions"].endswith("f in m")
+    # others read the same
+    with xarray.open_zarr(tmp_path / "s.zarr", consolidated=False) as plain:
+        assert {name: plain[name].attrs["units"] for name in expected} == expected
+        without_complex(plain.load()).to_netcdf(tmp_path / "s.nc", engine="h5netcdf")
+    with xarray.open_dataset(tmp_path / "s.nc", engine="h5netcdf") as plain:
+        assert plain.line_length.attrs["units"] == "m"
+        assert quantity == "rays" or plain.field.unit == "m"
+    if quantity == "monostatic":
+        assert ds.field.dbsm.attrs["units"] == "dBsm"
+
+
+def test_stores_from_before_units_open_and_are_mended(tmp_path):
+    plan = SweepPlan(METRIC, fake.REQUEST, cr.fibonacci_directions(6), 2, make=fake.FakeSweeper)
+    folder = tmp_path / "s.zarr"
+    SweepStore.create(folder, plan)
+    write_empty(tmp_path / "old", plan, "L")
+    shutil.copytree(folder / "study", tmp_path / "old/study", ignore=lambda *_: {"zarr.json"}, dirs_exist_ok=True)
+    shutil.rmtree(folder)
+    (tmp_path / "old").rename(folder)
+    study = json.loads((folder / "study/zarr.json").read_text())
+    content = study["attributes"]["content"]
+    assert content.pop("unit") == "L"
+    study["attributes"]["blake2b"] = content_digest(content)
+    (folder / "study/zarr.json").write_text(json.dumps(study))
+    assert SweepStore.open(folder).dataset().line_length.attrs["units"] == "L"
+    (folder / "creeping/zarr.json").write_text("{}")
+    with pytest.raises(cr.CreepingError, match="damaged or missing"):
+        SweepStore.open(folder)
+    store = open_store(plan, folder, resume=True)
+    fill(plan, store)
+    ds = store.dataset()
+    assert ds.creeping.attrs["units"] == "L" and ds.field.unit == "L"
+    assert np.array_equal(ds["creeping"].values, fake.creeping_of(6))
 
 
 def test_the_same_plan_gives_the_same_bytes(tmp_path):
