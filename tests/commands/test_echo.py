@@ -170,15 +170,15 @@ def test_azimuths_of_another_turn_are_compared_and_polar_angles_are_not(tmp_path
 
 
 def test_band_of_a_capsule(tmp_path, capsys, monkeypatch):
-    """Of a body with joints: rays and physical optics, which table, summary and text say."""
+    """Of a body with joints by currents, which table and text say."""
     # twelve incidences would be asked for it
     monkeypatch.setattr("creeping.sweeping.echoes.body_length", lambda body, k: 0.4)
     words = ["capsule:radius=0.05,length=0.25", "--sound-speed", 1500, "--frequency", "80:100:20kHz"]
     words += ["--incidence", "0,40", "-o", tmp_path, "--no-cache", "--boundary", "hard"]
     assert ran("ts", *words) == 0
-    assert "the others by rays and physical optics" in capsys.readouterr().out
+    assert "physical optics" not in capsys.readouterr().out
     rows = table(tmp_path / "ts.csv")
-    assert {row["method"] for row in rows} == {"rays+optics"} and (tmp_path / "ts.png").exists()
+    assert {row["method"] for row in rows} == {"currents"} and (tmp_path / "ts.png").exists()
     # of the lower cap or the upper: half its radius
     assert all(abs(float(row["level_db"]) - 20 * np.log10(0.025)) < 2.0 for row in rows)
     assert all(float(row["error_m"]) > 0 for row in rows)
