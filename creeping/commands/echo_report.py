@@ -247,7 +247,9 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             f"{summary['error_db_95']:.2g} dB in 95 of 100 values"
         )
     others = "rays" if summary["otherwise_by"] == "rays" else "rays and physical optics"
-    served = f"{summary['by_currents']} of {summary['values']} values by currents, the others by {others}"
+    count, values = summary["by_currents"], summary["values"]
+    rest = "" if count == values else f", the others by {others}"
+    served = f"{count} of {values} values by currents{rest}"
     rows.append(f"{served}; {summary['unresolved']} unresolved")
     least, largest = summary["validity"]["least_k_rho"], summary["validity"]["largest_transverse"]
     if least is not None and largest is not None:
