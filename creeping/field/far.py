@@ -94,8 +94,8 @@ def far_field(
     # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
     # there are no modes of an admittance that varies
-    must = not creased and (method == "currents" or (method == "auto" and kinds[0].varies))
-    if marches and (must or cheap or method == "currents"):
+    must = marches and (method == "currents" or (method == "auto" and kinds[0].varies and not creased))
+    if must or (marches and cheap):
         try:
             left_out = tip_waves(fan, k) if creased else 0.0
             far = _by_currents(kept_currents(fan, k, boundary), r, boundary, left_out)

@@ -108,15 +108,15 @@ def lit_error(
     """
     m = fock_scale(k, part.along)
     # grazing a flat or concave place m is infinite, and optics alone stands there
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
-    terms = (
-        SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
-        LEAST[kind.kind] / m**4 / (1 + FADES[kind.kind] * (np.minimum(m, 1e9) * part.cosine) ** 2),
-        VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
-        ACROSS[kind.kind] * across * (m**-2 if kind.kind == "conductor" else across),
-        _flat_error(part, k, extent),
-    )
+        terms = (
+            SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
+            LEAST[kind.kind] / m**4 / (1 + FADES[kind.kind] * (np.minimum(m, 1e9) * part.cosine) ** 2),
+            VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
+            ACROSS[kind.kind] * across * (m**-2 if kind.kind == "conductor" else across),
+            _flat_error(part, k, extent),
+        )
     share = np.linalg.norm(terms, axis=0) * (COATED if kind.varies else 1.0)
     return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
 

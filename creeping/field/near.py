@@ -74,7 +74,8 @@ def near_field(
     method : {"auto", "currents", "rays"}
         The currents of the whole body, or the sum over creeping rays, which on the lit side is not the total field
         (status LIT). "auto" takes, point by point, rays in the shadow where they err less, currents elsewhere, unless
-        these cost more than some forty seconds or the order is 1. Nearer to the body than a quarter of a wavelength
+        these cost more than some forty seconds or the order is 1 (bodies with joints have no rays off them: there
+        currents alone serve). Nearer to the body than a quarter of a wavelength
         "layer" stands for currents: what is between them and the field on the body (`creeping.field.near_layer`). Where
         that has no foot, over bays or ground without rays, rays serve.
 
@@ -125,7 +126,7 @@ def near_field(
         field = field.put(at, parts(fan, flat[at], k, kind, order))
     asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents")))
     if method != "rays" and order == 2 and len(asked):
-        must = method == "currents" or marched
+        must = method == "currents" or kind.varies
         field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=must)
     left = without[field.method[without] == "none"]
     if len(left) and not marched:

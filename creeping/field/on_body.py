@@ -19,7 +19,7 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
-from creeping.field.currents.second_kind import across_joints
+from creeping.field.currents.second_kind import across_joints, without_tips
 from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
@@ -129,16 +129,17 @@ def rays_on(
 
     ``share`` (n,) is that of rays that have just left the line.
     """
+    alone = march_alone(fan.body, kind)
+    if alone and not marches(fan, kind, order, len(points), k):
+        nothing = np.zeros(len(points))
+        none = RaySum(nothing.astype(complex), nothing, np.full(len(points), int(FieldStatus.NO_RAY)), nothing)
+        return none, np.full(len(points), "none")
     found = shed_on(fan_strips(fan), fan.body, points)
     young = np.zeros(len(found.observer), dtype=bool)
     if share is not None:
         young = fock_parameter(found.rays, k) < TAKEN_OVER
-    if march_alone(fan.body, kind):
-        if marches(fan, kind, order, len(points), k):
-            return marched_sum(fan, found, points, share, young, k, kind), np.full(len(points), "march")
-        nothing = np.zeros(len(points))
-        none = RaySum(nothing.astype(complex), nothing, np.full(len(points), int(FieldStatus.NO_RAY)), nothing)
-        return none, np.full(len(points), "rays")
+    if alone:
+        return marched_sum(fan, found, points, share, young, k, kind), np.full(len(points), "march")
     waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
     if share is not None:
         weight = np.where(young, share[found.observer], 1.0)
@@ -182,7 +183,11 @@ def total_on(
             lit = lit[0] + _thrown(currents, points, lit[2]), *lit[1:]
     unit = k if kind.kind == "soft" else 1.0
     field = composed(fan, lit, rays, by, left, k, kind, unit)
-    return across_joints(field, currents, points, lit[2], unit) if jointed and currents and order == 2 else field
+    if not jointed:
+        return field
+    if currents and order == 2:
+        field = across_joints(field, currents, points, lit[2], unit)
+    return without_tips(field)
 
 
 def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:

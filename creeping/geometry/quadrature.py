@@ -23,7 +23,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import is_creased, pieces_of, tiles_of
+from creeping.geometry.creased import Tiles, is_creased, pieces_of, tiles_of
 from creeping.geometry.curvature import adjugate_form, principal_curvature_bound, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
 from creeping.geometry.kept import kept
@@ -51,6 +51,10 @@ LONGEST = 0.2
 """and their longest sides, in body sizes."""
 SMALLER = 3.7
 """Triangles of bodies over the square of their longest sides."""
+OPEN = 1e-3
+"""Integral of n, as a share of the area, beyond which pieces do not make a closed body."""
+LADDER = 1.1
+"""Ratio of the sides that are taken."""
 STRETCH = (0.1, 10.0)
 """Bounds of (1 + h kappa_1)(1 + h kappa_2); at a tip, where curvatures are infinite, a triangle counts as flat."""
 
@@ -267,7 +271,9 @@ def _onto(body: Surface, points: FloatArray, areas: FloatArray) -> BodyNodes:
 def _side(body: Any, rate: float) -> float:
     """Sides, L, of the triangles of a body of pieces for a rate, 1/L."""
     half = max(value for value in np.arange(0.05, 20.0, 0.05) if _points_for(value) <= ON_PIECES)
-    return min(2 * float(half) / rate, LONGEST * size(body))
+    share = min(2 * float(half) / (rate * size(body)), LONGEST)
+    # on a ladder: neighbouring rates have one rule
+    return float(LADDER ** np.floor(np.log(share) / np.log(LADDER))) * size(body)
 
 
 def _on_pieces(body: Any, rate: float) -> BodyNodes:
@@ -278,11 +284,18 @@ def _on_pieces(body: Any, rate: float) -> BodyNodes:
             "take a lower wavenumber, or rays"
         )
     side = _side(body, rate)
-    return kept(body, f"quadrature {side:.3g}", lambda: _piece_nodes(body, side))
+    found: dict[float, BodyNodes] = kept(body, "piece quadratures", dict)
+    # the last one used stands last
+    nodes = found[side] = found.pop(side) if side in found else _piece_nodes(body, side)
+    while len(found) > KEPT:
+        found.pop(next(iter(found)))
+    if not nodes.error <= OPEN:
+        raise SurfaceError(f"the pieces of the body do not close: {nodes.error:.2g} of its area faces nothing")
+    return nodes
 
 
 def _piece_nodes(body: Any, side: float) -> BodyNodes:
-    tiles = tiles_of(body, side / size(body))
+    tiles = Tiles(*body.tiles(side))
     u, w = np.polynomial.legendre.leggauss(ON_PIECES)
     u, w = 0.5 * (1 + u), 0.5 * w
     # barycentric places of the conical product

@@ -128,7 +128,11 @@ def parting_positions(
 
 
 def line_tangents(body: Surface, points: FloatArray, direction: FloatArray) -> FloatArray:
-    """Unit tangents grad F x Hd/|.| of n.d = 0 at its points; d is (3,) or one for each: (n, 3) -> (n, 3)."""
+    """Unit tangents grad F x Hd/|.| of n.d = 0 at its points; d is (3,) or one for each: (n, 3) -> (n, 3).
+
+    NaN where the ground is flat along d, as beside a joint that is the line itself.
+    """
     direction = np.broadcast_to(direction, points.shape)
     tangent = np.cross(body.gradient(points), np.einsum("nij,nj->ni", body.hessian(points), direction))
-    return np.asarray(tangent / np.linalg.norm(tangent, axis=-1, keepdims=True))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(tangent / np.linalg.norm(tangent, axis=-1, keepdims=True))

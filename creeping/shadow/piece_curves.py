@@ -31,7 +31,7 @@ ALIKE = 0.1
 """Distance from a curve, in its steps, up to which a seed lies on it: chords leave it by a third of that."""
 EDGE_ON = 1e-7
 """|n.d| on a whole piece up to which it lies edge-on and has no line of its own."""
-HALVINGS, CLOSE = 60, 1e-3
+HALVINGS, SHORT = 60, 1e-3
 """Halvings of the way to where a curve leaves its piece, and the distance, in body sizes, below which two steps do."""
 MOST = 20_000
 """Nodes of a curve at most."""
@@ -238,7 +238,7 @@ class _Walk:
             if gap <= 1e-14 * self.size:
                 break
             # the middle of two points of the curve is off it by the square of their distance
-            y = self._corrected(0.5 * (best + other)[None], 0.3 * gap, 2 if gap < CLOSE * self.size else 6)
+            y = self._corrected(0.5 * (best + other)[None], 0.3 * gap, 2 if gap < SHORT * self.size else 6)
             if self.inside(y)[0]:
                 best = y[0]
             else:

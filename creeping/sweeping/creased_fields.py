@@ -3,7 +3,7 @@
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.errors import SingularIncidenceError
+from creeping.errors import SingularIncidenceError, SurfaceError
 from creeping.field.boundary import parse_boundary
 from creeping.field.far import far_field
 from creeping.geometry.surface import Surface
@@ -45,7 +45,11 @@ def fill_creased(
             boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
                 asked: dict[str, Any] = {"boundary": boundary, "order": request.order, "method": request.method}
-                field = far_field(fan, observers, wavenumber=wavenumber, **asked)
+                try:
+                    field = far_field(fan, observers, wavenumber=wavenumber, **asked)
+                except SurfaceError:
+                    # what no mesh of the body resolves is as rays have it, and says so
+                    field = far_field(fan, observers, wavenumber=wavenumber, **asked | {"method": "rays"})
                 for part, values in FieldArrays.of(field, 1).arrays.items():
                     if part + suffix in out:
                         out[part + suffix][(row, *which, k)] = values[0] if bistatic else values[0, 0]

@@ -87,3 +87,46 @@ def test_what_has_no_march_is_refused():
             ask()
     far = cr.far_field(fan, [(0, 0, 1)], wavenumber=12.0, boundary="pec")
     assert far.method.tolist() == ["rays+optics"]
+
+
+def test_along_the_axis_the_line_is_a_joint():
+    """No tubes of rays there: rays and optics far away, and elsewhere words or a status, no foreign error."""
+    fan = fan_of(PILL, (0, 0, 1))
+    far = cr.far_field(fan, [(0, 0, 1.0)], wavenumber=12.0, boundary="hard")
+    assert far.method.tolist() == ["rays+optics"] and np.all(np.isfinite(far.total))
+    u = cr.surface_field(fan, [(1.0, 0, 0), (0, 0, -2.0)], wavenumber=12.0, boundary="hard")
+    assert not np.any(u.ok) and np.all(np.isfinite(u.values))
+    with pytest.raises(InvalidInputError, match="more rays"):
+        cr.surface_field(fan, wavenumber=12.0, boundary="hard")
+    nearly = cr.surface_field(fan_of(PILL, (1e-6, 0, 1)), [(1.0, 0, 0)], wavenumber=12.0, boundary="hard")
+    assert np.isfinite(nearly.values[0]) and nearly.error[0] > 0
+
+
+def test_a_tip_has_no_value():
+    cone = sc.ConeSphere(1.0, 4.0)
+    u = cr.surface_field(fan_of(cone, (0.3, 0, -1)), [(0, 0, 3.0)], wavenumber=12.0, boundary="soft")
+    assert u.values[0] == 0 and np.isinf(u.error[0]) and not u.ok[0]
+
+
+def test_beams_of_the_other_side_of_a_thin_body_do_not_count():
+    """A prolate spheroid met almost along its axis: dark ground all round, thinner than beams reach."""
+    body, k, d = sc.Ellipsoid(0.7, 0.7, 2.5), 12.0, np.array([np.sin(0.1), 0, np.cos(0.1)])
+    exact = joints.scatter_by_rings(spheroid(0.7, 2.5), k, [0.1], "hard")
+    x, n = joints.spread(spheroid(0.7, 2.5), np.random.default_rng(3), 200)
+    dark = n @ d > 0.1
+    u = cr.surface_field(fan_of(body, d), x[dark], wavenumber=k, boundary="hard")
+    off = np.abs(u.values - exact.total(x[dark])[:, 0])[u.ok]
+    assert np.quantile(off, 0.95) < 0.25 * np.abs(exact.total(x)).max()
+
+
+def spheroid(a, c):
+    """The profile of a spheroid by arc length, from a fine table."""
+    t = np.linspace(0, np.pi, 20_001)
+    s = np.concatenate([[0], np.cumsum(np.hypot(a * np.cos(t[1:] - t[1] / 2), c * np.sin(t[1:] - t[1] / 2)) * t[1])])
+
+    def at(place):
+        angle = np.interp(place, s, t)
+        n = np.stack([np.sin(angle) / a, np.cos(angle) / c], axis=-1)
+        return np.stack([a * np.sin(angle), c * np.cos(angle)], axis=-1), n / np.linalg.norm(n, axis=-1, keepdims=True)
+
+    return joints.Profile(at, float(s[-1]), (), (), a * a / c)

@@ -139,7 +139,9 @@ def lit_part(body: Surface, line: ShadowLine, nodes: BodyNodes, wavenumber: floa
     """Rows of the nodes that the wave of an incidence reaches, to the end of the penumbra, and what they ask for."""
     d = line.direction
     cosine, along, across = plane_of_incidence(nodes, d)
-    xi = -fock_scale(wavenumber, along) * cosine
+    # flat along d, as on a cylinder met along its axis: 0 times infinity
+    with np.errstate(invalid="ignore"):
+        xi = -fock_scale(wavenumber, along) * cosine
     dark = cosine <= 0
     kept = ~dark | ((along > 0) & (xi < PENUMBRA[1]))
     kept[kept] = ~_out_of_the_wave(line, nodes.points[kept], dark[kept])
@@ -202,7 +204,9 @@ def radius_rates(
         x, normals, hessians, _ = nearest_points(body, points + sign * step * t)
         ends.append(plane_of_incidence(BodyNodes(x, normals, np.ones(len(x)), hessians, 0.0), direction)[1])
     slope, bent = (ends[0] - ends[1]) / (2 * step), (ends[0] - 2 * along + ends[1]) / step**2
-    rate, bend = -slope / along**2, -bent / along**3 + 2 * slope**2 / along**4
+    # at a tip curvature is infinite
+    with np.errstate(over="ignore", invalid="ignore"):
+        rate, bend = -slope / along**2, -bent / along**3 + 2 * slope**2 / along**4
     return np.clip(rate, -STEEPEST, STEEPEST), np.clip(bend, -SHARPEST, SHARPEST)
 
 
@@ -211,7 +215,9 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     length = _length(fan, wavenumber, boundary)
     wavelength = 2 * np.pi / wavenumber
     attached = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
-    n_rays = max(16, int(np.ceil(RAYS * attached / wavelength)))
+    # marches ask for some rays on each arc, and arcs of bodies of pieces are many and short
+    fewest = 96 if is_creased(fan.body) else 16
+    n_rays = max(fewest, int(np.ceil(RAYS * attached / wavelength)))
     dense = launch(fan.flow, fan.line, length=length, n_rays=n_rays, max_gap=GAP * wavelength, measured=False)
     times = np.linspace(0.0, length, max(16, int(np.ceil(STEPS * length / wavelength))) + 1)
     _, rays = ray_points(dense, times)

@@ -7,8 +7,8 @@
 The expansions of lit ground know its curvature at a place and no more; where it jumps the true field passes from one to
 the other over the paths by which waves come from either side. The right side, with the expansions in it, holds these
 waves. On lit ground a step makes what is wrong smaller, by what a wave that grazes less than c suffers from one place
-to the next, kappa/(k c^3); behind the line it does not, and there rays serve. With t = eta/c that of a plane mirror is
-taken over to the left.
+to the next, kappa/(k c^3); behind the line it does not, and there rays serve. What an impedance does to a plane mirror,
+(eta/c) u, stands on the left too: it is not small.
 
 Next to x the integrals are weakly singular. With chi = e^{-(R/a)^2}, a = 2/k, kappa = (kappa_1 + kappa_2)/2,
 
@@ -26,6 +26,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.point_result import FieldStatus
 from creeping.field.served import Served
 from creeping.field.shed_wave import smoothstep
 from creeping.geometry.quadrature import nodes_at
@@ -33,18 +34,18 @@ from creeping.geometry.surface import normal
 from creeping.kernels.threads import in_threads
 
 NEAR = 2.0
-"""A, over 1/k."""
+"""Width a of the window, over 1/k."""
 NEIGHBOURS = 4.5
 """Distance, over a, of nodes that are next to a point: chi is 1e-9 there."""
 EACH = 2.5e-9
 """Seconds of one pair, about."""
-MOST_PAIRS = 1e10
-"""Pairs of a point and a node up to which it is done."""
 LEAST = 0.05
-"""C from which the wave of an impedance is taken apart."""
+"""Least c with which the wave of an impedance is parted."""
 OWN, EVERYWHERE, STILL = 1.5, 2.0, 0.25
 """Error of a step, in what currents leave of the incident wave inside, and in what it changes everywhere; and what it
 leaves of the error before."""
+NO_VALUE = 1e30
+"""Size from which a value is that of a tip."""
 SAMPLE, CLEAR, QUARTER = 128, 0.3, 0.25
 """Nodes, of c above this, by which that is judged, and the quantile."""
 WHOLE = 0.5
@@ -60,7 +61,7 @@ def across_joints(
     A step is taken as far as it changes more than it errs by itself, as a share of the incident wave's ``unit``.
     """
     at = np.flatnonzero(share > 0)
-    if not 0 < len(at) * len(currents.points) < MOST_PAIRS:
+    if not len(at):
         return field
     values = field.values[at]
     change = stepped(currents, points[at], normal(currents.body, points[at]), values) - values
@@ -71,6 +72,21 @@ def across_joints(
     wave[at] += reach * taken * change
     error[at] = np.hypot(error[at], reach * size * (1 - taken + STILL * taken))
     return replace(field, wave=wave, error=error)
+
+
+def without_tips(field: Served) -> Served:
+    """The field without values where curvature is infinite, as on a tip: 0, without a bound, UNRESOLVED."""
+    bad = ~(np.isfinite(field.values) & np.isfinite(field.error) & (np.abs(field.values) < NO_VALUE))
+    if not np.any(bad):
+        return field
+    return replace(
+        field,
+        wave=np.where(bad, 0.0, field.wave),
+        creeping=np.where(bad, 0.0, field.creeping),
+        error=np.where(bad, np.inf, field.error),
+        error_by=np.where(bad, "bound", field.error_by),
+        status=np.where(bad, int(FieldStatus.UNRESOLVED), field.status),
+    )
 
 
 def _everywhere(currents: SurfaceCurrents, unit: float) -> float:

@@ -16,6 +16,8 @@ from numba import njit
 
 from creeping.kernels.block import strict_options
 
+STEEPEST = 0.6
+"""Height of a point above the tangent plane at a foot, over its distance: beyond, it is on another side of a body."""
 SPAN = 16
 
 
@@ -61,7 +63,13 @@ def add_beams(
                 for i in range(begin, end + 1):
                     a, b, c = x - points[ray, i, 0], y - points[ray, i, 1], z - points[ray, i, 2]
                     g = a * tangents[ray, i, 0] + b * tangents[ray, i, 1] + c * tangents[ray, i, 2]
-                    if i > begin and before > 0.0 and g <= 0.0 and a * a + b * b + c * c < reach * reach:
+                    square = a * a + b * b + c * c
+                    # along n = p x b: a foot that the point stands high above or deep below is on another side
+                    up = a * (tangents[ray, i, 1] * sides[ray, i, 2] - tangents[ray, i, 2] * sides[ray, i, 1])
+                    up += b * (tangents[ray, i, 2] * sides[ray, i, 0] - tangents[ray, i, 0] * sides[ray, i, 2])
+                    up += c * (tangents[ray, i, 0] * sides[ray, i, 1] - tangents[ray, i, 1] * sides[ray, i, 0])
+                    beside = square < reach * reach and up * up <= STEEPEST * STEEPEST * square
+                    if i > begin and before > 0.0 and g <= 0.0 and beside:
                         o, t = i - 1, before / (before - g)
                         n = 0.0
                         for e in range(3):

@@ -69,6 +69,10 @@ def from_beside(
             area += chi
             bent += chi * bends[i]
             if square < least:
+                # (e^{ikR} - 1)/R is ik there
+                if alike[i]:
+                    p -= k * single[1, i]
+                    q += k * single[0, i]
                 continue
             inverse = 1.0 / math.sqrt(square)
             across = sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz

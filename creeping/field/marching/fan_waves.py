@@ -135,7 +135,7 @@ class FanWaves:
             for name in ("lean", "torsion", "curvature")
         )
         bent = np.maximum(kappa, FLAT * kappa[:, :1])
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             slope = np.gradient(y, self.times, axis=1)
             turned = np.minimum(np.nan_to_num(np.abs(slope / (k * y))), MOST_TURNED)
         density = 0.5 * k * turned**2 * (lean**2 + (torsion / bent) ** 2)
@@ -182,6 +182,8 @@ def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = FEWEST_
         and sum(len(strip.positions) for strip in strips) == len(fan.status)
         and min(len(strip.positions) for strip in strips) >= fewest
         and not has_edges(fan.body)
+        # where the line runs along a joint rays have no tube
+        and all(bool(np.all(np.isfinite(part))) for strip in strips for part in (strip.rays.lanes, strip.rays.starts))
         and bool(np.all(np.isin(fan.status, (RayStatus.OK, RayStatus.DETACHED, *AT_CREASES))))
     )
 

@@ -163,7 +163,8 @@ class _March:
         self.reliable = plan.reliable.copy()
         shares = [profiles.obliqueness(ray, 0.5 * (edges[1:] + edges[:-1])) for ray, edges in enumerate(self.edges)]
         ways = [share * np.diff(edges) for share, edges in zip(shares, self.edges, strict=True)]
-        sizes = np.round(k * np.concatenate(ways), 9)
+        # a joint may stand next to the end of a step
+        sizes = np.maximum(np.round(k * np.concatenate(ways), 9), 1e-9)
         distinct, which = np.unique(sizes, return_inverse=True)
         self.rational = rational_step(distinct)
         self.which = np.split(which, np.cumsum([len(edges) - 1 for edges in self.edges])[:-1])
