@@ -66,4 +66,4 @@ def test_sweeps_say_metres_of_a_body_that_knows():
         "L": {"wavenumber": "1/L", "creeping": "L", "line_length": "L"},
     }
     assert [found[name].field.dbsm.attrs["units"] for name in "mL"] == ["dBsm", "dB re 1 L^2"]
-    assert "metre" not in found["L"].attrs["conventions"] and "1/m" in found["m"].attrs["conventions"]
+    assert "metre" not in found["L"].attrs["conventions"] and "wavenumbers in m-1" in found["m"].attrs["conventions"]
