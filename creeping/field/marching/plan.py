@@ -40,7 +40,7 @@ FLAT = 0.3
 """Share of the curvature at the shadow line below which ground is flat."""
 LEAST_CURVATURE = 0.05
 """Share of the largest curvature that scales are taken from at least."""
-CAPS, ELEMENTS, HEIGHTS = 1.3, 1.2, 1.35
+CAPS, ELEMENTS, HEIGHTS = 1.1, 1.2, 1.35
 """Ratios of neighbouring caps, of longest elements, and of heights and first elements: finer ones fill fewer lanes."""
 BACK = 3.0
 """Rays of optics come from so many radii of curvature behind the start at most."""
