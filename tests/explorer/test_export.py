@@ -136,5 +136,6 @@ def test_a_body_with_joints_has_rays_and_a_cut():
     frame = preview_of(flow, request, step_of(body))
     for boundary in ("soft", "pec"):
         found = refined_view(flow, replace(frame, request=request.changed(boundary=boundary)), np.zeros((1, 3)))
-        assert found.body_levels is None and len(found.far.total) == len(found.cut_angles)
+        # a conductor's current goes by modes, which no joint knows
+        assert (found.body_levels is None) == (boundary == "pec") and len(found.far.total) == len(found.cut_angles)
     assert np.isfinite(frame.ray_segments).all()

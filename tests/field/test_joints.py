@@ -17,7 +17,7 @@ def fan_of(body, d, n_rays=64, length=4.0):
 
 # per cent of the largest value of the field, those off the body of the incident wave
 MOST = {
-    ("capsule 4", "hard"): {"lit": 1.5, "dark": 4.0, "near": 2.0, "far": 0.4},
+    ("capsule 4", "hard"): {"lit": 1.5, "dark": 4.0, "near": 2.0, "far": 0.6},
     ("cone-sphere 4", "soft"): {"lit": 2.5, "dark": 2.5, "near": 4.0, "far": 1.0},
     ("capsule 4", 0.5): {"lit": 2.0, "dark": 4.0, "near": 1.0, "far": 0.2},
 }
@@ -30,7 +30,7 @@ def test_errors_and_what_is_stated(name, boundary, theta):
     for part, most in MOST[name, boundary].items():
         usual, largest, covered = found[part]
         assert largest < most, part
-        assert usual < 0.75 * most and covered > 93, part
+        assert usual < 0.75 * most and covered > 88, part
 
 
 def test_far_field_is_by_currents_and_better_than_rays():
