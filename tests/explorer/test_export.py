@@ -135,7 +135,9 @@ def test_a_body_with_joints_has_rays_and_a_cut():
     flow, request = cr.DirectFlow(body, rtol=1e-8), REQUEST.changed(rays=16, length=0.8, wavenumber=10.0)
     frame = preview_of(flow, request, step_of(body))
     for boundary in ("soft", "pec"):
-        found = refined_view(flow, replace(frame, request=request.changed(boundary=boundary)), np.zeros((1, 3)))
+        found = refined_view(
+            flow, replace(frame, request=request.changed(boundary=boundary)), np.array([[0.4, 0.0, 0.1]])
+        )
         # a conductor's current goes by modes, which no joint knows
         assert (found.body_levels is None) == (boundary == "pec") and len(found.far.total) == len(found.cut_angles)
     assert np.isfinite(frame.ray_segments).all()
