@@ -15,6 +15,8 @@ Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four b
 x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
@@ -47,6 +49,9 @@ LEFT, UNKNOWN = 2.0, 2.0
 reflected wave and its image."""
 AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0, "conductor": 2.5}
 """The factor on dark ground where waves are marched beyond the end of rays."""
+
+NO_VALUE = 1e30
+"""Size from which a value is that of a tip."""
 
 
 def convex(fan: RayFan) -> bool:
@@ -96,6 +101,21 @@ def composed(
         error_by=np.where(unknown | (status != FieldStatus.OK), "bound", "expansion"),
         status=np.where(unknown & (status == FieldStatus.OK), FieldStatus.UNRESOLVED, status).astype(np.int64),
         method=np.where(share == 1, "lit", np.where(share > 0, np.char.add("lit+", by), by)),
+    )
+
+
+def without_tips(field: Served) -> Served:
+    """The field without values where curvature is infinite, as on a tip: 0, without a bound, UNRESOLVED."""
+    bad = ~(np.isfinite(field.values) & np.isfinite(field.error) & (np.abs(field.values) < NO_VALUE))
+    if not np.any(bad):
+        return field
+    return replace(
+        field,
+        wave=np.where(bad, 0.0, field.wave),
+        creeping=np.where(bad, 0.0, field.creeping),
+        error=np.where(bad, np.inf, field.error),
+        error_by=np.where(bad, "bound", field.error_by),
+        status=np.where(bad, int(FieldStatus.UNRESOLVED), field.status),
     )
 
 

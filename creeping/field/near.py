@@ -75,9 +75,9 @@ def near_field(
         The currents of the whole body, or the sum over creeping rays, which on the lit side is not the total field
         (status LIT). "auto" takes, point by point, rays in the shadow where they err less, currents elsewhere, unless
         these cost more than some forty seconds or the order is 1 (bodies with joints have no rays off them: there
-        currents alone serve). Nearer to the body than a quarter of a wavelength
-        "layer" stands for currents: what is between them and the field on the body (`creeping.field.near_layer`). Where
-        that has no foot, over bays or ground without rays, rays serve.
+        currents alone serve). Nearer to the body than a quarter of a wavelength "layer" stands for currents: what is
+        between them and the field on the body (`creeping.field.near_layer`). Where that has no foot, over bays or
+        ground without rays, rays serve.
 
     Returns
     -------

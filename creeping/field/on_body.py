@@ -19,12 +19,12 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
-from creeping.field.currents.second_kind import across_joints, without_tips
+from creeping.field.currents.second_kind import across_joints
 from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
-from creeping.field.lit_ground import composed, convex, lit_error
+from creeping.field.lit_ground import composed, convex, lit_error, without_tips
 from creeping.field.marched_sum import marched_sum, marches
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.own_waves import own_waves

@@ -96,16 +96,12 @@ def _by_modes(
 
 def _by_marching(fan: RayFan, rays: RayPoints, k: float, kind: Boundary) -> tuple[ComplexArray, FloatArray]:
     """Waves and their errors (rays, steps), infinite where there is no wave."""
-    waves = fan_waves(fan, wavenumber=k, boundary=kind)
-    values, error = np.zeros(rays.time.shape, dtype=complex), np.full(rays.time.shape, np.inf)
-    for number, rows in enumerate(waves.rows):
-        mine = rays[rows]
-        sigma = np.repeat(waves.strips[number].positions, mine.time.shape[1])
-        at = number, sigma, mine.time.ravel()
-        values[rows] = spread_out(waves.at(*at).reshape(mine.time.shape), mine, k)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            error[rows] = waves.error(*at).reshape(mine.time.shape) / np.sqrt(np.abs(mine.spreading))
-    return values, error
+    shape = rays.time.shape
+    ray = np.repeat(np.arange(shape[0]), shape[1])
+    y, off = fan_waves(fan, wavenumber=k, boundary=kind).along(ray, rays.time.ravel())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = off.reshape(shape) / np.sqrt(np.abs(rays.spreading))
+    return spread_out(y.reshape(shape), rays, k), error
 
 
 def _wide(fan: RayFan, rays: RayPoints, k: float) -> FloatArray:

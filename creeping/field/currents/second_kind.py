@@ -26,10 +26,8 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.point_result import FieldStatus
 from creeping.field.served import Served
 from creeping.field.shed_wave import smoothstep
-from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal
 from creeping.kernels.threads import in_threads
 
@@ -44,8 +42,6 @@ LEAST = 0.05
 OWN, EVERYWHERE, STILL = 1.5, 2.0, 0.25
 """Error of a step, in what currents leave of the incident wave inside, and in what it changes everywhere; and what it
 leaves of the error before."""
-NO_VALUE = 1e30
-"""Size from which a value is that of a tip."""
 SAMPLE, CLEAR, QUARTER = 128, 0.3, 0.25
 """Nodes, of c above this, by which that is judged, and the quantile."""
 WHOLE = 0.5
@@ -72,21 +68,6 @@ def across_joints(
     wave[at] += reach * taken * change
     error[at] = np.hypot(error[at], reach * size * (1 - taken + STILL * taken))
     return replace(field, wave=wave, error=error)
-
-
-def without_tips(field: Served) -> Served:
-    """The field without values where curvature is infinite, as on a tip: 0, without a bound, UNRESOLVED."""
-    bad = ~(np.isfinite(field.values) & np.isfinite(field.error) & (np.abs(field.values) < NO_VALUE))
-    if not np.any(bad):
-        return field
-    return replace(
-        field,
-        wave=np.where(bad, 0.0, field.wave),
-        creeping=np.where(bad, 0.0, field.creeping),
-        error=np.where(bad, np.inf, field.error),
-        error_by=np.where(bad, "bound", field.error_by),
-        status=np.where(bad, int(FieldStatus.UNRESOLVED), field.status),
-    )
 
 
 def _everywhere(currents: SurfaceCurrents, unit: float) -> float:
@@ -117,14 +98,15 @@ def stepped(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, 
     own = np.stack([here.real, here.imag, values.real, values.imag]) / (4 * np.pi)
     x, n, y, sides = (np.ascontiguousarray(part.T) for part in (points, normals, currents.points, currents.normals))
     out = np.zeros((len(points), 4))
-    bends = 0.5 * nodes_at(currents.body, currents.points, currents.normals).total_curvature
     beside = currents.beside(points, NEIGHBOURS * a)
 
     def work(part: slice) -> None:
         from_afar(x, n, y, sides, *both, k, NEIGHBOURS * a, soft, part.start, part.stop, out)
 
     in_threads(work, len(points), least=16, multiple=1, seconds=EACH * len(double))
-    from_beside(x, n, own, *beside, y, sides, currents.weights, bends, currents.lit, *both, k, a, soft, out)
+    from_beside(
+        x, n, own, *beside, y, sides, currents.weights, currents.mean_curvature, currents.lit, *both, k, a, soft, out
+    )
     cover, bent = out[:, 2] / (np.pi * a**2), out[:, 3] / (np.pi * a**2)
     sign = 1 if soft else -1
     put_back = here * cover * np.sqrt(np.pi) / 4 * a + sign * values * bent * np.sqrt(np.pi) / 8 * a

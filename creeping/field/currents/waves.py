@@ -50,17 +50,9 @@ def _marched(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, C
         raise InvalidInputError(
             f"the admittance {kind.coating} varies, and {some}; give a constant admittance, or another incidence"
         )
-    marched = fan_waves(nodes.fan, wavenumber=k, boundary=kind)
-    values, change = np.zeros((2, len(nodes.rows)), dtype=complex)
-    for number, rows in enumerate(marched.rows):
-        order = np.full(len(nodes.fan.status), -1)
-        order[rows] = np.arange(len(rows))
-        mine = np.flatnonzero(order[nodes.rows] >= 0)
-        sigma, rays = marched.strips[number].positions[order[nodes.rows[mine]]], nodes.rays[mine]
-        y, error = marched.at(number, sigma, rays.time), marched.error(number, sigma, rays.time)
-        wave = spread_out(y, rays, k)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            off = wave * np.minimum(error / np.abs(y), 1.0)
-        known = np.isfinite(error) & np.isfinite(wave) & np.isfinite(off)
-        values[mine], change[mine] = np.where(known, wave, 0.0), np.where(known, off, 0.0)
-    return values, change
+    y, error = fan_waves(nodes.fan, wavenumber=k, boundary=kind).along(nodes.rows, nodes.rays.time)
+    wave = spread_out(y, nodes.rays, k)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = wave * np.minimum(error / np.abs(y), 1.0)
+    known = np.isfinite(error) & np.isfinite(wave) & np.isfinite(off)
+    return np.where(known, wave, 0.0), np.where(known, off, 0.0)

@@ -39,6 +39,7 @@ from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.depth import inner_points
+from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import Surface
 
 DEPTH = 0.25
@@ -237,6 +238,11 @@ class SurfaceCurrents:
         found = self._nodes.query_ball_point(points, distance, return_sorted=True)
         ends = np.cumsum([len(near) for near in found], dtype=np.int64)
         return np.concatenate([np.zeros(0, np.int64), *found]).astype(np.int64), ends
+
+    @cached_property
+    def mean_curvature(self) -> FloatArray:
+        """(kappa_1 + kappa_2)/2 of the body at the nodes (n,), 1/L."""
+        return 0.5 * nodes_at(self.body, self.points, self.normals).total_curvature
 
     @cached_property
     def _left(self) -> FloatArray:

@@ -95,6 +95,17 @@ class FanWaves:
         ray = self.strips[strip].nearest(sigma)
         return np.asarray(self._tables[strip][1][ray, np.clip(np.searchsorted(self.times, s), 0, len(self.times) - 1)])
 
+    def along(self, ray: IntArray, times: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Y and its error on the fan's own rays (n,), by their numbers, at times (n,), L: (n,) each."""
+        y, error = np.zeros(len(ray), dtype=complex), np.full(len(ray), np.inf)
+        for number, rows in enumerate(self.rows):
+            place = np.full(len(self.ends), -1)
+            place[rows] = np.arange(len(rows))
+            mine = np.flatnonzero(place[ray] >= 0)
+            at = number, self.strips[number].positions[place[ray[mine]]], times[mine]
+            y[mine], error[mine] = self.at(*at), self.error(*at)
+        return y, error
+
     @cached_property
     def _tables(self) -> list[tuple[ComplexArray, FloatArray]]:
         """Y and its error (rays, steps) of each strip, by marching and by modes."""
