@@ -204,9 +204,9 @@ class _Window:
 
     def _drop_what_waits(self) -> None:
         """Cancel tasks that no worker has begun."""
-        futures = [future for _, future in self.flying.values()]
-        busy = {key for stacks in self.client.call_stack(futures).values() for key in stacks} if futures else set()
-        idle = [key for key in self.flying if key not in busy]
+        # stacks of all that runs, asked without names: a scheduler fails over the name of a task that ended meanwhile
+        busy = {key for stacks in self.client.call_stack().values() for key in stacks} if self.flying else set()
+        idle = [key for key, (_, future) in self.flying.items() if key not in busy and not future.done()]
         dropped = [self.flying.pop(key)[1] for key in idle]
         self.client.cancel(dropped, force=True)
 

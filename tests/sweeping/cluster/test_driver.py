@@ -1,5 +1,6 @@
 """Sweeps on a cluster: the same bytes however many workers, however they die, with few tasks in flight."""
 
+import asyncio
 import os
 import signal
 from dataclasses import replace
@@ -90,6 +91,23 @@ def test_stopping_keeps_what_is_done(two, tmp_path):
     assert 5 <= len(done) <= 5 + 2 * cluster.AHEAD
     assert 100 - len(store.missing()) == len(done) and store.dataset().attrs["incidences_ok"] == done[-1]
     assert two.futures == {} or all(f.status == "cancelled" for f in two.futures.values())
+
+
+def test_stopping_bears_a_task_that_the_scheduler_has_forgotten(two):
+    window = cluster._Window(two, fake.plan(4, 2), lambda: True)
+    window.submit(0, len)
+    ((key, (_, future)),) = window.flying.items()
+    # as where it ended between the question and the answer
+    two.cancel([future], force=True)
+    two.run_on_scheduler(_forgets, key)
+    window._drop_what_waits()
+    assert not window.flying or all(future.done() for _, future in window.flying.values())
+
+
+async def _forgets(key, dask_scheduler):
+    """Wait until a scheduler knows a task no more."""
+    while key in dask_scheduler.tasks:
+        await asyncio.sleep(0.01)
 
 
 def test_a_worker_that_cannot_write_ends_the_sweep_with_the_reason(two, tmp_path):
