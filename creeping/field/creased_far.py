@@ -147,7 +147,8 @@ class CreasedParts(Parts):
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
         normals = shed.rays.first_normal, g.shed_normals
-        self._add_apart(self.creeping, number, shed.observer, wave, off, *normals, merged)
+        each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
+        self._add_apart(self.creeping, shed.observer, each, doubts, merged)
         for points, by in self.specular:
             self._add_specular(number, kind, points, by)
 

@@ -30,7 +30,14 @@ from creeping.field.far_geometry import FarGeometry, merging, off_axis
 from creeping.field.far_result import FarField
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.polarisation import dyads, wave_frame
-from creeping.field.reflected import NORMAL, UNRESOLVED, next_order, reflected_amplitude, reflected_error
+from creeping.field.reflected import (
+    NORMAL,
+    UNRESOLVED,
+    next_order,
+    polarisation_terms,
+    reflected_amplitude,
+    reflected_error,
+)
 from creeping.field.shed_wave import scales, shed_wave, smoothstep
 from creeping.rays.quantities import RayPoints
 from creeping.rays.specular import SpecularPoints
@@ -218,7 +225,8 @@ class Parts:
         normals = shed.rays.first_normal, g.shed_normals
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
-        self._add_apart(self.creeping, number, shed.observer, wave, off, *normals, merged)
+        each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
+        self._add_apart(self.creeping, shed.observer, each, doubts, merged)
         if np.any(self.in_fan > 0):
             self._add_fan(number, kind)
         self._add_reflected(number, kind)
@@ -245,14 +253,34 @@ class Parts:
         g, k = self.geometry, self.wavenumber
         incident = self.incident[s.observer]
         wave = reflected_amplitude(s, g.directions, incident, k, kind, self.order)
+        crossed: ComplexArray | None = None
         if self.vector:
             # at normal incidence no polarisation is along the plane of incidence: both take the mean of their orders
-            other = reflected_amplitude(s, g.directions, incident, k, CROSSED[kind][1], self.order)
-            wave = wave - 0.5 * (1 - smoothstep(s.sine, *NORMAL)) * (wave + other)
+            sign, other = CROSSED[kind]
+            mean = reflected_amplitude(s, g.directions, incident, k, other, self.order)
+            wave = wave - 0.5 * (1 - smoothstep(s.sine, *NORMAL)) * (wave + mean)
+            if self.order == 2:
+                own, turned = polarisation_terms(s, k)
+                wave, crossed = (1 + sign * own) * wave, _weighted(share, -turned * wave)
         off = share * reflected_error(s, wave, k, self.order, THIRD * self.unsure)
         wave = _weighted(share, wave)
         failing = np.abs(next_order(s, k)) > UNRESOLVED
-        self._add_apart(self.reflected, number, s.observer, wave, off, s.normals, s.normals, failing)
+        each, doubts = (self._reflected(number, s, one) for one in (wave, off))
+        if crossed is not None:
+            each = each + self._reflected(number, s, crossed, turned=True)
+        self._add_apart(self.reflected, s.observer, each, doubts, failing)
+
+    def _reflected(
+        self, number: int, s: SpecularPoints, wave: ComplexArray | FloatArray, *, turned: bool = False
+    ) -> ComplexArray:
+        """Waves (n,) of specular points as they are summed, of a conductor those that come ``turned`` out as well."""
+        if not self.vector:
+            return np.asarray(wave, dtype=complex)
+        d, r = self.incident[s.observer], self.geometry.directions[s.observer]
+        b = np.cross(s.normals, s.plane)
+        before, after = (np.stack([b, np.cross(b, way)], axis=-2) for way in (d, r))
+        pair = dyads(before, after[:, ::-1] if turned else after, d, r)[:, number]
+        return np.asarray(np.asarray(wave)[:, None, None] * pair)
 
     def _add_forward(self, number: int, kind: Boundary) -> None:
         """Add the forward lobes."""
@@ -278,25 +306,14 @@ class Parts:
             self.forward += self._summed(number, ahead, np.asarray(wave), aside, aside)
 
     def _add_apart(
-        self,
-        into: ComplexArray,
-        number: int,
-        observer: IntArray,
-        wave: ComplexArray,
-        off: FloatArray,
-        n0: FloatArray,
-        n: FloatArray,
-        failing: BoolArray,
+        self, into: ComplexArray, observer: IntArray, each: ComplexArray, off: ComplexArray, failing: BoolArray
     ) -> None:
-        """Add contributions (n,) that err apart, by ``off``; those whose expansion fails are noted.
-
-        ``n0`` and ``n`` (n, 3) are the normals where they land and where they leave.
-        """
-        each = self._each(number, observer, wave, n0, n)
+        """Add contributions (n, ...) that err apart, by ``off``; those whose expansion fails are noted."""
         np.add.at(into, observer, each)
         (self.shed_waves if into is self.creeping else self.specular_waves).append(each)
-        self.doubt += np.abs(self._summed(number, observer, off, n0, n, squared=True))
-        np.add.at(self.failing_size, observer, np.where(failing, np.abs(wave), 0.0))
+        np.add.at(self.doubt, observer, np.abs(off) ** 2)
+        sizes = np.sqrt(np.sum(np.abs(each) ** 2, axis=tuple(range(1, each.ndim))))
+        np.add.at(self.failing_size, observer, np.where(failing, sizes, 0.0))
 
     def _add_whole(self, into: ComplexArray, first: ComplexArray, second: ComplexArray, *, sharp: bool = True) -> None:
         """Add an integral of both orders (m, ...), which errs as one; unless ``sharp`` by what the second adds."""

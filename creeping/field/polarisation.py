@@ -107,7 +107,10 @@ def wave_frame(normals: FloatArray, directions: FloatArray, spare: FloatArray) -
 
 
 def dyads(incoming: FloatArray, outgoing: FloatArray, direction: FloatArray, observers: FloatArray) -> FloatArray:
-    """Components of both dyads (n, 2 kinds, 2 scattered, 2 incident), from frames (n, 2, 3); d is (3,) or (n, 3)."""
+    """Components of both dyads (n, 2 kinds, 2 scattered, 2 incident), from frames (n, 2, 3); d is (3,) or (n, 3).
+
+    The kind is that of the incoming vector; the outgoing one stands in the same place.
+    """
     received = incoming @ np.swapaxes(spherical_frame(direction), -1, -2)
     sent = np.einsum("nkc,noc->nko", outgoing, spherical_frame(observers))
     return np.asarray(sent[..., :, None] * received[..., None, :])

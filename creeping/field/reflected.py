@@ -4,9 +4,15 @@
     R = -√(-4/ξ) e^{iξ³/12} P(ξ; q + q_eff),   ξ = -2 m cos θᵢ,   q_eff = -r/(4m²)
 
 m with the curvature in the plane of incidence, r = κ_b/κₙ of the curvature across it. q_eff belongs to the hard
-boundary and to impedances; it is 1 - iκ_b/(k cos θᵢ) away from grazing. On a conducting sphere that factor is found
-with E across the plane of incidence, and none with E in it. What P lacks of an admittance η at that order is added to
-R; where P does not serve, R is that of a plane with what P would have of that order, R₀ = (cos θᵢ - η)/(cos θᵢ + η):
+boundary and to impedances; it is 1 - iκ_b/(k cos θᵢ) away from grazing. A conductor has that factor with E across the
+plane of incidence, and none with E in it, and turns polarisations where the plane leans against the principal axes: e
+along b and h along b × d go on as e', h' along b and b × r with
+
+    e' = R_e e - (it/(k cos²θᵢ)) R_h h,    h' = R_h h - (it/(k cos²θᵢ)) R_e e,    t = a.Sb
+
+At normal incidence R_e and R_h are ∓1 with 1 ± i(κ_a - κ_b)/(2k), whatever the plane. What P lacks of an admittance
+η at that order is added to R; where P does not serve, R is that of a plane with what P would have of that order,
+R₀ = (cos θᵢ - η)/(cos θᵢ + η):
 
     (i η/(2k (cos θᵢ + η)²)) [κ_b - R₀ κₙ]     and     -(i κₙ/(2k cos³θᵢ)) [R₀² + 2 η² cos θᵢ/(cos θᵢ + η)³]
 
@@ -16,7 +22,7 @@ The bracket is what the next order of the reflected field's series adds to that 
 derivatives of the surface (`creeping.rays.specular.shape_term`), is 1/(2a) on a sphere, where the bracket is 1, and
 3/(16a) on a cylinder, where κ_b = 0. It comes from Green's formula with the field on the surface to the same order.
 
-Sources: [KLS56] for the series, [P79] for P; Derivations, F13.
+Sources: [KLS56] for the series, [P79] for P; Derivations, F13, and F18 for what is a conductor's own.
 """
 
 import numpy as np
@@ -101,6 +107,20 @@ def curvatures(specular: SpecularPoints) -> tuple[FloatArray, FloatArray]:
     oblique = smoothstep(specular.sine, *NORMAL)
     mean = 0.5 * (specular.along + specular.across)
     return mean + oblique * (specular.along - mean), mean + oblique * (specular.across - mean)
+
+
+def polarisation_terms(specular: SpecularPoints, wavenumber: float) -> tuple[ComplexArray, ComplexArray]:
+    """What a conductor has beside R_e, R_h of `curvatures`: p and s (n,) in (1 + p) R_e, (1 - p) R_h, -s R_e, -s R_h.
+
+    p is what the mean of the curvatures next to normal incidence leaves out.
+    """
+    c = np.maximum(specular.cosine, 1e-12)
+    along, across = curvatures(specular)
+    kept_back = 0.5 * ((specular.along - specular.across) - (along - across))
+    with np.errstate(over="ignore"):
+        own = 0.5j * kept_back * (1 + 1 / c**2) / (wavenumber * c)
+        other = 1j * specular.twist / (wavenumber * c**2)
+    return limited(np.asarray(own), LARGEST_TERM), limited(np.asarray(other), LARGEST_TERM)
 
 
 def next_order(specular: SpecularPoints, wavenumber: float) -> FloatArray:

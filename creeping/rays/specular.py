@@ -39,8 +39,10 @@ class SpecularPoints:
     points, normals : (n, 3)
     cosine : (n,)
         cos θᵢ.
-    along, across : (n,), 1/L
-        Normal curvatures in the plane of incidence and across it.
+    along, across, twist : (n,), 1/L
+        Entries of the shape operator: normal curvatures along a and across, and what mixes them.
+    plane : (n, 3)
+        Unit tangent a in the plane of incidence, the way that the wave goes; any tangent at normal incidence.
     principal : (n, 2), 1/L
         κ1 <= κ2, positive where convex.
     shape : (n,), 1/L
@@ -53,6 +55,8 @@ class SpecularPoints:
     cosine: FloatArray
     along: FloatArray
     across: FloatArray
+    twist: FloatArray
+    plane: FloatArray
     principal: FloatArray
     shape: FloatArray
 
@@ -108,6 +112,8 @@ def specular_points(
         cosine=np.sum(n * r, axis=1),
         along=along,
         across=across,
+        twist=mixed,
+        plane=q,
         principal=principal,
         shape=shape_term(body, points, n, frame, principal),
     )
