@@ -30,8 +30,9 @@ import numpy as np
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.field.boundary import SOFT, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.crossed_rays import strong_coupling
 from creeping.field.far_geometry import FarGeometry, far_geometry, merging
-from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold, strong_coupling
+from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
 from creeping.field.far_result import FarField
 from creeping.field.likely_cells import parted
 from creeping.field.optics import lit_tiles, optics_field, side_of_tiles
@@ -146,6 +147,8 @@ class CreasedParts(Parts):
         first, second = waves
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
+        if self.vector:
+            self._doubt_turning(shed, wave)
         normals = shed.rays.first_normal, g.shed_normals
         each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
         self._add_apart(self.creeping, shed.observer, each, doubts, merged)

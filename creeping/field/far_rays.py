@@ -18,14 +18,8 @@ Sources: [LK59], [P79]; Derivations, F3, F10, F13 to F15. The thresholds of W an
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.boundary import (
-    ELECTRIC_HARD,
-    ELECTRIC_SOFT,
-    Boundary,
-    BoundaryLike,
-    boundary_name,
-    scalar_boundaries,
-)
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.crossed_rays import CROSSED, gradient_coupling, held_coupling, strong_coupling, turning
 from creeping.field.far_geometry import FarGeometry, merging, off_axis
 from creeping.field.far_result import FarField
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
@@ -40,6 +34,7 @@ from creeping.field.reflected import (
 )
 from creeping.field.shed_wave import scales, shed_wave, smoothstep
 from creeping.rays.quantities import RayPoints
+from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints
 
 FORWARD = (0.55, 0.85)
@@ -47,8 +42,6 @@ FORWARD = (0.55, 0.85)
 NEAR_AXIS = (0.3, 0.45)
 """m̄ θ between which its silhouette gives way to the poles."""
 LONG_RAYS = (np.radians(4.0), np.radians(12.0))
-CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)}
-"""Polarisations of a conductor and the other of each, with the sign of their coupling."""
 MATTERS = 0.05
 """Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
 DARK = 0.5
@@ -60,8 +53,6 @@ THIRD, UNSURE = 3.0, 1.5
 are left out, so many times that."""
 AHEAD = 0.1
 """Error of the forward lobe over itself and 1/m̄⁴."""
-STRONG = 0.5
-"""Size of the coupling of polarisations from which its expansion fails."""
 MERGED = (0.38, 0.52)
 """χ between which the fan integral replaces isolated rays."""
 
@@ -114,37 +105,6 @@ def held_rate(rays: RayPoints, m: FloatArray, passed: BoolArray) -> FloatArray:
     rate = np.abs(rays.spreading_rate)
     least = np.where(passed, 0.5 * np.abs(rays.spreading) * np.maximum(rays.curvature[1], 0.0) / m, 0.0)
     return np.asarray(np.sqrt(np.sqrt(rate**4 + least**4)))
-
-
-def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
-    """i κ_t1 κ_t2/(k J'): how much of one polarisation's wave goes with the other's (n,), without unit.
-
-    An amplitude n0.E that varies across the rays has a transverse field of higher order in 1/k; the soft wave is so
-    weak that this outweighs it. Found on the sphere, exactly; κ_t at both ends, for reciprocity, on other bodies.
-    """
-    first, last = rays.transverse
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(1j * np.maximum(first * last, 0.0) / (wavenumber * rays.spreading_rate))
-
-
-def held_coupling(coupling: ComplexArray) -> ComplexArray:
-    """The coupling c held below 1 in size, c/(1 + |c|⁴)^(1/4).
-
-    As the next order of a wave it cannot be larger than what it comes from.
-    """
-    # the size first: its fourth power may not be a number
-    large = np.abs(coupling) > 1
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        out = np.where(large, coupling / np.abs(coupling) / (1 + np.abs(coupling) ** -4.0) ** 0.25, coupling)
-        out = np.where(large, out, coupling / (1 + np.abs(coupling) ** 4) ** 0.25)
-    return np.asarray(np.nan_to_num(out, nan=1.0))
-
-
-def strong_coupling(rays: RayPoints, wavenumber: float, boundary: Boundary) -> BoolArray:
-    """Whether the wave of the other polarisation is too large a part of a ray's for an expansion (n,)."""
-    if boundary not in CROSSED:
-        return np.zeros(rays.alive.shape, dtype=bool)
-    return np.asarray(~(np.abs(gradient_coupling(rays, wavenumber)) < STRONG))
 
 
 class Parts:
@@ -225,6 +185,8 @@ class Parts:
         normals = shed.rays.first_normal, g.shed_normals
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
+        if self.vector:
+            self._doubt_turning(shed, wave)
         each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
         self._add_apart(self.creeping, shed.observer, each, doubts, merged)
         if np.any(self.in_fan > 0):
@@ -232,6 +194,11 @@ class Parts:
         self._add_reflected(number, kind)
         if np.any(w > 0):
             self._add_forward(number, kind)
+
+    def _doubt_turning(self, shed: ShedRays, wave: ComplexArray) -> None:
+        """Note what may pass from creeping waves (n,) of one polarisation into the other on their way."""
+        share = np.nan_to_num(turning(shed.rays, self.wavenumber) * np.abs(wave))
+        np.add.at(self.doubt, shed.observer, share[:, None, None] ** 2)
 
     def _add_fan(self, number: int, kind: Boundary) -> None:
         g, k = self.geometry, self.wavenumber
