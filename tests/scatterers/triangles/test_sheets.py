@@ -108,12 +108,12 @@ def test_a_small_crossing_is_cut_out_with_cap():
     assert "that crossed others, or next to them," in mesh.repairs[-1] and "cut out" in mesh.repairs[-1]
     assert volume(mesh) == pytest.approx(4.1, rel=0.05) and np.all(edges_of(mesh.triangles).faces == 2)
     # holes larger than what may be closed are none that can be left
-    with pytest.raises(ValueError, match="crosses itself: .* too much of it for being cut out"):
+    with pytest.raises(ValueError, match=r"crosses itself: .* too much of it for being cut out"):
         sc.examined_mesh(crossed, cap=1e-3)
 
 
 def test_what_crosses_all_over_is_refused():
     ball = trimesh.creation.icosphere(2)
     shaken = ball.vertices + np.random.default_rng(3).normal(scale=0.3, size=ball.vertices.shape)
-    with pytest.raises(ValueError, match="crosses itself: .* too much of it for being cut out: repair it"):
+    with pytest.raises(ValueError, match=r"crosses itself: .* too much of it for being cut out: repair it"):
         sc.examined_mesh(trimesh.Trimesh(shaken, ball.faces, process=False), cap=np.inf)
