@@ -18,7 +18,7 @@ Sources: [YC06b], [C76], [G05]; Derivations, R1 to R4.
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.geometry.creased import is_creased, pieces_of
 from creeping.geometry.curvature import curvature_norms, principal_curvature_bound, second_form
 from creeping.geometry.kept import kept
@@ -31,9 +31,12 @@ USUAL = 0.98
 
 
 def points_of_charts(body: Surface) -> FloatArray:
-    """Points all over a body (n, 3), L; of one with creases, or a piece of one, not on them."""
+    """Points all over a body (n, 3), L; of one with creases, or a piece of one, not on them.
+
+    Where a body of pieces is not trusted its curvatures are those of a fit that failed: points there are left out.
+    """
     if is_creased(body):
-        return np.concatenate([piece.samples for piece in pieces_of(body)])
+        return kept(body, "points of trusted pieces", lambda: _on_pieces(body))
     samples: FloatArray | None = getattr(body, "samples", None)
     if samples is not None:
         return samples
@@ -44,6 +47,13 @@ def points_of_charts(body: Surface) -> FloatArray:
         return kept(body, "points without charts", lambda: _on_a_grid(body))
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     return np.concatenate([chart.point(uv) for chart in charts])
+
+
+def _on_pieces(body: Surface) -> FloatArray:
+    points = np.concatenate([piece.samples for piece in pieces_of(body)])
+    rough: Any = getattr(body, "non_smooth", None)
+    trusted = points if rough is None else points[~np.asarray(rough(points), dtype=bool)]
+    return trusted if len(trusted) else points
 
 
 def _on_a_grid(body: Surface) -> FloatArray:

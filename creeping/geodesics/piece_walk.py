@@ -6,7 +6,7 @@ the next stop, and so do rays next to a tip, in steps that do not reach through 
 
 What a ray does is bounded: after CROSSINGS it stays on its piece up to the end of the window, and after ROUNDS, or
 where no step however short is left to it, it ends as data, at the nearest edge or tip, without a crease if none is
-near.
+near; without one it ends, too, where a window begins on ground that the body does not trust.
 
 Sources: Derivations, R1 and R3.
 """
@@ -64,6 +64,7 @@ class Walk:
         out = np.repeat(self.states[:, None], len(stops), axis=1)
         if len(stops) == 1:
             return out
+        self._untrusted(stops[0])
         loose = np.flatnonzero((self.end <= stops[0]) & (self.end + beyond > stops[0]) & ~self.stuck)
         self.now[:], self.place[:], self.longest[:], self.crossed[:] = stops[0], 0, np.inf, 0
         for _ in range(ROUNDS):
@@ -77,6 +78,14 @@ class Walk:
             self._beyond(loose, stops, out)
         self.states = out[:, -1].copy()
         return out
+
+    def _untrusted(self, begin: float) -> None:
+        """End rays, without a crease, that begin a window where the body is not trusted: of them nothing is known."""
+        if not hasattr(self.body, "non_smooth"):
+            return
+        rows = np.flatnonzero(np.isinf(self.end))
+        lost = rows[np.asarray(self.body.non_smooth(self.states[rows, X]), dtype=bool)]
+        self.end[lost] = begin
 
     def _round(self, rows: IntArray, stops: FloatArray, out: FloatArray) -> None:
         """Take each ray on by one step of its own, or all the way to the last stop with the others."""

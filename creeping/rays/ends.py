@@ -43,7 +43,9 @@ def ends_of(
         begun = np.concatenate([points[:, None], path[..., X]], axis=1) if times[0] > 0 else path[..., X]
         since = np.concatenate([[0.0], times]) if times[0] > 0 else times
         met = non_smooth_from(body, begun, since)
-        status = np.where(creeping & (met < first), _refused(body, begun, since, met), status)
+        # a ray that begins there has ended at the same time, without a crease
+        sooner = np.isfinite(met) & (met <= first)
+        status = np.where(creeping & sooner, _refused(body, begun, since, met), status)
         first = np.minimum(first, met)
     return status, first
 

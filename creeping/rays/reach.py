@@ -174,7 +174,8 @@ def decayed_lengths(
             last = np.minimum(last, rays[:, -1, END])
         found[row] = np.quantile(np.minimum(ends, last), 1 - spared)
     grain = GRAIN * size(body)
-    return np.asarray(np.minimum(np.ceil(found / grain - 1e-6) * grain, most))
+    # rays that all end where they begin have a length, too
+    return np.clip(np.ceil(found / grain - 1e-6) * grain, grain, most)
 
 
 def weighted_length(body: Surface) -> float:

@@ -190,17 +190,23 @@ class FittedBody(SplineBody):
             return _fitted_pieces(cloud, progress)
         _require_smooth_points(cloud)
         fine, coarse, smoothing = fits(cloud, progress)
+        try:
+            for one in (fine, coarse):
+                _require_one_body(Samples(one.spline.at_nodes(), one.spline.origin, one.spline.spacing))
+        except ValueError as error:
+            raise ValueError(f"{error}{_finer(cloud)}") from None
         report = compared(cloud, fine, coarse, smoothing)
         if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
             raise ValueError(
                 f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
-                "of 1; it is too thin or too curved for the distance of its points: refine the mesh there"
+                f"of 1; it is too thin or too curved for the distance of its points: refine the mesh there"
+                + _finer(cloud)
             )
         doubt = report.normal_curvature_error / report.normal_curvature
         if doubt > cloud.uncertain:
             raise ValueError(
                 f"the mesh is too coarse: its curvatures are uncertain by {100 * doubt:.0f} %; "
-                f'{cloud.quality.reasons}; or subdivide="auto", which takes a smooth surface near its vertices'
+                f"{cloud.quality.reasons}{_finer(cloud)}"
             )
         arrays = (
             {"rough": cloud.non_smooth, "badness": cloud.quality.badness}
@@ -292,6 +298,13 @@ def _fitted_pieces(cloud: PieceCloud, progress: Progress) -> tuple[dict[str, Flo
         arrays |= SplinePieces.of(fitted, corners, coarse=name == "coarse").arrays(name)
     text = {"fit": fitted.report().to_json(), "quality": cloud.quality.to_json(), "reach": 0.0}
     return arrays, text | cloud.notes
+
+
+def _finer(cloud: PointCloud) -> str:
+    """What helps a mesh, not a CAD file, that is too coarse for its fit."""
+    if cloud.quality.verdict != "too coarse" or "edges" in cloud.notes:
+        return ""
+    return '; or subdivide="auto", which takes a smooth surface near its vertices'
 
 
 def _require_smooth_points(cloud: PointCloud) -> None:

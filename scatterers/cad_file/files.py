@@ -106,7 +106,8 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
     ModuleNotFoundError
         If gmsh is not installed.
     """
-    from scatterers.triangles.topology import cleaned, oriented
+    from scatterers.cad_file.solids import cleaned_apart
+    from scatterers.triangles.topology import oriented
 
     kind = kind_of(path)
     if importlib.util.find_spec("gmsh") is None:
@@ -123,7 +124,8 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
         triangles = triangles.reshape(-1, 3)
         repairs: list[str] = []
         before = found["points"][used]
-        vertices, triangles = cleaned(path.name, before, triangles, repairs.append, repairs.append)
+        of, bounds = (found[key].astype(np.int64) for key in ("of", "bounds"))
+        vertices, triangles = cleaned_apart(path.name, before, triangles, of, bounds, repairs.append)
         vertices, triangles = whole_body(path.name, vertices, triangles, reading.choice, scale, repairs.append)
         lacking = len(before) / max(len(vertices), 1)
         if not (again and lacking > LACKING):
@@ -136,12 +138,13 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
     row = np.full(len(number), -1, dtype=np.int64)
     row[found["nodes"][used]] = [place.get(tuple(p), -1) for p in before]
     mesh = TriangleMesh(vertices * scale, triangles, tuple(repairs))
+    of = _faces_of(triangles, row[found["triangles"].astype(np.int64)], found["of"].astype(np.int64))
     at = row[found["at"]]
-    known = at >= 0
+    # faces of solids that are left out may touch the body
+    known = (at >= 0) & np.isin(found["face"], of)
     normals, edges, sharp = _joined(mesh, at[known], found["face"][known], found["normals"][known])
     for line in repairs:
         progress(line)
-    of = _faces_of(triangles, row[found["triangles"].astype(np.int64)], found["of"].astype(np.int64))
     corners = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
     return CadPoints(mesh, normals, corners, *_creases(mesh, of, corners), edges, mesh.vertices[sharp])
 

@@ -5,7 +5,7 @@ of the system are missing. With CURVED, triangles are smaller where faces curve:
 with SEW, faces that far apart are sewn first. Lengths are in
 millimetres, to which it brings files that state their unit. OUT (npz): ``nodes`` (n,) and ``points`` (n, 3);
 ``triangles`` (m, 3) of node numbers and ``of`` (m,), their faces; of each node on each face ``at`` (k,), ``face`` (k,),
-``normals`` (k, 3).
+``normals`` (k, 3); of each face of a solid ``bounds`` (j, 2), face and solid.
 """
 
 import sys
@@ -42,13 +42,14 @@ def main(path: str, points: int, out: str, curved: int = 0, sew: float = 0.0) ->
         gmsh.option.setNumber(option, value)
     gmsh.model.mesh.generate(2)
     nodes, coordinates, _ = gmsh.model.mesh.getNodes()
-    triangles, of, at, face, normals = [], [], [], [], []
+    triangles, of, at, face, normals, bounds = [], [], [], [], [], []
     for tag in faces:
         for kind, _, members in zip(*gmsh.model.mesh.getElements(2, tag), strict=True):
             # 2 is gmsh's number of the flat triangle
             if kind == 2:
                 triangles.append(np.asarray(members).reshape(-1, 3))
                 of.append(np.full(len(triangles[-1]), tag))
+        bounds += [(tag, int(solid)) for solid in gmsh.model.getAdjacencies(2, tag)[0]]
         own, _, parameters = gmsh.model.mesh.getNodes(2, tag, includeBoundary=True, returnParametricCoord=True)
         at.append(own)
         face.append(np.full(len(own), tag))
@@ -62,6 +63,7 @@ def main(path: str, points: int, out: str, curved: int = 0, sew: float = 0.0) ->
         at=np.concatenate(at).astype(np.int64),
         face=np.concatenate(face).astype(np.int64),
         normals=np.concatenate(normals),
+        bounds=np.array(bounds, dtype=np.int64).reshape(-1, 2),
     )
     gmsh.finalize()
 

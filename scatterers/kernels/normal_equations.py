@@ -30,3 +30,32 @@ def accumulate(places, values, slopes, weights, shape, c, out):  # type: ignore[
         residual = (weights[0] * r, weights[1] * rx, weights[1] * ry, weights[1] * rz)
         scatter(out, start, stride_x, stride_y, tx, ty, tz, residual)
     return total
+
+
+@njit(cache=True, nogil=True, **OPTIONS)
+def subtract_roughness(weight, shape, c, out):  # type: ignore[no-untyped-def]
+    """Subtract w D^T D c from out, D the fourth differences along each axis in turn, of coefficients as above."""
+    stride_y = shape[2]
+    stride_x = shape[1] * stride_y
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            row = i * stride_x + j * stride_y
+            for k in range(shape[2]):
+                at = row + k
+                if i + 4 < shape[0]:
+                    _fourth(weight, at, stride_x, c, out)
+                if j + 4 < shape[1]:
+                    _fourth(weight, at, stride_y, c, out)
+                if k + 4 < shape[2]:
+                    _fourth(weight, at, 1, c, out)
+
+
+@njit(cache=True, nogil=True, inline="always", **OPTIONS)
+def _fourth(weight, at, step, c, out):  # type: ignore[no-untyped-def]
+    far, near, middle = c[at] + c[at + 4 * step], c[at + step] + c[at + 3 * step], c[at + 2 * step]
+    rough = weight * (far - 4.0 * near + 6.0 * middle)
+    out[at] -= rough
+    out[at + step] += 4.0 * rough
+    out[at + 2 * step] -= 6.0 * rough
+    out[at + 3 * step] += 4.0 * rough
+    out[at + 4 * step] -= rough

@@ -261,7 +261,7 @@ class _Equations:
 
     def residual(self, c: FloatArray, *, targets: bool) -> FloatArray:
         """A^T W (b - A c) less the smoothing's gradient, b = 0 unless targets; zero where c is not unknown."""
-        from scatterers.kernels.normal_equations import accumulate
+        from scatterers.kernels.normal_equations import accumulate, subtract_roughness
 
         out = np.zeros_like(c)
         shape = np.array(self.shape, dtype=np.int64)
@@ -270,12 +270,8 @@ class _Equations:
             weight = np.array([OFFSET_WEIGHT, 0.0] if k else [1.0, self.normal_weight])
             slopes = self.sorted_normals if targets and not k else flat
             accumulate(places, values if targets else np.zeros(len(places)), slopes, weight, shape, c, out)
-        grid, total = c[:-OVERREAD].reshape(self.shape), out[:-OVERREAD].reshape(self.shape)
-        for axis in range(3):
-            fourth = np.moveaxis(self.smoothing * np.diff(grid, 4, axis=axis), axis, 0)
-            along = np.moveaxis(total, axis, 0)
-            for k, weight_of in enumerate((1, -4, 6, -4, 1)):
-                along[k : k + len(fourth)] -= weight_of * fourth
+        subtract_roughness(self.smoothing, shape, c, out)
+        total = out[:-OVERREAD].reshape(self.shape)
         total *= self.unknown
         out[-OVERREAD:] = 0.0
         return out
@@ -286,9 +282,10 @@ class _Equations:
         return np.concatenate([z.ravel(), np.zeros(OVERREAD)])
 
     def _cardinal(self, values: FloatArray) -> FloatArray:
-        for axis in range(3):
-            values = np.moveaxis(np.tensordot(self.cardinal[axis], values, axes=(1, axis)), 0, axis)
-        return values
+        first, second, third = self.cardinal
+        # along each axis in the order of the memory: nothing is transposed
+        values = (first @ values.reshape(len(first), -1)).reshape(self.shape)
+        return np.asarray(np.matmul(second, values) @ third.T)
 
     def _seen(self) -> NDArray[np.bool_]:
         """Coefficients that some sample sees."""

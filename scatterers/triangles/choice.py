@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.triangles.parts import capped, chosen_part, united
+from scatterers.triangles.sheets import taken_apart
 from scatterers.triangles.topology import cleaned, oriented
 
 FloatArray = NDArray[np.float64]
@@ -63,6 +64,7 @@ def whole_body(
     named: bool = False,
 ) -> tuple[FloatArray, IntArray]:
     """The body that is chosen, with its holes closed, in the unit of the file."""
+    vertices, triangles = taken_apart(name, vertices, triangles, note)
     if choice.part is not None and not named:
         if isinstance(choice.part, str) and choice.part != "largest":
             raise ValueError(f'{name} has no part {choice.part!r}; give "largest" or a number from 1')
@@ -72,6 +74,7 @@ def whole_body(
     if choice.union:
         vertices, triangles = united(name, vertices, triangles, lambda x, t: oriented(name, x, t, silent), note)
         vertices, triangles = cleaned(name, vertices, triangles, silent, silent)
+        vertices, triangles = taken_apart(name, vertices, triangles, silent)
     return vertices, triangles
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from scatterers.triangles.choice import Choice, silent, whole_body
 from scatterers.triangles.crossings import crossings
+from scatterers.triangles.cutting import uncrossed
 from scatterers.triangles.form import check_whole
 from scatterers.triangles.threemf import read_3mf
 from scatterers.triangles.topology import cleaned, oriented
@@ -123,7 +124,10 @@ def read_mesh(
     local = vertices - offset
     triangles = oriented(raw.name, local, triangles, note)
     _check_rounding(raw.name, vertices, triangles)
-    _check_crossings(raw.name, local, triangles, offset * scale, scale)
+    if choice.cap is not None:
+        local, triangles = uncrossed(raw.name, local, triangles, choice.cap, scale, note)
+        vertices = local + offset
+    _check_crossings(raw.name, local, triangles, offset * scale, scale, cut=choice.cap is not None)
     if np.linalg.norm(offset) > FAR * np.linalg.norm(np.ptp(vertices, axis=0)):
         note(
             f"{raw.name} lies {np.linalg.norm(offset) * scale:.6g} m from the origin; "
@@ -350,13 +354,19 @@ def _check_rounding(name: str, vertices: FloatArray, triangles: IntArray) -> Non
         )
 
 
-def _check_crossings(name: str, local: FloatArray, triangles: IntArray, offset: FloatArray, scale: float) -> None:
+def _check_crossings(
+    name: str, local: FloatArray, triangles: IntArray, offset: FloatArray, scale: float, *, cut: bool
+) -> None:
     count, pairs = crossings(local, triangles)
     if count:
         first = local[triangles[pairs[0, 0]]].mean(axis=0) * scale + offset
         spread = local[triangles[pairs.ravel()]].mean(axis=1)
+        remedy = (
+            "too much of it for being cut out: repair it"
+            if cut
+            else "repair it, or give cap= with a size, m: what crosses is cut out, and holes up to that size are closed"
+        )
         raise ValueError(
             f"{name} crosses itself: {count} pairs of its {len(triangles)} triangles, the first near {_where(first)}, "
-            f"within {np.ptp(spread, axis=0).max() * scale:.3g} m of each other; repair it, or give "
-            "union=True if parts of it cross each other"
+            f"within {np.ptp(spread, axis=0).max() * scale:.3g} m of each other; {remedy}"
         )

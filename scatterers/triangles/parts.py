@@ -39,7 +39,7 @@ def parts_of(vertices: FloatArray, triangles: IntArray) -> IntArray:
     # triangles and edges are the nodes of a graph
     label = components(m + int(number.max()) + 1, np.arange(3 * m) // 3, m + number)[1][:m]
     _, label = np.unique(label, return_inverse=True)
-    order = np.argsort(-np.bincount(label.ravel(), _areas(vertices, triangles)), kind="stable")
+    order = np.argsort(-np.bincount(label.ravel(), areas(vertices, triangles)), kind="stable")
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return np.asarray(rank[label.ravel()], dtype=np.int64)
@@ -76,7 +76,7 @@ def chosen_part(
         )
     if count > 1:
         left = triangles[parts != number - 1]
-        share = float(_areas(vertices, left).sum()) / float(_areas(vertices, triangles).sum())
+        share = float(areas(vertices, left).sum()) / float(areas(vertices, triangles).sum())
         note(f"part {number} of {count} of {name} taken; {100 * share:.2g} % of its area left out")
     return compact(vertices, triangles[parts == number - 1])
 
@@ -110,28 +110,30 @@ def capped(
 
 
 def _borders(triangles: IntArray) -> list[IntArray]:
-    """Closed borders of a mesh as vertices in the order in which its triangles run along them."""
+    """Closed borders of a mesh as vertices, in the order in which a triangle at the first runs along it.
+
+    Each vertex of a border has two open edges if it has one umbrella; others are on no border that can be closed.
+    """
     first, last = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     edges = edges_of(triangles)
     open_ = edges.faces[edges.number] == 1
-    after: dict[int, list[int]] = {}
+    beside: dict[int, list[int]] = {}
     for a, b in zip(first[open_].tolist(), last[open_].tolist(), strict=True):
-        after.setdefault(a, []).append(b)
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    left = {vertex for vertex, ends in beside.items() if len(ends) == 2}
     loops = []
-    while after:
-        start = next(iter(after))
-        loop, here = [], start
-        while here in after:
+    for begin, onward in zip(first[open_].tolist(), last[open_].tolist(), strict=True):
+        loop, here = [begin], onward
+        while here in left and here != begin:
             loop.append(here)
-            onward = after[here]
-            here = onward.pop()
-            if not onward:
-                del after[loop[-1]]
-            if here == start:
-                break
-        # where triangles turn against each other borders do not close
-        if here == start and len(loop) >= 3:
+            left.discard(here)
+            a, b = beside[here]
+            here = b if a == loop[-2] else a
+        # triangles may be turned against each other along it: they are oriented later
+        if here == begin and begin in left and len(loop) >= 3:
             loops.append(np.array(loop, dtype=np.int64))
+        left.discard(begin)
     return loops
 
 
@@ -187,6 +189,7 @@ def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note
     return np.asarray(fine, dtype=float), np.asarray(corners, dtype=np.int64)
 
 
-def _areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:
+def areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:
+    """Areas (m,) of triangles."""
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))

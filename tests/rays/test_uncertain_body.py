@@ -208,3 +208,35 @@ def test_rays_that_end_are_left_out():
 def test_bad_numbers_of_rays(rays):
     with pytest.raises(cr.CreepingError, match=r"rays = .* is not a whole number >= 1"):
         body_uncertainty(fan_of(UNSURE), n_rays=rays)
+
+
+class Rough(sc.Cylinder):
+    """A cylinder whose lower half is not trusted, and on which nothing is known of curvatures."""
+
+    def non_smooth(self, points):
+        return np.asarray(points)[..., 2] < 0
+
+
+def test_rays_of_pieces_stop_where_the_ground_is_not_trusted():
+    """They stay where they begin: going on took minutes on files with a piece whose fit has failed."""
+    body = Rough(0.5, 4.0)
+    line = cr.shadow_line(body, (1, 0.2, 0.3))
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), line, n_rays=24, wavenumber=20.0)
+    below = fan.points[:, 0, 2] < 0
+    assert 0.2 < below.mean() < 0.8
+    assert set(fan.status[below]) <= {cr.RayStatus.NON_SMOOTH, cr.RayStatus.EDGE}
+    np.testing.assert_array_equal(fan.detachment[below], 0)
+    np.testing.assert_array_equal(fan.points[below], np.repeat(fan.points[below, :1], fan.points.shape[1], axis=1))
+    ff = cr.far_field(fan, [(0, 0, 1), (0, 1, 0)], wavenumber=20.0)
+    assert np.all(np.isfinite(ff.error)) and np.all(ff.error > 0)
+
+
+def test_rays_that_all_end_at_once_have_a_length():
+    class Untrusted(sc.Cylinder):
+        def non_smooth(self, points):
+            return np.ones(np.shape(points)[:-1], dtype=bool)
+
+    body = Untrusted(0.5, 4.0)
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (1, 0.2, 0.3)), n_rays=8, wavenumber=20.0)
+    assert fan.length > 0
+    assert np.all(np.isfinite(cr.far_field(fan, [(0, 0, 1)], wavenumber=20.0).error))

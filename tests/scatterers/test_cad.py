@@ -54,6 +54,11 @@ write("two.brep")
 make.addBox(0, 0, 0, 1, 1, 1)
 make.addBox(0.5, 0.5, 0.5, 1, 1, 1)
 write("crossing.brep")
+make.fragment([(3, make.addBox(0, 0, 0, 1, 1, 1))], [(3, make.addBox(1, 0, 0, 1, 2, 1))])
+write("joined.brep")
+make.addBox(0, 0, 0, 1, 1, 1)
+make.addBox(1, 0, 0, 1, 2, 1)
+write("touching.brep")
 make.fillet([make.addCylinder(0, 0, 0, 0, 0, 1, 0.5)], [1], [0.2])
 write("filleted.brep")
 # faces of one cylinder are not made one
@@ -231,6 +236,23 @@ def test_parts_of_a_cad_file_are_chosen_and_united(files):
     points = np.random.default_rng(6).uniform(-0.2, 1.7, size=(2000, 3))
     inside = np.all(np.abs(points - 0.5) < 0.5, axis=1) | np.all(np.abs(points - 1) < 0.5, axis=1)
     assert np.array_equal(whole.level(points) < 0, inside)
+
+
+@pytest.mark.parametrize("name", ["joined.brep", "touching.brep"])
+def test_solids_that_share_a_wall_are_parts_and_have_an_outer_surface(files, name):
+    """Boxes of volumes 1 and 2: as they touch, edges of the wall between them have more than two triangles."""
+    with pytest.raises(ValueError, match=r"2 separate surfaces.*part='largest', or all with union=True"):
+        parted(files / name)
+    largest, second = (parted(files / name, points=2000, part=part) for part in ("largest", 2))
+    # what the wall leaves of the larger face, and the wall
+    assert (len(largest.pieces), len(second.pieces)) == (7 if name == "joined.brep" else 6, 6)
+    assert {crease.kind for crease in largest.creases + second.creases} <= {"edge", "seam"}
+    whole = parted(files / name, points=2000, union=True)
+    points = np.random.default_rng(7).uniform([-0.2] * 3, [2.2, 2.2, 1.2], size=(2000, 3))
+    low = np.all((points > 0) & (points < 1), axis=1)
+    high = np.all((points > [1, 0, 0]) & (points < [2, 2, 1]), axis=1)
+    for body, inside in ((largest, high), (second, low), (whole, low | high)):
+        assert np.array_equal(body.level(points) < 0, inside)
 
 
 @pytest.mark.parametrize("sew", [0, -1.0, True, "wide", np.nan])

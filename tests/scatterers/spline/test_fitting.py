@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scatterers as sc
-from scatterers.kernels.normal_equations import accumulate
+from scatterers.kernels.normal_equations import accumulate, subtract_roughness
 from scatterers.kernels.spline_constants import OVERREAD
 from scatterers.spline import fitting as _fitting
 from scatterers.spline.fitting import _Equations, accumulate_numpy, fit
@@ -83,6 +83,20 @@ def test_kernel_equals_numpy(system, rng):
     np.testing.assert_allclose(fast, plain, atol=1e-13)
     # what vectors load beyond the last row stays as it was
     np.testing.assert_array_equal(fast[-OVERREAD:], 0)
+
+
+def test_roughness_is_that_of_fourth_differences(rng):
+    shape = (9, 5, 4)
+    c = np.concatenate([rng.normal(size=np.prod(shape)), np.zeros(OVERREAD)])
+    out = np.zeros_like(c)
+    subtract_roughness(0.3, np.array(shape), c, out)
+    expected = np.zeros(shape)
+    for axis in (0, 1):
+        fourth = np.diff(np.eye(shape[axis]), 4, axis=0)
+        along = np.tensordot(fourth.T @ fourth, c[:-OVERREAD].reshape(shape), axes=(1, axis))
+        expected -= 0.3 * np.moveaxis(along, 0, axis)
+    np.testing.assert_allclose(out[:-OVERREAD].reshape(shape), expected, atol=1e-13)
+    assert not out[-OVERREAD:].any()
 
 
 def test_rows_are_value_and_slopes_of_the_spline(system):

@@ -254,13 +254,6 @@ def placed(*parts):
     )
 
 
-def pinched():
-    # opposite vertices become one
-    faces = FACES.copy()
-    faces[faces == int(np.argmin(VERTICES[:, 2]))] = int(np.argmax(VERTICES[:, 2]))
-    return mesh(faces=faces)
-
-
 def handled():
     """A torus bent through itself: the tube is thicker than the hole."""
     return trimesh.creation.torus(1.0, 1.3, 24, 24)
@@ -302,7 +295,6 @@ BAD_MESHES = {
     "three at an edge": (lambda: mesh(faces=np.concatenate([FACES, [[0, 1, 2]]])), "of the mesh"),
     "cavity": (lambda: placed((VERTICES, FACES), (VERTICES / 2, FACES)), "2 separate surfaces .1 of them within"),
     "two": (lambda: placed((VERTICES, FACES), (VERTICES + 5, FACES)), "2 separate surfaces, of 320, 320 triangles"),
-    "pinched": (pinched, "1 vertices of the mesh join sheets"),
     "torus through itself": (handled, "crosses itself: .* pairs"),
     "klein": (klein, "one side only"),
     "folded": (folded, "the mesh crosses itself"),
