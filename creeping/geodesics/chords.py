@@ -9,31 +9,30 @@ from creeping._typing import FloatArray
 from creeping.geodesics.states import P, X
 
 
-def windows(times: FloatArray, most: float) -> list[tuple[FloatArray, list[tuple[int, int]]]]:
-    """Runs of stops from 0 through ascending times, no longer than ``most``, and which of each are which of the times.
+def windows(times: FloatArray, gap: float, most: float) -> list[tuple[FloatArray, list[tuple[int, int]]]]:
+    """Stops from 0 through ascending times, ``gap`` apart at most, in runs no longer than ``most``.
+
+    Of each run the stops, and which of them are which of the times.
 
     Examples
     --------
-    >>> [(stops.tolist(), wanted) for stops, wanted in windows(np.array([0.0, 1.0, 4.0]), 2.0)]
-    [([0.0, 1.0], [(0, 0), (1, 1)]), ([1.0, 2.5], []), ([2.5, 4.0], [(1, 2)])]
+    >>> [(stops.tolist(), wanted) for stops, wanted in windows(np.array([0.0, 1.0, 4.0]), 2.0, 3.0)]
+    [([0.0, 1.0, 2.5], [(0, 0), (1, 1)]), ([2.5, 4.0], [(1, 2)])]
     """
-    now, runs, stops = 0.0, [], [0.0]
-    wanted: list[tuple[int, int]] = []
-    for column, time in enumerate(times):
-        while time - now > most * (1 + 1e-9):
-            parts = np.ceil((time - now) / most)
-            if len(stops) > 1:
-                runs.append((np.array(stops), wanted))
-                now, stops, wanted = stops[-1], [stops[-1]], []
-                continue
-            now += (time - now) / parts
-            runs.append((np.array([stops[0], now]), wanted))
-            stops, wanted = [now], []
-        if time > stops[-1]:
-            stops.append(float(time))
-        wanted = [*wanted, (len(stops) - 1, column)]
-    runs.append((np.array(stops), wanted))
-    return runs
+    stops, places = [0.0], []
+    for time in times:
+        parts = int(np.ceil((time - stops[-1]) / gap * (1 - 1e-9)))
+        stops.extend(np.linspace(stops[-1], time, max(parts, 0) + 1)[1:].tolist())
+        places.append(len(stops) - 1)
+    every, runs, begin = np.array(stops), list[tuple[FloatArray, list[tuple[int, int]]]](), 0
+    while True:
+        end = int(np.searchsorted(every, every[begin] + most * (1 + 1e-9), side="right")) - 1
+        end = min(max(end, begin + 1), len(every) - 1)
+        wanted = [(at - begin, column) for column, at in enumerate(places) if begin < at <= end or at == begin == 0]
+        runs.append((every[begin : end + 1], wanted))
+        if end == len(every) - 1:
+            return runs
+        begin = end
 
 
 def cubics(a: FloatArray, b: FloatArray, long: FloatArray, shares: FloatArray) -> FloatArray:
@@ -44,10 +43,10 @@ def cubics(a: FloatArray, b: FloatArray, long: FloatArray, shares: FloatArray) -
 
 
 def cubic_at(a: FloatArray, b: FloatArray, long: FloatArray, share: FloatArray) -> FloatArray:
-    """Point at a share (n,) of each cubic: (n, 3)."""
-    u, h = share[:, None], long[:, None]
-    ends = (1 - u) ** 2 * (1 + 2 * u) * a[:, X] + u**2 * (3 - 2 * u) * b[:, X]
-    return np.asarray(ends + h * u * (1 - u) * ((1 - u) * a[:, P] - u * b[:, P]))
+    """Points at shares (n, m) of each cubic: (n, m, 3)."""
+    u, h = share[..., None], long[:, None, None]
+    ends = (1 - u) ** 2 * (1 + 2 * u) * a[:, None, X] + u**2 * (3 - 2 * u) * b[:, None, X]
+    return np.asarray(ends + h * u * (1 - u) * ((1 - u) * a[:, None, P] - u * b[:, None, P]))
 
 
 def nearest_on(path: FloatArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -25,8 +25,12 @@ from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X
 from creeping.geometry.creased import SMOOTH, nearest_crease, piece_ahead, pieces_of
 from creeping.geometry.surface import size
 
-WINDOW = 0.1
-"""Longest time, in body sizes, that a ray is traced beyond a crease before that is noticed."""
+GAP, WINDOW = 0.1, 0.3
+"""Longest time, in body sizes, between states, and that a ray is traced beyond a crease before that is noticed."""
+NEAR = 0.1
+"""Distance, in body sizes, within which a ray that cannot go on ends at an edge or tip."""
+SECTIONS = 16
+"""Parts of a bracket that are looked at together."""
 TIGHT = 1e-5
 """Half the time, in body sizes, between exact states around a crossing; the cubic there errs by its fourth power."""
 CROSSINGS = 64
@@ -168,7 +172,7 @@ class Walk:
         """Find where rays leave a piece on their way to the states ``far``, and end them or send them on."""
         base, tip = self.states[rows], exits.tip
         tight = np.minimum(TIGHT * self.size, 0.5 * long)
-        low, high = self._bisected(number, base, far, long, exits.low, exits.high, tip, 0.01 * TIGHT)
+        low, high = self._bracketed(number, base, far, long, exits.low, exits.high, tip, 0.01 * TIGHT)
         for _ in range(4):
             first, last = np.maximum(low - tight, 0.0), np.minimum(high + tight, long)
             before = self._own(number, base, first)
@@ -179,7 +183,7 @@ class Walk:
                 break
             tight = np.where(good, tight, np.minimum(30 * tight, long))
         short = last - first
-        u, v = self._bisected(number, before, after, short, 0 * short, short, tip, 1e-15)
+        u, v = self._bracketed(number, before, after, short, 0 * short, short, tip, 1e-15)
         at = 0.5 * (u + v)
         state = self._later(self._own(number, before, at), rows, self.now[rows] + first)
         lost = ~np.all(np.isfinite(state[:, :BARE]), axis=1)
@@ -208,7 +212,7 @@ class Walk:
     def _stop(self, rows: IntArray, stops: FloatArray, out: FloatArray) -> None:
         """End rays that cannot go on, at the nearest edge or tip."""
         crease, distance = nearest_crease(self.body, self.states[rows, X], kinds=("edge", "tip"))
-        self._ended(rows, np.where(distance < WINDOW * self.size, crease, -1), stops, out)
+        self._ended(rows, np.where(distance < NEAR * self.size, crease, -1), stops, out)
 
     def _ended(self, rows: IntArray, crease: IntArray, stops: FloatArray, out: FloatArray) -> None:
         self.end[rows], self.crease[rows] = self.now[rows], crease
@@ -225,7 +229,7 @@ class Walk:
             self.stuck[mine[~good]] = True
             out[mine[good], 1:] = found[good]
 
-    def _bisected(
+    def _bracketed(
         self,
         number: int,
         a: FloatArray,
@@ -237,13 +241,19 @@ class Walk:
         close: float,
     ) -> tuple[FloatArray, FloatArray]:
         """Bracket, ``close`` sizes wide, of the time at which the cubics from a to b (n, lanes) leave the piece."""
-        for _ in range(50):
-            middle = 0.5 * (low + high)
+        shares = np.arange(1, SECTIONS) / SECTIONS
+        row = np.arange(len(a))
+        for _ in range(20):
             if np.all(high - low <= close * self.size):
                 break
-            share = np.divide(middle, long, out=np.zeros_like(middle), where=long > 0)
-            out = self.exits.outside(number, cubic_at(a, b, long, share), tip)
-            low, high = np.where(out, low, middle), np.where(out, middle, high)
+            times = np.concatenate([low[:, None], low[:, None] + (high - low)[:, None] * shares, high[:, None]], axis=1)
+            share = np.divide(
+                times[:, 1:-1], long[:, None], out=np.zeros(times[:, 1:-1].shape), where=long[:, None] > 0
+            )
+            points = cubic_at(a, b, long, share)
+            out = self.exits.outside(number, points.reshape(-1, 3), np.repeat(tip, SECTIONS - 1))
+            first = np.argmax(np.concatenate([out.reshape(len(a), -1), np.ones((len(a), 1), bool)], axis=1), axis=1)
+            low, high = times[row, first], times[row, first + 1]
         return low, high
 
     def _later(self, found: FloatArray, rows: IntArray, begin: FloatArray | float) -> FloatArray:

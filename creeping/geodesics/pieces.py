@@ -13,7 +13,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.geodesics.chords import windows
 from creeping.geodesics.piece_trace import Passages, PieceTrace
-from creeping.geodesics.piece_walk import WINDOW, Walk
+from creeping.geodesics.piece_walk import GAP, WINDOW, Walk
 from creeping.geodesics.states import WHOLE
 from creeping.geometry.creased import is_creased
 
@@ -59,7 +59,7 @@ def trace_pieces(
     walk = Walk(body, states, rtol, step)
     times = np.asarray(times, dtype=float)
     out = np.empty((len(states), len(times), states.shape[1]))
-    for stops, wanted in windows(times, WINDOW * walk.size):
+    for stops, wanted in windows(times, GAP * walk.size, WINDOW * walk.size):
         found = walk.window(stops, beyond)
         for place, column in wanted:
             out[:, column] = found[:, place]

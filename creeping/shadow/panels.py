@@ -45,11 +45,11 @@ def newton_step(
     F, gradient, hessian = jet(body, points)
     Hd = (hessian @ direction[..., None])[..., 0]
     G = np.sum(gradient * direction, axis=-1)
-    W = np.cross(gradient, Hd)
+    W = _crossed(gradient, Hd)
     if axis is None:
         axis = W
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        step = -(F[..., None] * np.cross(Hd, axis) + G[..., None] * np.cross(axis, gradient))
+        step = -(F[..., None] * _crossed(Hd, axis) + G[..., None] * _crossed(axis, gradient))
         step /= np.sum(W * axis, axis=-1, keepdims=True)
         tangent = W / np.linalg.norm(W, axis=-1, keepdims=True)
     return step, tangent
@@ -60,10 +60,22 @@ def onto_line(
 ) -> FloatArray:
     """Points of {F = 0, grad F.d = 0} by steps of least norm, each at most ``reach``: (n, 3) -> (n, 3)."""
     points = np.array(points, dtype=float)
+    least = np.finfo(float).eps * np.max(np.abs(points), initial=0.0)
     for _ in range(iterations):
         step, _ = newton_step(body, direction, points)
         points += _limited(step, reach)
+        # what is left is rounding
+        if np.all(np.abs(step) <= least):
+            break
     return points
+
+
+def _crossed(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products of (n, 3): a third of numpy's time where points are few."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return out
 
 
 def _limited(step: FloatArray, reach: FloatArray | float) -> FloatArray:

@@ -60,7 +60,7 @@ class Compiled:
 
     @property
     def function(self) -> Any:
-        """The compiled function, a numba CFunc."""
+        """The compiled function, a `scatterers.kernels.entry.BlockFunction`."""
         return _compile(self.source, self.kind)
 
     @property
@@ -74,6 +74,8 @@ def _compile(source: Callable[..., None], kind: str) -> Any:
     from numba import cfunc, types
     from numba.extending import register_jitable
 
+    from scatterers.kernels.entry import BlockFunction
+
     while _helpers:
         register_jitable(**OPTIONS)(_helpers.pop())
     row, rows = types.float64[::1], types.float64[:, ::1]
@@ -85,4 +87,4 @@ def _compile(source: Callable[..., None], kind: str) -> Any:
     }[kind]
     # code made from an expression has no file that numba could cache beside
     in_file = not source.__code__.co_filename.startswith("<")
-    return cfunc(signature, cache=in_file, **OPTIONS)(source)
+    return BlockFunction(cfunc(signature, cache=in_file, **OPTIONS)(source))
