@@ -73,7 +73,10 @@ def largest(name: str, boundary: Any, k: float, incidence: int) -> float:
 
 
 def far_errors(name: str, boundary: Any, k: float, incidence: int, count: int = 600) -> dict[str, Any]:
-    """Total far field over the sphere of directions: medians by sector, largest error, and that of resolved ones."""
+    """Total far field over the sphere of directions: medians by sector, largest error, and that of resolved ones.
+
+    Of the unresolved directions how many are 90 deg from d or less, and whether all err by no more than they state.
+    """
     solution, fan = reference(name, boundary, k), fan_of(name, incidence)
     r = sphere_of_directions(count)
     found = cr.far_field(fan, r, wavenumber=k, boundary=boundary, method="rays")
@@ -86,6 +89,8 @@ def far_errors(name: str, boundary: Any, k: float, incidence: int, count: int = 
         "largest": float(scale * error.max()),
         "largest_resolved": float(scale * error[~found.unresolved].max()),
         "unresolved": int(found.unresolved.sum()),
+        "unresolved_ahead": int(found.unresolved[theta <= 90].sum()),
+        "covered": bool(np.all(error[found.unresolved] <= found.error[found.unresolved])),
     }
 
 

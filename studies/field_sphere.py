@@ -5,7 +5,7 @@ far below the total. Run ``python -m studies.field_sphere`` (about a minute).
 """
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,8 @@ from studies.reference import sphere, watson
 KA = (10.0, 30.0, 100.0, 300.0)
 AZIMUTH = 0.3
 """Of the observers, radians: nothing may depend on it."""
+BESIDE = np.arange(30, 151, 10.0)
+"""Angles at which isolated rays are judged, degrees."""
 LIMITS: dict[str, tuple[float, ...]] = {
     "creeping rays, soft, first order": (17, 8, 3.4, 2.7),
     "creeping rays, soft": (3, 0.9, 0.3, 0.08),
@@ -62,15 +64,21 @@ def worst(found: ComplexArray, exact: ComplexArray) -> float:
     return float(100 * np.max(np.abs(found - exact) / np.abs(exact)))
 
 
+@cache
+def poles(k: float, boundary: Any) -> ComplexArray:
+    """Sum of the Regge poles at `BESIDE` (m,)."""
+    return np.asarray(watson.far_field(k, 1.0, np.radians(BESIDE), boundary, modes=12 if k < 20 else 8))
+
+
 def creeping_rays(fan: RayFan, k: float, boundary: Any, order: int) -> float:
     """Short and long isolated ray, 30 to 150 deg, against the Regge poles."""
-    theta = np.radians(np.arange(30, 151, 10.0))
+    theta = np.radians(BESIDE)
     geometry = far_geometry(fan, observers(theta))
     kind = scalar_boundaries(boundary)[0]
     found = np.zeros(len(theta), dtype=complex)
     np.add.at(found, geometry.shed.observer, isolated_rays(geometry, k, kind, order))
     reference: Any = boundary if isinstance(boundary, str) else boundary.admittance
-    return worst(found, watson.far_field(k, 1.0, theta, reference, modes=12 if k < 20 else 8))
+    return worst(found, poles(k, reference))
 
 
 def back_axis(fan: RayFan, k: float, boundary: Any, order: int) -> float:

@@ -25,6 +25,16 @@ def page():
     made.close()
 
 
+@pytest.fixture(scope="module")
+def guarded():
+    """A page that stays as it is: only its door is tried."""
+    from creeping.explorer.page import Explorer
+
+    made = Explorer(cr.DirectFlow(BODY, rtol=1e-9), REQUEST, port=8123)
+    yield made
+    made.close()
+
+
 def rays_of(page, **values):
     """Segments of the rays by the engine, for the request with other values."""
     request = REQUEST.changed(**values)
@@ -193,38 +203,38 @@ def opened(page, *, origin=None, cookie=True, host=None):
         {"cookie": "\u00e9" * 3},
     ],
 )
-def test_others_are_turned_away_before_the_upgrade(page, options):
+def test_others_are_turned_away_before_the_upgrade(guarded, options):
     from websockets.exceptions import InvalidStatus
 
     with pytest.raises(InvalidStatus) as refused:
-        opened(page, **options)
+        opened(guarded, **options)
     assert refused.value.response.status_code == 403
-    assert page.server.get_clients() == {}
+    assert guarded.server.get_clients() == {}
 
 
 @pytest.mark.parametrize("origin", ["http://127.0.0.1:8123", "http://localhost:8123", None])
-def test_the_page_itself_is_let_in(page, origin):
-    with opened(page, origin=origin) as socket:
+def test_the_page_itself_is_let_in(guarded, origin):
+    with opened(guarded, origin=origin) as socket:
         assert len(socket.recv(timeout=5)) > 0
 
 
-def test_two_hosts_are_none(page):
+def test_two_hosts_are_none(guarded):
     import socket as sockets
 
-    port = page.server.get_port()
+    port = guarded.server.get_port()
     with sockets.create_connection(("127.0.0.1", port), timeout=5) as raw:
         raw.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nHost: a.example\r\n\r\n".encode())
         assert b" 403 " in raw.recv(200)
 
 
-def test_the_files_of_the_page_ask_for_the_token(page):
+def test_the_files_of_the_page_ask_for_the_token(guarded):
     from urllib.error import HTTPError
     from urllib.request import Request, urlopen
 
-    port, token = page.server.get_port(), page.server.door.token
+    port, token = guarded.server.get_port(), guarded.server.door.token
     with pytest.raises(HTTPError, match="403"):
         urlopen(f"http://127.0.0.1:{port}/")
-    with urlopen(page.address) as answer:
+    with urlopen(guarded.address) as answer:
         cookie = answer.headers["Set-Cookie"]
     assert token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
     with urlopen(Request(f"http://127.0.0.1:{port}/", headers={"Cookie": cookie.split(";")[0]})) as answer:

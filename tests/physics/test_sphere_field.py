@@ -46,10 +46,11 @@ def test_impedance_on_the_body(fan, eta):
     assert found == pytest.approx(sphere.surface_field(100.0, 1.0, np.cos(theta), eta), rel=5e-3)
 
 
-def test_impedance_passes_to_hard(fan):
+@pytest.mark.parametrize(("method", "k"), [("rays", 30.0), ("currents", 10.0)])
+def test_impedance_passes_to_hard(fan, method, k):
     r = field_sphere.observers(np.radians(np.arange(0, 181, 10.0)))
-    hard = cr.far_field(fan, r, wavenumber=30.0, boundary="hard").total
-    nearly = cr.far_field(fan, r, wavenumber=30.0, boundary=cr.ImpedanceBoundary(1e-7)).total
+    hard = cr.far_field(fan, r, wavenumber=k, boundary="hard", method=method).total
+    nearly = cr.far_field(fan, r, wavenumber=k, boundary=cr.ImpedanceBoundary(1e-7), method=method).total
     assert nearly == pytest.approx(hard, rel=1e-4)
 
 

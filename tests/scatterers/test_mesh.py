@@ -11,11 +11,11 @@ import trimesh
 
 import creeping as cr
 import scatterers as sc
-from creeping.geometry.surface import normal, project, size
+from creeping.geometry.surface import normal, project
 from scatterers.spline import cache as _fit_cache
 from scatterers.spline.report import FitReport
 from scatterers.triangles.quality import MeshQuality
-from studies._meshes import almond, capsule, geodesic_sphere, on_body, scattered, slivers, torus_grid
+from studies._meshes import capsule, on_body, scattered, slivers, torus_grid
 
 NAMES = ("ellipsoid", "torus", "twisted")
 POINTS, RAYS, LENGTH = 2000, 60, 2.0
@@ -131,8 +131,13 @@ def test_errors_against_the_exact_body(name, n):
 
 @pytest.mark.parametrize("name, n", sizes(2000, 10000))
 def test_own_estimate_covers_the_error_of_the_curvature(name, n):
-    ratio = opened(name, n).fit.normal_curvature_error / errors(name, n)[2]
-    assert 1 <= ratio <= 10
+    mesh, body = opened(name, n), exact(name)
+    points, along = cloud(name)
+    stated, fine = mesh.fit.normal_curvature_error, errors(name, n)[2]
+    on_coarse = project(mesh.coarse_fit, points)
+    coarse = rms(curvature(mesh.coarse_fit, on_coarse, along) - curvature(body, points, along))
+    # a difference of two fits is no larger than the errors of both; it is taken at other points, hence twice
+    assert fine <= stated <= 2 * (fine + coarse)
 
 
 @pytest.mark.slow
@@ -341,58 +346,3 @@ def test_a_coarse_mesh_is_judged_by_its_fit():
 def test_unknown_units_are_refused():
     with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
         sc.Mesh(BALL, "yard", cache=False)
-
-
-@cache
-def drop():
-    """A body of revolution about x, round at one end, with a tip of 45 degrees at the other: t the angle from x."""
-    s, triangles = geodesic_sphere(2000)
-    across = np.linalg.norm(s[:, 1:], axis=1, keepdims=True)
-    t = np.arctan2(across, s[:, :1])
-    points = np.concatenate([s[:, :1], s[:, 1:] * np.sin(t / 2)], axis=1)
-    return points, triangles
-
-
-@pytest.mark.slow
-def test_the_non_smooth_region_is_at_the_tip_only():
-    with pytest.raises(ValueError, match="not smooth enough"):
-        sc.Mesh(Triangles(*drop()), strict=True, cache=False)
-    body = sc.Mesh(Triangles(*drop()), cache=False)
-    points = drop()[0]
-    non_smooth, x = body.non_smooth(points), points[:, 0]
-    assert body.non_smooth(np.array([1.0, 0, 0])) and non_smooth[x > 0.98].all()
-    assert not non_smooth[x < 0.5].any()
-    assert non_smooth.mean() < 0.2
-    # or an incidence on it would be compared with rays that go on
-    np.testing.assert_array_equal(body.coarse_fit.non_smooth(points), non_smooth)
-    line = cr.shadow_line(body, (1.0, 0.02, 0.01))
-    fan = cr.launch(cr.DirectFlow(body), line, length=2.5, n_rays=32, n_steps=50, max_gap=np.inf)
-    meets = np.array([body.non_smooth(ray).any() for ray in fan.points])
-    # all of them go about the tip, and end where it begins
-    assert meets.mean() > 0.5
-    np.testing.assert_array_equal(fan.status == cr.RayStatus.NON_SMOOTH, meets)
-    back = cr.launch(
-        cr.DirectFlow(body), cr.shadow_line(body, (-1.0, 0.02, 0.01)), length=1.0, n_rays=32, n_steps=50, max_gap=np.inf
-    )
-    assert np.all(back.status == cr.RayStatus.OK)
-
-
-@pytest.mark.slow
-def test_almond():
-    vertices, triangles = almond(40000)
-    with pytest.raises(ValueError, match="not smooth enough"):
-        sc.Mesh(Triangles(vertices, triangles), strict=True, cache=False)
-    body = sc.Mesh(Triangles(vertices, triangles), cache=False)
-    assert body.non_smooth(vertices[-1]) and not body.non_smooth(vertices[0])
-    x = vertices[:, 0]
-    assert body.non_smooth(vertices[x > 0.57]).all() and not body.non_smooth(vertices[np.abs(x) < 0.2]).any()
-    # the closed form of MESH.md, 1.3: y^2 + 9 z^2 = A(x)
-    blunt = project(body, vertices[x < -0.05])
-    across = (0.193333 * np.sqrt(np.maximum(1 - (blunt[:, 0] / 0.416667) ** 2, 0))) ** 2
-    off = np.abs(blunt[:, 1] ** 2 + 9 * blunt[:, 2] ** 2 - across) / np.maximum(np.sqrt(across), 0.02)
-    assert rms(off) < 1e-5
-    line = cr.shadow_line(body, (1.0, 0.2, 0.3))
-    fan = cr.launch(cr.DirectFlow(body), line, length=size(body), n_rays=32, n_steps=50)
-    ended = fan.status == cr.RayStatus.NON_SMOOTH
-    assert ended.mean() > 0.5
-    assert np.all(fan.points[ended][:, :, 0].max(axis=1) > 0.4)

@@ -39,7 +39,7 @@ PAPER = [name for name in studies.FIGURES if name.startswith("fig")]
 FIELD = [name for name in studies.FIGURES if name.startswith(("field", "sweep"))]
 
 
-SLOW = ("sweep-cross-section", "sweep-bistatic", "sweep-sphere-rcs")
+SLOW = ("sweep-cross-section", "sweep-bistatic", "sweep-sphere-rcs", "field-benchmarks", "field-body")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in FIELD])
@@ -58,6 +58,7 @@ def test_field_cut_lies_on_the_exact_curve(drawn):
     assert card["error"]["field"]["median_relative"] < 0.01
 
 
+@pytest.mark.slow
 def test_field_on_the_body_is_measured(drawn):
     card, _, _ = drawn("field-body")
     assert np.median(card["error"]["field"]["median_relative_by_arclength"]) < 10.5

@@ -60,9 +60,10 @@ def test_scipy_errs_no_more_than_the_sweep():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("quantity", ["rays", "fields"])
-def test_interpolated_sweeps_are_compared_with_computed_ones(quantity):
-    found = sweep_between.row("ellipsoid", quantity, sweep_between.cut(1200, sweep_between.TILTED)[:300], 16)
+@pytest.mark.parametrize(("quantity", "first", "last"), [("rays", 0, 300), ("fields", 90, 220)])
+def test_interpolated_sweeps_are_compared_with_computed_ones(quantity, first, last):
+    """Echoes of a spheroid from between its waist and its ends: there rays merge, and echoes are no sum of sheets."""
+    found = sweep_between.row("ellipsoid", quantity, sweep_between.cut(1200, sweep_between.TILTED)[first:last], 16)
     assert found["interpolated"] == 1 and found["between per s"] > 0 and found["computed per s"] > 0
     assert max(value for name, value in found.items() if "%" in name) < 1e-2
 

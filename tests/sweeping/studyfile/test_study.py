@@ -30,10 +30,11 @@ def mistakes(text, tmp_path):
 def test_the_example_says_what_it_means(tmp_path):
     (tmp_path / "a.toml").write_text(EXAMPLE)
     study = read_study(tmp_path / "a.toml")
-    request = study.request_for(sc.TwistedEllipsoid())
+    body = sc.Ellipsoid(1.0, 0.8, 0.6)
+    request = study.request_for(body)
     assert request.boundaries == ("soft", "hard") and request.wavenumbers == (20.0, 40.0) and request.n_rays == 256
-    lines = [cr.shadow_line(sc.TwistedEllipsoid(), d) for d in cr.fibonacci_directions(12)]
-    assert request.length == max(ray_length(line, wavenumber=20.0) for line in lines)
+    lengths = [ray_length(cr.shadow_line(body, d), wavenumber=20.0) for d in cr.fibonacci_directions(12)]
+    assert request.length == max(lengths) > min(lengths)
     assert (study.output, study.workers, study.text, study.folder) == ("sweep.zarr", None, EXAMPLE, tmp_path)
 
 
