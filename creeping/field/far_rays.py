@@ -26,11 +26,10 @@ from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.polarisation import dyads, wave_frame
 from creeping.field.reflected import (
     NORMAL,
-    UNRESOLVED,
-    next_order,
     polarisation_terms,
     reflected_amplitude,
     reflected_error,
+    series_fails,
 )
 from creeping.field.shed_wave import scales, shed_wave, smoothstep
 from creeping.rays.quantities import RayPoints
@@ -231,7 +230,7 @@ class Parts:
                 wave, crossed = (1 + sign * own) * wave, _weighted(share, -turned * wave)
         off = share * reflected_error(s, wave, k, self.order, THIRD * self.unsure)
         wave = _weighted(share, wave)
-        failing = np.abs(next_order(s, k)) > UNRESOLVED
+        failing = series_fails(s, k, conductor=self.vector)
         each, doubts = (self._reflected(number, s, one) for one in (wave, off))
         if crossed is not None:
             each = each + self._reflected(number, s, crossed, turned=True)

@@ -27,7 +27,7 @@ Sources: [KLS56] for the series, [P79] for P; Derivations, F13, and F18 for what
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.shed_wave import limited, smoothstep
@@ -127,6 +127,16 @@ def next_order(specular: SpecularPoints, wavenumber: float) -> FloatArray:
     """Size (n,) of (κ_b/2 - Λ)/(k cos θᵢ), real: i times it is the next term of the reflected field's series."""
     with np.errstate(divide="ignore", over="ignore"):
         return np.asarray((curvatures(specular)[1] / 2 - specular.shape) / (wavenumber * specular.cosine))
+
+
+def series_fails(specular: SpecularPoints, wavenumber: float, *, conductor: bool) -> BoolArray:
+    """Whether the next term is too large for a series (n,); a conductor's tells its polarisations apart too."""
+    size = np.abs(next_order(specular, wavenumber))
+    if conductor:
+        unlike = np.abs(specular.along - specular.across)
+        with np.errstate(divide="ignore", over="ignore"):
+            size = np.maximum(size, 0.5 * unlike / (wavenumber * specular.cosine))
+    return np.asarray(size > UNRESOLVED)
 
 
 def series_parameter(specular: SpecularPoints, wavenumber: float) -> FloatArray:

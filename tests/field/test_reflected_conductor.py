@@ -82,3 +82,13 @@ def test_echoes_of_an_ellipsoid_against_dipoles():
     # without the terms of both polarisations 0.02 and 0.8
     assert np.median(np.diagonal(off, axis1=2, axis2=3)) < 0.006
     assert np.mean(off <= stated) > 0.95
+
+
+def test_a_rim_too_sharp_for_the_second_order_of_polarisations_is_unresolved():
+    body, d = sc.Ellipsoid(1.0, 0.5, 0.16), unit(0, -1, 0)
+    for k, sharp in ((30.0, True), (150.0, False)):
+        fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), wavenumber=k, n_rays=24, max_gap=np.inf)
+        field = cr.far_field(fan, -d[None], wavenumber=k, boundary="pec", method="rays")
+        # k rho of the rim is 1.5 and 7.7
+        assert field.unresolved[0] == sharp
+        assert not sharp or np.all(field.error[0].diagonal() > 0.5 * np.abs(field.total[0].diagonal()))
