@@ -57,7 +57,7 @@ def layer_fields(
     low = lowest_height(fan, k)
     above = (low, low + APART, low + 2 * APART)
     at, nodes, height, tops = feet_of(body, points, k, above, CLEAR * low)
-    surface = on_conductor(fan, nodes.points, k, currents.incident_electric, left)
+    surface = on_conductor(fan, nodes.points, k, currents.incident_electric, left, currents)
     values, errors = [], []
     for top in tops:
         incident, scattered, its = total_fields(currents, top, occluded(body, top, d))

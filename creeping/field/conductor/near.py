@@ -97,9 +97,9 @@ def conductor_field(
     dark = np.zeros(len(flat), dtype=bool)
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
     fields = [_no_field(len(flat)) for _ in electric.T]
-    left = _left_inside(fan, k, mix)
+    left, currents = _left_inside(fan, k, mix)
     if len(at):
-        found = on_conductor(fan, flat[at], k, electric, left)
+        found = on_conductor(fan, flat[at], k, electric, left, currents)
         n = normal(fan.body, flat[at])
         fields = [one.put(at, _on_body(found, i, n)) for i, one in enumerate(fields)]
     if len(off):
@@ -160,7 +160,7 @@ def conductor_current(
     k, mix = _checked(fan, wavenumber, polarisation)
     electric = np.asarray(spherical_frame(fan.line.direction).T @ mix, dtype=complex)
     y = as_points(points)
-    found = on_conductor(fan, on_body(fan.body, y).reshape(-1, 3), k, electric, _left_inside(fan, k, mix))
+    found = on_conductor(fan, on_body(fan.body, y).reshape(-1, 3), k, electric, *_left_inside(fan, k, mix))
     shape, single = y.shape[:-1], polarisation is not None
     fields = found.current
     values, lit, creeping = (
@@ -189,16 +189,16 @@ def _places(count: int, mix: ComplexArray) -> int:
     return int(np.ceil(VECTOR * mix.shape[1] * count))
 
 
-def _left_inside(fan: RayFan, k: float, mix: ComplexArray) -> FloatArray:
-    """What currents leave inside of each incident wave (p,): 0 on a convex body, NaN where it is not to be known."""
+def _left_inside(fan: RayFan, k: float, mix: ComplexArray) -> tuple[FloatArray, ConductorCurrents | None]:
+    """What currents leave inside of each incident wave (p,), and they: 0 on a convex body, NaN where none are known."""
     if convex(fan):
-        return np.zeros(mix.shape[1])
-    unknown = np.full(mix.shape[1], np.nan)
+        return np.zeros(mix.shape[1]), None
+    unknown = np.full(mix.shape[1], np.nan), None
     try:
         currents = _currents(fan, k, mix) if affordable(fan, _places(INNER, mix), k) else None
     except SurfaceError:
         return unknown
-    return unknown if currents is None else np.max(currents.left_of_each, axis=0)
+    return unknown if currents is None else (np.max(currents.left_of_each, axis=0), currents)
 
 
 def _currents(fan: RayFan, k: float, mix: ComplexArray) -> ConductorCurrents:

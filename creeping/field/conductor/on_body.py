@@ -1,9 +1,10 @@
 """The current J = n x H and the charge n.E at points of a perfect conductor.
 
-    J = (1 - W) J_lit + sum_rays w_i J_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
+    J = (1 - W)(J_lit + J_thrown) + sum_rays w_i J_i,  W = W(xi; 0, 0.6),  w_i = W for rays that have just left the line
     n.E = div J/(ik),   dH_n/dn = -div (J x n)
 
-J_lit and J_i are those of `creeping.field.currents.conductor`; where rays merge beams stand for them
+J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
+the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
 (`creeping.field.conductor.mode_beams`). Divergences on the surface are differences between points 0.02/k to either
 side. Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|.
 
@@ -18,10 +19,10 @@ from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
 from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
-from creeping.field.currents.conductor import lit_vectors, ray_vectors
+from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
 from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
 from creeping.field.far_geometry import fan_strips
-from creeping.field.lit_ground import composed, lit_error
+from creeping.field.lit_ground import composed, convex, lit_error
 from creeping.field.point_result import FieldStatus
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
 from creeping.field.served import Served, Words
@@ -38,7 +39,8 @@ APART = 0.02
 """Distance of the points between which currents are differenced, over the wavelength over 2 pi."""
 MERGED = 1e-3
 """Error of the sum over rays, as a share of the incident wave, from which beams are asked."""
-
+BEYOND = 1.0
+"""What the ground receives later than at first, to and fro and by shed rays, as a share of what it does at first."""
 WORST = 0.99
 """Error of a ray, as a share of it, at most: one that has ended is none of those that beams are made of."""
 
@@ -62,14 +64,26 @@ class OnConductor:
     slope: ComplexArray
 
 
-def on_conductor(fan: RayFan, points: FloatArray, k: float, electric: ComplexArray, left: FloatArray) -> OnConductor:
+def on_conductor(
+    fan: RayFan,
+    points: FloatArray,
+    k: float,
+    electric: ComplexArray,
+    left: FloatArray,
+    currents: ConductorCurrents | None,
+) -> OnConductor:
     """J, n.E and dH_n/dn at points of the body (n, 3), for incident E0 (3, p).
 
-    ``left`` (p,) is what currents leave inside of each incident wave, 0 on a body that is convex.
+    ``left`` (p,) is what ``currents`` of the whole body leave inside of each incident wave, 0 on a body that is convex.
     """
     count = len(points)
     around, normals, apart = _crosses(fan, points, k)
     lit, lit_off, share = _lit_at(fan, around, normals, k, electric)
+    if currents is not None and not convex(fan):
+        at = np.flatnonzero(share > 0)
+        thrown = share[at, None, None] * currents.thrown(around[at], normals[at])
+        lit[at] += thrown
+        lit_off[at] = np.hypot(lit_off[at], BEYOND * np.linalg.norm(thrown, axis=1))
     rays, by = _rays_at(fan, around, normals, k, electric, 1 - share)
     served, total = [], np.empty_like(lit)
     for i, (sums, method) in enumerate(zip(rays, by, strict=True)):

@@ -86,7 +86,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         wavenumber=k,
         boundary=kind,
     )
-    if kind.kind in ("soft", "hard") and faces_itself(lit):
+    if kind.kind in ("soft", "hard", "conductor") and faces_itself(lit):
         values[currents.lit] += currents.thrown(lit.points, lit.normals)
     return currents
 

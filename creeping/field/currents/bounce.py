@@ -1,6 +1,7 @@
 """What lit ground that faces other parts of the body receives from them: one bounce of physical optics.
 
     hard  u(x) += 2 int_(t > 0) W(t) u dG/dn_y dS_y,   soft  du/dn(x) += 2ik int_(t > 0) t W(t) du/dn G dS_y
+    conductor  J(x) += 2 n_x x int_(t > 0) W(t) grad_x G x J dS_y
 
 over all the body's currents above the horizon of x, t = n_x.(y - x)/|y - x|; W is a smooth step from 0 to 0.3, without
 which the cut at the horizon would radiate. What is above the horizon throws light on x, or shadow: its currents cancel
@@ -22,6 +23,8 @@ BLOCK = 64
 """Nodes that are looked at together."""
 EACH = 2e-9
 """Seconds of one pair, about."""
+VECTOR = 4.0
+"""What a pair of a conductor takes of that, both polarisations."""
 MOST_PAIRS = 4e9
 """Pairs of a point and a node up to which it is done: eight seconds, if all stand above each other's horizon."""
 SADDLE = -1e-3
@@ -48,22 +51,14 @@ def received(
 
     ``single`` and ``double`` (n,) are -du/dn dS/4 pi and u dS/4 pi; zeros where pairs are too many.
     """
-    from creeping.field.kernels.bounce import balls, from_above
+    from creeping.field.kernels.bounce import from_above
 
-    count = len(at[0])
-    if not 0 < count * len(single) < MOST_PAIRS:
-        return np.zeros(count, dtype=complex)
-
-    def blocks(x: FloatArray, n: FloatArray) -> tuple[FloatArray, ...]:
-        many = -(-x.shape[1] // BLOCK)
-        found = np.empty((many, 3)), np.empty(many), np.empty((many, 3)), np.empty(many)
-        balls(x, n, BLOCK, *found)
-        return found
-
-    points, sources = (tuple(np.ascontiguousarray(part.T) for part in pair) for pair in (at, nodes))
-    of, others = blocks(*points), blocks(*sources)
+    if not _affordable(at, nodes):
+        return np.zeros(len(at[0]), dtype=complex)
+    points, of = _blocks(at)
+    sources, others = _blocks(nodes)
     weights = [np.ascontiguousarray(np.stack([one.real, one.imag])) for one in (single, double)]
-    out = np.empty((count, 2))
+    out = np.empty((len(at[0]), 2))
 
     def work(part: slice) -> None:
         given = (*points, of, *sources, others, BLOCK, *weights, k, LOW, soft)
@@ -71,3 +66,40 @@ def received(
 
     in_threads(work, len(of[1]), least=4, multiple=1, seconds=EACH * BLOCK * len(single))
     return np.asarray(out[:, 0] + 1j * out[:, 1])
+
+
+def received_vectors(
+    at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray], strength: ComplexArray, k: float
+) -> ComplexArray:
+    """J that points of a conductor receive (m, 3, p) from J dS/4 pi (n, 3, p) at nodes; the others as of `received`."""
+    from creeping.field.kernels.bounce import vectors_from_above
+
+    waves = strength.shape[2]
+    if not _affordable(at, nodes):
+        return np.zeros((len(at[0]), 3, waves), dtype=complex)
+    points, of = _blocks(at)
+    sources, others = _blocks(nodes)
+    turned = np.moveaxis(strength, 0, 2)
+    J = np.ascontiguousarray(np.concatenate([turned.real, turned.imag]).transpose(1, 0, 2))
+    out = np.empty((len(at[0]), 2, waves, 3))
+
+    def work(part: slice) -> None:
+        vectors_from_above(*points, of, sources[0], others, BLOCK, J, k, LOW, part.start, part.stop, out)
+
+    in_threads(work, len(of[1]), least=4, multiple=1, seconds=EACH * VECTOR * BLOCK * len(strength))
+    return np.asarray(np.moveaxis(out[:, 0] + 1j * out[:, 1], 1, 2))
+
+
+def _affordable(at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray]) -> bool:
+    return 0 < len(at[0]) * len(nodes[0]) < MOST_PAIRS
+
+
+def _blocks(pair: tuple[FloatArray, FloatArray]) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, ...]]:
+    """Points and normals, (m, 3) each, as columns, and the balls about blocks of them."""
+    from creeping.field.kernels.bounce import balls
+
+    x, n = (np.ascontiguousarray(part.T) for part in pair)
+    many = -(-x.shape[1] // BLOCK)
+    found = np.empty((many, 3)), np.empty(many), np.empty((many, 3)), np.empty(many)
+    balls(x, n, BLOCK, *found)
+    return (x, n), found

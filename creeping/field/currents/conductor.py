@@ -22,6 +22,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT
+from creeping.field.currents.bounce import received_vectors
 from creeping.field.currents.lit import STEEPEST
 from creeping.field.currents.lit_conductor import lit_conductor
 from creeping.field.currents.nodes import LitNodes, RayNodes
@@ -63,6 +64,11 @@ class ConductorCurrents(SurfaceCurrents):
     def incident_electric(self) -> ComplexArray:
         """E0 of each polarisation (3, p)."""
         return np.asarray(spherical_frame(self.direction).T @ self.mix)
+
+    def thrown(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
+        """J that points of the body (m, 3), L, with normals, receive from above: (m, 3, p)."""
+        strength = self.values * (self.weights / (4 * np.pi))[:, None, None]
+        return received_vectors((points, normals), (self.points, self.normals), strength, self.wavenumber)
 
     def scattered_electric(self, points: FloatArray) -> ComplexArray:
         """Scattered E at points (m, 3), L, at least a quarter of a wavelength off the surface: (m, 3, p)."""

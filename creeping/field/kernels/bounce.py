@@ -2,6 +2,8 @@
 
     u(x) = sum_y r W(t) [a_y + b_y n_y.(x - y) (1/R - ik)/R] e^{ikR}/R,   t = n_x.(y - x)/R > 0,   R = |x - y|
 
+    J(x) = 2 sum_y W(t) n_x x (g x J_y),   g = (y - x)/R (1/R - ik) e^{ikR}/R          of a conductor
+
 W rises from 0 at the horizon to 1 at t = low; r is 2, what a mirror makes of a wave, or for du/dn of a soft one -2ikt.
 Blocks of nodes of which none is above the horizon of any point of a block are left out.
 
@@ -13,7 +15,7 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import entry_options
+from creeping.kernels.block import entry_options, options
 from creeping.kernels.turns import cosine_sine
 
 TOUCHING = 1e-6
@@ -42,6 +44,29 @@ def balls(points, normals, block, centres, radii, axes, spreads):
         radii[b], spreads[b] = math.sqrt(far), math.sqrt(off)
 
 
+@njit(**options)
+def _above(b, of, nodes, some):
+    """Number of blocks of nodes of which some may be above the horizon of block b of the points, and which they are."""
+    centres, radii, axes, spreads = of
+    others, widths = nodes[0], nodes[1]
+    count = 0
+    for a in range(len(widths)):
+        dx, dy, dz = others[a, 0] - centres[b, 0], others[a, 1] - centres[b, 1], others[a, 2] - centres[b, 2]
+        reach = math.sqrt(dx * dx + dy * dy + dz * dz) + radii[b] + widths[a]
+        up = axes[b, 0] * dx + axes[b, 1] * dy + axes[b, 2] * dz
+        if up + radii[b] + widths[a] + spreads[b] * reach > 0.0:
+            some[count] = a
+            count += 1
+    return count
+
+
+@njit(**options)
+def _risen(t, low):
+    """Smooth step from the horizon."""
+    w = min(t / low, 1.0)
+    return w * w * (3.0 - 2.0 * w)
+
+
 @njit(**entry_options)
 def from_above(x, normals, of, y, sides, nodes, block, single, double, k, low, soft, first, last, out):
     """Fill rows of blocks first..last of out (m, 2), real and imaginary part of u, or of du/dn if ``soft``.
@@ -49,20 +74,11 @@ def from_above(x, normals, of, y, sides, nodes, block, single, double, k, low, s
     Points x and their normals (3, m), nodes y and theirs ``sides`` (3, n), in blocks of so many with the `balls` ``of``
     and ``nodes``; single and double (2, n) the weights a and b, real before imaginary parts.
     """
-    centres, radii, axes, spreads = of
-    others, widths = nodes[0], nodes[1]
     n = y.shape[1]
     per, least = k / (2 * math.pi), (TOUCHING / k) ** 2
-    some = np.empty(len(widths), np.int64)
+    some = np.empty(len(nodes[1]), np.int64)
     for b in range(first, last):
-        count = 0
-        for a in range(len(widths)):
-            dx, dy, dz = others[a, 0] - centres[b, 0], others[a, 1] - centres[b, 1], others[a, 2] - centres[b, 2]
-            reach = math.sqrt(dx * dx + dy * dy + dz * dz) + radii[b] + widths[a]
-            up = axes[b, 0] * dx + axes[b, 1] * dy + axes[b, 2] * dz
-            if up + radii[b] + widths[a] + spreads[b] * reach > 0.0:
-                some[count] = a
-                count += 1
+        count = _above(b, of, nodes, some)
         for j in range(b * block, min((b + 1) * block, x.shape[1])):
             x0, x1, x2 = x[0, j], x[1, j], x[2, j]
             n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
@@ -72,8 +88,7 @@ def from_above(x, normals, of, y, sides, nodes, block, single, double, k, low, s
                     dx, dy, dz = y[0, i] - x0, y[1, i] - x1, y[2, i] - x2
                     inverse = 1.0 / math.sqrt(max(dx * dx + dy * dy + dz * dz, least))
                     t = max((n0 * dx + n1 * dy + n2 * dz) * inverse, 0.0)
-                    w = min(t / low, 1.0)
-                    w = w * w * (3.0 - 2.0 * w) * inverse
+                    w = _risen(t, low) * inverse
                     c, s = cosine_sine(per / inverse)
                     lean = -(sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz) * inverse
                     u = single[0, i] + lean * (double[0, i] * inverse + double[1, i] * k)
@@ -86,3 +101,45 @@ def from_above(x, normals, of, y, sides, nodes, block, single, double, k, low, s
                         p += 2.0 * f
                         q += 2.0 * g
             out[j, 0], out[j, 1] = p, q
+
+
+@njit(**entry_options)
+def vectors_from_above(x, normals, of, y, nodes, block, currents, k, low, first, last, out):
+    """Fill rows of blocks first..last of out (m, 2, p, 3), real and imaginary part of J of p incident waves.
+
+    ``currents`` (p, 6, n) are J dS/4 pi at the nodes, real parts of its components first; the others are as
+    of `from_above`.
+    """
+    n, waves = y.shape[1], currents.shape[0]
+    per, least = k / (2 * math.pi), (TOUCHING / k) ** 2
+    some = np.empty(len(nodes[1]), np.int64)
+    for b in range(first, last):
+        count = _above(b, of, nodes, some)
+        for j in range(b * block, min((b + 1) * block, x.shape[1])):
+            x0, x1, x2 = x[0, j], x[1, j], x[2, j]
+            n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
+            out[j] = 0.0
+            for a in range(count):
+                for i in range(some[a] * block, min((some[a] + 1) * block, n)):
+                    dx, dy, dz = y[0, i] - x0, y[1, i] - x1, y[2, i] - x2
+                    inverse = 1.0 / math.sqrt(max(dx * dx + dy * dy + dz * dz, least))
+                    t = (n0 * dx + n1 * dy + n2 * dz) * inverse
+                    if t <= 0.0:
+                        continue
+                    c, s = cosine_sine(per / inverse)
+                    w = 2.0 * _risen(t, low) * inverse
+                    real, imag = w * (c * inverse + s * k), w * (s * inverse - c * k)
+                    dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
+                    for q in range(waves):
+                        J = currents[q]
+                        u = n0 * J[0, i] + n1 * J[1, i] + n2 * J[2, i]
+                        v = n0 * J[3, i] + n1 * J[4, i] + n2 * J[5, i]
+                        # n x (g x J) = g (n.J) - J (n.g)
+                        a0, a1, a2 = dx * u - t * J[0, i], dy * u - t * J[1, i], dz * u - t * J[2, i]
+                        b0, b1, b2 = dx * v - t * J[3, i], dy * v - t * J[4, i], dz * v - t * J[5, i]
+                        out[j, 0, q, 0] += real * a0 - imag * b0
+                        out[j, 0, q, 1] += real * a1 - imag * b1
+                        out[j, 0, q, 2] += real * a2 - imag * b2
+                        out[j, 1, q, 0] += real * b0 + imag * a0
+                        out[j, 1, q, 1] += real * b1 + imag * a1
+                        out[j, 1, q, 2] += real * b2 + imag * a2
