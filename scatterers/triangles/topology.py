@@ -155,7 +155,12 @@ def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -
 
 def _check_edges(name: str, vertices: FloatArray, edges: Edges) -> None:
     for wrong, what, remedy in (
-        (edges.faces == 1, "are open", "close them, or give cap= with the size of the largest hole, m"),
+        (
+            edges.faces == 1,
+            "are open",
+            "close them, or give cap= with the size of the largest hole, m; what a large cap= leaves open has pinched "
+            "borders, to be repaired where the mesh was made",
+        ),
         (edges.faces > 2, "have more than two triangles", "sheets meet there: remove inner or double walls"),
     ):
         if bad := int(wrong.sum()):
