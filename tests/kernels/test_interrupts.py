@@ -62,7 +62,13 @@ def interrupted(command, folder, wait, *, again=False):
     """
     with (folder / "err").open("w") as err:
         process = subprocess.Popen(
-            command, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=err, text=True
+            command,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            stdout=subprocess.PIPE,
+            stderr=err,
+            text=True,
+            # what is started in the background of a shell ignores the signal, and so would its children
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         with process.stdout:
             assert wait(process), (folder / "err").read_text()
