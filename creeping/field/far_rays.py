@@ -295,12 +295,10 @@ class Parts:
         wave: ComplexArray | FloatArray,
         n0: FloatArray,
         n: FloatArray,
-        *,
-        squared: bool = False,
     ) -> ComplexArray:
-        """Sums (m, ...) of contributions (n,), or of their squares."""
+        """Sums (m, ...) of contributions (n,)."""
         out, each = self._zeros(), self._each(number, observer, wave, n0, n)
-        np.add.at(out, observer, np.abs(each) ** 2 if squared else each)
+        np.add.at(out, observer, each)
         return out
 
     def _each(
