@@ -23,7 +23,7 @@ BLOCK = 64
 """Nodes that are looked at together."""
 EACH = 2e-9
 """Seconds of one pair, about."""
-VECTOR = 4.0
+VECTOR = 2.5
 """What a pair of a conductor takes of that, both polarisations."""
 MOST_PAIRS = 4e9
 """Pairs of a point and a node up to which it is done: eight seconds, if all stand above each other's horizon."""
@@ -75,7 +75,7 @@ def received_vectors(
     from creeping.field.kernels.bounce import vectors_from_above
 
     waves = strength.shape[2]
-    if not _affordable(at, nodes):
+    if not _affordable(at, nodes, VECTOR):
         return np.zeros((len(at[0]), 3, waves), dtype=complex)
     points, of = _blocks(at)
     sources, others = _blocks(nodes)
@@ -90,8 +90,8 @@ def received_vectors(
     return np.asarray(np.moveaxis(out[:, 0] + 1j * out[:, 1], 1, 2))
 
 
-def _affordable(at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray]) -> bool:
-    return 0 < len(at[0]) * len(nodes[0]) < MOST_PAIRS
+def _affordable(at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray], each: float = 1.0) -> bool:
+    return 0 < each * len(at[0]) * len(nodes[0]) < MOST_PAIRS
 
 
 def _blocks(pair: tuple[FloatArray, FloatArray]) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, ...]]:
