@@ -1,6 +1,7 @@
 """Pictures of an echo: against angle or frequency with the band of its error, as a map of both, and in range."""
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +44,7 @@ def echo_cut_picture(
     """
     curves = _curves(echo, (slice(None), 0))
     heights = shown_range([curve.levels for curve in curves], SPAN)
+    curves = _told_if_low(curves, heights[0])
     figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
@@ -60,6 +62,7 @@ def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str 
     """Write a PNG of an echo against frequency at its first angle; arguments as of `echo_cut_picture`."""
     curves = _curves(echo, (0, slice(None)))
     low, high = shown_range([curve.levels for curve in curves], SPAN)
+    curves = _told_if_low(curves, low)
     scale, unit = _prefix(echo.hertz)
     figure = new_figure((6.4, 4.2))
     figure.set_layout_engine("constrained")
@@ -119,7 +122,8 @@ def range_picture(
     ax = figure.add_subplot()
     curves = {channel: echo.levels(found.values) for channel, found in profiles.items()}
     low, high = shown_range(curves.values(), SPAN)
-    for number, (channel, found) in enumerate(profiles.items()):
+    # the legend lists what was drawn last first
+    for number, (channel, found) in reversed(list(enumerate(profiles.items()))):
         ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **curve_style(number))
     reach = next(iter(profiles.values())).range
     ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
@@ -153,12 +157,15 @@ def comparison_picture(
     figure = new_figure((6.4, 5.6))
     figure.set_layout_engine("constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-    for number, (channel, found) in enumerate(comparisons.items()):
+    # the legend lists what was drawn last first
+    for number, (channel, found) in reversed(list(enumerate(comparisons.items()))):
         x, style = found.values / scale, curve_style(number)
+        broad = {"linewidth": 3.2, "alpha": 0.3, "zorder": 1.9}
+        above.plot(x, found.reference, label=f"{channel}, given", **style | broad)
         above.plot(x, found.levels, label=channel, **style)
-        above.plot(x, found.reference, label=f"{channel}, given", **style | {"linewidth": 3.2, "alpha": 0.3})
         below.plot(x, found.residual, label=f"_{channel}", **style)
     below.axhline(0.0, color=GREY, linewidth=0.6)
+    below.margins(x=0)
     _dressed(above, "", _level(echo), title)
     _dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)", "")
     add_legend(above, fresh=True)
@@ -173,6 +180,16 @@ def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
         finite: FloatArray = np.where(np.isposinf(levels[here]), np.nan, levels[here])
         found.append(Curve(channel, finite, curve_style(number), bounds[(slice(None), *here)], echo.unresolved[here]))
     return found
+
+
+def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
+    """Curves, with a word in the legend for those that lie below the picture as a whole."""
+    return [
+        replace(curve, label=f"{curve.label}, below {low:g} dB")
+        if np.nanmax(curve.levels, initial=-np.inf) < low
+        else curve
+        for curve in curves
+    ]
 
 
 def _level(echo: "Echo") -> str:

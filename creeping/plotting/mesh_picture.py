@@ -91,7 +91,10 @@ def _draw(figure: Any, bottom: float, height: float, mesh: MeshValues, label: st
         # edges in the colour of the face close the hairlines between triangles
         ax.add_collection(PolyCollection(list(flat), facecolors=shade, edgecolors=shade, linewidths=0.3))
         seen = np.intersect1d(np.flatnonzero(mesh.bad), mesh.triangles[front])
-        ax.plot(*view.project(mesh.vertices[seen]).T, ".", color=BAD_COLOUR, markersize=2.5)
+        dots = view.project(mesh.vertices[seen]).T
+        # rims of white: red on dark blue is hard to see for the colour-blind
+        ax.plot(*dots, ".", color="white", markersize=6.0, markeredgewidth=0)
+        ax.plot(*dots, ".", color=BAD_COLOUR, markersize=3.6, markeredgewidth=0)
         ax.autoscale_view()
         ax.set_aspect("equal")
         ax.set_axis_off()
