@@ -9,7 +9,8 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.field.decibels import shown_range
 from creeping.field.echo import LEVELS
-from creeping.plotting.far_cuts import Curve, draw_cut
+from creeping.plotting.colour_bar import add_bar, beyond
+from creeping.plotting.far_cuts import Curve, draw_cut, minus
 from creeping.plotting.palette import GREY, curve_style
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 PREFIXES = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
 SPAN = 60.0
 """Range of levels, dB."""
+VEIL = 0.7
+"""How much white hides of what is unresolved."""
 
 
 def echo_cut_picture(
@@ -85,7 +88,13 @@ def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str 
 
 
 def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
-    """Write a PNG of an echo over angle and frequency, a panel for each channel; arguments as of `echo_cut_picture`."""
+    """Write a PNG of an echo over angle and frequency, a panel for each channel; arguments as of `echo_cut_picture`.
+
+    What is unresolved has a veil of white.
+    """
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
     levels = echo.levels()
     low, high = shown_range([levels], SPAN)
     scale, unit = _prefix(echo.hertz)
@@ -99,11 +108,19 @@ def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str =
         image = ax.pcolormesh(
             echo.angles, echo.hertz / scale, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest"
         )
+        doubtful = echo.unresolved[number]
+        veil = np.ma.masked_where(~doubtful, np.ones(doubtful.shape)).T
+        ax.pcolormesh(
+            echo.angles, echo.hertz / scale, veil, cmap=ListedColormap(["white"]), alpha=VEIL, shading="nearest"
+        )
         _dressed(
             ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})", channel if number else f"{title}\n{channel}"
         )
         ax.grid(visible=False)
-        figure.colorbar(image, ax=ax, label=_level(echo))
+        add_bar(figure, image, _level(echo), extend=beyond(levels[number], low, high), fontsize=9, ax=ax)
+    if echo.unresolved.any():
+        patch = Patch(facecolor="white", edgecolor=GREY, linewidth=0.5, label="veiled: unresolved")
+        figure.legend(handles=[patch], loc="outside lower center", frameon=False, fontsize=8)
     save_figure(figure, path, dpi)
 
 
@@ -185,7 +202,7 @@ def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
 def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
     """Curves, with a word in the legend for those that lie below the picture as a whole."""
     return [
-        replace(curve, label=f"{curve.label}, below {low:g} dB")
+        replace(curve, label=f"{curve.label}, below {minus(low)} dB")
         if np.nanmax(curve.levels, initial=-np.inf) < low
         else curve
         for curve in curves

@@ -291,7 +291,7 @@ def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: s
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
     signed = [v if v <= 180 else v - 360 for v in range(0, 360, 30)]
-    ax.set_thetagrids(range(0, 360, 30), labels=[f"{_minus(v)}°" for v in signed])
+    ax.set_thetagrids(range(0, 360, 30), labels=[f"{minus(v)}°" for v in signed])
     low, high = heights
     step = next(s for s in (5, 10, 20, 50, 100, 1000) if (high - low) / s <= 6)
     rings = np.arange(step * np.ceil(low / step + 1e-9), high + 1e-9, step)
@@ -302,16 +302,16 @@ def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: s
         text.remove()
     halo = [withStroke(linewidth=2.0, foreground="white")]
     look: dict[str, Any] = {"fontsize": 7, "color": "#5a6872", "ha": "center", "va": "center", "gid": "ring"}
-    for ring in rings[: max(1, len(rings) - 1)]:
-        ax.text(np.radians(165), ring, _minus(ring), path_effects=halo, zorder=4, **look)
+    for ring in rings:
+        ax.text(np.radians(165), ring, minus(ring), path_effects=halo, zorder=4, **look)
     ax.tick_params(axis="x", labelsize=8)
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.spines["polar"].set_linewidth(0.5)
     ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
 
 
-def _minus(value: float) -> str:
-    """A number with a minus sign, as the numbers of straight axes have it."""
+def minus(value: float) -> str:
+    """A number with a minus sign in place of a hyphen, as the numbers of straight axes have it."""
     return f"{value:g}".replace("-", "\N{MINUS SIGN}")
 
 

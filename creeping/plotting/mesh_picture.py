@@ -100,7 +100,8 @@ def _draw(figure: Any, bottom: float, height: float, mesh: MeshValues, label: st
         ax.set_axis_off()
     rough = f"{int(mesh.bad.sum())} of {len(mesh.vertices)} vertices rough"
     figure.text(0.02, bottom + 0.94 * height, mesh.title, fontsize=9, va="center")
-    figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=BAD_COLOUR)
+    colour = BAD_COLOUR if mesh.bad.any() else "black"
+    figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=colour)
     bar = figure.colorbar(
         colours, cax=figure.add_axes((0.885, bottom + 0.1 * height, 0.018, 0.76 * height)), extend="min"
     )

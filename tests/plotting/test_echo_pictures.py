@@ -7,6 +7,7 @@ import pytest
 from fake_fields import echo_of
 
 from creeping.plotting import echo_pictures
+from creeping.plotting.far_cuts import minus
 
 
 @pytest.fixture
@@ -46,7 +47,21 @@ def test_a_curve_below_the_picture_is_told_in_the_legend(drawn, over):
         echo_pictures.echo_cut_picture("a.png", echo)
     first, second = (text.get_text() for text in drawn[0].legends[0].get_texts())
     low = drawn[0].axes[0].get_ylim()[0]
-    assert first == "HH" and second == f"VV, below {low:g} dB"
+    assert first == "HH" and second == f"VV, below {minus(low)} dB"
+
+
+def test_of_a_map_what_is_unresolved_has_a_veil(drawn):
+    echo = two_channels(0.5)
+    several = {name: np.repeat(v, 2, axis=2) for name, v in echo.parts.items()}
+    flags = {name: np.repeat(getattr(echo, name), 2, axis=2) for name in ("error", "unresolved", "by_currents")}
+    echo = replace(echo, wavenumbers=np.array([20.0, 21.0]), parts=several, **flags)
+    echo_pictures.echo_map_picture("a.png", echo)
+    flags["unresolved"][1, 0, 1] = True
+    echo_pictures.echo_map_picture("a.png", replace(echo, unresolved=flags["unresolved"]))
+    clear, veiled = drawn
+    assert not clear.legends and veiled.legends[0].get_texts()[0].get_text() == "veiled: unresolved"
+    shown = [int(np.ma.count(ax.collections[1].get_array())) for ax in veiled.axes if ax.get_title()]
+    assert shown == [0, 1]
 
 
 def test_rings_are_numbered_over_the_curves(drawn):
