@@ -27,6 +27,8 @@ from studies._measured import end_error, error_card, headline, map_card
 BODY = sc.Ellipsoid(1.2, 0.8, 0.8)
 GRID = Grid((16, 16, 64), 3, (False, False))
 FACES = ("$+x$", "$-x$", "$+y$", "$-y$", "$+z$", "$-z$")
+MARKS = ("o", "s") * 3
+"""Of opposite faces, whose colours some readers cannot tell apart."""
 VIEW = View(float(np.radians(-52)), float(np.radians(26)))
 TIME = 4.0
 
@@ -48,10 +50,11 @@ def grid_on_body(ax: Any) -> None:
         for chart, colour in zip(BODY.atlas.charts, COLOURS, strict=True)
     ]
     draw_curves(BODY, strokes, ax=ax, view=VIEW)
-    for colour, points in zip(COLOURS, nodes(), strict=True):
+    look: dict[str, Any] = {"depthshade": False, "linewidths": 0, "zorder": 20, "clip_on": False}
+    for colour, mark, points in zip(COLOURS, MARKS, nodes(), strict=True):
         seen = VIEW.visible(BODY, points)
         if seen.any():
-            ax.scatter(*points[seen].T, s=5, color=colour, depthshade=False, linewidths=0, zorder=20, clip_on=False)
+            ax.scatter(*points[seen].T, s=5, color=colour, marker=mark, **look)
 
 
 def grid_in_chart(ax: Any) -> None:
@@ -66,7 +69,7 @@ def grid_in_chart(ax: Any) -> None:
     front[:2] = False
     ax.plot(*np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2).T, "o", ms=3, mew=0, color=COLOURS[0])
     for k in range(2, 6):
-        ax.plot(*uv[k][front[k]].T, "o", ms=3.4, mfc="none", mew=0.6, color=COLOURS[k])
+        ax.plot(*uv[k][front[k]].T, MARKS[k], ms=3.4, mfc="none", mew=0.6, color=COLOURS[k])
     ax.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color=COLOURS[0], lw=1.2)
     ax.annotate(
         "",
@@ -100,10 +103,10 @@ def draw(path: Path, quick: bool) -> dict[str, Any]:
     figure.text(0.02, 0.94, "$\\bf{a}$  nodes of the charts that face the reader", fontsize=9)
     right = figure.add_axes((0.64, 0.20, 0.345, 0.72))
     grid_in_chart(right)
-    tag(right, "b", "chart $+x$ and neighbours (rings)")
+    tag(right, "b", "chart $+x$ and neighbours (hollow)")
     handles = [
-        Line2D([], [], color=colour, marker="o", ms=4, lw=1.2, label=name)
-        for name, colour in zip(FACES, COLOURS, strict=True)
+        Line2D([], [], color=colour, marker=mark, ms=4, lw=1.2, label=name)
+        for name, colour, mark in zip(FACES, COLOURS, MARKS, strict=True)
     ]
     figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.02, 0.0), ncols=6, frameon=False, fontsize=8)
     figure.savefig(path, dpi=100 if quick else 300)

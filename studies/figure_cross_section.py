@@ -168,7 +168,7 @@ def _picture(path: Path, shape: tuple[int, int], maps: dict[str, Any], dpi: int)
     handles.append(Line2D([], [], ls="", marker=".", ms=6, mfc="white", mec="black", mew=0.4, label="near singular"))
     figure.legend(handles=handles, loc="lower left", ncols=2, frameon=False, fontsize=8, bbox_to_anchor=(0.03, 0.0))
     words = f"4π|f|² in dB re 1 L², k = {K:g}/L; θ up the side, φ along the middle"
-    figure.text(0.98, 0.012, words, fontsize=8, ha="right")
+    figure.text(0.98, 0.023, words, fontsize=8, ha="right", va="center")
     figure.savefig(path, dpi=dpi, format="png")
 
 
@@ -176,7 +176,9 @@ def _angles(ax: Any) -> None:
     """θ from z at the side, φ along the equator, both in degrees."""
     from matplotlib.patheffects import withStroke
 
-    ax.set_xticks(np.radians([-120, -60, 0, 60, 120]), labels=["-120°", "-60°", "0°", "60°", "120°"])
+    ax.set_xticks(
+        np.radians([-120, -60, 0, 60, 120]), labels=["\N{MINUS SIGN}120°", "\N{MINUS SIGN}60°", "0°", "60°", "120°"]
+    )
     ax.set_yticks(np.radians([60, 30, 0, -30, -60]), labels=["30°", "60°", "90°", "120°", "150°"])
     ax.tick_params(labelsize=7)
     # over the colours of the map: the grid tells enough of φ elsewhere

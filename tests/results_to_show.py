@@ -19,6 +19,7 @@ class IsoPhaseCurve:
     closed: bool
     parameters: Any
     parameter_pieces: Any
+    unit: str = "L"
 
 
 def great_circle(direction, count):

@@ -176,7 +176,7 @@ class _Meter:
 
     def __init__(self, progress: Any, values: int) -> None:
         self.progress, self.values, self._shown = progress, values, 0.0
-        self._first: tuple[int, float] | None = None
+        self._first: tuple[float, float] | None = None
 
     def asked(self, request: Any) -> str:
         """What is computed."""
@@ -184,7 +184,7 @@ class _Meter:
         count = self.values // several
         return f"{count} angle{'s' * (count > 1)} x {several} frequenc{'ies' if several > 1 else 'y'}"
 
-    def told(self, done: int, total: int, seconds: float) -> None:
+    def told(self, done: float, total: int, seconds: float) -> None:
         """Show what is left, by what came after the first part, which may have had to compile."""
         if self._first is None:
             self._first = (done, seconds)
@@ -192,4 +192,5 @@ class _Meter:
         first, then = self._first
         if done > first and seconds - self._shown > 5 and done < total:
             self._shown = seconds
-            self.progress(f"{done} of {total}, {(total - done) * (seconds - then) / (done - first):.0f} s left")
+            left = (total - done) * (seconds - then) / (done - first)
+            self.progress(f"{int(self.values * done / total)} of {self.values}, {left:.0f} s left")

@@ -200,11 +200,14 @@ class Job:
             plotting.far_cut_picture(output / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
         if far.error_by == "extinction":
             currents = kept_currents(fan, self.wavenumber, self.boundary)
-            plotting.currents_picture(output / "field.png", currents, backend=backend, dpi=DPI)
+            plotting.currents_picture(
+                output / "field.png", currents, wave=self.told(far.unit), backend=backend, dpi=DPI
+            )
             names.append("field.png")
         # at points between rays the field needs a smooth body
         elif self.boundary != "pec" and not is_creased(fan.body):
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
+            options["wave"] = self.told(far.unit)
             plotting.surface_field_picture(output / "field.png", fan, backend=backend, dpi=DPI, **options)
             names.append("field.png")
         return names

@@ -1,7 +1,7 @@
 """Fields on planes of one ``creeping run``: what ``--plane`` asks for, and the files that come of it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -95,6 +95,8 @@ def write_planes(
         started = perf_counter()
         cut = field_cut(fan, **_options(plane, job), **_polarisation(job))
         seconds = perf_counter() - started
+        if job.unit:
+            cut = replace(cut, field=replace(cut.field, length_unit=job.unit))
         names += write_tables(output / stem, formats, cut, cut=cut)
         if pictures and np.any(cut.field.ok):
             title = f"{name}\n{job.told(cut.field.length_unit)}, {cut.field.boundary}"

@@ -8,6 +8,7 @@ from creeping.explorer.preview import Preview
 from creeping.explorer.refined import Refined
 from creeping.explorer.units import wave_text
 from creeping.field.validity_range import WITHIN, Validity, validity_words
+from creeping.geometry.unit import unit_of
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS
 from creeping.rays.fan import RayFan
 
@@ -39,7 +40,7 @@ def refined_text(found: Refined) -> str:
     shares = ", ".join(f"{share:.3g} {name}" for name, share in line.fractions.items() if share)
     lines = [
         f"shadow line: {len(line.curves)} {'curve' if len(line.curves) == 1 else 'curves'}, "
-        f"length {line.length:.8g} L; {shares}",
+        f"length {line.length:.8g} {unit_of(line.body)}; {shares}",
         f"rays drawn: {_counts(drawn)}, length {drawn.length:.4g}; error at their ends rms {drawn.error.rms:.1e}, "
         f"max {drawn.error.max:.1e} ({drawn.error.samples} traced)",
     ]

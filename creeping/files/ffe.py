@@ -119,7 +119,7 @@ def _lines(far: FarField, theta: FloatArray, phi: FloatArray, direction: ArrayLi
     yield "##File Type: Far field"
     yield "##File Format: 8"
     yield f"##Source: creeping {__version__}"
-    yield f"** {far.boundary} boundary, order {far.order}, k = {far.wavenumber!r} 1/L"
+    yield f"** {far.boundary} boundary, order {far.order}, k = {far.wavenumber!r} 1/{far.unit}"
     taken = "" if far.unit == "m" else "L is taken as the metre and "
     yield f"** frequency: {taken}the wave's speed as that of light"
     yield "** time factor exp(+jwt): complex conjugates of the far field f of creeping, exp(-iwt)"

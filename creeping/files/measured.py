@@ -6,8 +6,11 @@ comments. A header names the columns; without one the first is the angle in degr
 
 import os
 import re
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -16,6 +19,14 @@ from creeping.errors import InvalidInputError
 
 MOST_BYTES = 200_000_000
 """Largest file that is read."""
+MOST_ROWS, MOST_NUMBERS = 1_000_000, 20_000_000
+"""Rows of a table, and numbers in all of them."""
+MOST_HEADERS = 10_000
+"""Lines of words and comments above the numbers."""
+LONGEST = 65_536
+"""Characters of a line."""
+SHOWN = 12
+"""Names of columns that a message lists."""
 COMMENT = ("#", "%", "!", "//")
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
 _ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
@@ -70,18 +81,17 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
     Raises
     ------
     InvalidInputError
-        If it is no such table; with the columns that were found.
+        If it is no such table, with the columns that were found; or if it is too large, with the number of the line.
     """
     file = Path(path)
     try:
         nbytes = file.stat().st_size
         if nbytes > MOST_BYTES:
             raise InvalidInputError(f"{file} has {nbytes / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} are the most")
-        text = file.read_text(encoding="utf-8-sig", errors="replace")
+        with file.open(encoding="utf-8-sig", errors="replace") as stream:
+            header, numbers = _table(file, stream)
     except OSError as error:
         raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
-    header, rows = _table(file, text)
-    numbers = np.array(rows, dtype=float)
     names = header or ["angle", *(f"level {i}" for i in range(1, numbers.shape[1]))]
     at, over, scale = _abscissa(file, names, numbers)
     levels = {}
@@ -95,22 +105,19 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
                 values = 10 * np.log10(values)
         levels[name] = values
     if not levels:
-        raise InvalidInputError(f"{file} has no column of levels; its columns are {', '.join(names)}")
+        raise InvalidInputError(f"{file} has no column of levels; its columns are {_listed(names)}")
     order = np.argsort(numbers[:, at], kind="stable")
     polar = over == "angle" and bool(_POLAR.search(names[at].lower()))
     found = {name: v[order] for name, v in levels.items()}
     return MeasuredCut(file.name, over, scale * numbers[order, at], found, polar)
 
 
-def _table(file: Path, text: str) -> tuple[list[str], list[list[float]]]:
-    """Header, empty if there is none, and rows of numbers, NaN for what is none."""
+def _table(file: Path, stream: TextIO) -> tuple[list[str], FloatArray]:
+    """Header, empty if there is none, and numbers by row and column, NaN for what is none."""
     headers: list[list[str]] = []
-    rows: list[list[float]] = []
-    bare = False
-    for number, raw in enumerate(text.splitlines(), 1):
-        line = raw.strip()
-        if not line:
-            continue
+    # a list of lists would take ten times the memory
+    numbers, rows, columns, bare = array("d"), 0, 0, False
+    for number, line in _lines(file, stream):
         comment = line.startswith(COMMENT)
         cells = _cells(line.lstrip("#%!/ ") if comment else line)
         values = [_number(cell) for cell in cells]
@@ -120,19 +127,40 @@ def _table(file: Path, text: str) -> tuple[list[str], list[list[float]]]:
             if not rows:
                 headers.append(cells)
                 bare |= not comment
+                if len(headers) > MOST_HEADERS:
+                    raise InvalidInputError(f"{file}, line {number}: more than {MOST_HEADERS} lines above the numbers")
             continue
-        if rows and len(values) != len(rows[0]):
-            raise InvalidInputError(f"{file}, line {number}: {len(values)} columns where {len(rows[0])} were before")
-        rows.append([np.nan if value is None else value for value in values])
-    if len(rows) < 2 or len(rows[0]) < 2:
+        if rows and len(values) != columns:
+            raise InvalidInputError(f"{file}, line {number}: {len(values)} columns where {columns} were before")
+        numbers.extend(np.nan if value is None else value for value in values)
+        rows, columns = rows + 1, len(values)
+        if rows > MOST_ROWS or len(numbers) > MOST_NUMBERS:
+            what = f"{MOST_ROWS} rows" if rows > MOST_ROWS else f"{MOST_NUMBERS} numbers"
+            raise InvalidInputError(f"{file}, line {number}: more than {what}; split the file")
+    if rows < 2 or columns < 2:
         raise InvalidInputError(f"{file} has no table of two columns and two rows of numbers or more")
     # the last line of words above the numbers that has as many cells names them
-    header = next((cells for cells in reversed(headers) if len(cells) == len(rows[0])), [])
+    header = next((cells for cells in reversed(headers) if len(cells) == columns), [])
     if bare and not header:
-        raise InvalidInputError(f"{file} has {len(rows[0])} columns, and no line that names as many")
+        raise InvalidInputError(f"{file} has {columns} columns, and no line that names as many")
     if len(set(header)) < len(header):
-        raise InvalidInputError(f"{file} names columns twice: {', '.join(header)}")
-    return header, rows
+        raise InvalidInputError(f"{file} names columns twice: {_listed(header)}")
+    return header, np.array(numbers).reshape(rows, columns)
+
+
+def _lines(file: Path, stream: TextIO) -> Iterator[tuple[int, str]]:
+    """Lines that are not empty, with their numbers; of one without an end no more is read than is needed to refuse."""
+    for number, raw in enumerate(iter(lambda: stream.readline(LONGEST + 2), ""), 1):
+        if len(raw) > LONGEST + 1:
+            raise InvalidInputError(f"{file}, line {number}: more than {LONGEST} characters")
+        if line := raw.strip():
+            yield number, line
+
+
+def _listed(names: list[str]) -> str:
+    """Names as a message has them: the first ones, each cut if long."""
+    more = f", and {len(names) - SHOWN} more" * (len(names) > SHOWN)
+    return ", ".join(name[:40] for name in names[:SHOWN]) + more
 
 
 def _cells(line: str) -> list[str]:

@@ -4,6 +4,7 @@ Numbers keep all 17 digits, so that what is read back is what was written.
 """
 
 import os
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, TextIO
 
@@ -14,6 +15,7 @@ from creeping.errors import InvalidInputError
 from creeping.files import cut_table as _cut_table
 from creeping.files import far_table as _far_table
 from creeping.files.polylines import polydata
+from creeping.geometry.unit import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -113,11 +115,12 @@ def write_csv(
         )
     with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
         if line is not None:
-            _write_table(stream, _LINE_NOTES, _line_rows(line))
+            _write_table(stream, _in_unit(_LINE_NOTES, unit_of(line.body)), _line_rows(line))
         elif fan is not None:
-            _write_table(stream, _FAN_NOTES, _fan_rows(fan))
+            _write_table(stream, _in_unit(_FAN_NOTES, unit_of(fan.body)), _fan_rows(fan))
         elif curves is not None:
-            _write_table(stream, _CURVE_NOTES, _curve_rows(curves))
+            unit = curves[0].unit if curves else UNKNOWN
+            _write_table(stream, _in_unit(_CURVE_NOTES, unit), _curve_rows(curves))
         elif far is not None:
             _write_table(stream, _far_table.notes(far, observed=observed is not None), _far_table.rows(far, observed))
         elif cut is not None:
@@ -149,10 +152,15 @@ _FAN_NOTES = {
 _CURVE_NOTES = {
     "curve": "number of the curve",
     "of": "travel_time or eikonal",
-    "level": "its constant value",
+    "level": "its constant value; L where the speed is 1",
     "closed": "1 if the last point joins the first",
     **_POSITION,
 }
+
+
+def _in_unit(notes: dict[str, str], unit: str) -> dict[str, str]:
+    """Notes with the unit of the body's lengths in place of L."""
+    return {name: re.sub(r"\bL\b", unit, note) for name, note in notes.items()}
 
 
 def _write_table(stream: TextIO, notes: dict[str, str], rows: Iterable[tuple[Any, ...]]) -> None:

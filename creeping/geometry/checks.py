@@ -10,6 +10,7 @@ from creeping.geometry.arguments import checked_body
 from creeping.geometry.creased import is_creased, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import triangulate
+from creeping.geometry.unit import UNKNOWN, unit_of
 
 
 @dataclass(frozen=True)
@@ -37,15 +38,18 @@ class SurfaceReport:
     genus : int or None
         Handles of the body; None of a body with creases, whose triangles need not fit.
     area : float
-        L^2, of a triangulation: a few digits.
+        In squares of the unit, of a triangulation: a few digits.
     pieces : int
         Smooth pieces that bound it.
+    unit : str
+        Of lengths: "m" where the body knows it, else "L".
     """
 
     checks: tuple[Check, ...]
     genus: int | None
     area: float
     pieces: int = 1
+    unit: str = UNKNOWN
 
     @property
     def ok(self) -> bool:
@@ -61,7 +65,7 @@ class SurfaceReport:
     def __repr__(self) -> str:
         rows = [f"  {'ok ' if c.ok else 'BAD'} {c.name}: {c.worst:.2g} (limit {c.limit:.2g})" for c in self.checks]
         made = f"{self.pieces} smooth pieces" if self.genus is None else f"genus {self.genus}"
-        return "\n".join([f"SurfaceReport({made}, area {self.area:.4g} L^2)", *rows])
+        return "\n".join([f"SurfaceReport({made}, area {self.area:.4g} {self.unit}^2)", *rows])
 
 
 def check_surface(body: Surface) -> SurfaceReport:
@@ -103,6 +107,7 @@ def check_surface(body: Surface) -> SurfaceReport:
         ),
         genus=components - mesh.euler_characteristic // 2,
         area=float(doubled_area.sum() / 2),
+        unit=unit_of(body),
     )
 
 
@@ -132,7 +137,7 @@ def _creased_report(body: Any) -> SurfaceReport:
                             "mend tiles()"))  # fmt: skip
         checks += [Check(f"piece {number}: {c.name}", c.worst, c.limit, c.remedy) for c in _derivative_checks(piece, x)]
     checks.append(Check("share of points where F has the wrong sign outside or inside", out, 0.01, "mend level()"))
-    return SurfaceReport(checks=tuple(checks), genus=None, area=area, pieces=len(pieces))
+    return SurfaceReport(checks=tuple(checks), genus=None, area=area, pieces=len(pieces), unit=unit_of(body))
 
 
 def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:

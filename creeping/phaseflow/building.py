@@ -252,8 +252,10 @@ def sampled_errors(sample: Callable[[int], FloatArray], count: int, most: int, *
 
 def upper_bound(errors: FloatArray) -> float:
     """Rms of errors (n,), of any unit, two standard errors of their squares above it."""
-    square = errors**2
-    return float(np.sqrt(np.mean(square) + 2 * np.std(square) / np.sqrt(len(square))))
+    # rays that a trial has thrown far away have errors whose fourth powers are no numbers; powers of two are exact
+    exponent = int(np.frexp(np.max(errors, initial=0.0))[1])
+    square = np.ldexp(errors, -exponent) ** 2
+    return float(np.ldexp(np.sqrt(np.mean(square) + 2 * np.std(square) / np.sqrt(len(square))), exponent))
 
 
 class Reference:

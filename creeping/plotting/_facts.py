@@ -9,6 +9,7 @@ import numpy as np
 from creeping._presenting import brief
 from creeping._typing import Any, FloatArray
 from creeping.files.far_table import angles_of
+from creeping.geometry.unit import UNKNOWN, unit_of
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
@@ -33,11 +34,12 @@ def of_line(line: "ShadowLine") -> Facts:
     yield "direction", _direction(line.direction)
     yield "curves", str(len(line.curves))
     yield "points", str(sum(len(curve.points) for curve in line.curves))
-    yield "length", f"{line.length:.10g} L"
-    yield from _shares(line.fractions, line.length)
+    unit = unit_of(line.body)
+    yield "length", f"{line.length:.10g} {unit}"
+    yield from _shares(line.fractions, line.length, unit)
     if len(line.curves) > 1:
         yield from _cut_short(
-            (f"curve {k}", f"{curve.length:.10g} L, {len(curve.arcs)} arcs") for k, curve in enumerate(line.curves)
+            (f"curve {k}", f"{curve.length:.10g} {unit}, {len(curve.arcs)} arcs") for k, curve in enumerate(line.curves)
         )
     worst = max((float(np.max(np.abs(curve.normals @ line.direction))) for curve in line.curves), default=0.0)
     yield "largest |n.d|", f"{worst:.1e}"
@@ -50,22 +52,25 @@ def of_shadow_curve(curve: "ShadowCurve") -> Facts:
     yield "body", brief(curve.body, 200)
     yield "direction", _direction(curve.direction)
     yield "points", str(len(curve.points))
-    yield "length", f"{curve.length:.10g} L"
-    yield from _shares(curve.fractions, curve.length)
+    unit = unit_of(curve.body)
+    yield "length", f"{curve.length:.10g} {unit}"
+    yield from _shares(curve.fractions, curve.length, unit)
     yield from _cut_short(
-        (f"arc {k}", f"{status}, from {start:.6g} to {end:.6g} L") for k, (start, end, status) in enumerate(curve.arcs)
+        (f"arc {k}", f"{status}, from {start:.6g} to {end:.6g} {unit}")
+        for k, (start, end, status) in enumerate(curve.arcs)
     )
     yield "largest |n.d|", f"{np.max(np.abs(curve.normals @ curve.direction)):.1e}"
-    yield "kappa_n(d)", _range(curve.curvature, "1/L")
+    yield "kappa_n(d)", _range(curve.curvature, f"1/{unit}")
 
 
 def of_fan(fan: "RayFan") -> Facts:
     """Facts of a fan."""
+    unit = unit_of(fan.body)
     yield "body", brief(fan.body, 200)
     yield "direction", _direction(fan.line.direction)
     yield "rays", str(len(fan.points))
     yield "steps", str(len(fan.travel_time))
-    yield "length", f"{fan.length:g}"
+    yield "length", f"{fan.length:g}" + f" {unit}" * (unit != UNKNOWN)
     yield "arcs", str(len(fan.closed_arcs))
     for name, count in fan.status_counts.items():
         yield name, f"{count} rays"
@@ -79,10 +84,10 @@ def of_fan(fan: "RayFan") -> Facts:
 
 def of_curve(curve: "IsoPhaseCurve") -> Facts:
     """Facts of an iso-phase curve."""
-    yield "level", f"{curve.of} = {curve.level:g}"
+    yield "level", f"{curve.of} = {curve.level:g}" + f" {curve.unit}" * (curve.unit != UNKNOWN)
     yield "points", str(len(curve.points))
     yield "closed", "yes" if curve.closed else "no"
-    yield "length", f"{curve.length:.6g} L"
+    yield "length", f"{curve.length:.6g} {curve.unit}"
     yield "theta", _range(np.degrees(curve.parameters[:, 0]), "degrees")
     yield "phi", _range(np.degrees(curve.parameters[:, 1]), "degrees")
     if len(curve.rays):
@@ -182,10 +187,10 @@ def _direction(d: FloatArray) -> str:
     return f"({', '.join(f'{x:.6g}' for x in d)}), theta {theta:.6g}°, phi {phi:.6g}°"
 
 
-def _shares(fractions: dict[str, float], length: float) -> Facts:
+def _shares(fractions: dict[str, float], length: float, unit: str) -> Facts:
     for status, share in fractions.items():
         if share:
-            yield status, f"{share:.6g} of the length, {share * length:.6g} L"
+            yield status, f"{share:.6g} of the length, {share * length:.6g} {unit}"
 
 
 def _range(values: FloatArray, unit: str) -> str:

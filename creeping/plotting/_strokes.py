@@ -8,6 +8,7 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.surface import size
+from creeping.geometry.unit import UNKNOWN
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -80,7 +81,7 @@ def strokes(
     for curve in curves:
         bound, free = curve_pieces(curve, fan, curve.points)
         # levels are read off the colour bar; a single one has none
-        label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
+        label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
         colour = colours(curve.level)
         found += [Stroke(bound, colour, 0.9, label=label, rank=1)] if bound else []
         found += [Stroke(free, colour, FADED_WIDTH, alpha=FADED, rank=1)] if free else []
@@ -219,11 +220,14 @@ class LevelColours:
         Range of the levels.
     name : str
         What they are levels of.
+    unit : str
+        Of the levels, which are lengths: "m" where the body knows it, else "L".
     """
 
     low: float
     high: float
     name: str
+    unit: str = UNKNOWN
 
     @classmethod
     def of(cls, curves: Sequence[IsoPhaseCurve]) -> "LevelColours":
@@ -232,7 +236,13 @@ class LevelColours:
         names = {curve.of for curve in curves}
         if len(names) > 1:
             raise InvalidInputError(f"the curves mix levels of {' and '.join(sorted(names))}; draw them apart")
-        return cls(min(levels), max(levels), LEVEL_NAMES.get("".join(names), "".join(names)))
+        units = {curve.unit for curve in curves}
+        unit = units.pop() if len(units) == 1 else UNKNOWN
+        return cls(min(levels), max(levels), LEVEL_NAMES.get("".join(names), "".join(names)), unit)
+
+    def words(self, level: float) -> str:
+        """What a level is, with its unit if one is known."""
+        return f"{self.name} = {level:g}" + f" {self.unit}" * (self.unit != UNKNOWN)
 
     @property
     def mappable(self) -> Any:
@@ -255,6 +265,7 @@ class LevelColours:
         """Colour bar, where there are two levels at least; ``place`` as for ``Figure.colorbar``."""
         if self.high > self.low:
             bar = figure.colorbar(self.mappable, **place)
-            bar.set_label(f"iso-phase curves: {self.name}", fontsize=8)
+            unit = f" ({self.unit})" * (self.unit != UNKNOWN)
+            bar.set_label(f"iso-phase curves: {self.name}{unit}", fontsize=8)
             bar.ax.tick_params(labelsize=8, width=0.5)
             bar.outline.set_linewidth(0.5)

@@ -13,6 +13,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.decibels import decibels, shown_range
 from creeping.geometry.surface import Surface, normal
+from creeping.geometry.unit import unit_of
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._view import View
 from creeping.plotting.colour_bar import add_bar, beyond
@@ -40,6 +41,7 @@ def currents_picture(
     backend: str = "auto",
     view: View | None = None,
     span: float = 60.0,
+    wave: str = "",
     cells: int | None = None,
     dpi: int = 300,
 ) -> str:
@@ -52,7 +54,7 @@ def currents_picture(
     currents : SurfaceCurrents
     incident : {"theta", "phi"}, optional
         Polarisation of the wave that a conductor's currents belong to; the rms of both if not given.
-    backend, view, span, cells, dpi
+    backend, view, span, wave, cells, dpi
         As of `surface_field_picture`.
 
     Returns
@@ -74,7 +76,8 @@ def currents_picture(
     )
     levels = current_levels(currents, drawing.mesh.vertices, incident)
     name = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
-    label = f"20 log$_{{10}}${name} (dB)\nk = {k:g}/L, {currents.boundary.kind}"
+    wave = wave or f"k = {k:g}/{unit_of(currents.body)}"
+    label = f"20 log$_{{10}}${name} (dB)\n{wave}, {currents.boundary.kind}"
     return save_painted(path, drawing, levels, span=span, label=label, bare="no current", backend=backend, dpi=dpi)
 
 

@@ -1,6 +1,7 @@
 """Pictures of an echo: against angle or frequency with the band of its error, as a map of both, and in range."""
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,7 +9,8 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.field.decibels import shown_range
 from creeping.field.echo import LEVELS
-from creeping.plotting.far_cuts import Curve, draw_cut
+from creeping.plotting.colour_bar import add_bar, beyond
+from creeping.plotting.far_cuts import Curve, draw_cut, minus
 from creeping.plotting.palette import GREY, curve_style
 from creeping.plotting.pictures import add_legend, new_figure, save_figure
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 PREFIXES = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
 SPAN = 60.0
 """Range of levels, dB."""
+VEIL = 0.7
+"""How much white hides of what is unresolved."""
 
 
 def echo_cut_picture(
@@ -43,6 +47,7 @@ def echo_cut_picture(
     """
     curves = _curves(echo, (slice(None), 0))
     heights = shown_range([curve.levels for curve in curves], SPAN)
+    curves = _told_if_low(curves, heights[0])
     figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
@@ -60,6 +65,7 @@ def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str 
     """Write a PNG of an echo against frequency at its first angle; arguments as of `echo_cut_picture`."""
     curves = _curves(echo, (0, slice(None)))
     low, high = shown_range([curve.levels for curve in curves], SPAN)
+    curves = _told_if_low(curves, low)
     scale, unit = _prefix(echo.hertz)
     figure = new_figure((6.4, 4.2))
     figure.set_layout_engine("constrained")
@@ -82,7 +88,13 @@ def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str 
 
 
 def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
-    """Write a PNG of an echo over angle and frequency, a panel for each channel; arguments as of `echo_cut_picture`."""
+    """Write a PNG of an echo over angle and frequency, a panel for each channel; arguments as of `echo_cut_picture`.
+
+    What is unresolved has a veil of white.
+    """
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
     levels = echo.levels()
     low, high = shown_range([levels], SPAN)
     scale, unit = _prefix(echo.hertz)
@@ -96,11 +108,19 @@ def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str =
         image = ax.pcolormesh(
             echo.angles, echo.hertz / scale, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest"
         )
+        doubtful = echo.unresolved[number]
+        veil = np.ma.masked_where(~doubtful, np.ones(doubtful.shape)).T
+        ax.pcolormesh(
+            echo.angles, echo.hertz / scale, veil, cmap=ListedColormap(["white"]), alpha=VEIL, shading="nearest"
+        )
         _dressed(
             ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})", channel if number else f"{title}\n{channel}"
         )
         ax.grid(visible=False)
-        figure.colorbar(image, ax=ax, label=_level(echo))
+        add_bar(figure, image, _level(echo), extend=beyond(levels[number], low, high), fontsize=9, ax=ax)
+    if echo.unresolved.any():
+        patch = Patch(facecolor="white", edgecolor=GREY, linewidth=0.5, label="veiled: unresolved")
+        figure.legend(handles=[patch], loc="outside lower center", frameon=False, fontsize=8)
     save_figure(figure, path, dpi)
 
 
@@ -119,7 +139,8 @@ def range_picture(
     ax = figure.add_subplot()
     curves = {channel: echo.levels(found.values) for channel, found in profiles.items()}
     low, high = shown_range(curves.values(), SPAN)
-    for number, (channel, found) in enumerate(profiles.items()):
+    # the legend lists what was drawn last first
+    for number, (channel, found) in reversed(list(enumerate(profiles.items()))):
         ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **curve_style(number))
     reach = next(iter(profiles.values())).range
     ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
@@ -153,12 +174,15 @@ def comparison_picture(
     figure = new_figure((6.4, 5.6))
     figure.set_layout_engine("constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-    for number, (channel, found) in enumerate(comparisons.items()):
+    # the legend lists what was drawn last first
+    for number, (channel, found) in reversed(list(enumerate(comparisons.items()))):
         x, style = found.values / scale, curve_style(number)
+        broad = {"linewidth": 3.2, "alpha": 0.3, "zorder": 1.9}
+        above.plot(x, found.reference, label=f"{channel}, given", **style | broad)
         above.plot(x, found.levels, label=channel, **style)
-        above.plot(x, found.reference, label=f"{channel}, given", **style | {"linewidth": 3.2, "alpha": 0.3})
         below.plot(x, found.residual, label=f"_{channel}", **style)
     below.axhline(0.0, color=GREY, linewidth=0.6)
+    below.margins(x=0)
     _dressed(above, "", _level(echo), title)
     _dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)", "")
     add_legend(above, fresh=True)
@@ -173,6 +197,16 @@ def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
         finite: FloatArray = np.where(np.isposinf(levels[here]), np.nan, levels[here])
         found.append(Curve(channel, finite, curve_style(number), bounds[(slice(None), *here)], echo.unresolved[here]))
     return found
+
+
+def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
+    """Curves, with a word in the legend for those that lie below the picture as a whole."""
+    return [
+        replace(curve, label=f"{curve.label}, below {minus(low)} dB")
+        if np.nanmax(curve.levels, initial=-np.inf) < low
+        else curve
+        for curve in curves
+    ]
 
 
 def _level(echo: "Echo") -> str:

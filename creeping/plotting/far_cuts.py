@@ -286,19 +286,33 @@ def _straight_axes(ax: Any, angle: FloatArray, heights: tuple[float, float], lab
 
 
 def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: str) -> None:
+    from matplotlib.patheffects import withStroke
+
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
-    ax.set_thetagrids(range(0, 360, 30), labels=[f"{v if v <= 180 else v - 360}°" for v in range(0, 360, 30)])
+    signed = [v if v <= 180 else v - 360 for v in range(0, 360, 30)]
+    ax.set_thetagrids(range(0, 360, 30), labels=[f"{minus(v)}°" for v in signed])
     low, high = heights
     step = next(s for s in (5, 10, 20, 50, 100, 1000) if (high - low) / s <= 6)
     rings = np.arange(step * np.ceil(low / step + 1e-9), high + 1e-9, step)
     ax.set_ylim(low, high)
-    # between two spokes, away from the forward lobe
-    ax.set_rgrids(rings, labels=[f"{v:g}" for v in rings], angle=165, fontsize=7, color="#5a6872")
+    ax.set_rgrids(rings, labels=[""] * len(rings))
+    # between two spokes, away from the forward lobe; over the curves, which may pass there
+    for text in [one for one in ax.texts if one.get_gid() == "ring"]:
+        text.remove()
+    halo = [withStroke(linewidth=2.0, foreground="white")]
+    look: dict[str, Any] = {"fontsize": 7, "color": "#5a6872", "ha": "center", "va": "center", "gid": "ring"}
+    for ring in rings:
+        ax.text(np.radians(165), ring, minus(ring), path_effects=halo, zorder=4, **look)
     ax.tick_params(axis="x", labelsize=8)
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.spines["polar"].set_linewidth(0.5)
     ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
+
+
+def minus(value: float) -> str:
+    """A number with a minus sign in place of a hyphen, as the numbers of straight axes have it."""
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _unit(fields: Mapping[str, Any]) -> str:

@@ -17,6 +17,7 @@ from creeping.field.decibels import decibels, shown_range
 from creeping.field.on_body import surface_field
 from creeping.field.point_result import SurfaceField
 from creeping.field.surface import scalar_boundary
+from creeping.geometry.unit import unit_of
 from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays
 from creeping.plotting._view import View
@@ -41,6 +42,7 @@ def surface_field_picture(
     span: float = 60.0,
     fronts: bool = False,
     phase: float = 0.0,
+    wave: str = "",
     cells: int | None = None,
     dpi: int = 300,
 ) -> str:
@@ -65,6 +67,8 @@ def surface_field_picture(
         Whether to draw wave fronts, Re(u e^{-i phase}) = 0, where the field is OK.
     phase : float, radians
         omega t.
+    wave : str
+        What the picture says of the wave; the wavenumber if not given.
     cells : int, optional
         Fineness of the body, cells along each side of its box; by default eight a wavelength, within 48 to 96.
     dpi : int
@@ -90,7 +94,7 @@ def surface_field_picture(
     if fronts:
         drawing = with_fronts(drawing, field, phase)
     levels = _levels(field, kind)
-    label = f"{_name(kind)}\nk = {k:g}/L, {_boundary_name(kind)}"
+    label = f"{_name(kind)}\n{wave or f'k = {k:g}/{unit_of(fan.body)}'}, {_boundary_name(kind)}"
     return save_painted(path, drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
 
 
@@ -164,9 +168,9 @@ def decay_picture(
         _draw_decay(ax, fan, ray, level, curve_style(number, 1.2))
     ax.set_xlim(0.0, float(fan.travel_time[-1]))
     ax.set_ylim(low, high)
-    ax.set_xlabel("arclength from the shadow line (L)", fontsize=9)
+    ax.set_xlabel(f"arclength from the shadow line ({unit_of(fan.body)})", fontsize=9)
     ax.set_ylabel(_name(kind), fontsize=9)
-    ax.set_title(f"Field of single rays, k = {k:g}/L, {_boundary_name(kind)} boundary", fontsize=9)
+    ax.set_title(f"Field of single rays, k = {k:g}/{unit_of(fan.body)}, {_boundary_name(kind)} boundary", fontsize=9)
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
     handles = ax.get_legend_handles_labels()[0]

@@ -9,6 +9,7 @@ from creeping._presenting import brief
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import shown_range
+from creeping.geometry.unit import unit_of
 from creeping.plotting._cut_angles import CutAngles, cut_angles
 from creeping.plotting.far_cuts import Curve, checked_angles, cut_curves, draw_cut
 from creeping.plotting.palette import COLOURS, GREY, curve_style
@@ -142,7 +143,7 @@ def plot_growth(flow: "PhaseMap", ax: Any = None, *, tolerance: float | None = N
         ax.axhline(tolerance, color=GREY, linewidth=0.9, linestyle=":", label=f"tolerance {tolerance:.3g}")
     ax.set_yscale("log")
     weighted = getattr(flow.body, "speed", None) is not None
-    ax.set_xlabel("travel time of the ray" if weighted else "length of the ray (L)", fontsize=9)
+    ax.set_xlabel("travel time of the ray" if weighted else f"length of the ray ({unit_of(flow.body)})", fontsize=9)
     ax.set_ylabel("error of (x, p)", fontsize=9)
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5, which="both")

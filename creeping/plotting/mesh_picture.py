@@ -91,13 +91,17 @@ def _draw(figure: Any, bottom: float, height: float, mesh: MeshValues, label: st
         # edges in the colour of the face close the hairlines between triangles
         ax.add_collection(PolyCollection(list(flat), facecolors=shade, edgecolors=shade, linewidths=0.3))
         seen = np.intersect1d(np.flatnonzero(mesh.bad), mesh.triangles[front])
-        ax.plot(*view.project(mesh.vertices[seen]).T, ".", color=BAD_COLOUR, markersize=2.5)
+        dots = view.project(mesh.vertices[seen]).T
+        # rims of white: red on dark blue is hard to see for the colour-blind
+        ax.plot(*dots, ".", color="white", markersize=6.0, markeredgewidth=0)
+        ax.plot(*dots, ".", color=BAD_COLOUR, markersize=3.6, markeredgewidth=0)
         ax.autoscale_view()
         ax.set_aspect("equal")
         ax.set_axis_off()
     rough = f"{int(mesh.bad.sum())} of {len(mesh.vertices)} vertices rough"
     figure.text(0.02, bottom + 0.94 * height, mesh.title, fontsize=9, va="center")
-    figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=BAD_COLOUR)
+    colour = BAD_COLOUR if mesh.bad.any() else "black"
+    figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=colour)
     bar = figure.colorbar(
         colours, cax=figure.add_axes((0.885, bottom + 0.1 * height, 0.018, 0.76 * height)), extend="min"
     )

@@ -24,5 +24,14 @@ EXACT = "#111111"
 
 
 def curve_style(number: int, width: float = 1.3) -> dict[str, Any]:
-    """Look of a curve by its number in a picture, for matplotlib."""
-    return {"color": COLOURS[number % len(COLOURS)], "linestyle": STYLES[number % len(STYLES)], "linewidth": width}
+    """Look of a curve by its number in a picture, for matplotlib.
+
+    Later ones lie on top: of two that agree the broken one shows the other through its gaps.
+    """
+    colour, style = number % len(COLOURS), number % len(STYLES)
+    return {
+        "color": COLOURS[colour],
+        "linestyle": STYLES[style],
+        "linewidth": width,
+        "zorder": 2.0 + 0.01 * style,
+    }

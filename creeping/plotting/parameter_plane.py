@@ -83,7 +83,7 @@ def draw_curves(ax: Any, curves: Sequence[IsoPhaseCurve], fan: RayFan | None = N
     colours = LevelColours.of(curves)
     for curve in curves:
         # levels are read off the colour bar; a single one has none
-        label = "" if colours.high > colours.low or curve is not curves[0] else f"{colours.name} = {curve.level:g}"
+        label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
         bound, free = (
             [piece for part in parts for piece in split_at_seam(part, closed=False)]
             for parts in curve_pieces(curve, fan, curve.parameters)

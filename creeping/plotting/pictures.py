@@ -123,7 +123,7 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
     draw = _draw_pyvista if backend == "pyvista" else _draw_matplotlib
     draw(figure, place, drawing, dpi)
     left, bottom, width, height = place
-    return figure, (left + width + 0.03, bottom + 0.12 * height, 0.022, 0.76 * height)
+    return figure, (left + width + 0.02, bottom + 0.12 * height, 0.022, 0.76 * height)
 
 
 def new_figure(inches: tuple[float, float]) -> Any:

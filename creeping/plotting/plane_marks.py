@@ -10,6 +10,9 @@ from creeping.field.cut_result import FieldCut, grid_points, status_words
 from creeping.field.point_result import FieldStatus
 from creeping.plotting.coloured_body import NOTHING
 
+FRONT = "#ffffff"
+"""Colour of wave fronts."""
+
 SECTION = "#5a6872"
 """Colour of the body's section."""
 HATCH, HATCHED = "///", "#6d767d"
@@ -106,10 +109,11 @@ def _place(cut: FieldCut) -> str:
     return f", through ({', '.join(f'{v:.4g}' for v in cut.point + 0.0)})"
 
 
-def add_cut_legend(cut: FieldCut, ax: Any, *, fresh: bool) -> None:
+def add_cut_legend(cut: FieldCut, ax: Any, *, fresh: bool, fronts: bool = False) -> None:
     """Legend below a new figure, or on axes that were given."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
+    from matplotlib.patheffects import withStroke
 
     handles: list[Any] = []
     if np.any(~cut.outside):
@@ -117,6 +121,10 @@ def add_cut_legend(cut: FieldCut, ax: Any, *, fresh: bool) -> None:
     if len(cut.shadow_points()):
         look: dict[str, Any] = {"color": "#111111", "markeredgecolor": "#ffffff", "markersize": 5}
         handles.append(Line2D([], [], marker="o", linestyle="none", label="shadow line", **look))
+    if fronts:
+        # white on white would not be seen
+        around = [withStroke(linewidth=4.0, foreground="#8c4a6e")]
+        handles.append(Line2D([], [], color=FRONT, linewidth=1.0, path_effects=around, label="wave front"))
     if words := status_words(cut):
         face, edge = (NOTHING, HATCHED) if np.any(missing_of(cut)) else DOUBTFUL
         handles.append(Patch(facecolor=face, edgecolor=edge, linewidth=0, hatch=HATCH, label=f"not OK: {words}"))

@@ -15,10 +15,9 @@ from creeping.plotting.body_fronts import LEAST_SAMPLES
 from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.coloured_body import NOTHING
 from creeping.plotting.pictures import axes_or_new, new_figure, save_figure
-from creeping.plotting.plane_marks import add_cut_legend, dress, hatch, missing_of
+from creeping.plotting.plane_marks import FRONT, add_cut_legend, dress, hatch, missing_of
 
 SHOWS = ("level", "magnitude", "wave")
-FRONT = "#ffffff"
 MOST_FRONTS = 40.0
 """Wavelengths across a picture up to which it has wave fronts unless they are asked for."""
 PAGE = 6.4  # inches
@@ -72,7 +71,7 @@ def plot_field_cut(
     if fresh:
         ax.set_title(_title(cut), fontsize=9, parse_math=False)
     if fresh if legend is None else legend:
-        add_cut_legend(cut, ax, fresh=fresh)
+        add_cut_legend(cut, ax, fresh=fresh, fronts=_with_fronts(cut, show, fronts))
     return ax
 
 
@@ -133,7 +132,7 @@ def field_cut_picture(
         panels[0].set_xlabel("")
         _draw_error(cut, panels[1], span)
     panels[0].set_title(title or _title(cut), fontsize=9, parse_math=False)
-    add_cut_legend(cut, panels[0], fresh=True)
+    add_cut_legend(cut, panels[0], fresh=True, fronts=_with_fronts(cut, show, fronts))
     save_figure(figure, path, dpi)
 
 

@@ -32,6 +32,7 @@ from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
+from creeping.geometry.unit import unit_of
 from creeping.rays.ends import ends_of
 from creeping.rays.losses import Losses, losses_of
 from creeping.rays.reach import AUTO, IN_RANGE, ray_length
@@ -179,7 +180,8 @@ class RayFan(DrawnOnBody):
         counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
         error = f"rms {self.error.rms:.1e}, max {self.error.max:.1e} ({self.error.samples} rays traced)"
         arcs = len(self.closed_arcs)
-        sharpest = "" if np.isnan(self.least_radius) else f"; radius of curvature {self.least_radius:.3g} L at least"
+        radius = f"; radius of curvature {self.least_radius:.3g} {unit_of(self.body)} at least"
+        sharpest = "" if np.isnan(self.least_radius) else radius
         return (
             f"RayFan({len(self.points)} rays x {len(self.travel_time)} steps to {self.length:g}, "
             f"{arcs} arc{'s' * (arcs != 1)}, on {brief(self.body)})\n"

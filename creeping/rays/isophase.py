@@ -22,6 +22,7 @@ from creeping.geometry.arguments import flag, one_of, real_array
 from creeping.geometry.creased import is_creased
 from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import project
+from creeping.geometry.unit import UNKNOWN, unit_of
 from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
 from creeping.rays.status import AT_CREASES
@@ -46,6 +47,8 @@ class IsoPhaseCurve(DrawnOnBody):
         (theta, phi) of the points, radians; not unwrapped.
     rays : (m,)
         The ray of the fan that each point lies on.
+    unit : str
+        Of lengths: "m" where the body knows it, else "L".
 
     Examples
     --------
@@ -65,6 +68,7 @@ class IsoPhaseCurve(DrawnOnBody):
     closed: bool
     parameters: FloatArray
     rays: IntArray
+    unit: str = UNKNOWN
 
     @property
     def parameter_pieces(self) -> list[FloatArray]:
@@ -81,7 +85,8 @@ class IsoPhaseCurve(DrawnOnBody):
         shape = "closed" if self.closed else "open"
         missing = int(np.sum(~np.all(np.isfinite(self.points), axis=1)))
         return (
-            f"IsoPhaseCurve({self.of} = {self.level:g}, {len(self.points)} points, {shape}, length {self.length:.4g} L"
+            f"IsoPhaseCurve({self.of} = {self.level:g}, {len(self.points)} points, {shape}, "
+            f"length {self.length:.4g} {self.unit}"
             f"{f'; {missing} points not finite' * (missing > 0)})"
         )
 
@@ -150,7 +155,8 @@ def iso_phase_curves(
     parameters = fan.body.parameters(points)
     ends = np.cumsum([len(run) for _, run, _, _ in pieces])[:-1]
     parts = zip(pieces, np.split(points, ends), np.split(parameters, ends), strict=True)
-    return [IsoPhaseCurve(level, of, x, closed, angles, run) for (level, run, _, closed), x, angles in parts]
+    unit = unit_of(fan.body)
+    return [IsoPhaseCurve(level, of, x, closed, angles, run, unit) for (level, run, _, closed), x, angles in parts]
 
 
 def _whole_steps(fan: RayFan) -> FloatArray:

@@ -15,6 +15,7 @@ from creeping._presenting import DrawnOnBody
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.surface import Surface
+from creeping.geometry.unit import unit_of
 from creeping.shadow.nodes import LineNodes, polished
 from creeping.shadow.panels import PanelCurve, fit_panels
 from creeping.shadow.status import CONCAVE, STATUSES
@@ -123,12 +124,12 @@ class ShadowCurve(DrawnOnBody):
         return polished(self.body, self.direction, points)[0].reshape(*s.shape, 3)
 
     def __repr__(self) -> str:
-        n_dot_d = np.abs(self.normals @ self.direction)
+        n_dot_d, unit = np.abs(self.normals @ self.direction), unit_of(self.body)
         return (
-            f"ShadowCurve({len(self.points)} points, length {self.length:.10g} L)\n"
+            f"ShadowCurve({len(self.points)} points, length {self.length:.10g} {unit})\n"
             f"  {spelled(self.fractions)}; {counted(len(self.arcs), 'arc')}\n"
             f"  |n.d| at most {np.max(n_dot_d):.1e}; "
-            f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/L"
+            f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/{unit}"
         )
 
 

@@ -23,6 +23,7 @@ from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, normal
+from creeping.geometry.unit import unit_of
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.creased import creased_curves, launched_from
 from creeping.shadow.curve import ShadowCurve, counted, interpolated, spelled
@@ -122,7 +123,8 @@ class ShadowLine(DrawnOnBody):
         points = sum(len(curve.points) for curve in self.curves)
         on_edges = f"; {self.edge_share:.4g} of it on edges and tips" if self.edge_share else ""
         return (
-            f"ShadowLine({counted(len(self.curves), 'curve')}, {points} points, length {self.length:.10g} L, "
+            f"ShadowLine({counted(len(self.curves), 'curve')}, {points} points, "
+            f"length {self.length:.10g} {unit_of(self.body)}, "
             f"direction ({direction}))\n"
             f"  {spelled(self.fractions)}{on_edges}; on {brief(self.body)}\n"
             f"  |n.d| at most {worst:.1e}; singular distance {self.singular_distance:.3g}"

@@ -1,5 +1,7 @@
 """Fields of many incidences on a body with edges, joints or tips: of each alone, as `creeping.far_field` has them."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from creeping._typing import Any, FloatArray
@@ -32,16 +34,21 @@ def creased_lines(
 
 
 def fill_creased(
-    flow: Flow, request: SweepRequest, lines: tuple[ShadowLine | None, ...], out: dict[str, np.ndarray[Any, Any]]
+    flow: Flow,
+    request: SweepRequest,
+    lines: tuple[ShadowLine | None, ...],
+    out: dict[str, np.ndarray[Any, Any]],
+    passed: Callable[[float], None] = lambda _: None,
 ) -> None:
-    """Fields of incidences with these lines into arrays whose first axis is the incidence."""
+    """Fields of incidences with these lines into arrays whose first axis is the incidence; ``passed`` of `Sweeper`."""
     bistatic = request.quantity == "bistatic"
+    each = len(request.problems) * len(request.wavenumbers)
     for row, line in enumerate(lines):
         if line is None:
             continue
         fan = launch(flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
         observers = np.array(request.observation) if bistatic else -line.direction[None]
-        for name, which, suffix in request.problems:
+        for problem, (name, which, suffix) in enumerate(request.problems):
             boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
                 asked: dict[str, Any] = {"boundary": boundary, "order": request.order, "method": request.method}
@@ -57,3 +64,4 @@ def fill_creased(
                     numbers = (field.validity.least_k_rho, field.validity.largest_transverse)
                     for known, value in zip(VALID, numbers, strict=True):
                         out[known][row, k] = value
+                passed((row + (problem * len(request.wavenumbers) + k + 1) / each) / len(lines))

@@ -64,7 +64,7 @@ def backscatter(
     cache : bool
         Whether a phase map is kept for the next run.
     progress : callable, optional
-        Called as ``progress(done, total, seconds)``.
+        Called as ``progress(done, total, seconds)``, as by `creeping.sweep_directions`.
 
     Returns
     -------

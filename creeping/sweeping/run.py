@@ -22,14 +22,17 @@ from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.mending import mended
 from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.sweeper import Passed, Sweeper
 
 if TYPE_CHECKING:
     import xarray
 
 IN_MEMORY = 8_000_000_000
 """Bytes of results beyond which a store is asked for."""
-Progress = Callable[[int, int, float], None]
+Progress = Callable[[float, int, float], None]
 """Called with incidences done, incidences to do, and seconds."""
+EVERY = 1.0
+"""Seconds between reports within a task."""
 
 
 def sweep_directions(
@@ -96,7 +99,8 @@ def sweep_directions(
     chunk : int, optional
         Incidences of one task; a store that exists keeps its own.
     progress : callable, optional
-        Called as ``progress(done, total, seconds)`` after each task.
+        Called as ``progress(done, total, seconds)`` with incidences after each task, and where fields take long between
+        its frequencies too, about once a second: ``done`` has a fraction then.
 
     Returns
     -------
@@ -175,6 +179,8 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Datas
     guard = FirstTaskGuard()
     for task in range(plan.tasks):
         rows = plan.rows(task)
+        if progress and isinstance(sweeper, Sweeper):
+            sweeper.passed = _within(rows, count, started, progress)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():
             values[rows] = found[name]
@@ -183,6 +189,20 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Datas
         if progress:
             progress(rows.stop, count, time.perf_counter() - started)
     return as_dataset(plan, arrays, errors, time.perf_counter() - started)
+
+
+def _within(rows: slice, count: int, started: float, progress: Progress) -> Passed:
+    """What tells the progress within a task, but for its end."""
+    last = time.perf_counter()
+
+    def passed(share: float) -> None:
+        nonlocal last
+        now = time.perf_counter()
+        if share < 1 and now - last >= EVERY:
+            last = now
+            progress(rows.start + share * (rows.stop - rows.start), count, now - started)
+
+    return passed
 
 
 def open_store(

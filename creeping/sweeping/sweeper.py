@@ -38,6 +38,8 @@ Arrays = dict[str, np.ndarray[Any, Any]]
 Made = tuple[IntArray, FarGeometry, list[Parts]]
 """Rows of incidences, and what their fields are made of, one `Parts` for each boundary and wavenumber."""
 Told = Callable[[IntArray, FarGeometry, list[Parts]], None]
+Passed = Callable[[float], None]
+"""Called with the share that is done, above 0 and up to 1."""
 
 
 def outputs_of(body: Surface, request: SweepRequest) -> int:
@@ -57,6 +59,11 @@ class Sweeper:
     flow : PhaseMap or DirectFlow
     request : SweepRequest
 
+    Attributes
+    ----------
+    passed : callable
+        Called with the share of the incidences of a call whose fields are done, after each frequency and boundary.
+
     Raises
     ------
     InvalidInputError
@@ -65,6 +72,7 @@ class Sweeper:
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
+        self.passed: Passed = lambda _: None
         self._one_by_one = request.quantity != "rays" and is_creased(flow.body)
         together = request.quantity != "rays" and not self._one_by_one
         self._tracer = RayTracer(flow.body, request.length) if together else None
@@ -88,25 +96,30 @@ class Sweeper:
         batch = max(1, together // self.request.n_rays)
         for first in range(0, len(incidences), batch):
             part = slice(first, first + batch)
-            made = self._batch(incidences[part], {name: values[part] for name, values in out.items()})
+            count = len(incidences[part])
+
+            def passed(share: float, first: int = first, count: int = count) -> None:
+                self.passed((first + share * count) / len(incidences))
+
+            made = self._batch(incidences[part], {name: values[part] for name, values in out.items()}, passed)
             if told and made:
                 told(first + made[0], *made[1:])
         return out
 
-    def _batch(self, incidences: FloatArray, out: dict[str, Any]) -> Made | None:
+    def _batch(self, incidences: FloatArray, out: dict[str, Any], passed: Passed) -> Made | None:
         if self._one_by_one:
             found, lines = creased_lines(self.body, incidences, self.request.n_rays)
             fill_lines(lines, out)
-            fill_creased(self.flow, self.request, found, out)
+            fill_creased(self.flow, self.request, found, out, passed)
             return None
         lines = shadow_lines(self.body, incidences, self.request.n_rays)
         fill_lines(lines, out)
         if self._tracer is None:
             fill_rays(self.flow, lines, self.request.travel_times, out)
             return None
-        return self._fill_fields(lines, self._tracer, out)
+        return self._fill_fields(lines, self._tracer, out, passed)
 
-    def _fill_fields(self, lines: ShadowLines, tracer: RayTracer, out: dict[str, Any]) -> Made | None:
+    def _fill_fields(self, lines: ShadowLines, tracer: RayTracer, out: dict[str, Any], passed: Passed) -> Made | None:
         rows = np.flatnonzero(lines.status != SINGULAR)
         if not len(rows):
             return None
@@ -152,6 +165,7 @@ class Sweeper:
                 for part, values in field.arrays.items():
                     if part + suffix in out:
                         out[part + suffix][(rows, *which, k)] = values if bistatic else values[:, 0]
+                passed(len(made) / (len(request.problems) * len(request.wavenumbers)))
         return rows, geometry, made
 
     def _fan(self, direction: FloatArray) -> RayFan:

@@ -120,7 +120,7 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
         drawn[path.name] = (len(angles), list(fields), words)
 
     monkeypatch.setattr("creeping.plotting.far_cut_picture", picture)
-    monkeypatch.setattr("creeping.plotting.currents_picture", lambda *_, **__: None)
+    monkeypatch.setattr("creeping.plotting.currents_picture", lambda *_, wave, **__: drawn.update(wave=wave))
     asked = {"polarisation": "HV,VV", "frequency": "0.5GHz"}
     job = run_field.job(None, "pec", ["cut:90", "cut:0", "cut:0:20"], X, **asked)
     body = sc.Sphere()
@@ -128,6 +128,7 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
     entry, names = job.write(job.far_field(fan)[0], fan, tmp_path, "matplotlib", "ball$")
     assert {"far.png", "far_2.png", "far.csv"} <= set(names) and entry["unit"] == "m"
     assert drawn["far.png"][:2] == (361, ["φ = 90°", "φ = 0°"]) and drawn["far_2.png"][0] == 19
+    assert drawn["wave"].startswith("500 MHz, k = ") and drawn["wave"].endswith("/m")
     words = drawn["far.png"][2]
     assert words["components"] == ("pt", "tt") and words["quantity"] == "rcs"
     assert words["title"].startswith("ball\\$\n500 MHz, k = ") and words["title"].endswith(", pec")

@@ -49,6 +49,21 @@ def test_planes_are_written(tmp_path, capsys):
     assert np.median(np.abs(values[away] - exact)) < 0.03
 
 
+def test_a_frequency_makes_the_lengths_of_a_plane_metres(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("creeping.plotting.field_cut_picture", lambda _, cut, **words: drawn.append((cut, words)))
+    body = sc.Sphere()
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, (1, 0, 0)), length=2.0, n_rays=24)
+    for asked, unit in (({"frequency": "0.3GHz"}, "m"), ({}, "L")):
+        job = run_field.job(None if asked else 6.0, "hard", None, (1, 0, 0), **asked)
+        planes = run_plane.asked_planes(["xy:0.4"], job, body)
+        run_plane.write_planes(planes, job, fan, tmp_path, "ball", lambda _: None, pictures=True)
+        cut, words = drawn.pop()
+        assert cut.field.length_unit == unit and words["title"].endswith(f"/{unit}, hard")
+        notes = [row for row in (tmp_path / "plane.csv").read_text().splitlines() if row.startswith("#")]
+        assert any(note.endswith(f", {unit}") for note in notes)
+
+
 @pytest.mark.parametrize(("first", "each"), [(60.0, 1e-3), (0.0, 0.02)])
 def test_seconds_are_those_of_all_points_without_what_is_made_once(monkeypatch, first, each):
     """By a clock of our own: kernels and currents take their time once, points each time."""

@@ -5,7 +5,7 @@ import pytest
 from fake_fields import echo_of
 
 import creeping as cr
-from creeping.files import read_cut, write_echo
+from creeping.files import measured, read_cut, write_echo
 
 
 def written(tmp_path, text):
@@ -107,3 +107,36 @@ def test_the_column_that_varies_is_the_angle(tmp_path, text):
 def test_tables_that_would_be_misread_are_refused(tmp_path, text):
     with pytest.raises(cr.InvalidInputError):
         read_cut(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("bound", "text", "said"),
+    [
+        ({"MOST_BYTES": 10}, "angle,HH\n0,1\n1,2\n", "0 MB"),
+        ({"MOST_ROWS": 2}, "angle,HH\n0,1\n1,2\n2,3\n", "line 4: more than 2 rows"),
+        ({"MOST_NUMBERS": 4}, "angle,HH\n0,1\n1,2\n2,3\n", "line 4: more than 4 numbers"),
+        ({"MOST_HEADERS": 1}, "# a\n# b\n0,1\n1,2\n", "line 2: more than 1 lines"),
+        ({"LONGEST": 20}, "angle,HH\n0," + "1" * 19 + "\n1,2\n", "line 2: more than 20 characters"),
+    ],
+)
+def test_tables_that_are_too_large_are_refused(tmp_path, monkeypatch, bound, text, said):
+    for name, most in bound.items():
+        monkeypatch.setattr(measured, name, most)
+    with pytest.raises(cr.InvalidInputError, match=said):
+        read_cut(written(tmp_path, text))
+
+
+def test_a_line_without_an_end_is_not_read_to_its_end(tmp_path):
+    file = tmp_path / "endless.csv"
+    with file.open("wb") as stream:
+        stream.truncate(measured.MOST_BYTES - 1)
+    with pytest.raises(cr.InvalidInputError, match="line 1: more than"):
+        read_cut(file)
+
+
+def test_messages_list_few_columns(tmp_path):
+    names = ["angle", *(f"phase {i}" for i in range(200))]
+    text = ",".join(names) + "\n" + (",".join("1" * 201) + "\n") * 2
+    with pytest.raises(cr.InvalidInputError, match="and 189 more") as refused:
+        read_cut(written(tmp_path, text))
+    assert len(str(refused.value)) < 500

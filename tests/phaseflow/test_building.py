@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.phaseflow.building import measure
+from creeping.phaseflow.building import measure, upper_bound
 
 EXAMPLES = {
     1: (sc.Ellipsoid(1.2, 0.8, 0.8), (16, 64), 5e-6),
@@ -95,3 +95,13 @@ def test_grid_too_coarse_for_the_tolerance_says_which_does():
 def test_unreachable_tolerance_says_what_was_reached():
     with pytest.raises(cr.CreepingError, match="the best"):
         cr.build_phase_map(sc.TwistedEllipsoid(), tolerance=1e-9, horizon=4.0, cache=False)
+
+
+def test_the_bound_of_an_error_holds_for_any_size():
+    rng = np.random.default_rng(5)
+    errors = np.abs(rng.normal(size=40))
+    square = errors**2
+    plain = float(np.sqrt(np.mean(square) + 2 * np.std(square) / np.sqrt(len(square))))
+    for scale in (1.0, 2.0**-300, 2.0**300):
+        assert upper_bound(scale * errors) == scale * plain
+    assert upper_bound(np.zeros(3)) == 0.0

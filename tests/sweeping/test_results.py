@@ -1,5 +1,7 @@
 """Datasets of sweeps: what stands in them, that files keep it, and that bad input is refused with what is wrong."""
 
+import itertools
+
 import fake_sweeps as fake
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.storage import extras
 from creeping.sweeping import results as dataset
+from creeping.sweeping import run
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.run import in_memory
@@ -150,3 +153,15 @@ def test_rays_of_a_sweep_are_as_long_as_the_lowest_wavenumber_asks():
     short = {"length": 0.4, "n_rays": 16, "wavenumbers": 40.0, "boundary": "hard"}
     seen = cr.sweep_directions(flow, [(0, 0, 1)], quantity="bistatic", observation=[(0, 4, 3), (0, 0, -1)], **short)
     assert seen.unresolved.values.ravel().tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    "body", [sc.Sphere(), sc.Implicit("max(x**2 + y**2 + z**2 - 1, x**2 + y**2 + (z - 1)**2 - 1)")]
+)
+def test_progress_is_told_between_the_frequencies_of_one_direction(monkeypatch, body):
+    monkeypatch.setattr(run, "EVERY", 0.0)
+    seen = []
+    asked = {"wavenumbers": [10.0, 11.0, 12.0, 13.0], "n_rays": 16, "length": 2.0}
+    cr.sweep_directions(cr.DirectFlow(body, rtol=1e-6), [(0, 0.6, 0.8)], progress=lambda *a: seen.append(a), **asked)
+    assert [one[:2] for one in seen] == [(0.25, 1), (0.5, 1), (0.75, 1), (1, 1)]
+    assert all(first[2] <= second[2] for first, second in itertools.pairwise(seen))

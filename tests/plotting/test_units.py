@@ -1,0 +1,90 @@
+"""Results of a body whose lengths are metres say so, in words, tables and pictures."""
+
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.files import write_csv
+from creeping.plotting import _facts, _strokes, coloured_body, field_pictures, parameter_plane
+from creeping.plotting.coloured_body import currents_picture
+from creeping.plotting.field_pictures import decay_picture, surface_field_picture
+
+
+class Ball(sc.Sphere):
+    """As a body from a file is."""
+
+    unit = "m"
+
+
+@pytest.fixture(scope="module")
+def fan():
+    ball = Ball()
+    return cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, (0, 0.6, 0.8)), length=2.0, n_rays=24)
+
+
+def test_words_and_facts(fan):
+    (curve,) = cr.iso_phase_curves(fan, 1.0)
+    assert curve.unit == "m"
+    for one in (fan.line, fan.line.curves[0], fan, curve):
+        assert " m" in repr(one) and not any(word in repr(one) for word in (" L,", " L)", " L\n", "/L", " L at"))
+    facts = [_facts.of_line(fan.line), _facts.of_shadow_curve(fan.line.curves[0])]
+    facts += [_facts.of_fan(fan), _facts.of_curve(curve)]
+    for rows in facts:
+        told = dict(rows)
+        assert told["length"].endswith(" m")
+        assert not any(value.endswith(("L", "/L")) for value in told.values())
+
+
+def test_tables(fan, tmp_path):
+    curves = cr.iso_phase_curves(fan, 1.0)
+    for name, given in (("line", {"line": fan.line}), ("fan", {"fan": fan}), ("curves", {"curves": curves})):
+        write_csv(tmp_path / f"{name}.csv", **given)
+        notes = [row for row in (tmp_path / f"{name}.csv").read_text().splitlines() if row.startswith("#")]
+        assert "# x: position, m" in notes and not any(note.endswith(" L") or " L " in note for note in notes)
+    assert "# kappa_n: normal curvature along the ray, 1/m, positive where convex" in (
+        (tmp_path / "fan.csv").read_text()
+    )
+
+
+def test_levels_and_bars(fan):
+    curves = cr.iso_phase_curves(fan, [0.5, 1.0])
+    assert _strokes.LevelColours.of(curves).words(0.5) == "travel time = 0.5 m"
+    ax = parameter_plane.plot_parameters(fan.line, fan, curves)
+    labels = [one.get_ylabel() for one in (*ax.figure.axes, *ax.child_axes)]
+    assert "iso-phase curves: travel time (m)" in labels
+
+
+def labelled(monkeypatch, module, name):
+    """Labels of the painted bodies that a module would write."""
+    said = []
+    monkeypatch.setattr(module, name, lambda *_, label, **__: said.append(label) or "matplotlib")
+    return said
+
+
+def test_painted_bodies_say_the_wave(fan, monkeypatch, tmp_path):
+    said = labelled(monkeypatch, field_pictures, "save_painted")
+    asked = {"wavenumber": 12.0, "boundary": "hard", "cells": 48, "backend": "matplotlib"}
+    surface_field_picture(tmp_path / "a.png", fan, **asked)
+    surface_field_picture(tmp_path / "b.png", fan, wave="38 kHz", **asked)
+    assert said[0].endswith("k = 12/m, hard") and said[1].endswith("38 kHz, hard")
+    said = labelled(monkeypatch, coloured_body, "save_painted")
+    currents = cr.surface_currents(fan, wavenumber=12.0, boundary="hard")
+    currents_picture(tmp_path / "c.png", currents, cells=48, backend="matplotlib")
+    assert said[0].endswith("k = 12/m, hard")
+
+
+def test_decay(fan, monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr(field_pictures, "save_figure", lambda figure, *_: drawn.append(figure.axes[0]))
+    decay_picture(tmp_path / "a.png", fan, wavenumber=12.0, boundary="hard")
+    assert drawn[0].get_xlabel() == "arclength from the shadow line (m)"
+    assert drawn[0].get_title() == "Field of single rays, k = 12/m, hard boundary"
+
+
+def test_axes_of_a_plane_and_its_fronts(fan):
+    cut = cr.field_cut(fan, wavenumber=6.0, boundary="hard", extent=(3.0, 3.0), step=0.15)
+    ax = cut.plot()
+    assert ax.get_xlabel().endswith("(m)") and ax.get_ylabel().endswith("(m)")
+    assert "wave front" in [one.get_text() for one in ax.figure.legends[0].get_texts()]
+    ax = cut.plot(fronts=False)
+    assert "wave front" not in [one.get_text() for one in ax.figure.legends[0].get_texts()]
