@@ -6,7 +6,8 @@
 J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
 the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
 (`creeping.field.conductor.mode_beams`). Divergences on the surface are differences between points 0.02/k to either
-side. Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|.
+side. Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
+ground BEYOND |J_thrown| stands besides, for what comes to it later.
 
 Sources: [CK13, sec. 6.2]; Derivations, F18 and F26.
 """
