@@ -12,15 +12,16 @@ Source: Derivations, F29.
 """
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.currents.nodes import LitNodes
 from creeping.kernels.threads import in_threads
 
 LOW = 0.3
 """T up to which W rises."""
-BLOCK = 64
-"""Nodes that are looked at together."""
+BLOCK = 16
+"""Nodes that are looked at together, neighbours in space."""
 EACH = 2e-9
 """Seconds of one pair, about."""
 VECTOR = 2.5
@@ -55,9 +56,9 @@ def received(
 
     if not _affordable(at, nodes):
         return np.zeros(len(at[0]), dtype=complex)
-    points, of = _blocks(at)
-    sources, others = _blocks(nodes)
-    weights = [np.ascontiguousarray(np.stack([one.real, one.imag])) for one in (single, double)]
+    place, points, of = _blocks(at)
+    order, sources, others = _blocks(nodes)
+    weights = [np.ascontiguousarray(np.stack([one.real, one.imag])) for one in (single[order], double[order])]
     out = np.empty((len(at[0]), 2))
 
     def work(part: slice) -> None:
@@ -65,7 +66,9 @@ def received(
         from_above(*given, part.start, part.stop, out)
 
     in_threads(work, len(of[1]), least=4, multiple=1, seconds=EACH * BLOCK * len(single))
-    return np.asarray(out[:, 0] + 1j * out[:, 1])
+    found = np.empty(len(out), dtype=complex)
+    found[place] = out[:, 0] + 1j * out[:, 1]
+    return found
 
 
 def received_vectors(
@@ -77,29 +80,34 @@ def received_vectors(
     waves = strength.shape[2]
     if not _affordable(at, nodes, VECTOR):
         return np.zeros((len(at[0]), 3, waves), dtype=complex)
-    points, of = _blocks(at)
-    sources, others = _blocks(nodes)
-    turned = np.moveaxis(strength, 0, 2)
+    place, points, of = _blocks(at)
+    order, sources, others = _blocks(nodes)
+    turned = np.moveaxis(strength[order], 0, 2)
     J = np.ascontiguousarray(np.concatenate([turned.real, turned.imag]).transpose(1, 0, 2))
-    out = np.empty((len(at[0]), 2, waves, 3))
+    out = np.empty((len(at[0]), waves, 6))
 
     def work(part: slice) -> None:
         vectors_from_above(*points, of, sources[0], others, BLOCK, J, k, LOW, part.start, part.stop, out)
 
     in_threads(work, len(of[1]), least=4, multiple=1, seconds=EACH * VECTOR * BLOCK * len(strength))
-    return np.asarray(np.moveaxis(out[:, 0] + 1j * out[:, 1], 1, 2))
+    found = np.empty((len(out), 3, waves), dtype=complex)
+    found[place] = np.moveaxis(out[..., :3] + 1j * out[..., 3:], 1, 2)
+    return found
 
 
 def _affordable(at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray], each: float = 1.0) -> bool:
     return 0 < each * len(at[0]) * len(nodes[0]) < MOST_PAIRS
 
 
-def _blocks(pair: tuple[FloatArray, FloatArray]) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, ...]]:
-    """Points and normals, (m, 3) each, as columns, and the balls about blocks of them."""
+def _blocks(
+    pair: tuple[FloatArray, FloatArray],
+) -> tuple[IntArray, tuple[FloatArray, FloatArray], tuple[FloatArray, ...]]:
+    """An order in which neighbours follow each other; in it points and normals (3, m), and the balls of blocks."""
     from creeping.field.kernels.bounce import balls
 
-    x, n = (np.ascontiguousarray(part.T) for part in pair)
+    order = cKDTree(pair[0], leafsize=BLOCK).indices
+    x, n = (np.ascontiguousarray(part[order].T) for part in pair)
     many = -(-x.shape[1] // BLOCK)
     found = np.empty((many, 3)), np.empty(many), np.empty((many, 3)), np.empty(many)
     balls(x, n, BLOCK, *found)
-    return (x, n), found
+    return order, (x, n), found

@@ -5,7 +5,7 @@
     J(x) = 2 sum_y W(t) n_x x (g x J_y),   g = (y - x)/R (1/R - ik) e^{ikR}/R          of a conductor
 
 W rises from 0 at the horizon to 1 at t = low; r is 2, what a mirror makes of a wave, or for du/dn of a soft one -2ikt.
-Blocks of nodes of which none is above the horizon of any point of a block are left out.
+Blocks of nodes, in balls, are left out where none is above the horizon: first for a block of points, then for each.
 
 Source: Derivations, F29.
 """
@@ -61,6 +61,16 @@ def _above(b, of, nodes, some):
 
 
 @njit(**options)
+def _sunk(x, normals, j, nodes, a):
+    """Whether the ball about block a of the nodes lies below the horizon of point j."""
+    centres, radii = nodes[0], nodes[1]
+    up = 0.0
+    for c in range(3):
+        up += normals[c, j] * (centres[a, c] - x[c, j])
+    return up + radii[a] <= 0.0
+
+
+@njit(**options)
 def _risen(t, low):
     """Smooth step from the horizon."""
     w = min(t / low, 1.0)
@@ -84,6 +94,8 @@ def from_above(x, normals, of, y, sides, nodes, block, single, double, k, low, s
             n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
             p, q = 0.0, 0.0
             for a in range(count):
+                if _sunk(x, normals, j, nodes, some[a]):
+                    continue
                 for i in range(some[a] * block, min((some[a] + 1) * block, n)):
                     dx, dy, dz = y[0, i] - x0, y[1, i] - x1, y[2, i] - x2
                     inverse = 1.0 / math.sqrt(max(dx * dx + dy * dy + dz * dz, least))
@@ -103,43 +115,66 @@ def from_above(x, normals, of, y, sides, nodes, block, single, double, k, low, s
             out[j, 0], out[j, 1] = p, q
 
 
+@njit(**options)
+def _gradients(at, up, y, first, last, k, low, out):
+    """Fill out (5, ...) with W g of nodes first..last: the direction from a point to each, then the complex factor."""
+    per, least = k / (2 * math.pi), (TOUCHING / k) ** 2
+    for i in range(first, last):
+        dx, dy, dz = y[0, i] - at[0], y[1, i] - at[1], y[2, i] - at[2]
+        inverse = 1.0 / math.sqrt(max(dx * dx + dy * dy + dz * dz, least))
+        dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
+        w = _risen(max(up[0] * dx + up[1] * dy + up[2] * dz, 0.0), low) * inverse
+        c, s = cosine_sine(per / inverse)
+        j = i - first
+        out[0, j], out[1, j], out[2, j] = dx, dy, dz
+        out[3, j], out[4, j] = w * (c * inverse + s * k), w * (s * inverse - c * k)
+
+
+@njit(**options)
+def _crossed_sum(g, J, first, last):
+    """Sum of g x J over nodes first..last, real and imaginary parts of its components."""
+    a0, a1, a2, b0, b1, b2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(first, last):
+        j = i - first
+        dx, dy, dz, c, s = g[0, j], g[1, j], g[2, j], g[3, j], g[4, j]
+        u0, u1, u2 = dy * J[2, i] - dz * J[1, i], dz * J[0, i] - dx * J[2, i], dx * J[1, i] - dy * J[0, i]
+        v0, v1, v2 = dy * J[5, i] - dz * J[4, i], dz * J[3, i] - dx * J[5, i], dx * J[4, i] - dy * J[3, i]
+        a0 += c * u0 - s * v0
+        a1 += c * u1 - s * v1
+        a2 += c * u2 - s * v2
+        b0 += c * v0 + s * u0
+        b1 += c * v1 + s * u1
+        b2 += c * v2 + s * u2
+    return a0, a1, a2, b0, b1, b2
+
+
 @njit(**entry_options)
 def vectors_from_above(x, normals, of, y, nodes, block, currents, k, low, first, last, out):
-    """Fill rows of blocks first..last of out (m, 2, p, 3), real and imaginary part of J of p incident waves.
+    """Fill rows of blocks first..last of out (m, p, 6), real and imaginary part of J of p incident waves.
 
     ``currents`` (p, 6, n) are J dS/4 pi at the nodes, real parts of its components first; the others are as
     of `from_above`.
     """
     n, waves = y.shape[1], currents.shape[0]
-    per, least = k / (2 * math.pi), (TOUCHING / k) ** 2
-    some = np.empty(len(nodes[1]), np.int64)
+    some, g, total = np.empty(len(nodes[1]), np.int64), np.empty((5, block)), np.empty((waves, 6))
     for b in range(first, last):
         count = _above(b, of, nodes, some)
         for j in range(b * block, min((b + 1) * block, x.shape[1])):
-            x0, x1, x2 = x[0, j], x[1, j], x[2, j]
+            at = x[0, j], x[1, j], x[2, j]
             n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
-            out[j] = 0.0
+            total[:] = 0.0
             for a in range(count):
-                for i in range(some[a] * block, min((some[a] + 1) * block, n)):
-                    dx, dy, dz = y[0, i] - x0, y[1, i] - x1, y[2, i] - x2
-                    inverse = 1.0 / math.sqrt(max(dx * dx + dy * dy + dz * dz, least))
-                    t = (n0 * dx + n1 * dy + n2 * dz) * inverse
-                    if t <= 0.0:
-                        continue
-                    c, s = cosine_sine(per / inverse)
-                    w = 2.0 * _risen(t, low) * inverse
-                    real, imag = w * (c * inverse + s * k), w * (s * inverse - c * k)
-                    dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
-                    for q in range(waves):
-                        J = currents[q]
-                        u = n0 * J[0, i] + n1 * J[1, i] + n2 * J[2, i]
-                        v = n0 * J[3, i] + n1 * J[4, i] + n2 * J[5, i]
-                        # n x (g x J) = g (n.J) - J (n.g)
-                        a0, a1, a2 = dx * u - t * J[0, i], dy * u - t * J[1, i], dz * u - t * J[2, i]
-                        b0, b1, b2 = dx * v - t * J[3, i], dy * v - t * J[4, i], dz * v - t * J[5, i]
-                        out[j, 0, q, 0] += real * a0 - imag * b0
-                        out[j, 0, q, 1] += real * a1 - imag * b1
-                        out[j, 0, q, 2] += real * a2 - imag * b2
-                        out[j, 1, q, 0] += real * b0 + imag * a0
-                        out[j, 1, q, 1] += real * b1 + imag * a1
-                        out[j, 1, q, 2] += real * b2 + imag * a2
+                if _sunk(x, normals, j, nodes, some[a]):
+                    continue
+                start, end = some[a] * block, min((some[a] + 1) * block, n)
+                _gradients(at, (n0, n1, n2), y, start, end, k, low, g)
+                for q in range(waves):
+                    part = _crossed_sum(g, currents[q], start, end)
+                    for c in range(6):
+                        total[q, c] += part[c]
+            for q in range(waves):
+                for c in (0, 3):
+                    h0, h1, h2 = total[q, c], total[q, c + 1], total[q, c + 2]
+                    out[j, q, c] = 2.0 * (n1 * h2 - n2 * h1)
+                    out[j, q, c + 1] = 2.0 * (n2 * h0 - n0 * h2)
+                    out[j, q, c + 2] = 2.0 * (n0 * h1 - n1 * h0)
