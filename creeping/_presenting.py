@@ -48,7 +48,8 @@ class Drawn(Shown):
             as the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
         **options
             ``legend=True`` adds a legend to axes that were given; a new figure has one. All others depend on the type,
-            see `line_plots`, `level_plots` and `plane_pictures` of `creeping.plotting`:
+            see `line_plots`, `level_plots`, `plane_pictures`, `port_plots`, `response_plots` and `echo_pictures` of
+            `creeping.plotting`:
 
             - `ShadowLine`, `ShadowCurve`, `RayFan` (``plot_line``): ``kind="parameters"``, the plane of (theta, phi) in
               degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;
@@ -59,6 +60,9 @@ class Drawn(Shown):
             - `FieldCut` (``plot_field_cut``): ``show="level"``, ``"magnitude"`` or ``"wave"``, Re(u e^{-i phase});
               ``quantity=``, ``fronts=``, ``phase=``, ``span=``.
             - `PhaseMap` (``plot_growth``): ``tolerance=``.
+            - `Coupling` (``plot_coupling``), `SourcePattern` (``plot_pattern``), `Echo` (``plot_echo``): ``span=``;
+              of an echo over angle and frequency ``channel=``.
+            - `ImpulseResponse` (``plot_impulse``), `RangeProfile` (``plot_profile``): ``start=``, ``end=``, ``span=``.
 
         Returns
         -------

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._presenting import Shown, brief
+from creeping._presenting import Drawn, brief
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.array_result import ArrayResult
@@ -69,7 +69,7 @@ class CouplingPaths:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Coupling(ArrayResult, Shown):
+class Coupling(ArrayResult, Drawn):
     """Fields between ports on a body, at port j of a unit source at port i; acts as their matrix.
 
     Of `coupling` u of e^{ikr}/(4 pi r); of `slot_coupling` H along slot j of a dipole along slot i.

@@ -10,20 +10,27 @@ Sources: [S08] for the cross section, [U83] for target strength.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creeping._presenting import Drawn
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import cross_section_decibels, decibels
 from creeping.field.frequency import frequency
+from creeping.field.labelled import echo_dataset
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 LEVELS = {"rcs": ("radar cross section", "dBsm"), "ts": ("target strength", "dB re 1 m")}
 """Names of the levels, and their units where lengths are metres."""
 
 
-@dataclass(frozen=True, eq=False)
-class Echo:
+@dataclass(frozen=True, eq=False, repr=False)
+class Echo(Drawn):
     """Echo in c channels at n angles and k wavenumbers; lengths are metres.
 
     Attributes
@@ -88,6 +95,14 @@ class Echo:
         if self.elevation.shape != self.azimuth.shape:
             raise InvalidInputError(f"elevation has shape {self.elevation.shape}, not {self.azimuth.shape}")
 
+    def __repr__(self) -> str:
+        told = self.summary()
+        tops = ", ".join(f"{c} up to {'none' if v is None else f'{v:.1f}'}" for c, v in told["largest"].items())
+        return (
+            f"Echo({told['quantity']}, {told['angles']} angles x {told['frequencies']} frequencies)\n"
+            f"  {tops} {told['unit']}; {told['unresolved']} of {told['values']} values unresolved"
+        )
+
     @property
     def total(self) -> ComplexArray:
         """Amplitude f, m (c, n, k)."""
@@ -103,6 +118,11 @@ class Echo:
         """Frequencies (k,), Hz."""
         return np.asarray(frequency(self.wavenumbers, sound_speed=self.sound_speed))
 
+    @property
+    def level_name(self) -> tuple[str, str]:
+        """What the levels are, and their unit."""
+        return LEVELS[self.quantity]
+
     def levels(self, amplitude: ComplexArray | FloatArray | None = None) -> FloatArray:
         """Levels, dB, of the total (c, n, k), or of another amplitude (...), metres: of its shape."""
         values = self.total if amplitude is None else amplitude
@@ -112,6 +132,14 @@ class Echo:
         """Levels, dB, of the amplitude less and more its error: (c, n, k) each, down to -inf."""
         size = np.abs(self.total)
         return self.levels(np.maximum(size - self.error, 0.0)), self.levels(size + self.error)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Amplitude, parts, level, error and flags with names, by channel, angle and frequency."""
+        return echo_dataset(self)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """The same as a ``pandas.DataFrame``, one row a value."""
+        return self.to_xarray().to_dataframe()
 
     def summary(self) -> dict[str, Any]:
         """Numbers that tell what it is like."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from creeping._presenting import Drawn
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.array_result import ArrayResult
@@ -25,7 +26,7 @@ from creeping.geometry.arguments import number_between, positive_number
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImpulseResponse:
+class ImpulseResponse(Drawn):
     """A field against delay, (m, ...).
 
     Attributes

@@ -12,16 +12,18 @@ Sources: Derivations, F21.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
+from creeping._presenting import Drawn
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.band_sum import band_sum
 
 
-class RangeProfile(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class RangeProfile(Drawn):
     """Echo against range.
 
     Attributes
@@ -44,6 +46,13 @@ class RangeProfile(NamedTuple):
     range: FloatArray
     values: ComplexArray
     resolution: float
+
+    def __repr__(self) -> str:
+        size = np.abs(self.values)
+        return (
+            f"RangeProfile({len(self.range)} ranges, {self.range[0]:.4g} to {self.range[-1]:.4g})\n"
+            f"  resolution {self.resolution:.3g}, up to {size.max():.4g} at {self.range[int(np.argmax(size))]:.4g}"
+        )
 
 
 def range_profile(field: ArrayLike, wavenumbers: ArrayLike, *, window: str = "hann") -> RangeProfile:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._presenting import Shown
+from creeping._presenting import Drawn
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
@@ -42,7 +42,7 @@ N_RAYS = 48
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SourcePattern(ArrayResult, Shown):
+class SourcePattern(ArrayResult, Drawn):
     """Far fields F of point sources, directions (m,) by sources (s,); it acts as the array of its values.
 
     Attributes

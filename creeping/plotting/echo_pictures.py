@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.errors import InvalidInputError
 from creeping.field.decibels import shown_range
-from creeping.field.echo import LEVELS
 from creeping.plotting.colour_bar import add_bar, beyond
-from creeping.plotting.far_cuts import Curve, draw_cut, minus
+from creeping.plotting.far_cuts import Curve, draw_cut, dressed, minus
 from creeping.plotting.palette import GREY, curve_style
-from creeping.plotting.pictures import add_legend, new_figure, save_figure
+from creeping.plotting.pictures import add_legend, axes_or_new, new_figure, save_figure
 
 if TYPE_CHECKING:
     from creeping.field.comparison import Comparison
@@ -45,31 +45,44 @@ def echo_cut_picture(
     CreepingError
         If nothing can be drawn, or the file cannot be written.
     """
-    curves = _curves(echo, (slice(None), 0))
-    heights = shown_range([curve.levels for curve in curves], SPAN)
-    curves = _told_if_low(curves, heights[0])
     figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
-    draw_cut(ax, np.radians(echo.angles), curves, heights, quantity="rcs", angle_name=echo.angle_name, unit="m")
-    if kind == "cartesian":
-        ax.set_ylabel(_level(echo), fontsize=9)
-    else:
-        ax.set_xlabel(f"{echo.angle_name}; rings: {_level(echo)}", fontsize=9)
+    draw_echo_cut(ax, echo)
     ax.set_title(title, fontsize=9, parse_math=False)
     add_legend(ax, fresh=True)
     save_figure(figure, path, dpi)
 
 
+def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
+    """Draw an echo of several angles at its first wavenumber, on straight or polar axes."""
+    curves = _curves(echo, (slice(None), 0))
+    heights = shown_range([curve.levels for curve in curves], span)
+    curves = _told_if_low(curves, heights[0])
+    draw_cut(ax, np.radians(echo.angles), curves, heights, quantity="rcs", angle_name=echo.angle_name, unit="m")
+    if ax.name == "polar":
+        ax.set_xlabel(f"{echo.angle_name}; rings: {_level(echo)}", fontsize=9)
+    else:
+        ax.set_ylabel(_level(echo), fontsize=9)
+
+
 def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
     """Write a PNG of an echo against frequency at its first angle; arguments as of `echo_cut_picture`."""
-    curves = _curves(echo, (0, slice(None)))
-    low, high = shown_range([curve.levels for curve in curves], SPAN)
-    curves = _told_if_low(curves, low)
-    scale, unit = _prefix(echo.hertz)
     figure = new_figure((6.4, 4.2))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot()
+    draw_echo_band(ax, echo)
+    ax.set_title(title, fontsize=9, parse_math=False)
+    add_legend(ax, fresh=True)
+    save_figure(figure, path, dpi)
+
+
+def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
+    """Draw an echo against frequency at its first angle."""
+    curves = _curves(echo, (0, slice(None)))
+    low, high = shown_range([curve.levels for curve in curves], span)
+    curves = _told_if_low(curves, low)
+    scale, unit = _prefix(echo.hertz)
     x = echo.hertz / scale
     for curve in reversed(curves):
         floor = low - (high - low)
@@ -82,9 +95,7 @@ def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str 
         ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=GREY, clip_on=False, label="unresolved")
     ax.set_xlim(x[0], x[-1])
     ax.set_ylim(low, high)
-    _dressed(ax, f"frequency ({unit})", _level(echo), title)
-    add_legend(ax, fresh=True)
-    save_figure(figure, path, dpi)
+    dressed(ax, f"frequency ({unit})", _level(echo), "")
 
 
 def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
@@ -92,36 +103,84 @@ def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str =
 
     What is unresolved has a veil of white.
     """
-    from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    levels = echo.levels()
-    low, high = shown_range([levels], SPAN)
-    scale, unit = _prefix(echo.hertz)
     count = len(echo.channels)
+    heights = shown_range([echo.levels()], SPAN)
     figure = new_figure((6.4, 0.6 + 2.9 * count))
     figure.set_layout_engine("constrained")
     for number, channel in enumerate(echo.channels):
         ax = figure.add_subplot(count, 1, number + 1)
-        # nulls are low, what is not there stays white
-        grid = np.where(np.isneginf(levels[number]), low, levels[number])
-        image = ax.pcolormesh(
-            echo.angles, echo.hertz / scale, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest"
-        )
-        doubtful = echo.unresolved[number]
-        veil = np.ma.masked_where(~doubtful, np.ones(doubtful.shape)).T
-        ax.pcolormesh(
-            echo.angles, echo.hertz / scale, veil, cmap=ListedColormap(["white"]), alpha=VEIL, shading="nearest"
-        )
-        _dressed(
-            ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})", channel if number else f"{title}\n{channel}"
-        )
-        ax.grid(visible=False)
-        add_bar(figure, image, _level(echo), extend=beyond(levels[number], low, high), fontsize=9, ax=ax)
+        draw_echo_map(ax, echo, number, heights)
+        ax.set_title(channel if number else f"{title}\n{channel}", fontsize=9, parse_math=False)
     if echo.unresolved.any():
         patch = Patch(facecolor="white", edgecolor=GREY, linewidth=0.5, label="veiled: unresolved")
         figure.legend(handles=[patch], loc="outside lower center", frameon=False, fontsize=8)
     save_figure(figure, path, dpi)
+
+
+def draw_echo_map(ax: Any, echo: "Echo", number: int, heights: tuple[float, float]) -> None:
+    """Draw one channel of an echo over angle and frequency, what is unresolved veiled."""
+    from matplotlib.colors import ListedColormap
+
+    levels, (low, high) = echo.levels()[number], heights
+    scale, unit = _prefix(echo.hertz)
+    at = echo.angles, echo.hertz / scale
+    # nulls are low, what is not there stays white
+    grid = np.where(np.isneginf(levels), low, levels)
+    image = ax.pcolormesh(*at, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest")
+    doubtful = echo.unresolved[number]
+    veil = np.ma.masked_where(~doubtful, np.ones(doubtful.shape)).T
+    ax.pcolormesh(*at, veil, cmap=ListedColormap(["white"]), alpha=VEIL, shading="nearest")
+    dressed(ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})", "")
+    ax.grid(visible=False)
+    add_bar(ax.figure, image, _level(echo), extend=beyond(levels, low, high), fontsize=9, ax=ax)
+
+
+def plot_echo(
+    echo: "Echo", ax: Any = None, *, channel: str | None = None, span: float = SPAN, legend: bool | None = None
+) -> Any:
+    """Draw an echo: against its angle, or frequency, where one of them varies; as a map of both where both do.
+
+    Parameters
+    ----------
+    echo : Echo
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure; polar ones are drawn round.
+    channel : str, optional
+        The one that a map shows; by default the first.
+    span : float, dB
+        Range below the highest value.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        If there is a single value only, or no such channel.
+    """
+    angles, waves = len(echo.azimuth), len(echo.wavenumbers)
+    if angles < 2 and waves < 2:
+        raise InvalidInputError("one angle and one frequency make no picture; levels() and error have the values")
+    number = 0 if channel is None else echo.channels.index(channel) if channel in echo.channels else -1
+    if number < 0:
+        raise InvalidInputError(f"channel {channel!r} is not among {', '.join(echo.channels)}")
+    fresh, ax = axes_or_new(ax, (6.4, 4.2))
+    if angles > 1 and waves > 1:
+        draw_echo_map(ax, echo, number, shown_range([echo.levels()[number]], span))
+        if fresh:
+            ax.set_title(f"{echo.channels[number]}; veiled: unresolved", fontsize=9, parse_math=False)
+        return ax
+    if angles > 1:
+        draw_echo_cut(ax, echo, span)
+    else:
+        draw_echo_band(ax, echo, span)
+    add_legend(ax, fresh, legend)
+    return ax
 
 
 def range_picture(
@@ -145,7 +204,7 @@ def range_picture(
     reach = next(iter(profiles.values())).range
     ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
     ax.set_ylim(low, high)
-    _dressed(ax, "range along the line of sight (m), from the radar", _level(echo), title)
+    dressed(ax, "range along the line of sight (m), from the radar", _level(echo), title)
     add_legend(ax, fresh=True)
     save_figure(figure, path, dpi)
 
@@ -183,8 +242,8 @@ def comparison_picture(
         below.plot(x, found.residual, label=f"_{channel}", **style)
     below.axhline(0.0, color=GREY, linewidth=0.6)
     below.margins(x=0)
-    _dressed(above, "", _level(echo), title)
-    _dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)", "")
+    dressed(above, "", _level(echo), title)
+    dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)", "")
     add_legend(above, fresh=True)
     save_figure(figure, path, dpi)
 
@@ -210,17 +269,9 @@ def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
 
 
 def _level(echo: "Echo") -> str:
-    name, unit = LEVELS[echo.quantity]
+    name, unit = echo.level_name
     return f"{name} ({unit})"
 
 
 def _prefix(hertz: FloatArray) -> tuple[float, str]:
     return next((one for one in PREFIXES if hertz.max() >= one[0]), PREFIXES[-1])
-
-
-def _dressed(ax: Any, across: str, up: str, title: str) -> None:
-    ax.set_xlabel(across, fontsize=9)
-    ax.set_ylabel(up, fontsize=9)
-    ax.set_title(title, fontsize=9, parse_math=False)
-    ax.grid(color="#d9dde0", linewidth=0.5)
-    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)

@@ -310,6 +310,15 @@ def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: s
     ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
 
 
+def dressed(ax: Any, across: str, up: str, title: str) -> None:
+    """Give straight axes their names, title, grid and ticks."""
+    ax.set_xlabel(across, fontsize=9)
+    ax.set_ylabel(up, fontsize=9)
+    ax.set_title(title, fontsize=9, parse_math=False)
+    ax.grid(color="#d9dde0", linewidth=0.5)
+    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
+
+
 def minus(value: float) -> str:
     """A number with a minus sign in place of a hyphen, as the numbers of straight axes have it."""
     return f"{value:g}".replace("-", "\N{MINUS SIGN}")
