@@ -18,6 +18,7 @@ from creeping.explorer.units import far_levels, far_name
 from creeping.field.decibels import shown_range
 from creeping.field.far_result import FarField
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, line_pieces
+from creeping.plotting.far_cuts import component_name
 from creeping.plotting.palette import COLOURS, EXACT
 from creeping.plotting.parameter_plane import is_torus
 from creeping.rays.angle_seams import split_at_seam
@@ -179,7 +180,7 @@ def cut_svg(request: ViewRequest, angles: FloatArray, far: FarField | None) -> s
 def _cut_curves(far: FarField) -> dict[str, ComplexArray]:
     """What a cut draws: of a conductor both copolarised components."""
     if far.total.ndim > 1:
-        return {"θθ": far.total[:, 0, 0], "φφ": far.total[:, 1, 1]}
+        return {component_name("tt"): far.total[:, 0, 0], component_name("pp"): far.total[:, 1, 1]}
     return {"total": far.total, "creeping": far.creeping, "reflected": far.reflected}
 
 

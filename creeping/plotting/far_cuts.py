@@ -26,6 +26,7 @@ QUANTITIES = {
 }
 COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
 """Scattered by incident component of a vector field: t is θ̂, p is φ̂."""
+_GREEK, _RADAR = str.maketrans("tp", "θφ"), str.maketrans("tp", "VH")
 PARTS = {"creeping": "--", "reflected": "-.", "forward": ":"}
 HATCHED: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
 """Of angles at which a field is unresolved."""
@@ -255,11 +256,21 @@ def _picks(label: str, values: Any, count: int, components: Sequence[str]) -> li
         raise InvalidInputError(
             f"field {label!r} has shape {shape}; {count} angles take ({count},) or ({count}, 2, 2) complex numbers"
         )
-    greek = {"t": "θ", "p": "φ"}
     return [
-        (f" {greek[name[0]]}{greek[name[1]]}", lambda v, at=COMPONENTS[name]: np.asarray(v)[:, at[0], at[1]])
+        (f" {component_name(name)}", lambda v, at=COMPONENTS[name]: np.asarray(v)[:, at[0], at[1]])
         for name in components
     ]
+
+
+def component_name(name: str) -> str:
+    """Name of a component of a vector field, and what radar calls it: θ̂ is vertical, φ̂ horizontal.
+
+    Examples
+    --------
+    >>> component_name("tt"), component_name("pt")
+    ('θθ (VV)', 'φθ (HV)')
+    """
+    return name.translate(_GREEK) + f" ({name.translate(_RADAR)})"
 
 
 def _levels(values: ComplexArray, quantity: str) -> FloatArray:

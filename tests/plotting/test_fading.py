@@ -48,4 +48,4 @@ def test_parts_are_named_by_their_component():
     phi = np.radians([0.0, 90, 180, 270, 360])
     far = far_of(np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=-1), values, boundary="pec")
     labels = [line.get_label() for line in far.plot(parts=True).lines]
-    assert {"θθ", "φφ", "θθ, creeping"} <= set(labels) and not any("total" in label for label in labels)
+    assert {"θθ (VV)", "φφ (HH)", "θθ (VV), creeping"} <= set(labels) and not any("total" in label for label in labels)

@@ -49,7 +49,7 @@ def test_curves_are_the_levels_of_total_and_parts(lobe):
 
 def test_curves_of_a_vector_field_are_its_components(vector):
     curves = cut_curves(len(ANGLES), {"pec": vector}, components=("tt", "tp", "pp"))
-    assert [curve.label for curve in curves] == ["pec θθ", "pec θφ", "pec φφ"]
+    assert [curve.label for curve in curves] == ["pec θθ (VV)", "pec θφ (VH)", "pec φφ (HH)"]
     np.testing.assert_allclose([curve.levels[7] for curve in curves], 20 * np.log10([1, 2, 4]))
 
 
