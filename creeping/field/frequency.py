@@ -33,7 +33,7 @@ def wavenumber(value: str | ArrayLike, *, sound_speed: float | None = None) -> f
     ----------
     value : str, float or array of float
         Frequency in Hz, or text with a unit: a frequency ("10 GHz", "38kHz") or a wavelength ("3 cm"), or a range of
-        either, "first:last:step" with the unit behind the last number.
+        either, "first:last:step" with the unit behind the last number, or one behind each.
     sound_speed : float, m/s, optional
         Of the medium; the speed of light if not given.
 
@@ -118,24 +118,34 @@ def _positive(value: ArrayLike, what: str) -> FloatArray:
 
 def _parsed(text: str) -> tuple[FloatArray, float, bool]:
     """Numbers (n,) of a text, their unit in Hz or m, and whether it is a length."""
-    match = re.fullmatch(rf"\s*({_NUMBER})(?::({_NUMBER}))?(?::({_NUMBER}))?\s*([^\W\d]*)\s*", text)
+    parts = [re.fullmatch(rf"\s*({_NUMBER})\s*([^\W\d]*)\s*", part) for part in text.split(":")]
     known = f"units are {', '.join(['Hz', 'kHz', 'MHz', 'GHz', 'THz', *METRES])}"
-    if not match or (match[2] and not match[3]):
+    found = [(float(part[1]), part[2]) for part in parts if part]
+    if len(found) < len(parts) or len(parts) not in (1, 3):
         raise InvalidInputError(
             f'{text!r} is no frequency or wavelength such as "10 GHz", "3 cm", "2:18:0.1GHz"; {known}'
         )
-    unit = match[4] or "Hz"
+    last_unit = found[-1][1] or "Hz"
+    units = [unit or last_unit for _, unit in found]
     # of frequencies capitals do not matter, of lengths they would
-    scale = HERTZ.get(unit.lower(), METRES.get(unit))
-    if scale is None:
-        raise InvalidInputError(f"{text!r}: unknown unit {unit!r}; {known}")
-    first = float(match[1])
-    if not match[3]:
-        return np.array([first]), scale, unit.lower() not in HERTZ
-    last, step = float(match[2]), float(match[3])
+    scales = [HERTZ.get(unit.lower(), METRES.get(unit)) for unit in units]
+    unknown = [unit for unit, scale in zip(units, scales, strict=True) if scale is None]
+    if unknown:
+        raise InvalidInputError(f"{text!r}: unknown unit {unknown[0]!r}; {known}")
+    of_length = {unit.lower() not in HERTZ for unit in units}
+    if len(of_length) > 1:
+        raise InvalidInputError(f"{text!r} mixes units of frequency and of wavelength; give one kind")
+    scale = scales[-1] or 1.0
+    # in the unit of the last number, whose digits stay what they are
+    numbers = [
+        value if own == scale else value * (own or 1.0) / scale for (value, _), own in zip(found, scales, strict=True)
+    ]
+    if len(numbers) == 1:
+        return np.array(numbers), scale, of_length.pop()
+    first, last, step = numbers
     if not (step > 0 and first > 0 and np.isfinite(last) and last >= first):
         raise InvalidInputError(f"{text!r} is no range: give first:last:step, positive, the first not above the last")
     if not (last - first) / step < MOST:
         raise InvalidInputError(f"{text!r} has {(last - first) / step + 1:.3g} values; {MOST} are the most")
     values = first + step * np.arange(int((last - first) / step + 1e-9) + 1)
-    return np.asarray(values, dtype=float), scale, unit.lower() not in HERTZ
+    return np.asarray(values, dtype=float), scale, of_length.pop()

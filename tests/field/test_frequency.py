@@ -31,6 +31,18 @@ def test_ranges_keep_their_last_value():
     assert np.all(np.diff(cr.wavenumber("1:3:1cm")) < 0)
 
 
+def test_each_number_of_a_range_may_have_its_unit():
+    whole = cr.wavenumber("2:4:0.5GHz")
+    np.testing.assert_array_equal(cr.wavenumber("2GHz:4GHz:0.5GHz"), whole)
+    np.testing.assert_allclose(cr.wavenumber("2 GHz : 4 GHz : 500 MHz"), whole, rtol=1e-14)
+    np.testing.assert_allclose(cr.wavenumber("2000 MHz:4:0.5 GHz"), whole, rtol=1e-14)
+    np.testing.assert_allclose(cr.wavenumber("1cm:3cm:10mm"), 2 * np.pi / np.array([0.01, 0.02, 0.03]), rtol=1e-14)
+    with pytest.raises(cr.InvalidInputError, match="mixes units"):
+        cr.wavenumber("1cm:2cm:1GHz")
+    with pytest.raises(cr.InvalidInputError, match="unknown unit 'parsec'"):
+        cr.wavenumber("1parsec:2:1GHz")
+
+
 def test_sound():
     assert cr.wavenumber(38e3, sound_speed=1477) == pytest.approx(2 * np.pi * 38e3 / 1477)
     assert cr.wavenumber("38kHz", sound_speed=1477) == pytest.approx(2 * np.pi * 38e3 / 1477)
