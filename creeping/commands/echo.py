@@ -35,6 +35,8 @@ Incidence = Annotated[
     str | None,
     Parameter(group=_angles, help="AZIMUTH,ELEVATION of the radar, degrees; of a cut the angle that stays. 0,0."),
 ]
+TOLD = 90.0
+"""Seconds from which it is said beforehand what a request may cost."""
 Method = Annotated[
     str, Parameter(help="auto, rays or currents: auto takes currents where rays do not resolve a value and err more.")
 ]
@@ -152,7 +154,7 @@ def _echo(
     shape = parse_body(body, progress=progress, **made)
     azimuths, elevations = request.angles(shape)
     meter = _Meter(progress, len(azimuths) * len(request.wavenumbers))
-    progress(meter.asked(request))
+    progress(meter.asked(request) + _cost(shape, request, azimuths, elevations, method))
     ready = time.perf_counter()
     dataset = echo_report.computed(shape, request, boundary, azimuths, elevations, method, made["cache"], meter.told)
     echo = echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
@@ -169,6 +171,18 @@ def _echo(
     write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
     print(json.dumps(summary, indent=1) if as_json else echo_report.readable(summary, output))
     return 0
+
+
+def _cost(shape: Any, request: Any, azimuths: Any, elevations: Any, method: str) -> str:
+    """What it may take where that is minutes: currents serve what rays cannot, hundreds of times as slowly."""
+    from creeping.sweeping.echoes import seconds_of_currents
+
+    if method == "rays" or not request.monostatic:
+        return ""
+    seconds = seconds_of_currents(shape, request.wavenumbers, azimuths, elevations)
+    if seconds < TOLD:
+        return ""
+    return f"; up to about {seconds / 60:.0f} min if currents of the body must serve all (--method rays: seconds)"
 
 
 class _Meter:

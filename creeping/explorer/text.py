@@ -37,12 +37,14 @@ def validity_text(found: Validity) -> str:
 def refined_text(found: Refined) -> str:
     """Line, errors and what the far field leaves open."""
     line, drawn = found.line, found.drawn
+    # lengths of an expression are metres once a frequency was given
+    unit = "m" if found.request.metres else unit_of(line.body)
     shares = ", ".join(f"{share:.3g} {name}" for name, share in line.fractions.items() if share)
     lines = [
         f"shadow line: {len(line.curves)} {'curve' if len(line.curves) == 1 else 'curves'}, "
-        f"length {line.length:.8g} {unit_of(line.body)}; {shares}",
-        f"rays drawn: {_counts(drawn)}, length {drawn.length:.4g}; error at their ends rms {drawn.error.rms:.1e}, "
-        f"max {drawn.error.max:.1e} ({drawn.error.samples} traced)",
+        f"length {line.length:.8g} {unit}; {shares}",
+        f"rays drawn: {_counts(drawn)}, length {drawn.length:.4g} {unit}; error at their ends "
+        f"rms {drawn.error.rms:.1e}, max {drawn.error.max:.1e} ({drawn.error.samples} traced)",
     ]
     if found.far is not None:
         doubt, fan, request = int(np.sum(found.far.unresolved)), found.fan, found.request

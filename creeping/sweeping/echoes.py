@@ -12,17 +12,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
-from creeping.errors import InvalidInputError
+from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_method, checked_plain
 from creeping.field.boundary import BoundaryLike
+from creeping.field.currents.kept import expected_seconds
 from creeping.field.echo import Echo
 from creeping.field.labelled import PARTS
+from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.tuning.flow_choice import choose_flow
+from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
+from creeping.shadow.line import shadow_line
 from creeping.sweeping.accessor import SweepFields
 from creeping.sweeping.run import Progress, sweep_directions
 
@@ -140,6 +144,24 @@ def bistatic(
     asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "bistatic", "observation": observers}
     found = _swept(body, -radar[None], wavenumbers, asked, cache, progress)
     return _with_angles(found, "observer", azimuths, elevations)
+
+
+def seconds_of_currents(
+    body: Surface, wavenumbers: FloatArray, azimuths: FloatArray, elevations: FloatArray, *, observers: int = 1
+) -> float:
+    """About what an echo costs where currents serve all of its incidences, by the first of them; 0 of unknown cost.
+
+    ``azimuths``, ``elevations`` (n,), degrees, are the radar's; ``observers`` directions belong to each.
+    """
+    if is_creased(body):
+        return 0.0
+    radar = directions_from_azimuth_elevation(np.radians(azimuths[0]), np.radians(elevations[0]))
+    try:
+        line = shadow_line(body, -radar)
+    except SingularIncidenceError:
+        return 0.0
+    fan = launch(DirectFlow(body, rtol=1e-6), line, length=size(body), n_rays=8, measured=False)
+    return len(azimuths) * expected_seconds(fan, wavenumbers, observers)
 
 
 def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, FloatArray]:

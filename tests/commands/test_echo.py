@@ -2,10 +2,13 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
 
+import scatterers as sc
+from creeping.commands.echo import _cost
 from creeping.commands.echo_request import echo_request
 from creeping.commands.main import main
 from creeping.errors import InvalidInputError
@@ -167,6 +170,21 @@ def test_azimuths_of_another_turn_are_compared_and_polar_angles_are_not(tmp_path
         assert ("3 of its azimuths by whole turns" in said) == bool(wrapped)
         off = json.loads((tmp_path / "summary.json").read_text())["compared"]["VV"]
         assert (off["places"], off["wrapped"]) == (places, wrapped) and off["rms_db"] < 0.3
+
+
+def test_what_may_take_minutes_is_told_before():
+    """Of a slender body over a band, and not of a few values, nor of those that rays alone compute."""
+    fish = sc.Ellipsoid(0.07, 0.007, 0.007)
+    asked = {"wavelength": None, "sound_speed": 1477.0, "polarisation": None, "boundary": "soft", "bistatic": None}
+    asked |= {"incidence": None}
+    band = echo_request("ts", frequency="38:200:2kHz", monostatic="az:2", **asked)
+    at = band.angles(fish)
+    words = _cost(fish, band, *at, "auto")
+    # a run of it took 75 minutes
+    assert 40 <= int(re.search(r"about (\d+) min", words)[1]) <= 160 and "--method rays" in words
+    assert _cost(fish, band, *at, "rays") == ""
+    few = echo_request("ts", frequency="38kHz", monostatic="az:30", **asked)
+    assert _cost(fish, few, *few.angles(fish), "auto") == ""
 
 
 def test_band_of_a_capsule(tmp_path, capsys, monkeypatch):

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from creeping._typing import FloatArray
 from creeping.field.boundary import BoundaryLike
 from creeping.field.currents.assembly import surface_currents
 from creeping.field.currents.nodes import RAYS, STEPS
@@ -27,6 +28,8 @@ MOST_NODES = 1_500_000
 """Nodes up to which it does, for the memory's sake."""
 MAKING = 2700.0
 """What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
+SECONDS = 3.3e-9
+"""Of one node at one place."""
 LIT = 0.6
 """Share of a body's nodes that are lit or in the penumbra."""
 KEPT = 2
@@ -44,6 +47,12 @@ def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = F
     if not distant:
         return nodes * MAKING < AFFORDABLE and nodes * places < POINTS
     return nodes * (MAKING + (0 if by_transform else places)) < AFFORDABLE
+
+
+def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int) -> float:
+    """About what currents of one incidence at wavenumbers (k,), 1/L, and their far field cost, where they are taken."""
+    known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
+    return SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
 
 
 def expected_nodes(fan: RayFan, wavenumber: float) -> int:
