@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from cyclopts import App, Group, Parameter
+from cyclopts import App, CycloptsError, Group, Parameter
 
 from creeping._version import __version__
 from creeping.commands import check as _checking
@@ -49,7 +49,10 @@ def main(arguments: list[str] | None = None) -> None:
         print(json.dumps(_upkeep.versions(), indent=1))
         raise SystemExit(0)
     try:
-        code = app(given)
+        # the library's own code for wrong usage is another in other versions
+        code = app(given, exit_on_error=False)
+    except CycloptsError:
+        code = 2
     except CreepingError as error:
         print(f"creeping: {error}", file=sys.stderr)
         code = 3
