@@ -49,6 +49,8 @@ LEFT, UNKNOWN = 2.0, 2.0
 reflected wave and its image."""
 AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0, "conductor": 2.5}
 """The factor on dark ground where waves are marched beyond the end of rays."""
+WELL_KNOWN = 0.04
+"""What currents of a conductor leave at most where that tells of dark ground; beyond, the factor grows with it."""
 
 NO_VALUE = 1e30
 """Size from which a value is that of a tip."""
@@ -78,9 +80,8 @@ def composed(
     unknown = (share > 0) & (not np.isfinite(left))
     lit_off = np.hypot(lit_off, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
     # where rays have ended the march goes on, but waves from elsewhere come to dark ground as well
-    lit_off = np.hypot(
-        lit_off, (by == "march") * (1 - share) * unit * AFAR[kind.kind] * left if np.isfinite(left) else 0.0
-    )
+    afar = AFAR[kind.kind] * (max(1.0, left / WELL_KNOWN) if kind.kind == "conductor" else 1.0)
+    lit_off = np.hypot(lit_off, (by == "march") * (1 - share) * unit * afar * left if np.isfinite(left) else 0.0)
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
     # next to the line rays have hardly a share: what ends with the fan is less there than lit ground is off by

@@ -1,15 +1,10 @@
 """The current of creeping waves where their rays merge, by Gaussian beams that carry vectors.
 
-    J = sum of beams of u with V + M n V',   V = -h (1 + T C) p - t rho j p + (j + h t rho C) b,   V' = -h b
-
-u is the wave "electric hard", j = e v/u (i/k) and C = Du/(2 m^2 u) as in `creeping.field.currents.conductor`. The beam
-of u turns by M n, so that -h (p + M n b) is (i/k) grad (h u): beside a ray that is its -e (i kappa_t1/(kJ)) u b, which
-grows without bound where J = 0, and the sum does not.
+Beams of `creeping.field.conductor.vector_waves`, whose waves are creeping modes of second order.
 
 Sources: [P82]; Derivations, F24 and F26.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,13 +12,12 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.beams import seconds
 from creeping.field.boundary import ELECTRIC_HARD
-from creeping.field.currents.conductor import amplitudes, ray_scalars, turn_of, vectors_of
+from creeping.field.conductor.vector_waves import VectorWaves
+from creeping.field.currents.conductor import ray_scalars
 from creeping.field.far_geometry import fan_strips
 from creeping.field.strip_waves import StripTable, modes_on_strip, resampled, without_tubes
-from creeping.geometry.quadrature import BodyNodes
 from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
-from creeping.rays.strips import Strip
 
 STEPS = 12.0
 """Steps a wavelength at which waves are kept along rays."""
@@ -33,24 +27,8 @@ LONGEST = 60.0
 """Seconds that beams may take."""
 
 
-@dataclass(frozen=True, eq=False)
-class ModeWaves:
-    """Creeping modes of a conductor on the strips of a fan, for incident E0 (3, p): what beams are made of.
-
-    Attributes
-    ----------
-    strips : tuple of Strip
-    times : (steps,), L
-    wavenumber : float, 1/L
-    direction : (3,)
-    electric : (3, p) complex
-    """
-
-    strips: tuple[Strip, ...]
-    times: FloatArray
-    wavenumber: float
-    direction: FloatArray
-    electric: ComplexArray
+class ModeWaves(VectorWaves):
+    """Creeping modes of a conductor."""
 
     def at(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
         """Y of u at places (n,) of a strip: (n,)."""
@@ -68,21 +46,10 @@ class ModeWaves:
         """0 (n,): modes know nothing of what varies across their rays."""
         return np.zeros(sigma.shape)
 
-    def components(
-        self, strip: int, sigma: FloatArray, s: FloatArray, nodes: BodyNodes, p: FloatArray
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """V and V' (n, 3 p) of the beams at places (n,) of a strip, at nodes with tangents p (n, 3)."""
-        own = self.strips[strip]
-        starts, back = np.unique(sigma, return_inverse=True)
-        first = own.at(starts, np.zeros(len(starts))).first_normal
-        axes = np.broadcast_to(self.direction, first.shape)
-        h, e = (v[back] for v in amplitudes(first, axes, self.direction, self.electric))
-        b = np.cross(nodes.normals, p)
-        turn = turn_of(nodes.curvature(p), nodes.twist(p))
+    def ratios(self, strip: int, sigma: FloatArray, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """(i/k) v/u and Du/(2 m^2 u) at places (n,) of a strip."""
         soft, changing = (table.at(strip, sigma, s) for table in self._ratios)
-        V = vectors_of(p, b, h, e * soft[:, None], np.ones(len(p)), turn, changing)
-        lean = -b[:, :, None] * h[:, None]
-        return V.reshape(len(p), -1), lean.reshape(len(p), -1)
+        return soft, changing
 
     @cached_property
     def _hard(self) -> StripTable:

@@ -16,15 +16,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
+from creeping.field.conductor.marched import current_marches, marched_current
 from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
 from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
 from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
-from creeping.field.point_result import FieldStatus
+from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
 from creeping.field.served import Served, Words
 from creeping.field.shed_wave import fock_parameter
@@ -40,6 +41,9 @@ APART = 0.02
 """Distance of the points between which currents are differenced, over the wavelength over 2 pi."""
 MERGED = 1e-3
 """Error of the sum over rays, as a share of the incident wave, from which beams are asked."""
+FAVOUR = {"beams": 1.0, "march": 0.3}
+"""Share of the error of what serves already, below which another sum takes its place: where modes hold they know more
+of a conductor than what is marched does."""
 BEYOND = 1.0
 """What the ground receives later than at first, to and fro and by shed rays, as a share of what it does at first."""
 WORST = 0.99
@@ -96,7 +100,7 @@ def on_conductor(
         dropped = np.all(one.creeping == 0, axis=1) | ~np.all(np.isfinite(sums.values[:count]), axis=1)
         total[:, :, i] = lit[:, :, i] + np.where(np.tile(dropped, 5)[:, None], 0.0, sums.values)
     magnetic = np.cross(total, normals[:, :, None], axis=1)
-    charge, turned = (_divergence(v.reshape(5, count, 3, -1), apart) for v in (total, magnetic))
+    charge, turned = (_divergence(v.reshape(5, count, *v.shape[1:]), apart) for v in (total, magnetic))
     return OnConductor(served, charge / (1j * k), -turned / k)
 
 
@@ -175,12 +179,46 @@ def _rays_at(
     at = np.flatnonzero(asked)
     if len(at) and beams_serve(fan, 5 * len(at), k):
         by_beams = _beams_at(fan, around, at, found, (waves, strength, weight[:, 0, 0]), share, k, electric)
-        for i, its in enumerate(by_beams):
-            mine = sums[i]
-            ok = its.status == FieldStatus.OK
-            better = at[ok & ((mine.status[at] != FieldStatus.OK) | (its.error < mine.error[at]))]
-            sums[i], methods[i] = _taken(mine, its, at, better, methods[i])
+        _take_better(sums, methods, by_beams, at, "beams")
+    at = np.flatnonzero(np.any([(one.status != FieldStatus.OK) | (one.error > MERGED) for one in sums], axis=0))
+    if len(at) and current_marches(fan, 5 * len(at), k):
+        rows, shed, mine = _found_at(found, len(around), at)
+        marched = marched_current(fan, shed, around[rows], normals[rows], share[rows], young[mine], k, electric)
+        its = [replace(one, **_of_points(one, len(at))) for one in marched]
+        _take_better(sums, methods, its, at, "march")
     return sums, methods
+
+
+def _found_at(found: ShedRays, total: int, at: IntArray) -> tuple[IntArray, ShedRays, BoolArray]:
+    """Rows of the points ``at`` and of those around them among (5n,), their rays, and which of all rays these are."""
+    count = total // 5
+    rows = np.concatenate([at + block * count for block in range(5)])
+    row = np.full(total, -1)
+    row[rows] = np.arange(len(rows))
+    mine = row[found.observer] >= 0
+    return rows, replace(found[mine], observer=row[found.observer[mine]]), mine
+
+
+def _of_points(one: RaySum, few: int) -> dict[str, Any]:
+    """Error, status and what has faded of the points alone."""
+    return {name: getattr(one, name)[:few] for name in ("error", "status", "faded")}
+
+
+def _take_better(sums: list[RaySum], methods: list[Words], others: list[RaySum], at: IntArray, name: str) -> None:
+    """Put other sums in place of those that are not OK or err more, at the points ``at`` of each polarisation.
+
+    Where rays have ended and no sum is OK the march knows of more waves.
+    """
+    for i, its in enumerate(others):
+        mine = sums[i]
+        status, error = mine.status[at], mine.error[at]
+        # what is worth little by itself is replaced by anything that is worth more
+        size = np.linalg.norm(mine.values[at], axis=1)
+        poor = error > np.maximum(WORTH * size, LEAST_WORTH)
+        less = np.where(poor, error, FAVOUR[name] * error)
+        better = (its.status == FieldStatus.OK) & ((status != FieldStatus.OK) | (its.error < less))
+        better |= (name == "march") & (status == FieldStatus.DETACHED) & (its.status == FieldStatus.DETACHED)
+        sums[i], methods[i] = _taken(mine, its, at, at[better], methods[i], name)
 
 
 def _strength(rays: RayPoints, weight: FloatArray, k: float) -> FloatArray:
@@ -189,8 +227,8 @@ def _strength(rays: RayPoints, weight: FloatArray, k: float) -> FloatArray:
         return np.where(weight[:, 0, 0] > 0, np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1)) * weight[:, 0, 0], 0.0)
 
 
-def _taken(mine: RaySum, its: RaySum, at: IntArray, better: IntArray, method: Words) -> tuple[RaySum, Words]:
-    """A sum with that of beams, at points ``at`` and around them, in its place at the points ``better``."""
+def _taken(mine: RaySum, its: RaySum, at: IntArray, better: IntArray, method: Words, name: str) -> tuple[RaySum, Words]:
+    """A sum with another, at points ``at`` and around them, in its place at the points ``better``."""
     count = len(mine.status)
     row = np.full(count, -1)
     row[at] = np.arange(len(at))
@@ -199,7 +237,7 @@ def _taken(mine: RaySum, its: RaySum, at: IntArray, better: IntArray, method: Wo
         values[better + block * count] = its.values[row[better] + block * len(at)]
     error[better], status[better] = its.error[row[better]], its.status[row[better]]
     method = method.astype("<U8")
-    method[better] = "beams"
+    method[better] = name
     return RaySum(values, error, status, mine.faded), method
 
 
@@ -217,12 +255,8 @@ def _beams_at(
 
     ``waves`` of the rays found are J (m, 3, p), |u| (m,), and their weights (m,).
     """
-    count, few, p = len(around) // 5, len(at), electric.shape[1]
-    rows = np.concatenate([at + block * count for block in range(5)])
-    row = np.full(len(around), -1)
-    row[rows] = np.arange(len(rows))
-    mine = row[found.observer] >= 0
-    shed = replace(found[mine], observer=row[found.observer[mine]])
+    few, p = len(at), electric.shape[1]
+    rows, shed, mine = _found_at(found, len(around), at)
     J, strength, weight = waves[0][mine], waves[1][mine], waves[2][mine]
     # an infinite wave is that of a caustic: beams serve there
     own, strength = np.where(np.isfinite(J), J, 0.0), np.where(np.isfinite(strength), strength, 0.0)

@@ -180,10 +180,7 @@ def ray_vectors(
     across, turn = e * soft[:, None], np.zeros(hard.shape)
     if coupled:
         turn = turn_of(rays.curvature[1], twist)
-        m = scales(rays, k)[1]
-        # 1/J is held where rays cross: J is known to be no narrower than the boundary layer there
-        spread = rays.spreading / (rays.spreading**2 + 1 / m**4)
-        across = across - e * (1j / k * rays.transverse[0] * spread * hard)[:, None]
+        across = across - e * (1j / k * rays.transverse[0] * spread_of(rays, k) * hard)[:, None]
     return vectors_of(p, np.cross(normals, p), h, across, hard, turn, changing)
 
 
@@ -198,6 +195,12 @@ def ray_scalars(rays: RayPoints, wavenumber: float, order: int) -> tuple[Complex
         rate = surface_function(np.where(rays.alive, fock_parameter(rays, wavenumber), 0.0), 0.0, 1)
         changing = np.where(rays.alive, rate * ray_factor(rays, wavenumber) / (2 * m**2), 0.0)
     return hard, soft, changing
+
+
+def spread_of(rays: RayPoints, wavenumber: float) -> FloatArray:
+    """1/J (...), held where rays cross: J is known to be no narrower than the boundary layer there."""
+    m = scales(rays, wavenumber)[1]
+    return np.asarray(rays.spreading / (rays.spreading**2 + 1 / m**4))
 
 
 def turn_of(curvature: FloatArray, twist: FloatArray) -> FloatArray:

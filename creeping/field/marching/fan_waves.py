@@ -188,7 +188,7 @@ def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = FEWEST_
     strips = fan_strips(fan)
     return (
         order == 2
-        and boundary.kind in ("soft", "hard", "impedance")
+        and boundary.kind in ("soft", "hard", "impedance", "electric hard")
         and len(strips) > 0
         and sum(len(strip.positions) for strip in strips) == len(fan.status)
         and min(len(strip.positions) for strip in strips) >= fewest

@@ -138,7 +138,7 @@ def march_rays(profiles: RayProfiles, *, wavenumber: float, boundary: Boundary) 
         If the wavenumber is no positive number, or the boundary none of these.
     """
     k = checked(wavenumber, 2)
-    if boundary.kind not in ("soft", "hard", "impedance"):
+    if boundary.kind not in ("soft", "hard", "impedance", "electric hard"):
         raise InvalidInputError(f"boundary of kind {boundary.kind!r} is not marched; give soft, hard or impedance")
     return _March(profiles, march_plan(profiles, k), k, boundary).run()
 
@@ -151,6 +151,7 @@ class _March:
         self.soft = boundary.kind == "soft"
         self.admittance = boundary.admittance if boundary.kind == "impedance" else 0j
         self.varies = boundary.kind == "impedance" and profiles.admittance is not None
+        self.electric = boundary.kind == "electric hard"
         ends = [self._edges(ray) for ray in range(len(profiles))]
         self.edges = [np.concatenate([first, second[1:]]) for first, second in ends]
         self.driven = np.array([len(first) - 1 for first, _ in ends])
@@ -270,6 +271,8 @@ class _March:
         """Cubics of the admittance along a ray."""
         if self.varies:
             return np.asarray(self.profiles.cubics_of("admittance", ray))
+        if self.electric:
+            return np.asarray(self.profiles.cubics_of("transverse", ray) / (1j * self.k))
         cubics = np.zeros((self.profiles.s.shape[1] - 1, 4), dtype=complex)
         cubics[:, 0] = self.admittance
         return cubics

@@ -1,0 +1,72 @@
+"""The current of a conductor by marched waves: the condition of E on the body, Mie, and what modes do not reach."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.boundary import ELECTRIC_HARD, HARD
+from creeping.field.conductor import on_body
+from creeping.field.marching.fan_waves import fan_waves
+from creeping.field.strip_waves import modes_on_strip
+from creeping.geometry.surface import normal
+from creeping.rays.status import RayStatus
+from studies import conductor_coverage
+
+K = 20.0
+
+
+def test_the_wave_with_e_along_the_normal_has_a_condition_of_its_own(ball):
+    """Against its creeping modes, exact to second order: u_n = 0 would be off by what kappa_t brings."""
+    found, other = (fan_waves(ball, wavenumber=K, boundary=kind).marched for kind in (ELECTRIC_HARD, HARD))
+    strip = fan_waves(ball, wavenumber=K, boundary=ELECTRIC_HARD).strips[0]
+    times = np.linspace(0.4, 2.2, 10)
+    modes = modes_on_strip(strip, times, K, ELECTRIC_HARD)[0][0]
+    off, wrong = (np.abs(one.at(0, times) / modes - 1) for one in (found, other))
+    assert off.max() < 0.03 and np.all(wrong > 4 * off)
+
+
+def test_marching_is_mie_on_the_sphere(ball, mie, rng, monkeypatch):
+    monkeypatch.setattr(on_body, "MERGED", -1.0)
+    monkeypatch.setattr(on_body, "FAVOUR", {"beams": 0.0, "march": np.inf})
+    x = rng.normal(size=(120, 3))
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    found = cr.conductor_current(ball, x, wavenumber=K)
+    J = np.cross(x[:, :, None], mie(K, x)[1], axis=1)
+    off = np.linalg.norm(found - J, axis=1)
+    by_march = np.char.endswith(found.method, "march")
+    assert np.mean(by_march) > 0.3 and np.all(found.ok[by_march])
+    assert off[by_march].max() < 0.03
+    assert np.mean(off[by_march] <= found.error[by_march]) > 0.95
+
+
+@pytest.fixture(scope="module")
+def twisted():
+    body = sc.TwistedEllipsoid()
+    return cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (0.3, 0.5, 0.812)), wavenumber=K, n_rays=96)
+
+
+def test_rays_that_have_detached_carry_current_on(twisted):
+    ended = np.flatnonzero(twisted.status == RayStatus.DETACHED)[::4]
+    step = np.argmin(np.abs(twisted.travel_time[None] - (twisted.detachment[ended] + 0.15)[:, None]), axis=1)
+    x = twisted.points[ended, step]
+    found = cr.conductor_current(twisted, x, wavenumber=K)
+    served = found.ok
+    # by modes there is none
+    assert np.mean(served) > 0.6 and set(found.method[served]) - {"lit", "lit+march"} == {"march"}
+    size = np.linalg.norm(found.values, axis=1)
+    assert np.all(size[served] > 0) and np.all(size[served] < 2.5)
+    along = np.einsum("nc,nci->ni", normal(twisted.body, x), found.values)
+    np.testing.assert_allclose(along, 0.0, atol=1e-6)
+
+
+def test_no_points_have_no_current(ball):
+    assert cr.conductor_current(ball, np.zeros((0, 3)), wavenumber=K).shape == (0, 3, 2)
+
+
+@pytest.mark.slow
+def test_the_twisted_ellipsoid_is_covered():
+    """Against electric dipoles, an incidence that no factor was set on: half of it was without a current."""
+    found = conductor_coverage.row("twisted", K, 41)
+    assert found["J dark"] > 93 and found["J dark error"] < 20
+    assert found["on"] < 25
