@@ -24,7 +24,7 @@ from creeping.field.validity_range import validity
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
-from creeping.rays.tracer import ray_points
+from creeping.rays.fan_points import ray_points
 
 
 def own_waves(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, order: int) -> SurfaceField:

@@ -14,7 +14,7 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.surface import Surface, normal
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import LANES, START_LANES, RayPoints
-from creeping.rays.tracer import ray_points
+from creeping.rays.fan_points import ray_points
 
 DEGREE = 5
 ROUND = 40

@@ -24,7 +24,7 @@ from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
 from creeping.rays.reach import ray_length
-from creeping.rays.tracer import ray_points
+from creeping.rays.fan_points import ray_points
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.occlusion import occluded
 from creeping.shadow.status import ATTACHED
