@@ -29,9 +29,9 @@ from creeping.field.marched_sum import marched_sum, marches
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.own_waves import own_waves
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
+from creeping.field.ray_scales import fock_parameter
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.field.served import Served, Words
-from creeping.field.shed_wave import fock_parameter
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body

@@ -17,14 +17,14 @@ from creeping.field.beams import length_scale
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
+from creeping.field.ray_scales import scales
 from creeping.field.ray_sums import NARROW_ALONE, own_error, tube_share
-from creeping.field.shed_wave import scales
 from creeping.field.surface import surface_waves
 from creeping.field.validity_range import validity
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
-from creeping.rays.quantities import RayPoints
 from creeping.rays.fan_points import ray_points
+from creeping.rays.quantities import RayPoints
 
 
 def own_waves(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, order: int) -> SurfaceField:

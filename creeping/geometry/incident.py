@@ -131,9 +131,17 @@ def incident_of(direction: ArrayLike | None, source: Incident | None) -> Inciden
         return PlaneWave(direction)
     if not isinstance(source, PlaneWave | PointSource):
         raise InvalidInputError(
-            f"source = {shown(source)} is no wave; give creeping.PointSource((x, y, z)) or creeping.PlaneWave(direction)"
+            f"source = {shown(source)} is no wave; give creeping.PointSource((x, y, z)) or "
+            "creeping.PlaneWave(direction)"
         )
     return source
+
+
+def incident_of_row(wave: FloatArray) -> Incident:
+    """The wave of a row (d, w), or of a unit direction (3,)."""
+    if spherical(wave):
+        return PointSource(-wave[:3] / wave[3])
+    return PlaneWave(wave[:3])
 
 
 def plane_direction(source: Incident, what: str) -> FloatArray:

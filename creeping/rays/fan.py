@@ -1,6 +1,7 @@
 """The fan of creeping rays: geodesics launched from the shadow line along the wave, with initial tangent d.
 
-Ray sigma starts at x0(sigma) with p = d, of a point source the unit vector from it to x0; on a plain body t is arclength. Neighbouring rays part by J = c I,
+Ray sigma starts at x0(sigma) with p = d, of a point source the unit vector from it to x0; on a plain body t is
+arclength. Neighbouring rays part by J = c I,
 
     I(t) = I(0) M11(t) + I'(0) M12(t),   I(0) = 1/c,   I'(0) = (J'(0) - (p.grad c))/c,
 

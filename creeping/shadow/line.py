@@ -4,8 +4,9 @@ Sources: Derivations, R6 and R19.
 
     F(x) = 0,   grad F(x).q = 0,   T = grad F x Hq / |.|,   kappa_n = q.Hq/(|grad F| |q|^2)
 
-q = d of a plane wave, x - x_s of a point source. Seen from outside, the lit side (n.q < 0) is on the left of T. The line is that of `creeping.shadow.many`, the same to
-the last bit; next to a singular direction, where that cannot be certain, its topology is proven (`following`).
+q = d of a plane wave, x - x_s of a point source. Seen from outside, the lit side (n.q < 0) is on the left of T. The
+line is that of `creeping.shadow.many`, the same to the last bit; next to a singular direction, where that cannot be
+certain, its topology is proven (`following`).
 """
 
 # help() shows names of types instead of what they stand for

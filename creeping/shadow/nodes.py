@@ -187,8 +187,8 @@ def finished(body: Surface, wave: FloatArray, nodes: LineNodes, n_rays: int, *, 
     launched, places = np.full((n_rays, LAUNCHED), np.nan), np.full(n_rays, NO_RAY, np.int16)
     with evaluators(body) as parts:
         certain, total = finish(
-            *parts[:2], box_of(body), rows_of(wave), nodes.points, nodes.tangents, nodes.curvature, nodes.starts, curves,
-            nodes.spacing, every, summary, launched, places, arcs, which,
+            *parts[:2], box_of(body), rows_of(wave), nodes.points, nodes.tangents, nodes.curvature, nodes.starts,
+            curves, nodes.spacing, every, summary, launched, places, arcs, which,
         )  # fmt: skip
     shares = summary[SHARES : SHARES + 3]
     return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, bool(certain))

@@ -61,9 +61,7 @@ def newton_step(
     return step, tangent
 
 
-def onto_line(
-    body: Surface, wave: FloatArray, points: FloatArray, *, reach: float, iterations: int = 4
-) -> FloatArray:
+def onto_line(body: Surface, wave: FloatArray, points: FloatArray, *, reach: float, iterations: int = 4) -> FloatArray:
     """Points of {F = 0, grad F.q = 0} by steps of least norm, each at most ``reach``: (n, 3) -> (n, 3)."""
     points = np.array(points, dtype=float)
     least = np.finfo(float).eps * np.max(np.abs(points), initial=0.0)

@@ -26,9 +26,7 @@ MAX_DEPTH = 22
 MAX_TRIANGLES = 400_000
 
 
-def shadow_curves(
-    body: Surface, wave: FloatArray, mesh: Triangulation, critical: CriticalPoints
-) -> list[PanelCurve]:
+def shadow_curves(body: Surface, wave: FloatArray, mesh: Triangulation, critical: CriticalPoints) -> list[PanelCurve]:
     """Trace the closed curves n.q = 0, exact at every arclength.
 
     Parameters

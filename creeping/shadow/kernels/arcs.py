@@ -1,8 +1,8 @@
 """Compiled states of a shadow line: arcs between its breaks, whether the wave reaches them, and launch positions.
 
 The state is constant between breaks, so one point decides an arc: kappa_n(q) <= 0 is concave; the outermost points of
-the line seen along q are lit; for the rest F is sampled along the backward ray x - t q/|q|, which enters the body where F
-is negative at a sample or at a minimum between samples. Two more rays of the arc must agree.
+the line seen along q are lit; for the rest F is sampled along the backward ray x - t q/|q|, which enters the body where
+F is negative at a sample or at a minimum between samples. Two more rays of the arc must agree.
 
 Sources: Derivations, R10.
 """

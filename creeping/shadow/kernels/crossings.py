@@ -1,9 +1,10 @@
 """Compiled search for the places where the state of a shadow line may change: cusps and crossings.
 
 Seen along q the line is a plane curve: of a point source by the stereographic projection of the sphere of directions,
-which takes curves that cross to curves that cross and that of a plane wave for its limit. It has a cusp where kappa_n(q) = 0, since T is along q there, and
-visibility changes only at cusps and, where two of its pieces cross, on the one behind (the larger x.d, or R). Positions are
-node numbers with fractions, u, within a component of equally spaced nodes.
+which takes curves that cross to curves that cross and that of a plane wave for its limit. It has a cusp where
+kappa_n(q) = 0, since T is along q there, and visibility changes only at cusps and, where two of its pieces cross, on
+the one behind (the larger x.d, or R). Positions are node numbers with fractions, u, within a component of equally
+spaced nodes.
 
 Sources: [K84]; Derivations, R10.
 """

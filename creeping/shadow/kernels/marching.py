@@ -1,7 +1,8 @@
 """Compiled first steps of a shadow line: mixed triangles of a mesh, and the walk around them.
 
-s = n.q at the vertices, q = d + w x (`creeping.geometry.incident`). A triangle with vertices of both signs has one edge that goes from + to - counter-clockwise:
-leaving by it keeps the lit side on the left, and ends where it began, so components come out closed and oriented.
+s = n.q at the vertices, q = d + w x (`creeping.geometry.incident`). A triangle with vertices of both signs has one edge
+that goes from + to - counter-clockwise: leaving by it keeps the lit side on the left, and ends where it began, so
+components come out closed and oriented.
 
 Sources: Derivations, R6.
 """
