@@ -36,7 +36,7 @@ app.command(cache_app)
 
 _output = Group("Output")
 _field = Group("Field")
-_wave = Group("Incident wave", validator=validators.MutuallyExclusive())
+_wave = Group("Incident wave", validator=validators.mutually_exclusive)
 Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
 

@@ -68,16 +68,17 @@ def surface_field(
     Returns
     -------
     SurfaceField
-        Of shape (rays, steps): each ray's own contribution, by creeping modes up to where the ray detaches and by
-        marching beyond (``method``), infinite at its caustics (status CAUSTIC); 0 where it has ended otherwise
-        (DETACHED) or was never launched by the wave (NO_RAY). With points (...): the total field; all rays
-        through each of them summed in the shadow, 0 where none passes (NO_RAY or TRUNCATED); by creeping modes or by
-        marching and beams (``method``), whichever errs less: these go on across caustics and where rays have ended.
+        Of shape (rays, steps): each ray's own contribution, by creeping modes up to where the ray detaches and
+        by marching beyond (``method``; not for a point source, whose incident wave is e^{ikR}/(4 pi R)),
+        infinite at its caustics (status CAUSTIC); 0 where it has ended otherwise (DETACHED) or was never
+        launched by the wave (NO_RAY). With points (...): the total field; all rays through each of them summed
+        in the shadow, 0 where none passes (NO_RAY or TRUNCATED); by creeping modes or by marching and beams
+        (``method``), whichever errs less: these go on across caustics and where rays have ended.
 
     Raises
     ------
     InvalidInputError
-        On bad points, wavenumber, boundary or order, and for a weighted body.
+        On bad points, wavenumber, boundary or order, for a weighted body, and at points for the fan of a point source.
 
     Examples
     --------

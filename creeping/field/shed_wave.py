@@ -53,16 +53,21 @@ def mode_waves(
     order: int,
     *,
     shed_share: FloatArray | float | None = 1.0,
+    plane: bool = False,
 ) -> ComplexArray:
     """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
 
-    ``shed_share`` (...) is the power of the factor of shedding: 0 on the body, 1 far away; None leaves both ends out.
-    The correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
-    down.
+    ``plane`` leaves out what a point source adds. ``shed_share`` (...) is the power of the factor of shedding: 0 on
+    the body, 1 far away; None leaves both ends out. The correction to the exponent is held below half of it:
+    beyond, as before a ray detaches, the expansion has broken down.
     """
     leading = fock_parameter(rays, wavenumber)[..., None] * modes.tau
+
+    def source(order: int) -> ComplexArray | float:
+        return 0.0 if plane else of_source(rays, modes, wavenumber, boundary, order)
+
     if order == 1:
-        return np.asarray(np.exp(1j * (leading + of_source(rays, modes, wavenumber, boundary, 1))))
+        return np.asarray(np.exp(1j * (leading + source(1))))
     plain, across, varying = decay_terms(modes, boundary.sign)
     i = rays.integrals[..., None]
     change = np.cbrt(2 / wavenumber) * (plain * i[..., 2, :] + across * i[..., 3, :] + varying * i[..., 4, :])
@@ -71,7 +76,7 @@ def mode_waves(
         ends = ((shed_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
         change = change + (modes.tau**2 + 2 * modes.q_m0 * (modes.tau - modes.q_m0)) * ends
     change = limited(change, 0.5 * leading)
-    return np.asarray(np.exp(1j * (leading + change + of_source(rays, modes, wavenumber, boundary, 2))))
+    return np.asarray(np.exp(1j * (leading + change + source(2))))
 
 
 def amplitude_factor(

@@ -6,7 +6,7 @@ the distance from the source to the attachment point and e = ρ1/(m1 R), each mo
     exp{i τ'² e/4 + i τ³ e³/24} (1 + τ e²/4),   τ' = τ + c/m1²
 
 the first factor of order 1/m1, the others of second order and more; c is the decay of `creeping.field.creeping_modes`.
-What is left out is of the size τ⁴ e⁵/64 and (τ e²/4)².
+What is left out is of the size τ⁴ e⁵/64 and (τ e²/4)², and where curvature varies at the line τ³ e ρ1'/m1.
 
 Sources: [AS64, sec. 9.3]; Derivations, R19.
 """
@@ -19,6 +19,9 @@ from creeping.field.creeping_modes import decay_terms, modes_of
 from creeping.field.ray_scales import fock_parameter, mean_scale, scales, transverse_ratios
 from creeping.field.special.airy import Modes
 from creeping.rays.quantities import RayPoints
+
+VARIES, NEXT = 1 / 16, 2.0
+"""Weight of τ³ e ρ1'/m1 in the error, and how much is added to |τ| of the first mode at ξ = 0."""
 
 
 def nearness(rays: RayPoints, wavenumber: float) -> FloatArray:
@@ -48,11 +51,12 @@ def of_source(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Bounda
 def left_out(rays: RayPoints, wavenumber: float, boundary: Boundary) -> FloatArray:
     """Share of a wave (...) that its source has beyond these factors: by the first mode, and more next to the line.
 
-    The factor of that, one of |τ| more at ξ = 0, is from spheres.
+    By how much more there is from spheres, the weight of varying curvature from an ellipsoid.
     """
     if not np.any(rays.opening > 0):
         return np.zeros(rays.time.shape)
     e = nearness(rays, wavenumber)
-    tau = np.abs(modes_of(boundary, mean_scale(rays, wavenumber)).tau[..., 0])
-    tau = tau + np.exp(-fock_parameter(rays, wavenumber))
-    return np.asarray(np.where(e > 0, tau**4 * e**5 / 64 + (tau * e**2 / 4) ** 2, 0.0))
+    first = np.abs(modes_of(boundary, mean_scale(rays, wavenumber)).tau[..., 0])
+    tau = first + NEXT * np.exp(-fock_parameter(rays, wavenumber))
+    varying = VARIES * first**3 * e * np.abs(rays.radius_rate[0]) / scales(rays, wavenumber)[0]
+    return np.asarray(np.where(e > 0, tau**4 * e**5 / 64 + (tau * e**2 / 4) ** 2 + varying, 0.0))

@@ -57,8 +57,7 @@ def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order:
         out = np.zeros(rays.time.shape, dtype=complex)
         out[rays.alive] = surface_waves(rays[rays.alive], wavenumber, boundary, order)
         return out
-    m1, m2 = scales(rays, wavenumber)
-    xi = fock_parameter(rays, wavenumber)
+    m2 = scales(rays, wavenumber)[1]
     wave = _first_order(rays, wavenumber, boundary)
     if order == 2:
         weight = _by_residues(rays, wavenumber, boundary)
@@ -91,7 +90,10 @@ def _first_order(rays: RayPoints, wavenumber: float, boundary: Boundary) -> Comp
     first = wave + limited(change, 0.5 * np.abs(wave))
     series = first.copy()
     if np.any(late):
-        series[late] = _series(rays[late], wavenumber, boundary, 1)
+        # where the series holds without a source, its own change: of an impedance g and its series differ
+        some, deep = rays[late], smoothstep(xi[late], *SECOND_ORDER)
+        of_plane = wave[late] - _series(some, wavenumber, boundary, 1, plane=True)
+        series[late] = _series(some, wavenumber, boundary, 1) + np.where(deep > 0, deep * of_plane, 0.0)
     return np.asarray(np.where(turn > 0, weight * series + (1 - weight) * first, wave))
 
 
@@ -113,10 +115,10 @@ def ray_factor(rays: RayPoints, wavenumber: float) -> ComplexArray:
     return np.asarray(factor)
 
 
-def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """g or F by its residues (...)."""
+def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int, *, plane: bool = False) -> ComplexArray:
+    """g or F by its residues (...), with ``plane`` as if there were no point source."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber))
-    waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=0.0)
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=0.0, plane=plane)
     terms = end_residue(rays, wavenumber, boundary, "surface") * waves
     if order == 2:
         if boundary.kind == "impedance":

@@ -22,8 +22,9 @@ from creeping.geometry.directions import unit_direction
 from creeping.geometry.surface import Surface, size
 
 REMEDY = (
-    "a point source off the body; fields of such sources come by reciprocity: creeping.source_pattern gives what it "
-    "sends away and what points receive, creeping.coupling what passes between points on the body"
+    "a point source off the body. Its fan has each ray's own wave, by creeping.surface_field(fan, wavenumber=k) "
+    "without points; other fields come by reciprocity: creeping.source_pattern gives what it sends away, "
+    "creeping.coupling what passes between points on the body"
 )
 
 
