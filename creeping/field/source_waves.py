@@ -57,6 +57,6 @@ def left_out(rays: RayPoints, wavenumber: float, boundary: Boundary) -> FloatArr
         return np.zeros(rays.time.shape)
     e = nearness(rays, wavenumber)
     first = np.abs(modes_of(boundary, mean_scale(rays, wavenumber)).tau[..., 0])
-    tau = first + NEXT * np.exp(-fock_parameter(rays, wavenumber))
+    tau = first + NEXT * np.exp(-0.5 * fock_parameter(rays, wavenumber))
     varying = VARIES * first**3 * e * np.abs(rays.radius_rate[0]) / scales(rays, wavenumber)[0]
     return np.asarray(np.where(e > 0, tau**4 * e**5 / 64 + (tau * e**2 / 4) ** 2 + varying, 0.0))
