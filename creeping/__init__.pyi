@@ -48,6 +48,8 @@ from .geodesics.integrator import ErrorEstimate as ErrorEstimate
 from .geodesics.integrator import trace as trace
 from .geometry.checks import check_surface as check_surface
 from .geometry.directions import fibonacci_directions as fibonacci_directions
+from .geometry.incident import PlaneWave as PlaneWave
+from .geometry.incident import PointSource as PointSource
 from .phaseflow.cache import load_phase_map as load_phase_map
 from .phaseflow.phase_map import ErrorGrowth as ErrorGrowth
 from .phaseflow.phase_map import PhaseMap as PhaseMap

@@ -18,6 +18,7 @@ import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.evaluators import evaluators
+from creeping.geometry.incident import rows_of
 from creeping.shadow.many import shadow_lines
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, judged, prepared
@@ -55,7 +56,9 @@ def on_mesh(body: Any, directions: FloatArray, tier: int) -> Lines:
     summary, certain = np.empty((n, SUMMARY)), np.empty(n, bool)
     launched, places = np.empty((n, RAYS, LAUNCHED)), np.empty((n, RAYS), np.int16)
     with evaluators(body) as parts:
-        trace_lines(*parts[:2], box_of(body), lines.packed(tier), directions, False, summary, certain, launched, places)
+        trace_lines(
+            *parts[:2], box_of(body), lines.packed(tier), rows_of(directions), False, summary, certain, launched, places
+        )
     v = critical_distances(body, directions)
     _, status = judged(v, certain, lines.turn(tier), LineMeshes.count - 2)
     status[v < FORBIDDEN] = SINGULAR

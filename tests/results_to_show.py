@@ -9,6 +9,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
+from creeping.geometry.incident import PlaneWave
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def sphere_line():
     curve = SimpleNamespace(
         closed=True, points=points, normals=points, arclength=angle, length=2 * np.pi, status=status
     )
-    return SimpleNamespace(body=sc.Sphere(), direction=direction, curves=[curve])
+    return SimpleNamespace(body=sc.Sphere(), direction=direction, source=PlaneWave(direction), curves=[curve])
 
 
 @pytest.fixture(scope="session")

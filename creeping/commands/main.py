@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts import App, CycloptsError, Group, Parameter, validators
 
 from creeping._version import __version__
 from creeping.commands import check as _checking
@@ -36,6 +36,7 @@ app.command(cache_app)
 
 _output = Group("Output")
 _field = Group("Field")
+_wave = Group("Incident wave", validator=validators.mutually_exclusive)
 Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
 
@@ -78,7 +79,12 @@ def main(arguments: list[str] | None = None) -> None:
 def run(
     body: Body,
     *,
-    direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels; need not be unit.")],
+    direction: Annotated[
+        tuple[float, float, float] | None, Parameter(help="Where the wave travels; need not be unit.", group=_wave)
+    ] = None,
+    source: Annotated[
+        tuple[float, float, float] | None, Parameter(help="Or where a point source is, off the body.", group=_wave)
+    ] = None,
     output: Folder,
     length: Annotated[
         float | Literal["auto"],
@@ -87,8 +93,9 @@ def run(
     rays: Annotated[int, Parameter(help="Rays at the start; more are inserted where neighbours part.")] = 256,
     spacing: Annotated[float | None, Parameter(help="Spacing of iso-phase curves; length/16 if not given.")] = None,
     of: Annotated[
-        Literal["travel_time", "eikonal"], Parameter(help="What is constant on an iso-phase curve.")
-    ] = "travel_time",
+        Literal["travel_time", "eikonal"] | None,
+        Parameter(help="What is constant on an iso-phase curve; eikonal of a source if not given, else travel_time."),
+    ] = None,
     launch_from: Annotated[
         Literal["attached", "all"], Parameter(help="Points of the shadow line that launch.")
     ] = "attached",
@@ -159,6 +166,8 @@ def run(
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
     wave: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": sound_speed}
     wave |= {"polarisation": polarisation, "weighted": speed is not None}
+    of = of or ("travel_time" if source is None else "eikonal")
+    incident = _run_results.asked_wave(direction, source)
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with _Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
@@ -166,7 +175,7 @@ def run(
         if job:
             job = job.fitted(shape)
         progress("shadow line")
-        line = cr.shadow_line(shape, direction)
+        line = cr.shadow_line(shape, source=incident)
         length = ray_length(line, length, wavenumber=job.wavenumber if job else None)
         progress("flow")
         carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, progress)

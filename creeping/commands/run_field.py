@@ -26,6 +26,7 @@ from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
 from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import unit_direction
+from creeping.geometry.incident import REMEDY
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
 
@@ -226,7 +227,7 @@ def job(
     wavenumber: float | None,
     boundary: str | None,
     observe: Sequence[str] | None,
-    direction: Sequence[float],
+    direction: Sequence[float] | None,
     *,
     weighted: bool = False,
     frequency: str | None = None,
@@ -235,6 +236,8 @@ def job(
     polarisation: str | None = None,
 ) -> Job | None:
     """What the options ask for, None without a wavenumber, a frequency or a wavelength.
+
+    ``direction`` is None where the wave is that of a point source.
 
     Raises
     ------
@@ -253,6 +256,8 @@ def job(
         return None
     if weighted:
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out --speed, or the field")
+    if direction is None:
+        raise InvalidInputError(f"the field of --wavenumber is that of a plane wave; --source is {REMEDY}")
     k, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
     d = unit_direction(direction)
     targets = tuple(parse_target(text, d) for text in observe or [_own_cut(d)])

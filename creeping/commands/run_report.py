@@ -8,6 +8,30 @@ from creeping._version import __version__
 from creeping.commands.formats import write_tables
 
 
+def asked_wave(direction: Sequence[float] | None, source: Sequence[float] | None) -> Any:
+    """The incident wave of ``--direction`` or ``--source``.
+
+    Raises
+    ------
+    InvalidInputError
+        If neither is given, or its numbers are no direction or place.
+    """
+    from creeping.errors import InvalidInputError
+    from creeping.geometry.incident import PlaneWave, PointSource
+
+    if source is not None:
+        return PointSource(source)
+    if direction is None:
+        raise InvalidInputError("give --direction X Y Z, where a plane wave travels, or --source X Y Z, a point source")
+    return PlaneWave(direction)
+
+
+def wave_entry(source: Any) -> dict[str, list[float]]:
+    """The incident wave as the summary names it."""
+    position = getattr(source, "position", None)
+    return {"direction": list(source.direction)} if position is None else {"source": list(position)}
+
+
 def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any]) -> dict[str, Any]:
     """What the summary file holds."""
     import numpy as np
@@ -19,7 +43,7 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
         "body": body,
         "speed": speed,
         "version": __version__,
-        "direction": line.direction.tolist(),
+        **wave_entry(line.source),
         "shadow_line": [{"length": c.length, "fractions": c.fractions} for c in line.curves],
         "flow": "map" if hasattr(carrier, "leaps") else "direct",
         "rays": len(fan.points),
@@ -117,7 +141,9 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     from creeping.commands.run_plane import plane_words
     from creeping.field.validity_range import Validity, validity_words
 
-    rows = [f"{summary['body']}, d = ({', '.join(f'{v:.4f}' for v in summary['direction'])})"]
+    name, place = ("d", summary["direction"]) if "direction" in summary else ("source at", summary["source"])
+    equals = " =" if name == "d" else ""
+    rows = [f"{summary['body']}, {name}{equals} ({', '.join(f'{v:.4f}' for v in place)})"]
     for k, curve in enumerate(summary["shadow_line"]):
         shares = ", ".join(f"{100 * v:.1f} % {name}" for name, v in curve["fractions"].items() if v > 0)
         rows.append(f"shadow line {k + 1}: length {curve['length']:.10f}, {shares}")

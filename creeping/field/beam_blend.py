@@ -21,6 +21,7 @@ from creeping.field.beams import CUT, WIDTH, YOUNG, BeamSums, Components, StripW
 from creeping.field.boundary import Boundary
 from creeping.field.far_geometry import fan_strips
 from creeping.field.point_result import FieldStatus
+from creeping.field.ray_scales import fock_parameter
 from creeping.field.ray_sums import (
     FADED,
     LOST,
@@ -31,7 +32,7 @@ from creeping.field.ray_sums import (
     merging_error,
     total_of,
 )
-from creeping.field.shed_wave import fock_parameter, smoothstep
+from creeping.field.shed_wave import smoothstep
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays
 

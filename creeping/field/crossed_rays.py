@@ -12,7 +12,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary
-from creeping.field.shed_wave import fock_parameter, scales, transverse_ratios
+from creeping.field.ray_scales import fock_parameter, scales, transverse_ratios
 from creeping.rays.quantities import RayPoints
 
 CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)}

@@ -24,6 +24,7 @@ from creeping.field.far_geometry import FarGeometry, merging, off_axis
 from creeping.field.far_result import FarField
 from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
 from creeping.field.polarisation import dyads, wave_frame
+from creeping.field.ray_scales import scales
 from creeping.field.reflected import (
     NORMAL,
     polarisation_terms,
@@ -31,7 +32,7 @@ from creeping.field.reflected import (
     reflected_error,
     series_fails,
 )
-from creeping.field.shed_wave import scales, shed_wave, smoothstep
+from creeping.field.shed_wave import shed_wave, smoothstep
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints

@@ -16,7 +16,8 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.shed_wave import SECOND_ORDER, fock_parameter, scales, shared_pole, shed_wave, smoothstep
+from creeping.field.ray_scales import fock_parameter, scales
+from creeping.field.shed_wave import SECOND_ORDER, shared_pole, shed_wave, smoothstep
 from creeping.field.special.fock import pekeris_slope, pekeris_star
 from creeping.rays.observer_contour import HorizonRays, MidHorizon
 from creeping.shadow.attachment import line_tangents

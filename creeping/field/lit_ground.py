@@ -80,8 +80,11 @@ def composed(
     unknown = (share > 0) & (not np.isfinite(left))
     lit_off = np.hypot(lit_off, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
     # where rays have ended the march goes on, but waves from elsewhere come to dark ground as well
-    afar = AFAR[kind.kind] * (max(1.0, left / WELL_KNOWN) if kind.kind == "conductor" else 1.0)
-    lit_off = np.hypot(lit_off, (by == "march") * (1 - share) * unit * afar * left if np.isfinite(left) else 0.0)
+    afar, dark = AFAR[kind.kind], 1 - share
+    if kind.kind == "conductor":
+        # such waves come to the penumbra as they do beyond it
+        afar, dark = afar * max(1.0, left / WELL_KNOWN), np.where(share < 1, 1.0, 0.0)
+    lit_off = np.hypot(lit_off, (by == "march") * dark * unit * afar * left if np.isfinite(left) else 0.0)
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
     # next to the line rays have hardly a share: what ends with the fan is less there than lit ground is off by

@@ -29,9 +29,9 @@ from creeping.field.marched_sum import marched_sum, marches
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.own_waves import own_waves
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
+from creeping.field.ray_scales import fock_parameter
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.field.served import Served, Words
-from creeping.field.shed_wave import fock_parameter
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
@@ -68,16 +68,17 @@ def surface_field(
     Returns
     -------
     SurfaceField
-        Of shape (rays, steps): each ray's own contribution, by creeping modes up to where the ray detaches and by
-        marching beyond (``method``), infinite at its caustics (status CAUSTIC); 0 where it has ended otherwise
-        (DETACHED) or was never launched by the wave (NO_RAY). With points (...): the total field; all rays
-        through each of them summed in the shadow, 0 where none passes (NO_RAY or TRUNCATED); by creeping modes or by
-        marching and beams (``method``), whichever errs less: these go on across caustics and where rays have ended.
+        Of shape (rays, steps): each ray's own contribution, by creeping modes up to where the ray detaches and
+        by marching beyond (``method``; not for a point source, whose incident wave is e^{ikR}/(4 pi R)),
+        infinite at its caustics (status CAUSTIC); 0 where it has ended otherwise (DETACHED) or was never
+        launched by the wave (NO_RAY). With points (...): the total field; all rays through each of them summed
+        in the shadow, 0 where none passes (NO_RAY or TRUNCATED); by creeping modes or by marching and beams
+        (``method``), whichever errs less: these go on across caustics and where rays have ended.
 
     Raises
     ------
     InvalidInputError
-        On bad points, wavenumber, boundary or order, and for a weighted body.
+        On bad points, wavenumber, boundary or order, for a weighted body, and at points for the fan of a point source.
 
     Examples
     --------

@@ -16,6 +16,7 @@ from creeping.field.boundary import BoundaryLike
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary
+from creeping.geometry.incident import plane_direction
 from creeping.rays.fan import RayFan
 
 
@@ -41,6 +42,7 @@ def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "s
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, 1)
     checked_plain(fan.body)
+    plane_direction(fan.line.source, "this magnitude")
     out = np.zeros(fan.spreading.shape)
     here = creeps(fan)
     first = np.broadcast_to(fan.curvature[:, :1], here.shape)[here]

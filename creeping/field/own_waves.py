@@ -1,6 +1,6 @@
 """Each ray's own wave on the body, along the whole of a fan: by creeping modes, and by marching where these have none.
 
-Modes end where a ray detaches, at joints, and where an admittance varies; the marched wave
+Modes end where a ray detaches, at joints, and where an admittance varies; the marched wave, of a plane wave alone,
 
     u = y |J|^(-1/2) e^{ik(d.x0 + s) - i pi N/2}
 
@@ -17,14 +17,15 @@ from creeping.field.beams import length_scale
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
+from creeping.field.ray_scales import scales
 from creeping.field.ray_sums import NARROW_ALONE, own_error, tube_share
-from creeping.field.shed_wave import scales
 from creeping.field.surface import surface_waves
 from creeping.field.validity_range import validity
+from creeping.geometry.incident import PointSource, plane_direction
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
+from creeping.rays.fan_points import ray_points
 from creeping.rays.quantities import RayPoints
-from creeping.rays.tracer import ray_points
 
 
 def own_waves(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, order: int) -> SurfaceField:
@@ -37,7 +38,10 @@ def own_waves(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, ord
     """
     rays, launched = ray_points(fan, fan.travel_time)[1], fan.launched[:, None]
     shape = rays.time.shape
-    alone, marches = march_alone(fan.body, kind), marchable(fan, kind, order, fewest=2)
+    alone, sphere = march_alone(fan.body, kind), isinstance(fan.line.source, PointSource)
+    if alone:
+        plane_direction(fan.line.source, "a wave that is marched")
+    marches = not sphere and marchable(fan, kind, order, fewest=2)
     if alone and not marches:
         raise InvalidInputError(
             "beyond joints, and where an admittance varies, rays are marched, to second order: give order=2, and a fan "

@@ -16,7 +16,8 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
-from creeping.field.shed_wave import scales, shed_wave
+from creeping.field.ray_scales import scales
+from creeping.field.shed_wave import shed_wave
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geometry.surface import Surface, size
 from creeping.rays.quantities import RayPoints

@@ -26,7 +26,8 @@ from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.field.far_geometry import fan_strips
 from creeping.field.point_result import FieldStatus
-from creeping.field.shed_wave import fock_parameter, scales, transverse_ratios
+from creeping.field.ray_scales import fock_parameter, scales, transverse_ratios
+from creeping.field.source_waves import left_out
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
@@ -160,6 +161,7 @@ def own_error(
             growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS[boundary.kind] * across * power)
             growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
             share = np.hypot(SQUARED[boundary.kind] * (change / size) ** 2, growing)
+            share = np.hypot(share, left_out(rays, wavenumber, boundary))
         else:
             growing = np.zeros_like(size)
             share = np.hypot(CLOSE * small, VARIES_NEAR[boundary.kind] * varying)

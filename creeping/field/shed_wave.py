@@ -15,7 +15,9 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import BETA, decay_slopes, decay_terms, fock_scale, modes_of
+from creeping.field.creeping_modes import BETA, decay_slopes, decay_terms, modes_of
+from creeping.field.ray_scales import fock_parameter, mean_scale, scales, transverse_ratios
+from creeping.field.source_waves import of_source
 from creeping.field.special.airy import MODES, Modes
 from creeping.field.special.fock import pekeris_slope, pekeris_star, pole
 from creeping.rays.quantities import RayPoints
@@ -36,24 +38,6 @@ def smoothstep(x: FloatArray, start: float, end: float) -> FloatArray:
     return np.asarray(t * t * (3 - 2 * t))
 
 
-def fock_parameter(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """Fock parameter ξ (...), without unit; k in 1/L."""
-    return np.asarray(np.cbrt(wavenumber / 2) * rays.integrals[..., 1])
-
-
-def scales(rays: RayPoints, wavenumber: float) -> tuple[FloatArray, FloatArray]:
-    """m at the attachment and the shedding point (...), without unit; k in 1/L."""
-    first, last = rays.curvature
-    return fock_scale(wavenumber, first), fock_scale(wavenumber, last)
-
-
-def mean_scale(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """Mean of m along the ray, weighted by κₙ^(2/3) (...); m at attachment where the ray has no length."""
-    some = rays.integrals[..., 1] > 0
-    mean = np.divide(rays.integrals[..., 0], rays.integrals[..., 1], out=np.zeros(some.shape), where=some)
-    return np.asarray(np.where(some, np.cbrt(wavenumber / 2) * mean, scales(rays, wavenumber)[0]))
-
-
 def limited(change: ComplexArray, bound: ComplexArray | FloatArray | float) -> ComplexArray:
     """A correction held below a bound in magnitude; below a third of it, untouched to 1e-2 of itself (...)."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -69,16 +53,21 @@ def mode_waves(
     order: int,
     *,
     shed_share: FloatArray | float | None = 1.0,
+    plane: bool = False,
 ) -> ComplexArray:
     """exp{i ξ τ} of each mode, at second order with the decay c and the factors A of both ends: (..., n).
 
-    ``shed_share`` (...) is the power of the factor of shedding: 0 on the body, 1 far away; None leaves both ends out.
-    The correction to the exponent is held below half of it: beyond, as before a ray detaches, the expansion has broken
-    down.
+    ``plane`` leaves out what a point source adds. ``shed_share`` (...) is the power of the factor of shedding: 0 on
+    the body, 1 far away; None leaves both ends out. The correction to the exponent is held below half of it:
+    beyond, as before a ray detaches, the expansion has broken down.
     """
     leading = fock_parameter(rays, wavenumber)[..., None] * modes.tau
+
+    def source(order: int) -> ComplexArray | float:
+        return 0.0 if plane else of_source(rays, modes, wavenumber, boundary, order)
+
     if order == 1:
-        return np.asarray(np.exp(1j * leading))
+        return np.asarray(np.exp(1j * (leading + source(1))))
     plain, across, varying = decay_terms(modes, boundary.sign)
     i = rays.integrals[..., None]
     change = np.cbrt(2 / wavenumber) * (plain * i[..., 2, :] + across * i[..., 3, :] + varying * i[..., 4, :])
@@ -86,7 +75,8 @@ def mode_waves(
         (rate1, rate2), (m1, m2) = rays.radius_rate, scales(rays, wavenumber)
         ends = ((shed_share * rate2 / m2 - rate1 / m1) / 12)[..., None]
         change = change + (modes.tau**2 + 2 * modes.q_m0 * (modes.tau - modes.q_m0)) * ends
-    return np.asarray(np.exp(1j * (leading + limited(change, 0.5 * leading))))
+    change = limited(change, 0.5 * leading)
+    return np.asarray(np.exp(1j * (leading + change + source(2))))
 
 
 def amplitude_factor(
@@ -112,13 +102,6 @@ def _ends(rays: RayPoints, wavenumber: float) -> list[tuple[FloatArray, FloatArr
         r, bend = (np.where(np.isfinite(m), np.nan_to_num(v)[..., None], 0.0) for v in values)
         found.append((m, r, bend))
     return found
-
-
-def transverse_ratios(rays: RayPoints) -> tuple[FloatArray, FloatArray]:
-    """r = ρ κ_t at the attachment and the shedding point (...), without unit."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = [t / c for t, c in zip(rays.transverse, rays.curvature, strict=True)]
-    return np.nan_to_num(ratios[0]), np.nan_to_num(ratios[1])
 
 
 def mode_sum(

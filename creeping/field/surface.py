@@ -3,6 +3,9 @@
     u = e^{ik(d.x0 + s)} (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} g(ξ)          hard, impedance
     du/dn: the same with (k/m2) F(ξ)                                        soft
 
+Of a point source at the distance R from x0, e^{ikR}/(4πR) is in place of e^{ik d.x0}, and modes have the factors of
+`creeping.field.source_waves`.
+
 Second order, as a factor of 1 + ( )/(m1 m2) of each mode or, at small ξ, under the integrals of g and F, r the mean of
 both ends:
 
@@ -23,17 +26,9 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.creeping_modes import modes_of
-from creeping.field.shed_wave import (
-    SECOND_ORDER,
-    end_residue,
-    fock_parameter,
-    limited,
-    mean_scale,
-    mode_waves,
-    scales,
-    smoothstep,
-    transverse_ratios,
-)
+from creeping.field.ray_scales import fock_parameter, mean_scale, scales, transverse_ratios
+from creeping.field.shed_wave import SECOND_ORDER, end_residue, limited, mode_waves, smoothstep
+from creeping.field.source_waves import nearness
 from creeping.field.special.airy import Modes
 from creeping.field.special.fock import surface_function, surface_slope
 from creeping.rays.quantities import RayPoints
@@ -62,11 +57,10 @@ def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order:
         out = np.zeros(rays.time.shape, dtype=complex)
         out[rays.alive] = surface_waves(rays[rays.alive], wavenumber, boundary, order)
         return out
-    m1, m2 = scales(rays, wavenumber)
-    xi = fock_parameter(rays, wavenumber)
-    wave = surface_function(xi, boundary.q(np.sqrt(m1 * m2)))
+    m2 = scales(rays, wavenumber)[1]
+    wave = _first_order(rays, wavenumber, boundary)
     if order == 2:
-        weight = smoothstep(xi, *SECOND_ORDER)
+        weight = _by_residues(rays, wavenumber, boundary)
         early, late = weight < 1, weight > 0
         change = _early_correction(rays[early], wavenumber, boundary)
         wave[early] += (1 - weight[early]) * limited(change, 0.5 * np.abs(wave[early]))
@@ -77,19 +71,54 @@ def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order:
     )
 
 
+def _first_order(rays: RayPoints, wavenumber: float, boundary: Boundary) -> ComplexArray:
+    """g or F, of a point source with its factor exp{i τ² e/4} (...), e of `creeping.field.source_waves`.
+
+    At small ξ that is one of t under the integral, of which the first power is taken; where it makes the series of
+    residues converge that is summed instead.
+    """
+    m1, m2 = scales(rays, wavenumber)
+    xi = fock_parameter(rays, wavenumber)
+    q = boundary.q(np.sqrt(m1 * m2))
+    wave = surface_function(xi, q)
+    turn = nearness(rays, wavenumber) / 4
+    if not np.any(turn):
+        return wave
+    weight = _by_residues(rays, wavenumber, boundary)
+    late = (turn > 0) & (weight > 0)
+    change = 1j * turn * surface_function(xi, q, 2) - 0.5 * turn**2 * surface_function(xi, q, 4)
+    first = wave + limited(change, 0.5 * np.abs(wave))
+    series = first.copy()
+    if np.any(late):
+        # where the series holds without a source, its own change: of an impedance g and its series differ
+        some, deep = rays[late], smoothstep(xi[late], *SECOND_ORDER)
+        of_plane = wave[late] - _series(some, wavenumber, boundary, 1, plane=True)
+        series[late] = _series(some, wavenumber, boundary, 1) + np.where(deep > 0, deep * of_plane, 0.0)
+    return np.asarray(np.where(turn > 0, weight * series + (1 - weight) * first, wave))
+
+
+def _by_residues(rays: RayPoints, wavenumber: float, boundary: Boundary) -> FloatArray:
+    """Share of the series of residues (...): its last term falls like exp{-(ξ |τ| + e |τ|²/4) sin 60°}."""
+    xi, turn = fock_parameter(rays, wavenumber), nearness(rays, wavenumber) / 4
+    if np.any(turn):
+        xi = xi + turn * np.abs(modes_of(boundary, mean_scale(rays, wavenumber)).tau[..., -1])
+    return smoothstep(xi, *SECOND_ORDER)
+
+
 def ray_factor(rays: RayPoints, wavenumber: float) -> ComplexArray:
     """e^{ik(d.x0 + s)} (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} of rays that are alive (...), infinite on their caustics."""
     first, last = rays.curvature
     phase = wavenumber * rays.eikonal - 0.5 * np.pi * rays.caustics
+    strength = np.where(rays.opening > 0, rays.opening / (4 * np.pi), 1.0)
     with np.errstate(divide="ignore", over="ignore"):
-        factor = np.cbrt(np.sqrt(last / first)) / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * phase)
+        factor = strength * np.cbrt(np.sqrt(last / first)) / np.sqrt(np.abs(rays.spreading)) * np.exp(1j * phase)
     return np.asarray(factor)
 
 
-def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """g or F by its residues (...)."""
+def _series(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int, *, plane: bool = False) -> ComplexArray:
+    """g or F by its residues (...), with ``plane`` as if there were no point source."""
     modes = modes_of(boundary, mean_scale(rays, wavenumber))
-    waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=0.0)
+    waves = mode_waves(rays, modes, wavenumber, boundary, order, shed_share=0.0, plane=plane)
     terms = end_residue(rays, wavenumber, boundary, "surface") * waves
     if order == 2:
         if boundary.kind == "impedance":
@@ -113,7 +142,8 @@ def _early_correction(rays: RayPoints, wavenumber: float, boundary: Boundary) ->
     turn = np.cbrt(2 / wavenumber) * (i[..., 2] / 60 - 2 / 45 * i[..., 4]) - attachment
     bend = varying_curvature(rays)
     linear = (1 / 10 - bend / 60 if q is None else -1 / 30 + bend / 180) + r / 4 + rays.radius_rate[0] ** 2 / 36
-    total = 1j * turn * surface_function(xi, q, 2) + linear / (m1 * m2) * surface_function(xi, q, 1)
+    linear = linear / (m1 * m2) + nearness(rays, wavenumber) ** 2 / 4
+    total = 1j * turn * surface_function(xi, q, 2) + linear * surface_function(xi, q, 1)
     if q is not None:
         slope = surface_slope(xi, q)
         total = total - (0.1 + 0.25 * boundary.sign * r - bend / 60) / (m1 * m2) * slope

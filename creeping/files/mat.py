@@ -13,6 +13,7 @@ from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.labelled import PARTS, power
+from creeping.geometry.incident import PointSource
 from creeping.geometry.speed import speed_of
 from creeping.geometry.unit import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
@@ -108,7 +109,7 @@ def _content(result: Any) -> Content:
 def _line(line: ShadowLine) -> Content:
     length = unit_of(line.body)
     content = {
-        "direction": line.direction,
+        **_wave(line),
         "curve": np.repeat(np.arange(len(line.curves)), [len(c.points) for c in line.curves]),
         **{n: _joined([getattr(c, n) for c in line.curves]) for n in ("arclength", "curvature")},
         **{n: _joined([getattr(c, n) for c in line.curves], 3) for n in ("points", "normals", "tangents")},
@@ -116,19 +117,33 @@ def _line(line: ShadowLine) -> Content:
         "length": line.length,
     }
     units = {"arclength": length, "points": length, "length": length, "curvature": power(length, -1)}
-    return content, units | dict.fromkeys(("direction", "normals", "tangents"), "1")
+    units |= dict.fromkeys(("direction", "normals", "tangents"), "1")
+    return content, _of(content, units | {"source": length})
+
+
+def _of(content: dict[str, Any], units: dict[str, str]) -> dict[str, str]:
+    """The units of what there is."""
+    return {name: unit for name, unit in units.items() if name in content}
+
+
+def _wave(line: ShadowLine) -> dict[str, Any]:
+    """Direction of a plane wave, or where a point source is."""
+    if isinstance(line.source, PointSource):
+        return {"source": np.array(line.source.position)}
+    return {"direction": line.direction}
 
 
 def _fan(fan: RayFan) -> Content:
     length = unit_of(fan.body)
     content: dict[str, Any] = {name: np.asarray(getattr(fan, name)) for name in _FAN}
-    content["direction"] = fan.line.direction
+    content |= _wave(fan.line)
     time = length if speed_of(fan.body) is None else "time"
     units = dict.fromkeys(("points", "arclength"), length) | dict.fromkeys(
         ("travel_time", "eikonal", "detachment"), time
     )
     units |= dict.fromkeys(("spreading_rate", "curvature"), power(length, -1)) | {"attenuation": f"{length}^(1/3)"}
-    return content, units | dict.fromkeys(("direction", "directions", "spreading"), "1")
+    units |= dict.fromkeys(("direction", "directions", "spreading"), "1")
+    return content, _of(content, units | {"source": length})
 
 
 _FAN = (
@@ -230,4 +245,4 @@ def _echo(echo: Echo) -> Content:
     units = {"azimuth": "degree", "elevation": "degree", "incidence": "degree", "frequency": "Hz"}
     units |= {"wavenumber": "1/m", "sound_speed": "m/s"} | dict.fromkeys(("f", *echo.parts, "error"), "m")
     units |= dict.fromkeys(("level", "level_low", "level_high"), LEVELS[echo.quantity][1])
-    return content, {name: unit for name, unit in units.items() if name in content}
+    return content, _of(content, units)

@@ -102,20 +102,23 @@ def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> t
     return c * directions, -dc + along_n * n + along_u * directions + c * turning
 
 
-def launch_spreading(body: Surface, points: FloatArray, directions: FloatArray, along: FloatArray) -> FloatArray:
-    """Initial (J, J') of rays launched with the constant direction d from a line: (n, 3) x 3 -> (n, 2).
+def launch_spreading(
+    body: Surface, points: FloatArray, directions: FloatArray, along: FloatArray, openings: FloatArray
+) -> FloatArray:
+    """Initial (J, J') of rays launched along a wave from its shadow line: (n, 3) x 3, (n,) -> (n, 2).
 
     J = b.dx/dsigma with b = n x p and sigma measured across the ray, so J(0) = 1. Differentiating b.dx along the ray
-    with dp/dsigma = 0 leaves J'(0) = (b.grad c)(p.dx/dsigma): zero without a weight, whatever the line's obliquity.
-    ``along`` holds the tangents of the line.
+    with b.dp/dsigma = 1/R, the ``openings`` (0 of a plane wave), leaves J'(0) = c/R + (b.grad c)(p.dx/dsigma): 1/R
+    without a weight, whatever the line's obliquity. ``along`` holds the tangents of the line.
     """
     spreading = np.zeros((len(points), 2))
     spreading[:, 0] = 1.0
     speed = speed_of(body)
+    spreading[:, 1] = openings * (1.0 if speed is None else speed.value(points))
     if speed is not None:
         g = body.gradient(points)
         b = np.cross(g / np.linalg.norm(g, axis=-1, keepdims=True), directions)
         across = np.sum(b * along, axis=-1)
         oblique = np.divide(np.sum(directions * along, axis=-1), across, out=np.zeros_like(across), where=across != 0)
-        spreading[:, 1] = np.sum(b * speed.gradient(points), axis=-1) * oblique
+        spreading[:, 1] += np.sum(b * speed.gradient(points), axis=-1) * oblique
     return spreading

@@ -1,4 +1,8 @@
-"""One 3-D picture before any library draws it: camera, body, polylines, and the arrows beside the body."""
+"""One 3-D picture before any library draws it: camera, body, polylines, and the arrows beside the body.
+
+A point source within two body sizes is the foot of its arrow, which points to the body; of one farther away the arrow
+stands beside the body, as that of a plane wave does.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +13,9 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.creased import drawn_mesh
-from creeping.geometry.surface import Surface
+from creeping.geometry.directions import unit_direction
+from creeping.geometry.incident import PointSource
+from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._strokes import LevelColours, Stroke, strokes
 from creeping.plotting._view import View, shadow_view
@@ -17,10 +23,16 @@ from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
 
+INCIDENT = ("d", "S")
+"""Names of the arrow of the wave."""
+NEAR_SOURCE, SIDEWAYS, STEEP = 2.5, 75.0, 55.0
+"""Distance from all of the body, in body sizes, within which a source is in the picture; degrees by which the camera
+stands aside of its wave, so that the source and its shadow both show, and above or below a body that hides it."""
+
 
 @dataclass(frozen=True)
 class Mark:
-    """An arrow beside the body: the incidence "d", or an axis "x", "y", "z".
+    """An arrow beside the body: the incidence "d", a point source "S", or an axis "x", "y", "z".
 
     Attributes
     ----------
@@ -35,7 +47,7 @@ class Mark:
     @property
     def text(self) -> dict[str, Any]:
         """How matplotlib writes the name."""
-        style = {"fontsize": 9, "weight": "bold"} if self.name == "d" else {"fontsize": 7, "style": "italic"}
+        style = {"fontsize": 9, "weight": "bold"} if self.name in INCIDENT else {"fontsize": 7, "style": "italic"}
         return {"ha": "center", "va": "center", **style}
 
     def label(self, view: View) -> FloatArray:
@@ -43,7 +55,7 @@ class Mark:
         along = self.tip - self.foot
         flat = float(np.linalg.norm(view.project(along))) or 1.0
         # a fixed distance in the picture, however foreshortened the arrow is
-        if self.name == "d":
+        if self.name in INCIDENT:
             return np.asarray(self.foot - 0.1 * float(np.linalg.norm(along)) / flat * along)
         return np.asarray(self.tip + 0.22 * float(np.linalg.norm(along)) / flat * along)
 
@@ -53,7 +65,7 @@ class Mark:
         flat = view.project(along)
         length = float(np.linalg.norm(flat)) or 1.0
         across = (-flat[1] * view.right + flat[0] * view.up) / length
-        thick = float(np.linalg.norm(along)) * (0.008 if self.name == "d" else 0.011)
+        thick = float(np.linalg.norm(along)) * (0.008 if self.name in INCIDENT else 0.011)
         head = min(14 * thick, 0.6 * length)
         neck = self.tip - head / length * along
         sides = [self.foot - thick * across, neck - thick * across, neck - 0.32 * head * across, self.tip]
@@ -68,7 +80,7 @@ class Drawing:
     ----------
     body : Surface
     direction : (3,) or None
-        Incidence, None where no wave falls in.
+        Incidence, of a point source that at the middle of the body; None where no wave falls in.
     view : View
     mesh : Triangulation
     normals : (n, 3)
@@ -77,6 +89,8 @@ class Drawing:
     colours : LevelColours
     paint : (n, 3), optional
         Red, green, blue in 0..1 at the vertices of the mesh; by default the body has one colour.
+    source : (3,), optional, L
+        The point source of the wave.
     """
 
     body: Surface
@@ -87,22 +101,28 @@ class Drawing:
     strokes: list[Stroke]
     colours: LevelColours
     paint: FloatArray | None = None
+    source: FloatArray | None = None
 
     @cached_property
     def incidence(self) -> Mark:
-        """Arrow along the direction of the wave.
+        """Arrow along the direction of the wave, from its source where that is near.
 
-        In space it stands where the wave comes from; in the picture that is behind the body, so it is moved across
+        Else in space it stands where the wave comes from; in the picture that is behind the body, so it is moved across
         the direction, to the left, until it is clear of the body's outline.
         """
         if self.direction is None:
             raise InvalidInputError("this picture has no incidence; it is of a source on the body")
         low, high = self.view.frame(self.mesh.vertices, margin=0.0)
         extent = float(np.max(high - low))
+        if self.source is not None:
+            away = np.linalg.norm(self.mesh.vertices - self.source, axis=1)
+            if np.max(away) < NEAR_SOURCE * size(self.body):
+                long = min(0.38 * extent, 0.8 * float(np.min(away)))
+                return Mark("S", self.source, self.source + long * self.direction)
         along = 0.38 * extent * self.direction
         left = low[0] - 0.08 * extent - 0.5 * abs(along @ self.view.right)
         middle = self._at(left, 0.5 * (low[1] + high[1]))
-        return Mark("d", middle - 0.5 * along, middle + 0.5 * along)
+        return Mark("d" if self.source is None else "S", middle - 0.5 * along, middle + 0.5 * along)
 
     @cached_property
     def triad(self) -> list[Mark]:
@@ -153,6 +173,13 @@ class Drawing:
         return np.asarray(right * self.view.right + up * self.view.up + depth * self.view.toward)
 
 
+def _source_view(body: Surface, source: FloatArray, towards: FloatArray) -> View:
+    """Camera aside of the wave of a point source, raised or lowered where the body would hide the source."""
+    first = shadow_view(towards, turned=np.radians(SIDEWAYS))
+    tried = [first, *(View(first.azimuth, np.radians(e)) for e in (STEEP, -STEEP))]
+    return next((view for view in tried if view.visible(body, source[None])[0]), first)
+
+
 def compose(
     line: ShadowLine,
     fan: RayFan | None = None,
@@ -170,13 +197,23 @@ def compose(
     cells : int
         Fineness of the body, cells along each side of its box.
     """
-    direction = np.asarray(line.direction, dtype=float)
-    body = line.body
+    body, source = line.body, None
+    mesh, normals = drawn_mesh(body, cells)
+    if isinstance(line.source, PointSource):
+        source = np.array(line.source.position)
+        # towards the nearest point of the body: the middle of a ring may be the source
+        nearest = mesh.vertices[np.argmin(np.linalg.norm(mesh.vertices - source, axis=1))] - source
+        direction, camera = unit_direction(nearest), _source_view(body, source, nearest)
+    else:
+        direction = np.asarray(line.direction, dtype=float)
+        camera = shadow_view(direction)
     return Drawing(
         body,
         direction,
-        shadow_view(direction) if view is None else view,
-        *drawn_mesh(body, cells),
+        camera if view is None else view,
+        mesh,
+        normals,
         strokes(line, fan, curves, rays=rays, until=until),
         LevelColours.of(curves),
+        source=source,
     )

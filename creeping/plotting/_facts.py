@@ -9,6 +9,7 @@ import numpy as np
 from creeping._presenting import brief
 from creeping._typing import Any, FloatArray
 from creeping.files.far_table import angles_of
+from creeping.geometry.incident import Incident, PointSource, incident_of_row
 from creeping.geometry.unit import UNKNOWN, unit_of
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ MOST = 6
 def of_line(line: "ShadowLine") -> Facts:
     """Facts of a shadow line."""
     yield "body", brief(line.body, 200)
-    yield "direction", _direction(line.direction)
+    yield _wave(line.source)
     yield "curves", str(len(line.curves))
     yield "points", str(sum(len(curve.points) for curve in line.curves))
     unit = unit_of(line.body)
@@ -41,7 +42,7 @@ def of_line(line: "ShadowLine") -> Facts:
         yield from _cut_short(
             (f"curve {k}", f"{curve.length:.10g} {unit}, {len(curve.arcs)} arcs") for k, curve in enumerate(line.curves)
         )
-    worst = max((float(np.max(np.abs(curve.normals @ line.direction))) for curve in line.curves), default=0.0)
+    worst = max((float(np.max(np.abs(curve.grazing))) for curve in line.curves), default=0.0)
     yield "largest |n.d|", f"{worst:.1e}"
     distance = line.singular_distance
     yield "singular distance", f"{distance:.3g}, about {np.degrees(distance):.3g}°" if np.isfinite(distance) else "none"
@@ -50,7 +51,7 @@ def of_line(line: "ShadowLine") -> Facts:
 def of_shadow_curve(curve: "ShadowCurve") -> Facts:
     """Facts of one curve of a shadow line."""
     yield "body", brief(curve.body, 200)
-    yield "direction", _direction(curve.direction)
+    yield _wave(incident_of_row(curve.wave))
     yield "points", str(len(curve.points))
     unit = unit_of(curve.body)
     yield "length", f"{curve.length:.10g} {unit}"
@@ -59,7 +60,7 @@ def of_shadow_curve(curve: "ShadowCurve") -> Facts:
         (f"arc {k}", f"{status}, from {start:.6g} to {end:.6g} {unit}")
         for k, (start, end, status) in enumerate(curve.arcs)
     )
-    yield "largest |n.d|", f"{np.max(np.abs(curve.normals @ curve.direction)):.1e}"
+    yield "largest |n.d|", f"{np.max(np.abs(curve.grazing)):.1e}"
     yield "kappa_n(d)", _range(curve.curvature, f"1/{unit}")
 
 
@@ -67,7 +68,7 @@ def of_fan(fan: "RayFan") -> Facts:
     """Facts of a fan."""
     unit = unit_of(fan.body)
     yield "body", brief(fan.body, 200)
-    yield "direction", _direction(fan.line.direction)
+    yield _wave(fan.line.source)
     yield "rays", str(len(fan.points))
     yield "steps", str(len(fan.travel_time))
     yield "length", f"{fan.length:g}" + f" {unit}" * (unit != UNKNOWN)
@@ -180,6 +181,12 @@ def of_direct(flow: "DirectFlow") -> Facts:
         yield "step", f"equal, at most {flow.step:g}"
     yield "horizon", f"{flow.horizon:g}"
     yield "error at the end", _error(flow.error, "samples")
+
+
+def _wave(source: Incident) -> tuple[str, str]:
+    if isinstance(source, PointSource):
+        return "source at", _direction(np.array(source.position))
+    return "direction", _direction(np.array(source.direction))
 
 
 def _direction(d: FloatArray) -> str:

@@ -73,11 +73,11 @@ class View:
         return seen
 
 
-def shadow_view(direction: ArrayLike) -> View:
+def shadow_view(direction: ArrayLike, turned: float = np.radians(35.0)) -> View:
     """View of the shadow side: along the direction of the wave, turned and raised so that the shadow line shows."""
     d = unit_direction(direction)
     # straight up or down every azimuth is as good; this one is the custom of 3-D plots
-    azimuth = np.radians(-60.0) if np.hypot(d[0], d[1]) < 1e-6 else np.arctan2(d[1], d[0]) + np.radians(35.0)
+    azimuth = np.radians(-60.0) if np.hypot(d[0], d[1]) < 1e-6 else np.arctan2(d[1], d[0]) + turned
     # pulled to the horizon, so that z stays up: -42 to 66 degrees
     elevation = 0.6 * np.arcsin(np.clip(d[2], -1, 1)) + np.radians(12.0)
     return View(float(azimuth), float(elevation))

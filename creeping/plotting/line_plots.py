@@ -6,6 +6,7 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
+from creeping.geometry.incident import incident_of_row
 from creeping.plotting._drawing import Drawing, compose
 from creeping.plotting._strokes import LEVEL_NAMES
 from creeping.plotting._view import View
@@ -21,7 +22,7 @@ KINDS = ("parameters", "3d")
 
 def line_of(curve: ShadowCurve) -> ShadowLine:
     """Shadow line that consists of one curve, for pictures: how far it is from crossing itself is not known."""
-    return ShadowLine(curve.body, curve.direction, (curve,), np.nan, curve.line_nodes())
+    return ShadowLine(curve.body, incident_of_row(curve.wave), (curve,), np.nan, curve.line_nodes())
 
 
 def plot_line(

@@ -1,6 +1,7 @@
-"""The fan of creeping rays: geodesics launched from the shadow line with initial tangent d.
+"""The fan of creeping rays: geodesics launched from the shadow line along the wave, with initial tangent d.
 
-Ray sigma starts at x0(sigma) with p = d; on a plain body t is arclength. Neighbouring rays part by J = c I,
+Ray sigma starts at x0(sigma) with p = d, of a point source the unit vector from it to x0; on a plain body t is
+arclength. Neighbouring rays part by J = c I,
 
     I(t) = I(0) M11(t) + I'(0) M12(t),   I(0) = 1/c,   I'(0) = (J'(0) - (p.grad c))/c,
 
@@ -8,7 +9,7 @@ M the Jacobi matrix that the flow carries along, sigma measured across the ray, 
 `creeping.geodesics.equations.launch_spreading`. Every zero of J passed is a caustic. A creeping ray needs kappa_n > 0:
 where kappa_n first falls to 0 it is detached; its geometry goes on, its field does not.
 
-Sources: Derivations, R3 and R4.
+Sources: Derivations, R3, R4 and R19.
 """
 
 from dataclasses import dataclass, replace
@@ -63,7 +64,7 @@ class RayFan(DrawnOnBody):
     points, directions : (rays, steps, 3), L and 1
     travel_time : (steps,), L (time for a weighted body)
     eikonal : (rays, steps), L
-        d.x0 + travel_time.
+        d.x0 + travel_time; of a point source its distance from x0 + travel_time.
     spreading, spreading_rate : (rays, steps), 1 and 1/L
         J and J'.
     curvature : (rays, steps), 1/L
@@ -329,9 +330,9 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
     # a copy of all states takes as long as a leap
     path = states.reshape(-1, *states.shape[2:]) if full else states[there]
     points = launch.points.reshape(-1, 3) if full else launch.points[there]
-    directions = launch.directions[there[0]]
+    directions = launch.headings[there]
     tangents = None if speed_of(body) is None else line_tangents(body, points, directions)
-    J, rate, stalled = spread(body, points, tangents, directions, path)
+    J, rate, stalled = spread(body, points, tangents, directions, launch.openings[there], path)
     begun = np.array([LINE_STATUS[k] for k in sorted(LINE_STATUS)])[launch.state[there].astype(int)]
     status, first = ends_of(body, points, path, times, begun)
     status[stalled] = RayStatus.STALLED

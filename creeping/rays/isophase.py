@@ -1,7 +1,8 @@
 """Iso-phase curves of a fan: where travel time, or the eikonal d.x0 + t, has one value.
 
-Ray sigma meets the level at t(sigma) = level, or level - d.x0(sigma). Between two steps the ray is the quintic
-polynomial with the positions, velocities x' and accelerations x'' of both ends, put back on the body.
+Ray sigma meets the level at t(sigma) = level, or level - d.x0(sigma); of a point source R(sigma) is in place of d.x0.
+Between two steps the ray is the quintic polynomial with the positions, velocities x' and accelerations x'' of both
+ends, put back on the body.
 
 Sources: [YC06b]; Derivations, R14.
 """

@@ -21,8 +21,8 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 
 LANES = 18
 """x (3), p (3), J, J', φ, κₙ, κₙ', κₙ'', κ_t, and the five integrals."""
-START_LANES = 9
-"""d.x0, dσ⊥/dσ, κₙ, κₙ', κₙ'', κ_t and n at the launch point."""
+START_LANES = 10
+"""d.x0 (or R), dσ⊥/dσ, κₙ, κₙ', κₙ'', κ_t, n and 1/R of the wave at the launch point."""
 GAUSS = 4
 """Gauss points of a step."""
 GUARD = 5
@@ -123,7 +123,7 @@ class RayPoints:
 
     @property
     def eikonal(self) -> FloatArray:
-        """d.x0 + s, L."""
+        """d.x0 + s, L; of a point source R + s."""
         return np.asarray(self.starts[..., 0] + self.time)
 
     @property
@@ -135,6 +135,11 @@ class RayPoints:
     def width(self) -> FloatArray:
         """dσ⊥/dσ: arclength of the shadow line across the ray."""
         return self.starts[..., 1]
+
+    @property
+    def opening(self) -> FloatArray:
+        """1/R of the wave at the launch point, 1/L; 0 of a plane wave."""
+        return self.starts[..., 9]
 
     @property
     def first_normal(self) -> FloatArray:

@@ -155,7 +155,7 @@ def decayed_lengths(
 ) -> FloatArray:
     """Lengths (n,), L, at which waves of n incidences have died away; LONGEST body sizes where no ray is launched."""
     most, there = LONGEST * size(body), launch.there
-    starts = pack(launch.points[there], np.broadcast_to(launch.directions[:, None], launch.points.shape)[there])
+    starts = pack(launch.points[there], launch.headings[there])
     curvature = np.full(there.shape, np.nan)
     curvature[there] = curvature_values(body, starts)
     times: FloatArray = np.linspace(0.0, most, SAMPLES + 1)

@@ -1,10 +1,10 @@
-"""Spreading of rays launched from a line with one direction: J, J' and the caustics passed.
+"""Spreading of rays launched from a shadow line: J, J' and the caustics passed.
 
     J = c I,  I(t) = I(0) M11(t) + I'(0) M12(t),  I(0) = 1/c,  I'(0) = (J'(0) - (p.grad c))/c,
 
 M the Jacobi matrix that the flow carries along; J(0), J'(0) of `creeping.geodesics.equations.launch_spreading`.
 
-Sources: Derivations, R3 to R5.
+Sources: Derivations, R3 to R5 and R19.
 """
 
 import numpy as np
@@ -17,7 +17,12 @@ from creeping.geometry.surface import Surface
 
 
 def spread(
-    body: Surface, points: FloatArray, tangents: FloatArray | None, directions: FloatArray, states: FloatArray
+    body: Surface,
+    points: FloatArray,
+    tangents: FloatArray | None,
+    directions: FloatArray,
+    openings: FloatArray,
+    states: FloatArray,
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """J, J' (rays, steps) and the rays whose launch point has no speed.
 
@@ -26,15 +31,21 @@ def spread(
     body : Surface
     points, tangents, directions : (rays, 3)
         Of the line, where the rays start, and those of the launch; without a weight the tangents are not needed.
+    openings : (rays,), 1/L
+        1/R of the wave that launches them, 0 of a plane wave.
     states : (rays, steps, 10 or more)
         What the flow carried from there.
     """
     speed = speed_of(body)
     if speed is None:
-        # J(0) = 1, J'(0) = 0: the first column of the Jacobi matrix
-        return states[..., M11], states[..., M21], np.zeros(len(points), dtype=bool)
+        none = np.zeros(len(points), dtype=bool)
+        if not np.any(openings):
+            # J(0) = 1, J'(0) = 0: the first column of the Jacobi matrix
+            return states[..., M11], states[..., M21], none
+        a = openings[:, None]
+        return states[..., M11] + a * states[..., M12], states[..., M21] + a * states[..., M22], none
     assert tangents is not None
-    first = launch_spreading(body, points, directions, tangents)
+    first = launch_spreading(body, points, directions, tangents, openings)
     x, p = states[..., X], states[..., P]
     c, c0 = speed_values(body, x), speed_values(body, points)
     rate = np.sum(speed.gradient(x) * p, axis=-1)

@@ -100,4 +100,4 @@ class Starts(NamedTuple):
             np.array([self.arcs[k].closed for k in self.arc], dtype=float),
             self.state,
         )
-        return LaunchPoints(line.direction[None], *(row[None] for row in rows))
+        return LaunchPoints(line.wave[None], *(row[None] for row in rows))

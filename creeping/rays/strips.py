@@ -13,8 +13,8 @@ from scipy.linalg import solve_banded
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.surface import Surface, normal
 from creeping.rays.fan import RayFan
+from creeping.rays.fan_points import ray_points
 from creeping.rays.quantities import LANES, START_LANES, RayPoints
-from creeping.rays.tracer import ray_points
 
 DEGREE = 5
 ROUND = 40

@@ -1,6 +1,6 @@
 """Creeping rays traced for what a field needs to know of them: of a fan, or near given points of a shadow line.
 
-    F(x0) = 0,  grad F(x0).d = 0;   dσ⊥ = b0.dx0,  b0 = n0 x d
+    F(x0) = 0,  grad F(x0).d = 0;   dσ⊥ = b0.dx0,  b0 = n0 x d;   J(0) = 1,  J'(0) = 1/R
 
 Rays that leave towards r are found by Newton's method on p(σ, s) = r, with p and b = n x p at the end,
 
@@ -9,7 +9,9 @@ Rays that leave towards r are found by Newton's method on p(σ, s) = r, with p a
 Rays go by equal steps, in which the most curved part of the body turns them by TURN: what comes out of one does not
 depend on the others that are traced with it.
 
-Sources: Derivations, R4 and R12.
+R is the distance from a point source, inf of a plane wave.
+
+Sources: Derivations, R4, R12 and R19.
 """
 
 from collections.abc import Sequence
@@ -21,21 +23,18 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
-from creeping.geodesics.states import M11, M21, P, X, pack
+from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, size
-from creeping.rays.fan import RayFan
 from creeping.rays.nonsmooth import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
 from creeping.rays.single_rays import SingleRays
-from creeping.shadow.attachment import line_tangents
 from creeping.shadow.panels import newton_step
 
-TURN, FINE_TURN = 0.12, 0.08
-"""Largest angle by which a ray turns in one step, of single rays and of whole fans: polynomials of degree 9 then err by
-about 1e-9 and 3e-11."""
+TURN = 0.12
+"""Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 1e-9."""
 CLOSE = 1e-6
 """Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
 ACCEPTED = 1e-4
@@ -101,7 +100,13 @@ class RayTracer:
         return points, tangents
 
     def _states(
-        self, directions: FloatArray, starts: FloatArray, latest: float, step: float, before: bool
+        self,
+        directions: FloatArray,
+        starts: FloatArray,
+        openings: FloatArray,
+        latest: float,
+        step: float,
+        before: bool,
     ) -> tuple[FloatArray, FloatArray]:
         """x, p, J, J' at equal steps, GUARD of them before the launch point and beyond a time: (n, K, 8).
 
@@ -111,11 +116,13 @@ class RayTracer:
         last = int(np.ceil(latest / step)) + GUARD + 1
         forward: FloatArray = step * np.arange(last + 1, dtype=np.float64)
         ahead, end = self._traced(pack(starts, directions, jacobi=True), forward, step)
+        _open(ahead, openings)
         if not before:
             # never read, but polynomials of the first steps pass there
             return np.concatenate([np.repeat(ahead[:, :1, :8], GUARD, axis=1), ahead[..., :8]], axis=1), end
         some = forward[: GUARD + 1]
         back, _ = self._traced(pack(starts, -directions, jacobi=True), some, step)
+        _open(back, -openings)
         states = np.empty((len(starts), last + 1 + GUARD, 8))
         states[:, GUARD:] = ahead[..., :8]
         behind = back[:, GUARD:0:-1]
@@ -132,6 +139,7 @@ class RayTracer:
         owner: IntArray | None = None,
         *,
         long: int = 0,
+        openings: FloatArray | None = None,
         observers: FloatArray | None = None,
         cross: bool = False,
     ) -> SingleRays:
@@ -146,6 +154,8 @@ class RayTracer:
             Ray of each point; each has its own if not given.
         long : int
             0 for all quantities; else steps are so many times as long, and integrals along the ray are left out.
+        openings : (rays,), optional, 1/L
+            1/R, of a point source.
         observers : (n, 3), optional
             r of each point.
         cross : bool
@@ -161,6 +171,7 @@ class RayTracer:
 
         n, rays = len(times), len(starts)
         owner = np.arange(n) if owner is None else owner
+        opened = np.zeros(rays) if openings is None else openings
         lanes, first = np.zeros((n, LANES)), np.zeros((n, START_LANES))
         alive, risen = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         times = np.array(times)
@@ -185,7 +196,7 @@ class RayTracer:
                 now, which = times[rows], rank[owner[rows]] - k
                 before = whole or float(np.min(now)) < GUARD * step
                 states, ends_of[mine] = self._states(
-                    directions[mine], starts[mine], float(np.max(latest[mine])) + 2 * step, step, before
+                    directions[mine], starts[mine], opened[mine], float(np.max(latest[mine])) + 2 * step, step, before
                 )
                 seen = np.zeros((0, 3)) if observers is None else observers[rows]
                 if cross:
@@ -202,6 +213,8 @@ class RayTracer:
                 lanes[rows], first[rows], alive[rows], risen[rows] = out
         directions, starts, tangents = directions[owner], starts[owner], tangents[owner]
         first[:, 0] = np.sum(starts * directions, axis=1)
+        if np.any(opened):
+            first[:, 0], first[:, 9] = 1 / opened[owner], opened[owner]
         first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
         if whole and n:
             alive &= times < ends_of[owner]
@@ -347,44 +360,17 @@ class RayTracer:
         return self.at(directions, starts, tangents, times, owner, observers=observers, cross=True)
 
 
+def _open(states: FloatArray, openings: FloatArray) -> None:
+    """Give states (rays, steps, 10) the J and J' of rays that part by 1/R (rays,) at their start, in place."""
+    if np.any(openings):
+        states[..., M11] += openings[:, None] * states[..., M12]
+        states[..., M21] += openings[:, None] * states[..., M22]
+
+
 def _apart(rays: RayPoints, observers: FloatArray) -> FloatArray:
     """|r - p| (n,)."""
     p = rays.directions / np.linalg.norm(rays.directions, axis=1, keepdims=True)
     return np.asarray(np.linalg.norm(observers - p, axis=1))
-
-
-def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray, RayPoints]:
-    """Points of every ray of a fan, at equal steps that resolve the body if not at given times.
-
-    Returns
-    -------
-    times : (steps,), L
-    points : RayPoints
-        (rays, steps)
-
-    Raises
-    ------
-    InvalidInputError
-        If the body is weighted.
-    """
-    tracer = RayTracer(fan.body, fan.length, turn=FINE_TURN)
-    equal: FloatArray = tracer.step * np.arange(tracer.steps + 1, dtype=np.float64)
-    times = equal if times is None else times
-    rays, steps = len(fan.points), len(times)
-    starts = fan.points[:, 0]
-    d = np.broadcast_to(fan.line.direction, starts.shape)
-    tangents = line_tangents(fan.body, starts, d) if rays else np.zeros((0, 3))
-    owner = np.repeat(np.arange(rays), steps)
-    found = tracer.at(d, starts, tangents, np.tile(times, rays), owner).rays
-    launched = fan.launched
-    alive = found.alive.reshape(rays, steps) & launched[:, None]
-    return times, RayPoints(
-        found.lanes.reshape(rays, steps, LANES),
-        found.starts.reshape(rays, steps, START_LANES),
-        np.broadcast_to(times, alive.shape),
-        alive,
-        found.scale,
-    )
 
 
 def same_within(rays: RayPoints, cell: FloatArray) -> FloatArray:

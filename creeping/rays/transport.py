@@ -14,6 +14,7 @@ from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geodesics.states import pack
 from creeping.geometry.arguments import checked_body, shown
 from creeping.geometry.creased import is_creased
+from creeping.geometry.incident import headings
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK
 from creeping.shadow.attachment import LaunchPoints
@@ -73,7 +74,7 @@ def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: 
         filled = np.zeros((len(some), padded), dtype=bool)
         filled[:, :rays] = there[some]
         points[~filled] = np.broadcast_to(points[:, :1], points.shape)[~filled]
-    directions = np.broadcast_to(launch.directions[some, None], points.shape)
+    directions = headings(launch.waves[some, None], points)
     states = flow.transport(pack(points, directions, lanes=components), times)
     states = states.reshape(len(some), padded, len(times), components)[:, :rays]
     if len(some) == n:

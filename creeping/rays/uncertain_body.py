@@ -14,6 +14,7 @@ from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.states import pack
 from creeping.geometry.arguments import one_of, whole_number
+from creeping.geometry.incident import headings, openings
 from creeping.geometry.surface import project
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.spreading import spread
@@ -113,7 +114,7 @@ def coarse_fan(fan: RayFan) -> RayFan | None:
     coarse_fit: Any = getattr(fan.body, "coarse_fit", None)
     if coarse_fit is None:
         return None
-    line = shadow_line(coarse_fit, fan.line.direction)
+    line = shadow_line(coarse_fit, source=fan.line.source)
     rays, steps = max(len(fan.points), 1), len(fan.travel_time) - 1
     flow = DirectFlow(coarse_fit, rtol=RTOL)
     return launch(flow, line, length=fan.length, n_rays=rays, n_steps=steps, max_gap=float("inf"))
@@ -121,10 +122,10 @@ def coarse_fan(fan: RayFan) -> RayFan | None:
 
 def _ends(body: Any, starts: FloatArray, fan: RayFan) -> FloatArray:
     """x (3), J, attenuation and detachment at the end of rays from points near the body: (n, 6)."""
-    d = np.broadcast_to(fan.line.direction, starts.shape)
-    x, p = project_bundle(body, project(body, starts), d)
+    wave = fan.line.wave
+    x, p = project_bundle(body, project(body, starts), headings(wave, starts))
     states = DirectFlow(body, rtol=RTOL).transport(pack(x, p, lanes=12), fan.travel_time[[0, -1]])
-    tangents = line_tangents(body, x, fan.line.direction)
-    j, _, _ = spread(body, x, tangents, p, states)
+    tangents = line_tangents(body, x, headings(wave, x))
+    j, _, _ = spread(body, x, tangents, p, openings(wave, x), states)
     end = states[:, -1]
     return np.column_stack([end[:, :3], j[:, -1], end[:, 10:]])

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.geometry.incident import REMEDY, headings, openings, optical_paths, spherical
 from creeping.geometry.surface import Surface
 from creeping.shadow.status import NO_RAY
 
@@ -29,8 +31,8 @@ class LaunchPoints:
 
     Attributes
     ----------
-    directions : (n, 3)
-        Unit vectors d.
+    waves : (n, 3 or 4)
+        Unit vectors d of plane waves, or rows (d, w) of `creeping.geometry.incident`.
     points : (n, rays, 3), L
         NaN where there is no ray, as below.
     arclength : (n, rays), L
@@ -43,7 +45,7 @@ class LaunchPoints:
         Codes of `creeping.shadow.status.STATUSES`.
     """
 
-    directions: FloatArray
+    waves: FloatArray
     points: FloatArray
     arclength: FloatArray
     curve_index: IntArray
@@ -53,19 +55,36 @@ class LaunchPoints:
     state: FloatArray
 
     @classmethod
-    def unpacked(cls, directions: FloatArray, launched: FloatArray, places: Any) -> "LaunchPoints":
+    def unpacked(cls, waves: FloatArray, launched: FloatArray, places: Any) -> "LaunchPoints":
         """From what the kernels fill, (n, rays, LAUNCHED) and (n, rays)."""
         from creeping.shadow.kernels.trace import ARC, ARCLENGTH, CLOSED, SPACING, STATE
 
         arclength, arc = launched[..., ARCLENGTH], launched[..., ARC]
         spacing, closed = launched[..., SPACING], launched[..., CLOSED]
         state = launched[..., STATE]
-        return cls(directions, launched[..., :3], arclength, places, arc, spacing, closed, state)
+        return cls(waves, launched[..., :3], arclength, places, arc, spacing, closed, state)
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit vectors d (n, 3) of plane waves; see `headings` for others."""
+        if spherical(self.waves):
+            raise InvalidInputError(f"these launch points have no one direction: they are of {REMEDY}")
+        return np.asarray(self.waves[:, :3])
+
+    @property
+    def headings(self) -> FloatArray:
+        """Unit vectors p (n, rays, 3) along which rays start."""
+        return headings(self.waves[:, None], self.points)
+
+    @property
+    def openings(self) -> FloatArray:
+        """1/R (n, rays), 1/L: how fast rays part where they start."""
+        return openings(self.waves[:, None], self.points)
 
     @property
     def phase(self) -> FloatArray:
-        """d.x0 (n, rays), L."""
-        return np.asarray(np.sum(self.points * self.directions[:, None], axis=-1))
+        """d.x0, or the distance from the source (n, rays), L."""
+        return optical_paths(self.waves[:, None], self.points)
 
     @property
     def there(self) -> BoolArray:
@@ -128,7 +147,7 @@ def parting_positions(
 
 
 def line_tangents(body: Surface, points: FloatArray, direction: FloatArray) -> FloatArray:
-    """Unit tangents grad F x Hd/|.| of n.d = 0 at its points; d is (3,) or one for each: (n, 3) -> (n, 3).
+    """Unit tangents grad F x Hp/|.| of the line at its points; p is (3,) or one for each: (n, 3) -> (n, 3).
 
     NaN where the ground is flat along d, as beside a joint that is the line itself.
     """

@@ -91,7 +91,7 @@ def _finished(
     arcs = _arcs(body, piece, direction, panels)
     curve = ShadowCurve(
         body=body,
-        direction=direction,
+        wave=direction,
         points=points,
         normals=unit_normals(piece, points),
         tangents=tangents,

@@ -1,13 +1,14 @@
-"""Critical points of n.d on the body: where the shadow line would cross itself.
+"""Critical points of n.q on the body: where the shadow line would cross itself.
 
-With S the shape operator and d_T the tangential part of d, the gradient of h = n.d on Q is
+With S the shape operator and q_T the tangential part of q, the gradient of h = n.q on Q is
 
-    g = S d_T = P_T H d_T / |grad F|,   d_T = d - (n.d) n,   P_T = 1 - n n^T.
+    g = S q_T = P_T H q_T / |grad F|,   q_T = q - (n.q) n,   P_T = 1 - n n^T:
 
-Apart from n = +-d it vanishes only where K = 0 and d_T is the null direction. A critical point with h = 0 is a crossing
+q turns by its own change, which is a multiple of dx and has no part along n. Apart from n = +-q/|q| it vanishes only
+where K = 0 and q_T is the null direction. A critical point with h = 0 is a crossing
 or an isolated point of the shadow line; a small |h| there is a near-crossing, a small loop or a gap.
 
-Sources: Derivations, R6 and R11.
+Sources: Derivations, R6, R11 and R19.
 """
 
 from dataclasses import dataclass
@@ -16,23 +17,24 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import SingularIncidenceError
+from creeping.geometry.incident import travel
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
 
 SINGULAR = 1e-6
-"""|n.d| at a critical point below which the incidence is refused."""
+"""|n.q|/|q| at a critical point below which the incidence is refused."""
 MAX_SEEDS = 160
 
 
 @dataclass(frozen=True)
 class CriticalPoints:
-    """Critical points of n.d on the body with |n.d| < 1.
+    """Critical points of n.q on the body with |n.q| < |q|.
 
     Attributes
     ----------
     points : (k, 3), L
     values : (k,)
-        n.d there.
+        n.q/|q| there.
     """
 
     points: FloatArray
@@ -40,7 +42,7 @@ class CriticalPoints:
 
     @property
     def distance(self) -> float:
-        """Least |n.d|, inf if there is no critical point."""
+        """Least |n.q|/|q|, inf if there is no critical point."""
         return float(np.min(np.abs(self.values), initial=np.inf))
 
     def refuse(self) -> None:
@@ -55,29 +57,30 @@ class CriticalPoints:
         more = f" and {len(points) - 8} more" if len(points) > 8 else ""
         return SingularIncidenceError(
             f"the shadow line {trouble} at {len(points)} points: {named}{more} "
-            f"(least |n.d| at a critical point {self.distance:.1e}); perturb the direction by say 1e-3",
+            f"(least |n.d| at a critical point {self.distance:.1e}); perturb the direction, or move the source, by say "
+            "1e-3",
             points=points,
             distance=self.distance,
         )
 
 
-def incidence(body: Surface, direction: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return n.d and its gradient on the body times the body's size: (..., 3) -> (...), (..., 3)."""
+def incidence(body: Surface, wave: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return n.q and its gradient on the body times the body's size: (..., 3) -> (...), (..., 3)."""
     gradient = body.gradient(points)
     norm = np.linalg.norm(gradient, axis=-1, keepdims=True)
-    n = gradient / norm
-    h = n @ direction
-    across = (body.hessian(points) @ (direction - h[..., None] * n)[..., None])[..., 0]
+    n, q = gradient / norm, travel(wave, points)
+    h = np.einsum("...i,...i->...", n, np.broadcast_to(q, n.shape))
+    across = (body.hessian(points) @ (q - h[..., None] * n)[..., None])[..., 0]
     across -= np.sum(across * n, axis=-1, keepdims=True) * n
     return h, across * (size(body) / norm)
 
 
-def critical_points(body: Surface, direction: FloatArray, mesh: Triangulation) -> CriticalPoints:
-    """Locate the critical points of n.d, apart from n = +-d.
+def critical_points(body: Surface, wave: FloatArray, mesh: Triangulation) -> CriticalPoints:
+    """Locate the critical points of n.q, apart from n = +-q/|q|.
 
     Parameters
     ----------
-    body, direction : Surface, (3,)
+    body, wave : Surface, (3,) or (4,)
     mesh : Triangulation
         Of the body; its vertices of locally least |g| are the starting points.
 
@@ -85,13 +88,14 @@ def critical_points(body: Surface, direction: FloatArray, mesh: Triangulation) -
     -------
     CriticalPoints
     """
-    h, g = incidence(body, direction, mesh.vertices)
+    h, g = incidence(body, wave, mesh.vertices)
     steep = np.linalg.norm(g, axis=1)
     seeds = _seeds(mesh, h, steep)
-    points = _solve(body, direction, mesh.vertices[seeds])
-    h, g = incidence(body, direction, points)
+    points = _solve(body, wave, mesh.vertices[seeds])
+    h, g = incidence(body, wave, points)
+    h = h / np.linalg.norm(travel(wave, points), axis=-1)
     off = np.abs(body.level(points)) / np.linalg.norm(body.gradient(points), axis=1)
-    # at n = +-d, where the gradient vanishes for any body, 1 - |h| is the square of the error of the point
+    # at n = +-q/|q|, where the gradient vanishes for any body, 1 - |h| is the square of the error of the point
     found = (np.linalg.norm(g, axis=1) < 1e-8) & (off < 1e-9 * size(body)) & (np.abs(h) < 1 - 1e-8)
     points, h = points[found], h[found]
     kept = _distinct(points, 1e-5 * size(body), order=np.argsort(np.abs(h), kind="stable"))
@@ -111,14 +115,14 @@ def _seeds(mesh: Triangulation, h: FloatArray, steep: FloatArray) -> list[int]:
     return np.unique(np.concatenate([minima, near, least])).tolist()  # type: ignore[no-any-return]
 
 
-def _residual(body: Surface, direction: FloatArray, points: FloatArray) -> FloatArray:
+def _residual(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
     """(g, F/|grad F|) without dimension: (..., 3) -> (..., 4)."""
-    _, g = incidence(body, direction, points)
+    _, g = incidence(body, wave, points)
     off = body.level(points) / np.linalg.norm(body.gradient(points), axis=-1) / size(body)
     return np.concatenate([g, off[..., None]], axis=-1)
 
 
-def _solve(body: Surface, direction: FloatArray, points: FloatArray) -> FloatArray:
+def _solve(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
     """Levenberg-Marquardt steps with damping |r|^2: fast for isolated, degenerate and continuous solutions alike."""
     points = np.array(points, dtype=float)
     length = size(body)
@@ -127,9 +131,9 @@ def _solve(body: Surface, direction: FloatArray, points: FloatArray) -> FloatArr
     active = np.arange(len(points))
     for _ in range(40):
         x = points[active]
-        r = _residual(body, direction, x)
-        ahead = _residual(body, direction, x[:, None] + shifts)
-        J = np.swapaxes(ahead - _residual(body, direction, x[:, None] - shifts), 1, 2) / 2e-5
+        r = _residual(body, wave, x)
+        ahead = _residual(body, wave, x[:, None] + shifts)
+        J = np.swapaxes(ahead - _residual(body, wave, x[:, None] - shifts), 1, 2) / 2e-5
         Jt = np.swapaxes(J, 1, 2)
         # the floor keeps the matrix regular where a whole curve is critical
         damping = np.maximum(np.sum(r * r, axis=1), 1e-14 * np.trace(Jt @ J, axis1=1, axis2=2) + 1e-28)

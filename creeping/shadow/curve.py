@@ -14,6 +14,7 @@ import numpy as np
 from creeping._presenting import DrawnOnBody
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.incident import REMEDY, headings, spherical
 from creeping.geometry.surface import Surface
 from creeping.geometry.unit import unit_of
 from creeping.shadow.nodes import LineNodes, polished
@@ -30,7 +31,9 @@ class ShadowCurve(DrawnOnBody):
 
     Attributes
     ----------
-    body, direction : Surface, (3,)
+    body : Surface
+    wave : (3,) or (4,)
+        d of a plane wave, or the row (d, w) of `creeping.geometry.incident`.
     points : (n, 3), L
         The last is one spacing before the first; of an open curve the first and the last are its ends.
     normals, tangents : (n, 3)
@@ -41,9 +44,10 @@ class ShadowCurve(DrawnOnBody):
     error : float
         Estimated relative error of the length, and so of places along the curve.
     status : (n,) of str
-        "attached", "occluded" (the incident ray is stopped before) or "concave" (kappa_n(d) <= 0).
+        "attached", "occluded" (the incident ray is stopped before) or "concave" (kappa_n <= 0
+        along the wave).
     curvature : (n,), 1/L
-        kappa_n(d).
+        kappa_n along the wave.
     arcs : tuple of (start, end, status)
         Arclengths at which the status changes; the end passes the length where an arc wraps.
     nodes : (k, 3), L
@@ -59,7 +63,7 @@ class ShadowCurve(DrawnOnBody):
     """
 
     body: Surface
-    direction: FloatArray
+    wave: FloatArray
     points: FloatArray
     normals: FloatArray
     tangents: FloatArray
@@ -76,6 +80,18 @@ class ShadowCurve(DrawnOnBody):
     goes_on: tuple[int, int] = (-1, -1)
 
     @property
+    def direction(self) -> FloatArray:
+        """Unit vector (3,) of a plane wave."""
+        if spherical(self.wave):
+            raise InvalidInputError(f"this curve has no one direction: it is of {REMEDY}")
+        return np.asarray(self.wave[:3])
+
+    @property
+    def grazing(self) -> FloatArray:
+        """n.p at the points (n,), p the unit vector along which the wave travels: 0 to rounding."""
+        return np.asarray(np.sum(self.normals * headings(self.wave, self.points), axis=1))
+
+    @property
     def fractions(self) -> dict[str, float]:
         """Share of the length with each status, from the arcs."""
         shares = dict.fromkeys(STATUSES, 0.0)
@@ -87,14 +103,14 @@ class ShadowCurve(DrawnOnBody):
     def panels(self) -> PanelCurve:
         """The curve in panels that are exact to rounding, fitted when first asked for."""
         spacing = np.full(len(self.nodes), self.length / len(self.nodes))
-        return fit_panels(self.body, self.direction, self.nodes, spacing)
+        return fit_panels(self.body, self.wave, self.nodes, spacing)
 
     def line_nodes(self) -> LineNodes:
         """The curve as the nodes of a line of its own."""
         if self.piece >= 0:
             x, tangents, curvature = self.nodes, self.tangents, self.curvature
         else:
-            x, tangents, curvature = polished(self.body, self.direction, self.nodes)
+            x, tangents, curvature = polished(self.body, self.wave, self.nodes)
         spacing = np.array([self.length / len(x)])
         columns = np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T)
         return LineNodes(*columns, curvature, np.array([0, len(x)]), spacing, self.error)
@@ -121,14 +137,14 @@ class ShadowCurve(DrawnOnBody):
         if "panels" in vars(self):
             return self.panels.at(s.ravel()).reshape(*s.shape, 3)
         points = interpolated(self.nodes, s.ravel() / self.length * len(self.nodes))
-        return polished(self.body, self.direction, points)[0].reshape(*s.shape, 3)
+        return polished(self.body, self.wave, points)[0].reshape(*s.shape, 3)
 
     def __repr__(self) -> str:
-        n_dot_d, unit = np.abs(self.normals @ self.direction), unit_of(self.body)
+        unit = unit_of(self.body)
         return (
             f"ShadowCurve({len(self.points)} points, length {self.length:.10g} {unit})\n"
             f"  {spelled(self.fractions)}; {counted(len(self.arcs), 'arc')}\n"
-            f"  |n.d| at most {np.max(n_dot_d):.1e}; "
+            f"  |n.d| at most {np.max(np.abs(self.grazing)):.1e}; "
             f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/{unit}"
         )
 

@@ -1,4 +1,4 @@
-"""A shadow line followed by itself: critical points of n.d, a mesh refined until the signs decide, panels to rounding.
+"""A shadow line followed by itself: critical points of n.q, a mesh refined until the signs decide, panels to rounding.
 
 The last resort, some tenths of a second a line; what comes out is a `LineNodes` like any other.
 
@@ -8,6 +8,7 @@ Sources: Derivations, R9.
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.geometry.incident import headings
 from creeping.geometry.surface import Surface
 from creeping.shadow.critical_points import critical_points
 from creeping.shadow.nodes import LineNodes, prepared
@@ -20,8 +21,8 @@ A_PANEL = 24
 """Nodes on the shortest panel."""
 
 
-def followed(body: Surface, direction: FloatArray) -> tuple[LineNodes, tuple[PanelCurve, ...], float]:
-    """Nodes of the line of a unit direction, its curves in panels, and the least |n.d| at a critical point.
+def followed(body: Surface, wave: FloatArray) -> tuple[LineNodes, tuple[PanelCurve, ...], float]:
+    """Nodes of the line of a wave, its curves in panels, and the least |n.q|/|q| at a critical point.
 
     Raises
     ------
@@ -29,9 +30,9 @@ def followed(body: Surface, direction: FloatArray) -> tuple[LineNodes, tuple[Pan
         If the line crosses itself, or so nearly that its curves cannot be told apart.
     """
     mesh = prepared(body).coarsest
-    critical = critical_points(body, direction, mesh)
+    critical = critical_points(body, wave, mesh)
     critical.refuse()
-    curves = tuple(sorted(shadow_curves(body, direction, mesh, critical), key=lambda curve: -curve.length))
+    curves = tuple(sorted(shadow_curves(body, wave, mesh, critical), key=lambda curve: -curve.length))
     points, spacing = [], []
     for curve in curves:
         shortest = float(np.min(np.diff(curve.breaks)))
@@ -40,8 +41,9 @@ def followed(body: Surface, direction: FloatArray) -> tuple[LineNodes, tuple[Pan
         points.append(curve.at(curve.length * np.arange(count) / count))
         spacing.append(curve.length / count)
     x = np.concatenate(points)
-    _, tangents = newton_step(body, direction, x)
-    bent = np.einsum("nij,i,j->n", body.hessian(x), direction, direction)
+    _, tangents = newton_step(body, wave, x)
+    p = headings(wave, x)
+    bent = np.einsum("nij,ni,nj->n", body.hessian(x), p, p)
     nodes = LineNodes(
         points=np.ascontiguousarray(x.T),
         tangents=np.ascontiguousarray(tangents.T),

@@ -1,11 +1,12 @@
-"""The shadow line of an incidence: the curves n.d = 0 on the body, and what part of them launches rays.
+"""The shadow line of an incident wave: the curves n.q = 0 on the body, and what part of them launches rays.
 
-Sources: Derivations, R6.
+Sources: Derivations, R6 and R19.
 
-    F(x) = 0,   grad F(x).d = 0,   T = grad F x Hd / |.|,   kappa_n(d) = d.Hd/|grad F|
+    F(x) = 0,   grad F(x).q = 0,   T = grad F x Hq / |.|,   kappa_n = q.Hq/(|grad F| |q|^2)
 
-Seen from outside, the lit side (n.d < 0) is on the left of T. The line is that of `creeping.shadow.many`, the same to
-the last bit; next to a singular direction, where that cannot be certain, its topology is proven (`following`).
+q = d of a plane wave, x - x_s of a point source. Seen from outside, the lit side (n.q < 0) is on the left of T. The
+line is that of `creeping.shadow.many`, the same to the last bit; next to a singular direction, where that cannot be
+certain, its topology is proven (`following`).
 """
 
 # help() shows names of types instead of what they stand for
@@ -20,19 +21,22 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.creased import is_creased
-from creeping.geometry.directions import unit_direction
+from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction
 from creeping.geometry.speed import speed_of
-from creeping.geometry.surface import Surface, normal
+from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.unit import unit_of
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.creased import creased_curves, launched_from
 from creeping.shadow.curve import ShadowCurve, counted, interpolated, spelled
 from creeping.shadow.edges import EdgePart
 from creeping.shadow.following import followed
-from creeping.shadow.nodes import Finished, LineNodes, finished, line_nodes, polished
+from creeping.shadow.nodes import Finished, LineNodes, clearance, finished, line_nodes, polished
 from creeping.shadow.panels import PanelCurve
 from creeping.shadow.status import NEAR_SINGULAR, STATUSES
 from creeping.storage.memory import within_budget
+
+NEAREST, FARTHEST = 1e-5, 1e6
+"""Heights of a point source above the body, in body sizes."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,13 +46,13 @@ class ShadowLine(DrawnOnBody):
     Attributes
     ----------
     body : Surface
-    direction : (3,)
-        Unit vector, where the wave travels.
+    source : PlaneWave or PointSource
     curves : tuple of ShadowCurve
         Longest first.
     singular_distance : float
         Least |n.d| at critical points of n.d on the body apart from n = +-d, inf if there are none; also, to first
-        order, the angle from d to the next direction whose shadow line crosses itself.
+        order, the angle from d to the next direction whose shadow line crosses itself. Of a point source the same with
+        the unit vector from it for d, and within one body size of the body at most its height, in body sizes.
     nodes : LineNodes
         What the line was found by.
     on_edges : tuple of EdgePart
@@ -68,13 +72,23 @@ class ShadowLine(DrawnOnBody):
     """
 
     body: Surface
-    direction: FloatArray
+    source: Incident
     curves: tuple[ShadowCurve, ...]
     singular_distance: float
     nodes: LineNodes
     on_edges: tuple[EdgePart, ...] = ()
     at_tips: float = 0.0
     edge_on: tuple[int, ...] = ()
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector (3,) along which a plane wave travels; a point source has no such."""
+        return plane_direction(self.source, "this shadow line")
+
+    @property
+    def wave(self) -> FloatArray:
+        """Row (d, w) of `creeping.geometry.incident`: (4,)."""
+        return self.source.row(self.body)
 
     @property
     def length(self) -> float:
@@ -114,18 +128,17 @@ class ShadowLine(DrawnOnBody):
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
         if is_creased(self.body):
             return launched_from(self.curves, self.arcs(launch_from), self.direction, n_rays)
-        found = finished(self.body, self.direction, self.nodes, n_rays, every=launch_from == "all")
-        return LaunchPoints.unpacked(self.direction[None], found.launched[None], found.places[None])
+        found = finished(self.body, self.wave, self.nodes, n_rays, every=launch_from == "all")
+        return LaunchPoints.unpacked(self.wave[None], found.launched[None], found.places[None])
 
     def __repr__(self) -> str:
-        worst = max((float(np.max(np.abs(curve.normals @ self.direction))) for curve in self.curves), default=0.0)
-        direction = ", ".join(f"{d:.4g}" for d in self.direction)
+        worst = max((float(np.max(np.abs(curve.grazing))) for curve in self.curves), default=0.0)
         points = sum(len(curve.points) for curve in self.curves)
         on_edges = f"; {self.edge_share:.4g} of it on edges and tips" if self.edge_share else ""
         return (
             f"ShadowLine({counted(len(self.curves), 'curve')}, {points} points, "
             f"length {self.length:.10g} {unit_of(self.body)}, "
-            f"direction ({direction}))\n"
+            f"{wave_words(self.source)})\n"
             f"  {spelled(self.fractions)}{on_edges}; on {brief(self.body)}\n"
             f"  |n.d| at most {worst:.1e}; singular distance {self.singular_distance:.3g}"
         )
@@ -142,15 +155,19 @@ def checked_launch_from(launch_from: str) -> None:
         raise InvalidInputError(f"launch_from = {launch_from!r} is neither 'attached' nor 'all'")
 
 
-def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> ShadowLine:
-    """Find the shadow line of an incidence and classify it.
+def shadow_line(
+    body: Surface, direction: ArrayLike | None = None, *, source: Incident | None = None, n_points: int = 512
+) -> ShadowLine:
+    """Find the shadow line of a plane wave or a point source and classify it.
 
     Parameters
     ----------
     body : Surface
         Only ``level``, ``gradient``, ``hessian`` and ``bounds`` are used.
     direction : (3,)
-        Where the wave travels; need not be unit.
+        Where a plane wave travels; need not be unit.
+    source : PointSource or PlaneWave
+        In place of a direction; a point source outside the body, which is smooth.
     n_points : int
         Points on each curve, at least 16; lengths and arcs do not depend on it.
 
@@ -161,7 +178,7 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     Raises
     ------
     InvalidInputError
-        If the direction or n_points is not usable.
+        If the direction, the source or n_points is not usable: a source inside the body or on it among them.
     SurfaceError
         If F = 0 has no closed triangulation in its bounds.
     SingularIncidenceError
@@ -174,13 +191,19 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     >>> line = cr.shadow_line(sc.Torus(), direction=(0, 0, 1))
     >>> [round(curve.length, 6) for curve in line.curves]          # outer and inner equator
     [9.424778, 3.141593]
+    >>> line = cr.shadow_line(sc.Torus(), source=cr.PointSource((0, 0, 0)))        # in its hole
+    >>> [round(float(abs(curve.points[:, 2]).max()), 6) for curve in line.curves]
+    [0.433013, 0.433013]
     """
     checked_body(body, charts=False)
-    d = unit_direction(direction)
+    incident = incident_of(direction, source)
     n_points = whole_number(n_points, "n_points", 16)
     within_budget(150.0 * n_points, f"{n_points} points of the shadow line", "ask for fewer")
     if is_creased(body):
-        return _creased_line(body, d, n_points)
+        return _creased_line(body, incident, n_points)
+    if isinstance(incident, PointSource):
+        _checked_height(body, incident)
+    d = incident.row(body)
     nodes, code, distance = line_nodes(body, d)
     panels: tuple[PanelCurve, ...] = ()
     if nodes is None or code == NEAR_SINGULAR:
@@ -194,10 +217,36 @@ def shadow_line(body: Surface, direction: ArrayLike, *, n_points: int = 512) -> 
     for curve, exact_curve in zip(curves, panels, strict=False):
         # the nodes of a line that turns this fast are too far apart to go through
         vars(curve)["panels"] = exact_curve
-    return ShadowLine(body, d, tuple(curves), distance, nodes)
+    return ShadowLine(body, incident, tuple(curves), distance, nodes)
 
 
-def _creased_line(body: Surface, direction: FloatArray, n_points: int) -> ShadowLine:
+def wave_words(source: Incident) -> str:
+    """A wave in words: its direction, or where its source is."""
+    name, numbers = ("source", source.position) if isinstance(source, PointSource) else ("direction", source.direction)
+    return f"{name} ({', '.join(f'{x:.4g}' for x in numbers)})"
+
+
+def _checked_height(body: Surface, source: PointSource) -> None:
+    """Refuse a point source inside the body, on it, or so near or far that no line can be told."""
+    height, unit = clearance(body, np.array(source.position)), size(body)
+    if height > FARTHEST * unit:
+        raise InvalidInputError(
+            f"{source!r} is {height / unit:.1e} body sizes away, more than {FARTHEST:g}: give a PlaneWave"
+        )
+    if height <= NEAREST * unit:
+        where = "inside the body or on it" if height <= 0 else f"{height / unit:.1e} body sizes above it"
+        raise InvalidInputError(
+            f"{source!r} is {where}: of a source there no rays attach; it must be {NEAREST:g} sizes above. "
+            "creeping.source_pattern gives the far field of sources on the body, creeping.coupling what passes along it"
+        )
+
+
+def _creased_line(body: Surface, source: Incident, n_points: int) -> ShadowLine:
+    if isinstance(source, PointSource):
+        raise InvalidInputError(
+            f"{brief(body)} has creases: the shadow line of a point source is that of a smooth body; give a PlaneWave"
+        )
+    direction = np.array(source.direction)
     if speed_of(body) is not None:
         raise InvalidInputError(f"{brief(body)} has creases and a speed; give a body with one or the other")
     curves, on_edges, at_tips, edge_on = creased_curves(body, direction, n_points)
@@ -210,18 +259,18 @@ def _creased_line(body: Surface, direction: FloatArray, n_points: int) -> Shadow
         spacing=np.concatenate([np.zeros(0), *(part.spacing for part in parts)]),
         error=max((part.error for part in parts), default=0.0),
     )
-    return ShadowLine(body, direction, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
+    return ShadowLine(body, source, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
 
 
 def _curve(
-    body: Surface, direction: FloatArray, nodes: LineNodes, found: Finished, number: int, n_points: int
+    body: Surface, wave: FloatArray, nodes: LineNodes, found: Finished, number: int, n_points: int
 ) -> ShadowCurve:
     first, last = nodes.starts[number : number + 2]
     own = np.ascontiguousarray(nodes.points[:, first:last].T)
     spacing = float(nodes.spacing[number])
     length = spacing * len(own)
     arclength = np.linspace(0.0, length, n_points, endpoint=False, dtype=np.float64)
-    points, tangents, curvature = polished(body, direction, interpolated(own, arclength / spacing))
+    points, tangents, curvature = polished(body, wave, interpolated(own, arclength / spacing))
     mine = found.curve == number
     ends, codes = spacing * found.arcs[mine], found.state[mine]
     ends -= length * np.floor(ends[:, :1] / length)
@@ -231,7 +280,7 @@ def _curve(
     place = np.searchsorted(ends[:, 0], arclength, side="right") - 1
     return ShadowCurve(
         body=body,
-        direction=direction,
+        wave=wave,
         points=points,
         normals=normal(body, points),
         tangents=tangents,

@@ -13,6 +13,7 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
 from creeping.geometry.creased import is_creased
 from creeping.geometry.evaluators import evaluators
+from creeping.geometry.incident import rows_of
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 from creeping.shadow.attachment import LaunchPoints
@@ -85,7 +86,7 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     if is_creased(body):
         return _one_by_one(body, np.asarray(directions, dtype=float), n_rays, every)
     directions = np.ascontiguousarray(directions, dtype=float)
-    n = len(directions)
+    n, waves = len(directions), rows_of(directions)
     meshes, box, v = prepared(body), box_of(body), critical_distances(body, directions)
     summary, status = np.full((n, SUMMARY), np.nan), np.full(n, SINGULAR, np.int8)
     launched, places = np.full((n, n_rays, LAUNCHED), np.nan), np.full((n, n_rays), NO_RAY, np.int16)
@@ -93,7 +94,7 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     for tier in range(LineMeshes.count):
         if not len(rows):
             break
-        mesh, some = meshes.packed(tier), directions[rows]
+        mesh, some = meshes.packed(tier), waves[rows]
         out = (
             np.empty((len(rows), SUMMARY)),
             np.empty(len(rows), bool),

@@ -79,7 +79,7 @@ class LineMeshes:
 
     @cached_property
     def critical(self) -> FloatArray:
-        """(n, n x a) at both ends of the segments of K = 0: (m, 2, 6)."""
+        """(n, n x a, x) at both ends of the segments of K = 0: (m, 2, 9)."""
         # the finer the mesh, the fewer small parabolic loops are missed
         return singular_segments(self._body(), self.mesh(len(TIERS) - 1))  # type: ignore[arg-type]
 
@@ -123,7 +123,7 @@ def neighbours_of(triangles: IntArray) -> np.ndarray[Any, np.dtype[np.int32]]:
 
 
 def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
-    """Ends (n, n x a) of the segments in which K = 0 crosses the triangles of a mesh: (m, 2, 6)."""
+    """Ends (n, n x a, x) of the segments in which K = 0 crosses the triangles of a mesh: (m, 2, 9)."""
     K = gaussian_curvature(body, mesh.vertices)
     t, k = np.nonzero((K[mesh.triangles] > 0) != (K[np.roll(mesh.triangles, -1, axis=1)] > 0))
     first, last = mesh.triangles[t, k], mesh.triangles[t, (k + 1) % 3]
@@ -132,7 +132,7 @@ def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
     # two edges of a triangle are crossed; they follow each other in t
     n, a = n.reshape(-1, 2, 3), a.reshape(-1, 2, 3)
     a[:, 1] *= np.where(np.sum(a[:, 0] * a[:, 1], axis=-1) < 0, -1.0, 1.0)[:, None]
-    return np.ascontiguousarray(np.concatenate([n, np.cross(n, a)], axis=-1))
+    return np.ascontiguousarray(np.concatenate([n, np.cross(n, a), points.reshape(-1, 2, 3)], axis=-1))
 
 
 def _parabolic(body: Surface, low: FloatArray, high: FloatArray, positive: Any) -> FloatArray:

@@ -13,8 +13,9 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.evaluators import evaluators
+from creeping.geometry.incident import rows_of
 from creeping.geometry.kept import kept
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.kernels.threads import in_slices
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
@@ -37,7 +38,7 @@ class LineNodes:
     points, tangents : (3, n), L and 1
         One curve after the other.
     curvature : (n,), 1/L
-        kappa_n(d).
+        kappa_n(q).
     starts : (curves + 1,)
         First node of each curve, and their number.
     spacing : (curves,), L
@@ -95,14 +96,35 @@ def box_of(body: Surface) -> FloatArray:
     return np.ascontiguousarray(body.bounds, dtype=float)
 
 
-def critical_distances(body: Surface, directions: FloatArray) -> FloatArray:
-    """v, least |n.d| at critical points of n.d with K = 0, inf without one: (n, 3) -> (n,)."""
+def critical_distances(body: Surface, waves: FloatArray) -> FloatArray:
+    """v, least |n.q|/|q| at critical points of n.q with K = 0, inf without one: (n, 3 or 4) -> (n,).
+
+    Of a point source within one body size no more than its height in body sizes: there its line is a small loop.
+    """
     from creeping.shadow.kernels.trace import least_criticals
 
-    least = np.empty(len(directions))
+    rows = rows_of(waves)
+    least = np.empty(len(rows))
     points = prepared(body).critical
-    in_slices(lambda part: least_criticals(points, directions[part], least[part]), len(directions))
+    in_slices(lambda part: least_criticals(points, rows[part], least[part]), len(rows))
+    for row in np.flatnonzero(rows[:, 3]):
+        height = clearance(body, -rows[row, :3] / rows[row, 3])
+        if height < size(body):
+            least[row] = min(least[row], height / size(body))
     return least
+
+
+def clearance(body: Surface, point: FloatArray) -> float:
+    """Distance of a point (3,) from the body, L, negative inside; far away, of points 0.04 body sizes apart."""
+    vertices = prepared(body).coarsest.vertices
+    distances = np.linalg.norm(vertices - point, axis=1)
+    height, near = float(np.min(distances)), vertices[[np.argmin(distances)]]
+    for _ in range(16 if height < 0.3 * size(body) else 0):
+        n, away = normal(body, near), point - near
+        # by parts of the way: a foot next to a centre of curvature would be passed
+        near = project(body, near + 0.5 * (away - np.sum(away * n, axis=1, keepdims=True) * n))
+        height = min(height, float(np.linalg.norm(near - point)))
+    return height if float(body.level(point[None])[0]) > 0 else -height
 
 
 def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[BoolArray, IntArray]:
@@ -118,41 +140,41 @@ def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[B
     return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
 
 
-def line_nodes(body: Surface, direction: FloatArray) -> tuple[LineNodes | None, int, float]:
-    """Nodes of the line of a unit direction, its code, and v; no nodes where the line is to be followed."""
+def line_nodes(body: Surface, wave: FloatArray) -> tuple[LineNodes | None, int, float]:
+    """Nodes of the line of a wave, its code, and v; no nodes where the line is to be followed."""
     from creeping.shadow.kernels.trace import trace_nodes
 
-    v = float(critical_distances(body, direction[None])[0])
+    v = float(critical_distances(body, wave[None])[0])
     if v < FORBIDDEN:
         return None, SINGULAR, v
     box = box_of(body)
     for tier in range(LineMeshes.count):
         with evaluators(body) as parts:
             found, certain, x, T, kappa, starts, spacing, _, error = trace_nodes(
-                *parts[:2], box, prepared(body).packed(tier), direction
+                *parts[:2], box, prepared(body).packed(tier), rows_of(wave)
             )
         nodes = LineNodes(x, T, kappa, starts, spacing, error) if found else None
-        certain = nodes is not None and certain and finished(body, direction, nodes, 0).certain
+        certain = nodes is not None and certain and finished(body, wave, nodes, 0).certain
         onward, code = judged(np.array([v]), np.array([certain]), prepared(body).turn(tier), tier)
         if not onward[0]:
             return nodes if certain else None, int(code[0]), v
     raise AssertionError("the last mesh sends no line on")
 
 
-def polished(body: Surface, direction: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points next to a line moved onto it, with T and kappa_n(d): (n, 3) -> (n, 3), (n, 3), (n,)."""
+def polished(body: Surface, wave: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points next to a line moved onto it, with T and kappa_n(q): (n, 3) -> (n, 3), (n, 3), (n,)."""
     from creeping.kernels.block import BLOCK, aligned
     from creeping.shadow.kernels.newton import newton
 
     x, tangents, curvature = np.ascontiguousarray(points.T), np.empty((3, len(points))), np.empty(len(points))
-    work = aligned(18, BLOCK)
+    work, row = aligned(18, BLOCK), rows_of(wave)
     with evaluators(body) as parts:
         for _ in range(2):
-            newton(*parts[:2], direction, x, NEAR * size(body), work, tangents, curvature)
+            newton(*parts[:2], row, x, NEAR * size(body), work, tangents, curvature)
     return np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T), curvature
 
 
-def finished(body: Surface, direction: FloatArray, nodes: LineNodes, n_rays: int, *, every: bool = False) -> Finished:
+def finished(body: Surface, wave: FloatArray, nodes: LineNodes, n_rays: int, *, every: bool = False) -> Finished:
     """Arcs of a line, and so many launch points: on its attached arcs, or with ``every`` on the whole of it."""
     from creeping.shadow.kernels.crossings import LIMIT
     from creeping.shadow.kernels.trace import ERROR, LAUNCHED, LENGTH, SHARES, SUMMARY, finish
@@ -165,8 +187,8 @@ def finished(body: Surface, direction: FloatArray, nodes: LineNodes, n_rays: int
     launched, places = np.full((n_rays, LAUNCHED), np.nan), np.full(n_rays, NO_RAY, np.int16)
     with evaluators(body) as parts:
         certain, total = finish(
-            *parts[:2], box_of(body), direction, nodes.points, nodes.tangents, nodes.curvature, nodes.starts, curves,
-            nodes.spacing, every, summary, launched, places, arcs, which,
+            *parts[:2], box_of(body), rows_of(wave), nodes.points, nodes.tangents, nodes.curvature, nodes.starts,
+            curves, nodes.spacing, every, summary, launched, places, arcs, which,
         )  # fmt: skip
     shares = summary[SHARES : SHARES + 3]
     return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, bool(certain))
@@ -174,5 +196,5 @@ def finished(body: Surface, direction: FloatArray, nodes: LineNodes, n_rays: int
 
 def shares_of(line: "ShadowLine") -> dict[str, float]:
     """Shares of a line's length by state, as its kernel adds them."""
-    found = finished(line.body, line.direction, line.nodes, 0)
+    found = finished(line.body, line.wave, line.nodes, 0)
     return dict(zip(line.fractions, (float(share) for share in found.shares), strict=True))

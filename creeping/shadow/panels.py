@@ -1,9 +1,11 @@
-"""A smooth curve {F = 0, grad F.d = 0}, closed or open, in panels, exact at every arclength.
+"""A smooth curve {F = 0, grad F.q = 0}, closed or open, in panels, exact at every arclength.
+
+q is where the wave travels, d of a plane wave (`creeping.geometry.incident`).
 
 On the panel from a to b with chord c = b - a, the curve is a graph over the chord, u in [-1, 1]:
 
-    F(x) = 0,   grad F(x).d = 0,   c.(x - (a + b)/2 - u c/2) = 0,
-    ds/du = |c|^2 / (2 T.c),       T = grad F x Hd / |.|.
+    F(x) = 0,   grad F(x).q = 0,   c.(x - (a + b)/2 - u c/2) = 0,
+    ds/du = |c|^2 / (2 T.c),       T = grad F x Hq / |.|.
 
 x and ds/du are polynomials through Gauss points of u; panels are halved until the polynomials are exact to rounding, so
 they shrink where the curve turns fast and the length needs no resampling.
@@ -19,6 +21,7 @@ from numpy.polynomial import legendre
 
 from creeping._typing import BoolArray, FloatArray
 from creeping.errors import SingularIncidenceError
+from creeping.geometry.incident import spherical, travel
 from creeping.geometry.surface import Surface, jet, size
 
 ORDER = 16
@@ -33,36 +36,37 @@ _TO_COEFFICIENTS = (legendre.legvander(_U, ORDER - 1) * _WEIGHTS[:, None] * (np.
 
 
 def newton_step(
-    body: Surface, direction: FloatArray, points: FloatArray, axis: FloatArray | None = None
+    body: Surface, wave: FloatArray, points: FloatArray, axis: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Newton step for {F = 0, grad F.d = 0} at right angles to an axis, and the tangent: (n, 3), (n, 3).
+    """Newton step for {F = 0, G = 0}, G = grad F.q - w F, at right angles to an axis, and the tangent: (n, 3), (n, 3).
 
-    ``direction`` is d, (3,) or one for each point.
+    ``wave`` is (d, w), or d of a plane wave, (3,) or (4,) or one for each point.
 
-    Without an axis it is the tangent, and the step is that of least norm. Inverse rows of (grad F, Hd, axis) are cross
-    products over the determinant axis.(grad F x Hd).
+    Without an axis it is the tangent, and the step is that of least norm. grad G = Hq, and inverse rows of
+    (grad F, Hq, axis) are cross products over the determinant axis.(grad F x Hq).
     """
     F, gradient, hessian = jet(body, points)
-    Hd = (hessian @ direction[..., None])[..., 0]
-    G = np.sum(gradient * direction, axis=-1)
-    W = _crossed(gradient, Hd)
+    q = travel(wave, points)
+    Hq = (hessian @ q[..., None])[..., 0]
+    G = np.sum(gradient * q, axis=-1)
+    if spherical(wave):
+        G = G - wave[..., 3] * F
+    W = _crossed(gradient, Hq)
     if axis is None:
         axis = W
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        step = -(F[..., None] * _crossed(Hd, axis) + G[..., None] * _crossed(axis, gradient))
+        step = -(F[..., None] * _crossed(Hq, axis) + G[..., None] * _crossed(axis, gradient))
         step /= np.sum(W * axis, axis=-1, keepdims=True)
         tangent = W / np.linalg.norm(W, axis=-1, keepdims=True)
     return step, tangent
 
 
-def onto_line(
-    body: Surface, direction: FloatArray, points: FloatArray, *, reach: float, iterations: int = 4
-) -> FloatArray:
-    """Points of {F = 0, grad F.d = 0} by steps of least norm, each at most ``reach``: (n, 3) -> (n, 3)."""
+def onto_line(body: Surface, wave: FloatArray, points: FloatArray, *, reach: float, iterations: int = 4) -> FloatArray:
+    """Points of {F = 0, grad F.q = 0} by steps of least norm, each at most ``reach``: (n, 3) -> (n, 3)."""
     points = np.array(points, dtype=float)
     least = np.finfo(float).eps * np.max(np.abs(points), initial=0.0)
     for _ in range(iterations):
-        step, _ = newton_step(body, direction, points)
+        step, _ = newton_step(body, wave, points)
         points += _limited(step, reach)
         # what is left is rounding
         if np.all(np.abs(step) <= least):
@@ -90,7 +94,7 @@ class PanelCurve:
 
     Attributes
     ----------
-    body, direction : Surface, (3,)
+    body, wave : Surface, (3,) or (4,)
     nodes : (p, 3), L
         First points of the panels.
     shape : (p, ORDER, 3), L
@@ -101,7 +105,7 @@ class PanelCurve:
     """
 
     body: Surface
-    direction: FloatArray
+    wave: FloatArray
     nodes: FloatArray
     shape: FloatArray
     speed: FloatArray
@@ -135,12 +139,12 @@ class PanelCurve:
             if np.all(np.abs(step) < 1e-15):
                 break
         points = np.einsum("mk,mkc->mc", legendre.legvander(u, ORDER - 1), self.shape[panel])
-        return onto_line(self.body, self.direction, points, reach=1e-6 * size(self.body), iterations=2)
+        return onto_line(self.body, self.wave, points, reach=1e-6 * size(self.body), iterations=2)
 
 
 def fit_panels(
     body: Surface,
-    direction: FloatArray,
+    wave: FloatArray,
     nodes: FloatArray,
     spacing: FloatArray,
     *,
@@ -151,7 +155,7 @@ def fit_panels(
 
     Parameters
     ----------
-    body, direction : Surface, (3,)
+    body, wave : Surface, (3,) or (4,)
     nodes : (k, 3), L
         Points of the curve, running along T, up to swaps of neighbours closer than ``spacing``.
     spacing : (k,), L
@@ -171,8 +175,8 @@ def fit_panels(
         If a panel cannot be made exact: the curve turns within rounding of a crossing.
     """
     if closed:
-        nodes = _forward_nodes(body, direction, nodes, spacing)
-    _, tangents = newton_step(body, direction, nodes)
+        nodes = _forward_nodes(body, wave, nodes, spacing)
+    _, tangents = newton_step(body, wave, nodes)
     count = len(nodes)
     last = count if closed else count - 1
     chords = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)[:last]
@@ -185,7 +189,7 @@ def fit_panels(
     while todo:
         a, Ta = (np.array(part) for part in zip(*(known[key] for key, _ in todo), strict=True))
         b, Tb = (np.array(part) for part in zip(*(known[key] for _, key in todo), strict=True))
-        shape, speed, good = _fit(body, direction, a, Ta, b, Tb, tolerance)
+        shape, speed, good = _fit(body, wave, a, Ta, b, Tb, tolerance)
         done += [(todo[i][0], a[i], shape[i], speed[i]) for i in np.flatnonzero(good)]
         bad = np.flatnonzero(~good)
         halves = []
@@ -193,21 +197,22 @@ def fit_panels(
             low, high = todo[i]
             middle = _between(low, high)
             if middle not in known:
-                known[middle] = _middle(body, direction, a[i], Ta[i], b[i], Tb[i])
+                known[middle] = _middle(body, wave, a[i], Ta[i], b[i], Tb[i])
             halves += [(low, middle), (middle, high)]
         if len(done) + len(halves) > most or (
             len(bad) and np.min(np.linalg.norm(b - a, axis=1)[bad]) < 1e-11 * size(body)
         ):
             raise SingularIncidenceError(
                 f"the shadow line cannot be followed at {len(bad)} places, first near "
-                f"{np.round(a[bad[0]], 6).tolist()}; it turns too sharply there: perturb the direction by say 1e-3",
+                f"{np.round(a[bad[0]], 6).tolist()}; it turns too sharply there: perturb the direction, or move the "
+                "source, by say 1e-3",
                 points=a[bad],
                 distance=0.0,
             )
         todo = halves
     done.sort(key=lambda panel: panel[0])
     first, shape, speed = (np.array([panel[k] for panel in done]) for k in (1, 2, 3))
-    return PanelCurve(body, direction, first, shape, speed, closed)
+    return PanelCurve(body, wave, first, shape, speed, closed)
 
 
 def _between(low: float, high: float) -> float:
@@ -216,9 +221,9 @@ def _between(low: float, high: float) -> float:
     return float((first + last) // 2) if first <= last else (low + high) / 2
 
 
-def _forward_nodes(body: Surface, direction: FloatArray, nodes: FloatArray, spacing: FloatArray) -> FloatArray:
+def _forward_nodes(body: Surface, wave: FloatArray, nodes: FloatArray, spacing: FloatArray) -> FloatArray:
     """Drop nodes that lie behind, or less than a quarter of a mesh edge before, the last one kept."""
-    _, tangents = newton_step(body, direction, nodes)
+    _, tangents = newton_step(body, wave, nodes)
     kept = [0]
     for k in range(1, len(nodes)):
         if (nodes[k] - nodes[kept[-1]]) @ tangents[kept[-1]] > 0.25 * min(spacing[k], spacing[kept[-1]]):
@@ -239,7 +244,7 @@ def _first_breaks(tangents: FloatArray, last: int) -> list[int]:
 
 def _fit(
     body: Surface,
-    direction: FloatArray,
+    wave: FloatArray,
     a: FloatArray,
     Ta: FloatArray,
     b: FloatArray,
@@ -256,9 +261,9 @@ def _fit(
     good_ends = np.minimum(np.sum(Ta * chord, axis=1), np.sum(Tb * chord, axis=1)) > MIN_ALIGNMENT * long
     step = np.zeros_like(points)
     for _ in range(7):
-        step, _ = newton_step(body, direction, points, axis)
+        step, _ = newton_step(body, wave, points, axis)
         points = points + _limited(step, reach)
-    _, tangent = newton_step(body, direction, points, axis)
+    _, tangent = newton_step(body, wave, points, axis)
     aligned = np.sum(tangent * axis, axis=1).reshape(-1, ORDER)
     moved = np.linalg.norm(step, axis=1).reshape(-1, ORDER)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -291,11 +296,11 @@ def _hermite(a: FloatArray, Ta: FloatArray, b: FloatArray, Tb: FloatArray, u: Fl
 
 
 def _middle(
-    body: Surface, direction: FloatArray, a: FloatArray, Ta: FloatArray, b: FloatArray, Tb: FloatArray
+    body: Surface, wave: FloatArray, a: FloatArray, Ta: FloatArray, b: FloatArray, Tb: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Point of the curve near the middle of the cubic from a to b, with its tangent."""
     with np.errstate(divide="ignore", invalid="ignore"):
         guess = _hermite(a[None], Ta[None], b[None], Tb[None], np.zeros(1))[0]
-    point = onto_line(body, direction, guess, reach=0.3 * float(np.linalg.norm(b - a)), iterations=8)
-    _, tangent = newton_step(body, direction, point)
+    point = onto_line(body, wave, guess, reach=0.3 * float(np.linalg.norm(b - a)), iterations=8)
+    _, tangent = newton_step(body, wave, point)
     return point[0], tangent[0]

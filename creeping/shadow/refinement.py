@@ -1,13 +1,13 @@
-"""Closed curves n.d = 0 on the body, their topology from a mesh that is refined until the signs decide it.
+"""Closed curves n.q = 0 on the body, their topology from a mesh that is refined until the signs decide it.
 
-Where a triangle could hide a crossing, a loop or a gap, it is split. It cannot if, with h = n.d, its gradient g on the
+Where a triangle could hide a crossing, a loop or a gap, it is split. It cannot if, with h = n.q, its gradient g on the
 body, and e its longest edge,
 
     all h_i of one sign and min |h_i| > 2 e max |g_i|   (no zero inside), or
     g_i.g_j > |g_i||g_j|/2 for all i, j                 (the zeros inside are one graph).
 
 Curves leave a triangle by the edge whose sign falls in counter-clockwise order, so they come out closed, with the lit
-side (h < 0) on the left seen from outside: along T = grad F x Hd/|.|.
+side (h < 0) on the left seen from outside: along T = grad F x Hq/|.|.
 
 Sources: Derivations, R9.
 """
@@ -15,6 +15,7 @@ Sources: Derivations, R9.
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geometry.incident import travel
 from creeping.geometry.surface import Surface, project, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.shadow.critical_points import CriticalPoints, incidence
@@ -25,17 +26,15 @@ MAX_DEPTH = 22
 MAX_TRIANGLES = 400_000
 
 
-def shadow_curves(
-    body: Surface, direction: FloatArray, mesh: Triangulation, critical: CriticalPoints
-) -> list[PanelCurve]:
-    """Trace the closed curves n.d = 0, exact at every arclength.
+def shadow_curves(body: Surface, wave: FloatArray, mesh: Triangulation, critical: CriticalPoints) -> list[PanelCurve]:
+    """Trace the closed curves n.q = 0, exact at every arclength.
 
     Parameters
     ----------
-    body, direction : Surface, (3,)
+    body, wave : Surface, (3,) or (4,)
     mesh : Triangulation
     critical : CriticalPoints
-        Of n.d, none at n.d = 0; what an error names.
+        Of n.q, none at n.q = 0; what an error names.
 
     Returns
     -------
@@ -46,22 +45,22 @@ def shadow_curves(
     SingularIncidenceError
         If the topology is not settled at the finest mesh.
     """
-    mesh, h = _resolve(body, direction, mesh, critical)
+    mesh, h = _resolve(body, wave, mesh, critical)
     edges, sides = _edges(mesh.triangles)
     loops = _loops(sides, h[mesh.triangles] >= 0)
     finer = halved(body, mesh)
-    h_finer = np.concatenate([h, _values(body, direction, finer.vertices[len(h) :])])
+    h_finer = np.concatenate([h, _values(body, wave, finer.vertices[len(h) :])])
     again = _loops(_edges(finer.triangles)[1], h_finer[finer.triangles] >= 0)
     if len(again) != len(loops):
         raise _unsettled(
             critical, f"has {len(loops)} curves on one mesh and {len(again)} on the next; it nearly crosses itself"
         )
-    return [_curve(body, direction, mesh, edges[loop], h) for loop in loops]
+    return [_curve(body, wave, mesh, edges[loop], h) for loop in loops]
 
 
-def _values(body: Surface, direction: FloatArray, points: FloatArray) -> FloatArray:
+def _values(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
     gradient = body.gradient(points)
-    return np.asarray((gradient @ direction) / np.linalg.norm(gradient, axis=-1))
+    return np.asarray(np.sum(gradient * travel(wave, points), axis=-1) / np.linalg.norm(gradient, axis=-1))
 
 
 def _unsettled(critical: CriticalPoints, trouble: str, points: FloatArray | None = None) -> Exception:
@@ -71,10 +70,10 @@ def _unsettled(critical: CriticalPoints, trouble: str, points: FloatArray | None
 
 
 def _resolve(
-    body: Surface, direction: FloatArray, mesh: Triangulation, critical: CriticalPoints
+    body: Surface, wave: FloatArray, mesh: Triangulation, critical: CriticalPoints
 ) -> tuple[Triangulation, FloatArray]:
-    """Split triangles until none can hide a part of n.d = 0; the mesh and n.d at its vertices."""
-    h, g = incidence(body, direction, mesh.vertices)
+    """Split triangles until none can hide a part of n.q = 0; the mesh and n.q at its vertices."""
+    h, g = incidence(body, wave, mesh.vertices)
     for _ in range(MAX_DEPTH):
         unsafe = _unsafe(body, mesh, h, g)
         if not unsafe.any():
@@ -83,7 +82,7 @@ def _resolve(
         if len(mesh.triangles) > MAX_TRIANGLES:
             break
         mesh = _split(body, mesh, unsafe)
-        new_h, new_g = incidence(body, direction, mesh.vertices[len(h) :])
+        new_h, new_g = incidence(body, wave, mesh.vertices[len(h) :])
         h, g = np.concatenate([h, new_h]), np.concatenate([g, new_g])
     corner = mesh.vertices[mesh.triangles[np.flatnonzero(_unsafe(body, mesh, h, g))[:1], 0]]
     raise _unsettled(critical, "nearly crosses itself, closer than the finest mesh can tell,", corner)
@@ -103,7 +102,7 @@ def _unsafe(body: Surface, mesh: Triangulation, h: FloatArray, g: FloatArray) ->
 
 
 def _check_signs(critical: CriticalPoints, mesh: Triangulation, h: FloatArray) -> None:
-    """The vertex nearest to a critical point lies on the same side of n.d = 0."""
+    """The vertex nearest to a critical point lies on the same side of n.q = 0."""
     from scipy.spatial import cKDTree
 
     near = np.abs(critical.values) < 0.1
@@ -185,21 +184,21 @@ def _split(body: Surface, mesh: Triangulation, marked: BoolArray) -> Triangulati
     return Triangulation(np.concatenate([mesh.vertices, middles]), np.concatenate(triangles))
 
 
-def _curve(body: Surface, direction: FloatArray, mesh: Triangulation, ends: IntArray, h: FloatArray) -> PanelCurve:
+def _curve(body: Surface, wave: FloatArray, mesh: Triangulation, ends: IntArray, h: FloatArray) -> PanelCurve:
     """Curve through the crossings of a loop of edges (k, 2)."""
     a, b = mesh.vertices[ends[:, 0]], mesh.vertices[ends[:, 1]]
     spacing = np.linalg.norm(b - a, axis=1)
-    nodes = _crossings(body, direction, a, h[ends[:, 0]], b, h[ends[:, 1]])
-    polished = onto_line(body, direction, nodes, reach=1e-3 * size(body))
+    nodes = _crossings(body, wave, a, h[ends[:, 0]], b, h[ends[:, 1]])
+    polished = onto_line(body, wave, nodes, reach=1e-3 * size(body))
     # the bracket holds the branch; a polish that leaves it has gone to another one
     stayed = np.linalg.norm(polished - nodes, axis=1) < 1e-3 * spacing
-    return fit_panels(body, direction, polished[stayed], spacing[stayed])
+    return fit_panels(body, wave, polished[stayed], spacing[stayed])
 
 
 def _crossings(
-    body: Surface, direction: FloatArray, a: FloatArray, ha: FloatArray, b: FloatArray, hb: FloatArray
+    body: Surface, wave: FloatArray, a: FloatArray, ha: FloatArray, b: FloatArray, hb: FloatArray
 ) -> FloatArray:
-    """Points with n.d = 0 on edges brought onto the body, by the Illinois rule in t of a + t (b - a): (k, 3)."""
+    """Points with n.q = 0 on edges brought onto the body, by the Illinois rule in t of a + t (b - a): (k, 3)."""
     low, high = np.zeros(len(a)), np.ones(len(a))
     h_low, h_high = ha.copy(), hb.copy()
     moved_high = np.full(len(a), -1)
@@ -207,7 +206,7 @@ def _crossings(
     for _ in range(12):
         t = (low * h_high - high * h_low) / np.where(h_high == h_low, 1.0, h_high - h_low)
         points = project(body, a + t[:, None] * (b - a), iterations=4)
-        value = _values(body, direction, points)
+        value = _values(body, wave, points)
         if np.max(np.abs(value)) < 1e-9:
             break
         to_high = (value >= 0) == (h_high >= 0)

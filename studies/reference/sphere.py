@@ -170,6 +170,35 @@ def _surface_sum(wavenumber: float, radius: float, cos_theta: ArrayLike, boundar
     return 1j / x**2 * _angular_sum(turns / denominators, _cosines(cos_theta))
 
 
+def source_on_sphere(
+    wavenumber: float, radius: float, distance: float, cos_gamma: ArrayLike, boundary: Boundary
+) -> tuple[ComplexArray, ComplexArray]:
+    """Total u and ∂u/∂n, 1/L, on the sphere, of a point source e^{ikr}/(4πr): (m,) -> (m,), (m,).
+
+    The source is at ``distance`` from the centre, and gamma the angle between it and the point:
+
+        u = beta (i/x²) (ik/4π) Σ (2n+1) hₙ(k distance)/Dₙ Pₙ(cos gamma),   ∂u/∂n the same with -alpha k for beta
+    """
+    positive(wavenumber=wavenumber, radius=radius, distance=distance - radius)
+    x, y = wavenumber * radius, wavenumber * distance
+    alpha, beta = condition(boundary)
+    c = _cosines(cos_gamma)
+    total = np.zeros(c.shape, dtype=complex)
+    # hₙ/h_(n-1) at x and at y: the functions themselves outgrow all numbers where the source is close
+    near = far = -1j
+    ratio = np.exp(1j * (y - x)) * x / y
+    for n, p in enumerate(_legendre(c)):
+        # hₙ' = h_(n-1) - (n+1)/x hₙ
+        share = (2 * n + 1) * ratio / (alpha + beta * (1 / near - (n + 1) / x))
+        total += share * p
+        if n > x and abs(share) < 1e-17 * (1 + float(np.max(np.abs(total)))):
+            break
+        near, far = (2 * n + 1) / x - 1 / near, (2 * n + 1) / y - 1 / far
+        ratio *= far / near
+    total *= 1j / x**2 * 1j * wavenumber / (4 * np.pi)
+    return beta * total, -alpha * wavenumber * total
+
+
 def pec_amplitudes(wavenumber: float, radius: float, cos_theta: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
     """Bohren and Huffman's S1 (E across the plane of scattering) and S2 (E in it): (m,) -> (m,), (m,)."""
     positive(wavenumber=wavenumber, radius=radius)

@@ -72,6 +72,7 @@ def _starts(fan, lanes):
     starts[..., 2:5] = lanes[:, :1, 9:12]
     starts[..., 5] = lanes[:, :1, 12]
     starts[..., 6:9] = n0[:, None]
+    starts[..., 9] = 0.0
     return starts
 
 

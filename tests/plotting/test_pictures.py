@@ -87,7 +87,7 @@ def test_axes_of_the_parameter_plane(sphere_line, body, name, span):
 
     points = np.stack([body.bounds[0] * [1, 0, 0], [0.0, 1.0, -0.5 if name == "psi" else 0.0]])
     curve = type(sphere_line)(closed=True, points=points, status=np.array(["attached"] * 2))
-    line = type(sphere_line)(body=body, direction=sphere_line.direction, curves=[curve])
+    line = type(sphere_line)(body=body, direction=sphere_line.direction, source=sphere_line.source, curves=[curve])
     ax = plot_parameters(line, ax=Figure().add_subplot())
     assert name in ax.get_xlabel()
     assert ax.get_ylim() == span

@@ -10,8 +10,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.surface import normal
+from creeping.rays.fan_points import ray_points as points_of
 from creeping.rays.tracer import RayTracer
-from creeping.rays.tracer import ray_points as points_of
 
 LANES_ALIKE = [(slice(0, 9), 1e-6), ([9, 12], 1e-6), (10, 1e-4), (11, 1e-2), (slice(13, 17), 1e-6), (17, 5e-3)]
 """Lanes, and how well polynomials of degree 9 and splines know them: each derivative costs digits."""

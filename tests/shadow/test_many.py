@@ -134,7 +134,7 @@ def test_an_incidence_does_not_depend_on_its_company(rng):
 def test_singular_directions_of_the_torus():
     # K = 0 on its top and bottom circles, where the null direction is along them: all d across the axis
     segments = prepared(BODIES["torus"]).critical
-    n, b = segments[..., :3].reshape(-1, 3), segments[..., 3:].reshape(-1, 3)
+    n, b = segments[..., :3].reshape(-1, 3), segments[..., 3:6].reshape(-1, 3)
     assert np.max(np.abs(np.abs(n[:, 2]) - 1)) < 1e-12
     assert np.max(np.abs(b[:, 2])) < 1e-6
     assert len(prepared(BODIES["triaxial"]).critical) == 0

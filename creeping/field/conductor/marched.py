@@ -24,8 +24,9 @@ from creeping.field.currents.conductor import spread_of, turn_of, vectors_of
 from creeping.field.marched_sum import marches
 from creeping.field.marching.fan_rays import FLAT
 from creeping.field.marching.fan_waves import FanWaves, fan_waves, spread_out
+from creeping.field.ray_scales import scales, transverse_ratios
 from creeping.field.ray_sums import RaySum
-from creeping.field.shed_wave import scales, smoothstep, transverse_ratios
+from creeping.field.shed_wave import smoothstep
 from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan

@@ -26,9 +26,9 @@ from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_par
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
 from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus
+from creeping.field.ray_scales import fock_parameter
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
 from creeping.field.served import Served, Words
-from creeping.field.shed_wave import fock_parameter
 from creeping.field.strip_waves import without_tubes
 from creeping.field.surface import surface_waves
 from creeping.geometry.quadrature import nodes_at

@@ -18,8 +18,8 @@ from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD, ELECTRIC_SOFT
 from creeping.field.currents.conductor import amplitudes
 from creeping.field.far_geometry import fan_strips
 from creeping.field.near_wave import shed_waves
+from creeping.field.ray_scales import scales
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
-from creeping.field.shed_wave import scales
 from creeping.geometry.surface import normal
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays, free_ways, shed_near

@@ -33,7 +33,7 @@ from creeping.field.currents.radiation import (
 )
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.polarisation import spherical_frame
-from creeping.field.shed_wave import fock_parameter, scales
+from creeping.field.ray_scales import fock_parameter, scales
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import ray_factor, surface_waves
 from creeping.rays.quantities import RayPoints

@@ -1,8 +1,8 @@
 """Compiled states of a shadow line: arcs between its breaks, whether the wave reaches them, and launch positions.
 
-The state is constant between breaks, so one point decides an arc: kappa_n(d) <= 0 is concave; the outermost points of
-the line seen along d are lit; for the rest F is sampled along the backward ray x - t d, which enters the body where F
-is negative at a sample or at a minimum between samples. Two more rays of the arc must agree.
+The state is constant between breaks, so one point decides an arc: kappa_n(q) <= 0 is concave; the outermost points of
+the line seen along q are lit; for the rest F is sampled along the backward ray x - t q/|q|, which enters the body where
+F is negative at a sample or at a minimum between samples. Two more rays of the arc must agree.
 
 Sources: Derivations, R10.
 """
@@ -57,20 +57,21 @@ def arcs_of(places, where, count, starts, components, arcs, owner):
 
 
 @njit(**options)
-def classify(level, level_par, box, d, x, starts, extreme, arcs, owner, total, reach, work, state):
+def classify(level, level_par, box, wave, x, starts, extreme, arcs, owner, total, reach, work, state):
     """State of each arc; returns whether all rays agree.
 
-    ``box`` (2, 3) holds the body, ``extreme`` are the outermost nodes.
+    ``wave`` is (d, w), ``box`` (2, 3) holds the body, ``extreme`` are the outermost nodes, -1 for none.
     """
     agree = True
     probes, slopes, kappa, w = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(2 * HALF)
+    d = np.empty(3)
     for k in range(total):
         c = owner[k]
         first, number = starts[c], starts[c + 1] - starts[c]
         long = arcs[k, 1] - arcs[k, 0]
         for m, share in enumerate((0.5, 0.2, 0.8)):
             interpolate(x, first, number, arcs[k, 0] + share * long, w, probes, m)
-        newton(level, level_par, d, probes, reach, work, slopes, kappa)
+        newton(level, level_par, wave, probes, reach, work, slopes, kappa)
         if not kappa[0] > 0.0:
             state[k] = CONCAVE
             continue
@@ -85,10 +86,29 @@ def classify(level, level_par, box, d, x, starts, extreme, arcs, owner, total, r
             continue
         hidden = 0
         for m in range(3):
-            hidden |= blocked(level, level_par, box, d, probes, m, math.inf) << m
+            behind = heading_at(wave, probes, m, d)
+            hidden |= blocked(level, level_par, box, d, probes, m, behind) << m
         state[k] = OCCLUDED if hidden & 1 else ATTACHED
         agree &= hidden == 0 or hidden == 7
     return agree
+
+
+@njit(**options)
+def heading_at(wave, points, m, d):
+    """Fill d (3,) with the unit vector along which the wave (d, w) travels at points[:, m].
+
+    Returns how far behind it the samples of `blocked` may go, the last one at the source; inf of a plane wave.
+    """
+    square = 0.0
+    for axis in range(3):
+        d[axis] = wave[axis] + wave[3] * points[axis, m]
+        square += d[axis] * d[axis]
+    if wave[3] == 0.0:
+        return math.inf
+    norm = math.sqrt(square)
+    for axis in range(3):
+        d[axis] /= norm
+    return norm / wave[3] * SAMPLES / (SAMPLES + 1)
 
 
 @njit(**options)

@@ -1,8 +1,10 @@
 """Compiled search for the places where the state of a shadow line may change: cusps and crossings.
 
-Seen along d the line is a plane curve. It has a cusp where kappa_n(d) = 0, since T is along d there, and
-visibility changes only at cusps and, where two of its pieces cross, on the one behind (the larger x.d). Positions are
-node numbers with fractions, u, within a component of equally spaced nodes.
+Seen along q the line is a plane curve: of a point source by the stereographic projection of the sphere of directions,
+which takes curves that cross to curves that cross and that of a plane wave for its limit. It has a cusp where
+kappa_n(q) = 0, since T is along q there, and visibility changes only at cusps and, where two of its pieces cross, on
+the one behind (the larger x.d, or R). Positions are node numbers with fractions, u, within a component of equally
+spaced nodes.
 
 Sources: [K84]; Derivations, R10.
 """
@@ -23,7 +25,7 @@ LIMIT = 64
 
 @njit(**options)
 def cusps(values, first, number, places):
-    """Zeros of kappa_n(d) along a component into ``places``; returns their number and whether some may be hidden.
+    """Zeros of kappa_n(q) along a component into ``places``; returns their number and whether some may be hidden.
 
     Hidden are pairs of zeros between neighbours: an extremum nearer to 0 than half its second difference, or two
     changes in neighbouring cells.
@@ -86,28 +88,104 @@ def plane_of(d, e, f):
 
 
 @njit(**options)
-def project(x, tangents, n, d, plane):
-    """Fill plane (5, cap): components of x across d and along it, and of T across; returns the four extreme nodes."""
-    e, f = np.empty(3), np.empty(3)
-    plane_of(d, e, f)
-    for i in range(n):
-        plane[0, i] = e[0] * x[0, i] + e[1] * x[1, i] + e[2] * x[2, i]
-        plane[1, i] = f[0] * x[0, i] + f[1] * x[1, i] + f[2] * x[2, i]
-        plane[2, i] = d[0] * x[0, i] + d[1] * x[1, i] + d[2] * x[2, i]
-        plane[3, i] = e[0] * tangents[0, i] + e[1] * tangents[1, i] + e[2] * tangents[2, i]
-        plane[4, i] = f[0] * tangents[0, i] + f[1] * tangents[1, i] + f[2] * tangents[2, i]
+def project(x, tangents, n, wave, box, plane):
+    """Fill plane (5, cap): the line seen along q, its depth, and its slopes; returns the four extreme nodes.
+
+    These are -1 where a point source stands among the body, so that no picture has all of it inside.
+    """
+    e, f, axis, apart = np.empty(3), np.empty(3), wave[:3].copy(), True
+    if wave[3] != 0.0:
+        apart = _axis_of(x, n, wave, box, axis)
+    plane_of(axis, e, f)
+    if wave[3] == 0.0:
+        _flat(x, tangents, n, axis, e, f, plane)
+    else:
+        _stereographic(x, tangents, n, wave, axis, e, f, plane)
     left = right = low = high = 0
     for i in range(n):
         left = i if plane[0, i] < plane[0, left] else left
         right = i if plane[0, i] > plane[0, right] else right
         low = i if plane[1, i] < plane[1, low] else low
         high = i if plane[1, i] > plane[1, high] else high
-    return left, right, low, high
+    return (left, right, low, high) if apart else (-1, -1, -1, -1)
+
+
+@njit(**options)
+def _flat(x, tangents, n, d, e, f, plane):
+    """Components of x across d and along it, and of T across."""
+    for i in range(n):
+        plane[0, i] = e[0] * x[0, i] + e[1] * x[1, i] + e[2] * x[2, i]
+        plane[1, i] = f[0] * x[0, i] + f[1] * x[1, i] + f[2] * x[2, i]
+        plane[2, i] = d[0] * x[0, i] + d[1] * x[1, i] + d[2] * x[2, i]
+        plane[3, i] = e[0] * tangents[0, i] + e[1] * tangents[1, i] + e[2] * tangents[2, i]
+        plane[4, i] = f[0] * tangents[0, i] + f[1] * tangents[1, i] + f[2] * tangents[2, i]
+
+
+@njit(**options)
+def _stereographic(x, tangents, n, wave, axis, e, f, plane):
+    """u = e.y/(1 + a.y), v = f.y/(1 + a.y), with y = q/|q| and dy = w (T - (T.y) y)/|q|."""
+    y, dy, w = np.empty(3), np.empty(3), wave[3]
+    for i in range(n):
+        square = along = 0.0
+        for k in range(3):
+            y[k] = wave[k] + w * x[k, i]
+            square += y[k] * y[k]
+        norm = math.sqrt(square)
+        for k in range(3):
+            y[k] /= norm
+            along += y[k] * tangents[k, i]
+        for k in range(3):
+            dy[k] = w * (tangents[k, i] - along * y[k]) / norm
+        share = 1.0 / (1.0 + axis[0] * y[0] + axis[1] * y[1] + axis[2] * y[2])
+        change = axis[0] * dy[0] + axis[1] * dy[1] + axis[2] * dy[2]
+        plane[0, i] = share * (e[0] * y[0] + e[1] * y[1] + e[2] * y[2])
+        plane[1, i] = share * (f[0] * y[0] + f[1] * y[1] + f[2] * y[2])
+        plane[2, i] = norm / w
+        plane[3, i] = share * (e[0] * dy[0] + e[1] * dy[1] + e[2] * dy[2] - plane[0, i] * change)
+        plane[4, i] = share * (f[0] * dy[0] + f[1] * dy[1] + f[2] * dy[2] - plane[1, i] * change)
+
+
+@njit(**options)
+def _axis_of(x, n, wave, box, axis):
+    """Fill the axis (3,) of the picture of a point source; returns whether all of the body is on its side.
+
+    It points to the middle of the body if all of its box is ahead; else, of that and the six along the coordinates, it
+    is the one whose opposite, the point at infinity of the picture, is furthest from the line.
+    """
+    tried, best, most = np.zeros((7, 3)), 0, -1.0
+    square = 0.0
+    for k in range(3):
+        tried[0, k] = wave[k] + wave[3] * 0.5 * (box[0, k] + box[1, k])
+        square += tried[0, k] * tried[0, k]
+        tried[1 + k, k], tried[4 + k, k] = 1.0, -1.0
+    for k in range(3):
+        tried[0, k] /= math.sqrt(square + 1e-290)
+    ahead = square > 0.0
+    for corner in range(8):
+        dot = 0.0
+        for k in range(3):
+            dot += tried[0, k] * (wave[k] + wave[3] * box[(corner >> k) & 1, k])
+        ahead &= dot > 0.0
+    for c in range(0 if ahead or n == 0 else 7):
+        nearest = 2.0
+        for i in range(n):
+            dot = norm = 0.0
+            for k in range(3):
+                y = wave[k] + wave[3] * x[k, i]
+                dot += tried[c, k] * y
+                norm += y * y
+            nearest = min(nearest, 1.0 + dot / math.sqrt(norm))
+        usable = c > 0 or square > 0.5e-6
+        if usable and nearest > most:
+            best, most = c, nearest
+    for k in range(3):
+        axis[k] = tried[best, k]
+    return ahead
 
 
 @njit(**options)
 def convex(plane, starts, components):
-    """Whether the line seen along d is one convex curve, which does not cross itself."""
+    """Whether the line seen along q is one convex curve, which does not cross itself."""
     if components != 1:
         return False
     n, turns = starts[1], 0
@@ -123,7 +201,7 @@ def convex(plane, starts, components):
 
 @njit(**options)
 def crossings(plane, starts, components, spacing, boxes, owner, places, where):
-    """Places (component ``where``, u) of the pieces behind at crossings of the line seen along d; their number.
+    """Places (component ``where``, u) of the pieces behind at crossings of the line seen along q; their number.
 
     boxes (6, cap / BOX) is work space for the bounds of BOX segments and the sum of their chords. -1 if there are too
     many.

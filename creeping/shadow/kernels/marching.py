@@ -1,7 +1,8 @@
 """Compiled first steps of a shadow line: mixed triangles of a mesh, and the walk around them.
 
-s = n.d at the vertices. A triangle with vertices of both signs has one edge that goes from + to - counter-clockwise:
-leaving by it keeps the lit side on the left, and ends where it began, so components come out closed and oriented.
+s = n.q at the vertices, q = d + w x (`creeping.geometry.incident`). A triangle with vertices of both signs has one edge
+that goes from + to - counter-clockwise: leaving by it keeps the lit side on the left, and ends where it began, so
+components come out closed and oriented.
 
 Sources: Derivations, R6.
 """
@@ -14,12 +15,13 @@ TOO_MANY = -1
 
 
 @njit(**options)
-def incidence_at(normals, d, s):
-    """Fill s (n,) with n.d from normals (3, n), flat, and return nothing."""
+def incidence_at(vertices, normals, wave, s):
+    """Fill s (n,) with n.q from vertices (3, n) and normals (3, n), flat, and return nothing."""
     n = s.shape[0]
-    dx, dy, dz = d[0], d[1], d[2]
+    dx, dy, dz, w = wave[0], wave[1], wave[2], wave[3]
+    x, y, z = vertices[0], vertices[1], vertices[2]
     for i in range(n):
-        s[i] = normals[i] * dx + normals[n + i] * dy + normals[2 * n + i] * dz
+        s[i] = normals[i] * (dx + w * x[i]) + normals[n + i] * (dy + w * y[i]) + normals[2 * n + i] * (dz + w * z[i])
 
 
 @njit(**options)

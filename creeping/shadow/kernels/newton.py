@@ -1,8 +1,9 @@
 """Compiled nodes of a shadow line: Newton steps onto it, equal arclength, and its length.
 
-Sources: Derivations, R6 and R8.
+Sources: Derivations, R6, R8 and R19.
 
-    F = 0, G = grad F.d = 0;   W = grad F x Hd,   T = W/|W|,   dx = -[F (Hd x W) + G (W x grad F)]/|W|^2
+    q = d + w x;   F = 0, G = grad F.q - w F = 0, whose gradient is Hq
+    W = grad F x Hq,   T = W/|W|,   dx = -[F (Hq x W) + G (W x grad F)]/|W|^2
 
 dx is the Newton step of least norm. Between neighbours x_0, x_1 with chord c and tangents T the curve is a cubic; its
 arclength comes from the chord and the mean of T over the step, for nodes equally spaced,
@@ -34,10 +35,10 @@ _INVERSE = np.array(
 
 
 @njit(**options)
-def newton(level, level_par, d, x, reach, work, tangents, curvature):
+def newton(level, level_par, wave, x, reach, work, tangents, curvature):
     """Move x (3, n) by one Newton step, each at most ``reach``; returns the largest, FAILED where there is none.
 
-    Fills T (3, n) and kappa_n(d) (n,) from where the points were. work (18, BLOCK) is work space.
+    Fills T (3, n) and kappa_n(q) (n,) from where the points were. wave is (d, w), work (18, BLOCK) work space.
     """
     n = x.shape[1]
     points, values, out = work[:3], work[3:13], work[13:18]
@@ -49,7 +50,7 @@ def newton(level, level_par, d, x, reach, work, tangents, curvature):
             # the last block is filled up with its last point
             points[axis, count:] = x[axis, start + count - 1]
         level(points, values[0], values[1:4], values[4:], level_par)
-        worst = max(worst, _steps(points.reshape(-1), values.reshape(-1), out.reshape(-1), d, reach))
+        worst = max(worst, _steps(points.reshape(-1), values.reshape(-1), out.reshape(-1), wave, reach))
         for axis in range(3):
             copy(points[axis, :count], x[axis, start : start + count])
             copy(out[axis, :count], tangents[axis, start : start + count])
@@ -58,16 +59,17 @@ def newton(level, level_par, d, x, reach, work, tangents, curvature):
 
 
 @njit(**options)
-def _steps(x, g, out, d, reach):
-    """Newton steps of one block, rows flat; out holds T and kappa_n(d). Constant offsets let the loop vectorise."""
-    dx, dy, dz = d[0], d[1], d[2]
+def _steps(x, g, out, wave, reach):
+    """Newton steps of one block, rows flat; out holds T and kappa_n(q). Constant offsets let the loop vectorise."""
+    dx, dy, dz, w = wave[0], wave[1], wave[2], wave[3]
     worst = 0.0
     for i in range(BLOCK):
         F, gx, gy, gz = g[i], g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
         xx, yy, zz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i]
         yz, xz, xy = g[7 * BLOCK + i], g[8 * BLOCK + i], g[9 * BLOCK + i]
-        hx, hy, hz = xx * dx + xy * dy + xz * dz, xy * dx + yy * dy + yz * dz, xz * dx + yz * dy + zz * dz
-        G = gx * dx + gy * dy + gz * dz
+        qx, qy, qz = dx + w * x[i], dy + w * x[BLOCK + i], dz + w * x[2 * BLOCK + i]
+        hx, hy, hz = xx * qx + xy * qy + xz * qz, xy * qx + yy * qy + yz * qz, xz * qx + yz * qy + zz * qz
+        G = gx * qx + gy * qy + gz * qz - w * F
         wx, wy, wz = gy * hz - gz * hy, gz * hx - gx * hz, gx * hy - gy * hx
         # where W vanishes the step is too large for anything to hide it
         inverse = 1.0 / (wx * wx + wy * wy + wz * wz + 1e-290)
@@ -81,7 +83,7 @@ def _steps(x, g, out, d, reach):
         x[2 * BLOCK + i] += part * sz
         root = math.sqrt(inverse)
         out[i], out[BLOCK + i], out[2 * BLOCK + i] = wx * root, wy * root, wz * root
-        bent = dx * hx + dy * hy + dz * hz
+        bent = (qx * hx + qy * hy + qz * hz) / (qx * qx + qy * qy + qz * qz + 1e-290)
         out[3 * BLOCK + i] = bent / math.sqrt(gx * gx + gy * gy + gz * gz + 1e-290)
         out[4 * BLOCK + i] = size
     total = 0.0

@@ -48,30 +48,36 @@ its length by orders 4 and 8 that does."""
 
 
 @njit(**options)
-def least_critical(points, d):
-    """v: least |n.d| where d passes the curve of singular directions; points (m, 2, 6) are ends (n, n x a)."""
+def least_critical(points, wave):
+    """v: least |n.q|/|q| where q is along the null direction a, K = 0; points (m, 2, 9) are ends (n, n x a, x)."""
     least = np.inf
+    b, n = np.empty(2), np.empty(2)
     for m in range(points.shape[0]):
-        b0 = d[0] * points[m, 0, 3] + d[1] * points[m, 0, 4] + d[2] * points[m, 0, 5]
-        b1 = d[0] * points[m, 1, 3] + d[1] * points[m, 1, 4] + d[2] * points[m, 1, 5]
-        if (b0 > 0.0) != (b1 > 0.0):
-            share = b0 / (b0 - b1)
-            n0 = d[0] * points[m, 0, 0] + d[1] * points[m, 0, 1] + d[2] * points[m, 0, 2]
-            n1 = d[0] * points[m, 1, 0] + d[1] * points[m, 1, 1] + d[2] * points[m, 1, 2]
-            least = min(least, abs(n0 + share * (n1 - n0)))
+        for end in range(2):
+            one = points[m, end]
+            b[end] = n[end] = square = 0.0
+            for k in range(3):
+                q = wave[k] + wave[3] * one[6 + k]
+                n[end] += q * one[k]
+                b[end] += q * one[3 + k]
+                square += q * q
+            n[end] /= np.sqrt(square)
+        if (b[0] > 0.0) != (b[1] > 0.0):
+            share = b[0] / (b[0] - b[1])
+            least = min(least, abs(n[0] + share * (n[1] - n[0])))
     return least
 
 
 @njit(**options)
-def least_criticals(points, directions, least):
-    """`least_critical` of directions (n, 3) into least (n,)."""
-    for row in range(directions.shape[0]):
-        least[row] = least_critical(points, directions[row])
+def least_criticals(points, waves, least):
+    """`least_critical` of waves (n, 4) into least (n,)."""
+    for row in range(waves.shape[0]):
+        least[row] = least_critical(points, waves[row])
 
 
 @njit(**options)
-def trace_lines(level, level_par, box, mesh, directions, every, summary, certain_lines, launched, places):
-    """Lines of incidences (n, 3) on a mesh, and where their rays start.
+def trace_lines(level, level_par, box, mesh, waves, every, summary, certain_lines, launched, places):
+    """Lines of incidences, waves (n, 4), on a mesh, and where their rays start.
 
     Parameters
     ----------
@@ -93,13 +99,13 @@ def trace_lines(level, level_par, box, mesh, directions, every, summary, certain
     """
     work = work_of(mesh)
     starts, spacing = np.empty(COMPONENTS + 1, np.int64), np.empty(COMPONENTS)
-    for row in range(directions.shape[0]):
-        d = directions[row]
+    for row in range(waves.shape[0]):
+        wave = waves[row]
         summary[row, :] = np.nan
         places[row, :] = NO_RAY
         launched[row, :, :] = np.nan
         found, certain, components, length, error = find_nodes(
-            level, level_par, box, mesh, d, row, work, starts, spacing
+            level, level_par, box, mesh, wave, row, work, starts, spacing
         )
         if found:
             total = starts[components]
@@ -107,14 +113,14 @@ def trace_lines(level, level_par, box, mesh, directions, every, summary, certain
             summary[row, CURVES], summary[row, LENGTH], summary[row, ERROR] = components, length, error
             arcs, which = np.empty((LIMIT + components, 2)), np.empty((2, LIMIT + components), np.int64)
             certain &= finish(
-                level, level_par, box, d, x, T, work[4][0], starts, components, spacing, every, summary[row],
+                level, level_par, box, wave, x, T, work[4][0], starts, components, spacing, every, summary[row],
                 launched[row], places[row], arcs, which,
             )[0]  # fmt: skip
         certain_lines[row] = found and certain
 
 
 @njit(**options)
-def trace_nodes(level, level_par, box, mesh, d):
+def trace_nodes(level, level_par, box, mesh, wave):
     """Nodes of one line on a mesh.
 
     Returns
@@ -122,7 +128,7 @@ def trace_nodes(level, level_par, box, mesh, d):
     found, certain : bool
     x, T : (3, n)
     kappa : (n,)
-        kappa_n(d).
+        kappa_n(q).
     starts : (components + 1,)
         First node of each component.
     spacing : (components,)
@@ -130,7 +136,7 @@ def trace_nodes(level, level_par, box, mesh, d):
     """
     work = work_of(mesh)
     starts, spacing = np.empty(COMPONENTS + 1, np.int64), np.empty(COMPONENTS)
-    found, certain, components, length, error = find_nodes(level, level_par, box, mesh, d, 0, work, starts, spacing)
+    found, certain, components, length, error = find_nodes(level, level_par, box, mesh, wave, 0, work, starts, spacing)
     total = starts[components] if found else 0
     x, T = work[3][2][: 3 * total].reshape(3, total), work[3][3][: 3 * total].reshape(3, total)
     kappa = work[4][0][:total].copy()
@@ -157,7 +163,7 @@ def work_of(mesh):
 
 
 @njit(**options)
-def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
+def find_nodes(level, level_par, box, mesh, wave, number, work, starts, spacing):
     """Equally spaced nodes of one line on one mesh, the longest curve first, left in the work space.
 
     Returns whether there are any, whether every step was certain of them, components, length and its relative error.
@@ -166,7 +172,7 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
     s, (lit, found, stamp), (raw, raw_starts, kept), flat, (kappa, h, beside, slopes), scratch = work
     extent = max(box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[1, 2] - box[0, 2])
     nothing = False, False, 0, np.nan, np.nan
-    incidence_at(normals, d, s)
+    incidence_at(vertices, normals, wave, s)
     mixed = mixed_triangles(s, triangles, lit, found)
     components = walk(s, vertices, triangles, neighbours, found, mixed, stamp, number, raw, raw_starts)
     if components < 1:
@@ -178,12 +184,12 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
             x[axis, i] = raw[axis, i]
     # next to a small loop a longer step would end on another branch
     reach = REACH * edge
-    if newton(level, level_par, d, x, reach, scratch, T, kappa) == FAILED:
+    if newton(level, level_par, wave, x, reach, scratch, T, kappa) == FAILED:
         return nothing
-    step = newton(level, level_par, d, x, reach, scratch, T, kappa)
+    step = newton(level, level_par, wave, x, reach, scratch, T, kappa)
     certain = step < COARSE_STEP * edge
     for _ in range(MORE if not certain else 0):
-        step = newton(level, level_par, d, x, reach, scratch, T, kappa)
+        step = newton(level, level_par, wave, x, reach, scratch, T, kappa)
     kept_starts = np.empty(COMPONENTS + 1, np.int64)
     certain &= not prune(x, T, raw_starts, components, APART * edge, kept, kept_starts)
     lengths, counts = np.empty(COMPONENTS), np.empty(COMPONENTS, np.int64)
@@ -205,9 +211,9 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
         resample(x, T, kept, first, count, lengths[best], y, total, counts[best])
         total += counts[best]
     starts[components] = total
-    if newton(level, level_par, d, y, reach, scratch, U, kappa) == FAILED:
+    if newton(level, level_par, wave, y, reach, scratch, U, kappa) == FAILED:
         return nothing
-    last = newton(level, level_par, d, y, reach, scratch, U, kappa)
+    last = newton(level, level_par, wave, y, reach, scratch, U, kappa)
     if not last < LOST * extent:
         return nothing
     certain &= last < UNSETTLED * extent
@@ -223,7 +229,7 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
             length, error, rough = length + spacing[c] * size, error + off, rough + coarse
             if again == 0:
                 equalise(y, slopes, starts[c], size, own, h)
-        if again == 0 and not newton(level, level_par, d, y, reach, scratch, U, kappa) < LOST * extent:
+        if again == 0 and not newton(level, level_par, wave, y, reach, scratch, U, kappa) < LOST * extent:
             return nothing
     certain &= rough < SETTLED * length and error < PRECISE * length
     return True, certain, components, length, error / length
@@ -231,7 +237,7 @@ def find_nodes(level, level_par, box, mesh, d, number, work, starts, spacing):
 
 @njit(**options)
 def finish(
-    level, level_par, box, d, x, T, kappa, starts, components, spacing, every, summary, launched, places, arcs, which
+    level, level_par, box, wave, x, T, kappa, starts, components, spacing, every, summary, launched, places, arcs, which
 ):
     """Arcs and rays of a line with equally spaced nodes.
 
@@ -249,7 +255,7 @@ def finish(
         where[count : count + some] = c
         count += some
         certain &= not hidden
-    extreme = project(x, T, n, d, plane)
+    extreme = project(x, T, n, wave, box, plane)
     owner_of_box = np.empty(n // BOX + 1, np.int64)
     if not convex(plane, starts, components):
         some = crossings(plane, starts, components, spacing, boxes, owner_of_box, at[count:], where[count:])
@@ -262,7 +268,7 @@ def finish(
     total = arcs_of(at, where, count, starts, components, arcs, owner)
     extent = max(box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[1, 2] - box[0, 2])
     reach = 0.01 * extent
-    certain &= classify(level, level_par, box, d, x, starts, extreme, arcs, owner, total, reach, scratch, state)
+    certain &= classify(level, level_par, box, wave, x, starts, extreme, arcs, owner, total, reach, scratch, state)
     total = merge(arcs, owner, state, total, starts)
     summary[SHARES : SHARES + 3] = 0.0
     for k in range(total):
@@ -279,7 +285,7 @@ def finish(
         for axis in range(3):
             points[axis, m] = launched[m, axis]
     if filled:
-        newton(level, level_par, d, points, reach, scratch, tangents, curvature)
+        newton(level, level_par, wave, points, reach, scratch, tangents, curvature)
     for m in range(filled):
         c = places[m]
         place = launched[m, ARCLENGTH] / spacing[c]
