@@ -244,6 +244,7 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
             mean_curvature=None if cloud.mean_curvature is None else cloud.mean_curvature[some],
             smoothing=smoothing,
             normal_weight=weight,
+            keep_start=not cloud.noise,
             progress=progress,
         )
 

@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.spline.fitting import fit, spacing_of
+from scatterers.spline.fitting import ACCURACY, fit, spacing_of
 from scatterers.spline.tensor import TensorSpline, weights
 from scatterers.triangles.jet_points import centroids, signed_distance
 from scatterers.triangles.jets import Jets
@@ -36,7 +36,7 @@ SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
 COARSER = 1.35
 STEPS = 300
 """Of a fit: the borders of a piece take long, and gain little."""
-CLOSELY, ROUGHLY = 5e-5, 1e-3
+CLOSELY, ROUGHLY = ACCURACY, 3e-4
 """Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
 
 
