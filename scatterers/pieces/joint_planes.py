@@ -21,7 +21,7 @@ def of_one_surface(
     among: Mapping[tuple[int, int], int],
     joined: list[tuple[int, int]],
 ) -> dict[tuple[int, int], int]:
-    """0 for pairs of pieces that joints near a point join, and for those that a chain of joints does if they are alike."""
+    """0 for pairs of pieces that joints near a point join, and for alike ones that a chain of joints does."""
     found = dict.fromkeys(joined, 0)
     if len(joined) < 2:
         return found
@@ -49,8 +49,8 @@ def _unit(vectors: FloatArray) -> FloatArray:
 class JointPlanes:
     """Planes across the body through joints and seams, by which the two pieces of one smooth surface are told apart.
 
-    a.x > b is the side of the piece with the larger number: which way a crease runs says nothing of that, points of both
-    pieces next to it do.
+    a.x > b is the side of the piece with the larger number: which way a crease runs says nothing of that, points of
+    both pieces next to it do.
     """
 
     def __init__(

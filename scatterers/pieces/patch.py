@@ -80,7 +80,16 @@ def spline_patch(
         points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
     grid = max(cells * spacing, spacing_of(points, NODES))
     fine, coarse = (
-        fit(points, normals, h, distance=distance, mean_curvature=mean, accuracy=accuracy, iterations=STEPS)
+        fit(
+            points,
+            normals,
+            h,
+            distance=distance,
+            mean_curvature=mean,
+            keep_start=distance is not None,
+            accuracy=accuracy,
+            iterations=STEPS,
+        )
         for h in (grid, COARSER * grid)
     )
     return Patch(fine.spline, coarse.spline, "spline", fine.misfit, fine.turn, spacing)

@@ -4,10 +4,11 @@ Points of all pieces, closer to each other than a voxel, say which pieces bound 
 What two of them make of each other there is read off F of the one at points of the other: F < 0, the body is what both
 have inside, as at a convex edge and between the two sides of a thin part, and F of the body is the larger; F > 0, what
 either has, and it is the smaller; F = 0, they are parts of one smooth surface. So are pieces with a joint or seam near
-the voxel, and those that a chain of such joins with like normals, whatever F of the one is at the other: a fillet soon
+the voxel, and those with like normals that a chain of such joins, whatever F of the one is at the other: a fillet soon
 leaves the plane that it meets. Parts of one surface are parted by the planes through their creases there, and where
-they have none the nearer one stands for both. Of three and more the pairs make a tree: if pieces fall into groups that are all joined by "the larger", that comes last,
-and so on within the groups. Voxels far off follow the next ones with points.
+they have none the nearer one stands for both. Of three and more the pairs make a tree: if pieces fall into groups that
+are all joined by "the larger", that comes last, and so on within the groups. Voxels far off follow the next ones with
+points.
 
 Sources: Derivations, B13.
 """
