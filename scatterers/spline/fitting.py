@@ -47,6 +47,9 @@ CHECKED = 20
 """Iterations from one look at the curvature to the next."""
 ACCURACY = 2e-5
 """Change of the curvatures from one look to the next, relative to their rms, at which a fit is done."""
+STALLED = 0.7
+"""Change of the curvatures, in units of that two looks before, from which on a fit that keeps its start is done, too:
+surfaces that are less smooth than their grid go on changing a little."""
 LOST = 2.5
 """How much worse than the best the curvatures of the F that is taken may be: points and normals gain by every step."""
 WATCHED = 2000
@@ -133,6 +136,7 @@ def fit(
     p, rz = z.copy(), float(np.vdot(r, z))
     before, change, done = watch.curvatures(c), np.inf, 0
     best, kept = watch.off(before), c.copy()
+    changes = [np.inf, np.inf]
     while done < iterations and rz > 0:
         q = equations.residual(p, targets=False)
         step = -rz / float(np.vdot(p, q))
@@ -154,8 +158,9 @@ def fit(
             kept = c.copy()
         elif done > CHECKED:
             break
-        if change <= accuracy * scale:
+        if change <= accuracy * scale or (keep_start and change > STALLED * changes[-2]):
             break
+        changes.append(change)
     return equations.result(kept if watch.guided else c, done, change / spacing)
 
 
