@@ -40,6 +40,8 @@ FLOOR = 0.03
 """Of the density, in units of the largest: what the equations leave nearly free must not dominate the steps."""
 PADDING = 5.0
 """Cells between the body and the faces of the grid."""
+NEAR = 7.0
+"""Cells from the points within which a given distance is asked for: beyond, no sample sees what is there."""
 QUASI = np.array([13, -112, 438, -112, 13]) / 240
 MAX_NODES = 8_000_000
 ITERATIONS = 480
@@ -187,7 +189,6 @@ class _Equations:
         normal_weight: float,
         trusted: NDArray[np.bool_] | None = None,
     ) -> None:
-        from scipy.ndimage import binary_dilation
         from scipy.spatial import cKDTree
 
         low, high = points.min(0) - PADDING * spacing, points.max(0) + PADDING * spacing
@@ -211,8 +212,6 @@ class _Equations:
         self.samples = [places, *(np.ascontiguousarray((places + k * self.sorted_normals)[some]) for k in (1, -1))]
         self.targets = [np.zeros(len(places)), *(self._offset_targets(k) for k in (1, -1))]
         self.unknown = self._seen()
-        # QUASI reaches two nodes
-        self.asked = np.flatnonzero(binary_dilation(self.unknown, np.ones((5, 5, 5))))
         one = np.array([1, 26, 66, 26, 1]) / 120
         sampling = [sum(np.diag(np.full(n - abs(k), one[k + 2]), k) for k in range(-2, 3)) for n in self.shape]
         self.cardinal = [np.linalg.inv(matrix) for matrix in sampling]
@@ -221,7 +220,7 @@ class _Equations:
         self.divisor = density + FLOOR * density.max() + 210 * smoothing
 
     def _nearest(self, where: FloatArray) -> NDArray[np.int64]:
-        """Points nearest to all nodes (m, 3), but for some spacings where no sample sees the node.
+        """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
 
         A tree of points takes long where many are equally far, as in the middle of a body.
         """
@@ -230,9 +229,10 @@ class _Equations:
         node = np.rint((self.points - self.low) / self.spacing).astype(np.int64) + 2
         one = np.full(self.shape, -1, dtype=np.int64)
         one[tuple(node.T)] = np.arange(len(node))
-        index = distance_transform_edt(one < 0, return_distances=False, return_indices=True)
+        cells, index = distance_transform_edt(one < 0, return_indices=True)
         nearest = one[tuple(index)].ravel()
-        nearest[self.asked] = self.tree.query(where[self.asked])[1]
+        near = np.flatnonzero(cells.ravel() < NEAR + 2)
+        nearest[near] = self.tree.query(where[near])[1]
         return np.asarray(nearest)
 
     def _plane_distance(
@@ -262,10 +262,11 @@ class _Equations:
         where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         values, off = self._plane_distance(where, self._nearest(where))
         if distance is not None:
-            found = distance(where[self.asked])
+            near = np.flatnonzero(off < NEAR * self.spacing)
+            found = distance(where[near])
             # a foot that is farther off than the nearest point is none
-            good = np.abs(found) <= off[self.asked] * (1 + 1e-9)
-            values[self.asked[good]] = found[good]
+            good = np.abs(found) <= off[near] * (1 + 1e-9)
+            values[near[good]] = found[good]
         c = values.reshape(self.shape) / self.spacing
         for axis in range(3):
             c = convolve1d(c, QUASI, axis=axis, mode="nearest")
