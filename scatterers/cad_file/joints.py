@@ -7,6 +7,8 @@ Across an edge of the mesh that lies on the joint of two faces, each face bends 
 t across the edge in the face, near the middle of the edge and far the corner opposite to it; each errs by half an edge
 times the change of kappa along t. The median of kappa_left - kappa_right over the joint of two faces tells a jump from
 that: between a fillet and a plane it is all of the larger.
+
+Sources: Derivations, B13.
 """
 
 import numpy as np
