@@ -10,7 +10,6 @@ import pytest
 import trimesh
 
 import scatterers as sc
-from scatterers.triangles.choice import Choice
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.files import TriangleMesh, read_mesh
 
@@ -66,27 +65,6 @@ def test_3mf_states_its_unit_and_places_its_parts(tmp_path):
     assert found.repairs == () and volume(found) == pytest.approx(BALL.volume * 1e-9)
     np.testing.assert_allclose(found.vertices.mean(0), [5e-3, 6e-3, 7e-3], atol=1e-9)
     assert np.ptp(read(packed(tmp_path / "b.3mf", "inch"), "in").vertices[:, 0]) == pytest.approx(0.0508)
-
-
-def test_parts_of_3mf_have_the_names_of_their_objects(tmp_path):
-    vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in VERTICES.tolist())
-    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES.tolist())
-    ball = f"<mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>"
-    text = (
-        '<model unit="millimeter"><resources>'
-        f'<object id="1" name="ball">{ball}</object><object id="2">{ball}</object>'
-        '<object id="3" name="pair"><components><component objectid="1"/>'
-        '<component objectid="2" transform="2 0 0 0 2 0 0 0 2 9 0 0"/></components></object></resources>'
-        '<build><item objectid="3"/><item objectid="2" transform="3 0 0 0 3 0 0 0 3 -9 0 0"/></build></model>'
-    )
-    path = packed(tmp_path / "three.3mf", text=text)
-    # an object without a name has that of what it is a component of, if that has one
-    for part, radius, centre in (("ball", 1e-3, 0.0), ("pair", 2e-3, 9e-3), ("object 2", 3e-3, -9e-3)):
-        found = read_mesh(path, None, Choice(part=part), progress=str)
-        assert np.ptp(found.vertices[:, 0]) == pytest.approx(2 * radius)
-        assert found.vertices[:, 0].mean() == pytest.approx(centre, abs=1e-9)
-    with pytest.raises(ValueError, match=r"three.3mf has no part 'cube'; it has .*ball"):
-        read_mesh(path, None, Choice(part="cube"), progress=str)
 
 
 def test_objects_in_memory():
