@@ -125,7 +125,12 @@ class Cad(FittedBody):
         notes = {"source": path.name, "edges": list(found.edges)}
         if quality.verdict != "smooth" and strict:
             raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
-        if found.creases.any() or (quality.verdict != "smooth" and found.level.any()):
+        if found.jumps and strict:
+            raise ValueError(
+                f"{path.name} is not smooth enough: the curvature jumps where faces join, as where a fillet meets a "
+                "plane; blend them with continuous curvature, or leave strict out"
+            )
+        if found.creases.any() or found.jumps or (quality.verdict != "smooth" and found.level.any()):
             # fillets ask for more points than faces
             found = read_cad(path, reading, curved=CURVED, progress=progress)
             mesh, normals = found.mesh, found.corner_normals

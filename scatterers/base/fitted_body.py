@@ -244,11 +244,14 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
             mean_curvature=None if cloud.mean_curvature is None else cloud.mean_curvature[some],
             smoothing=smoothing,
             normal_weight=weight,
+            keep_start=not (cloud.noise or coarse),
             progress=progress,
         )
 
     every = np.ones(len(cloud.points), dtype=bool)
-    smoothing = SMOOTHINGS[0] if cloud.noise else SMOOTHING
+    # where most jets are bad, so is the distance that they give, and samples leave much free
+    coarse = bool(np.isfinite(cloud.uncertain))
+    smoothing = SMOOTHINGS[0] if cloud.noise or coarse else SMOOTHING
     fine = fitted(cloud.spacing, smoothing, every)
     for more in SMOOTHINGS[1:] if cloud.noise else ():
         smoother = fitted(cloud.spacing, more, every)

@@ -52,6 +52,8 @@ class CadPoints:
     creases, level : (e,) bool
         Edges, in the order of `scatterers.triangles.topology.edges_of`, at which faces do not join smoothly, and at
         which they do.
+    jumps : bool
+        Whether the curvature jumps where faces join smoothly, as where a fillet meets a plane.
     edges : tuple of str
         Where faces do not join smoothly.
     non_smooth : (k, 3), m
@@ -63,6 +65,7 @@ class CadPoints:
     corner_normals: FloatArray
     creases: NDArray[np.bool_]
     level: NDArray[np.bool_]
+    jumps: bool
     edges: tuple[str, ...]
     non_smooth: FloatArray
 
@@ -106,6 +109,7 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
     ModuleNotFoundError
         If gmsh is not installed.
     """
+    from scatterers.cad_file.joints import curvature_jumps
     from scatterers.cad_file.solids import cleaned_apart
     from scatterers.triangles.topology import oriented
 
@@ -146,7 +150,9 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
     for line in repairs:
         progress(line)
     corners = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
-    return CadPoints(mesh, normals, corners, *_creases(mesh, of, corners), edges, mesh.vertices[sharp])
+    creases, level = _creases(mesh, of, corners)
+    jumps = curvature_jumps(mesh.vertices, mesh.triangles, of, corners, level)
+    return CadPoints(mesh, normals, corners, creases, level, jumps, edges, mesh.vertices[sharp])
 
 
 def kind_of(path: Path) -> str:

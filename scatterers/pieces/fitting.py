@@ -154,7 +154,7 @@ def fitted_pieces(
     fine = piece_space([patch.fine for patch in patches], points, owner, creases)
     coarse = fine.with_splines([patch.coarse for patch in patches])
     astray = _astray(fine, patches, points, owner, size)
-    rough = np.array([_rough(patch, points[owner == k]) for k, patch in enumerate(patches)])
+    rough = np.array([_rough(patch, points[owner == k], size) for k, patch in enumerate(patches)])
     return FittedPieces(fine, coarse, tuple(patches), piece, at_corners, creases, rough, points, owner, astray)
 
 
@@ -332,8 +332,10 @@ def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray, exact: 
     return jets if np.mean(sound) >= GOOD else None
 
 
-def _rough(patch: Patch, points: FloatArray) -> bool:
-    """Whether F of a patch is no distance at points of its piece, or misses them."""
+def _rough(patch: Patch, points: FloatArray, size: float) -> bool:
+    """Whether F of a patch is no distance at points of its piece, or misses them, or it is a speck of the body."""
+    if float(np.max(np.ptp(points, axis=0))) < MISSED * size:
+        return True
     if patch.kind != "spline":
         return False
     value, gradient = patch.fine.value_and_gradient(points)

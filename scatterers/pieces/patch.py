@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.spline.fitting import fit, spacing_of
+from scatterers.spline.fitting import ACCURACY, fit, spacing_of
 from scatterers.spline.tensor import TensorSpline, weights
 from scatterers.triangles.jet_points import centroids, signed_distance
 from scatterers.triangles.jets import Jets
@@ -36,7 +36,7 @@ SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
 COARSER = 1.35
 STEPS = 300
 """Of a fit: the borders of a piece take long, and gain little."""
-CLOSELY, ROUGHLY = 5e-5, 1e-3
+CLOSELY, ROUGHLY = ACCURACY, 3e-4
 """Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
 
 
@@ -80,7 +80,16 @@ def spline_patch(
         points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
     grid = max(cells * spacing, spacing_of(points, NODES))
     fine, coarse = (
-        fit(points, normals, h, distance=distance, mean_curvature=mean, accuracy=accuracy, iterations=STEPS)
+        fit(
+            points,
+            normals,
+            h,
+            distance=distance,
+            mean_curvature=mean,
+            keep_start=distance is not None,
+            accuracy=accuracy,
+            iterations=STEPS,
+        )
         for h in (grid, COARSER * grid)
     )
     return Patch(fine.spline, coarse.spline, "spline", fine.misfit, fine.turn, spacing)

@@ -3,10 +3,12 @@
 Points of all pieces, closer to each other than a voxel, say which pieces bound the body in a voxel and the next ones.
 What two of them make of each other there is read off F of the one at points of the other: F < 0, the body is what both
 have inside, as at a convex edge and between the two sides of a thin part, and F of the body is the larger; F > 0, what
-either has, and it is the smaller; F = 0, they are parts of one smooth surface, parted by the plane through their crease
-there, and where they have none the nearer one stands for both. Of
-three and more the pairs make a tree: if pieces fall into groups that are all joined by "the larger", that comes last,
-and so on within the groups. Voxels far off follow the next ones with points.
+either has, and it is the smaller; F = 0, they are parts of one smooth surface. So are pieces with a joint or seam near
+the voxel, and those with like normals that a chain of such joins, whatever F of the one is at the other: a fillet soon
+leaves the plane that it meets. Parts of one surface are parted by the planes through their creases there, and where
+they have none the nearer one stands for both. Of three and more the pairs make a tree: if pieces fall into groups that
+are all joined by "the larger", that comes last, and so on within the groups. Voxels far off follow the next ones with
+points.
 
 Sources: Derivations, B13.
 """
@@ -22,6 +24,7 @@ from numpy.typing import NDArray
 from scatterers.kernels.pieces_layout import BESIDES, FIRST, LARGER, MOST_PIECES, SMALLER
 from scatterers.kernels.spline_constants import CENTRE, HEADER
 from scatterers.pieces.crease import Crease
+from scatterers.pieces.joint_planes import JointPlanes, of_one_surface
 from scatterers.spline.tensor import TensorSpline, evaluated
 
 FloatArray = NDArray[np.float64]
@@ -157,9 +160,10 @@ def piece_space(
     signs = _signs(splines, points, pairs, SAME * side)
     programs: list[Program] = [(int(number),) for number in nearest]
     known: dict[tuple[Any, ...], Program] = {}
-    planes = _Planes(splines, creases)
+    planes = JointPlanes(splines, creases, points, owner)
     for where, among in signs.items():
-        beside = planes.near(middles[where], [pair for pair, sign in among.items() if not sign], 3 * side)
+        beside = planes.near(middles[where], list(among), 3 * side)
+        among |= of_one_surface(splines, middles[where], among, list(beside))
         key = int(nearest[where]), tuple(sorted(among.items())), tuple(sorted(beside.items()))
         if key not in known:
             known[key] = _program(*key)
@@ -240,36 +244,6 @@ def _signs(
     return signs
 
 
-class _Planes:
-    """Planes across the body through joints and seams, by which the two pieces of one smooth surface are told apart."""
-
-    def __init__(self, splines: Sequence[TensorSpline], creases: Sequence[Crease]) -> None:
-        from scipy.spatial import cKDTree
-
-        self._of: dict[tuple[int, int], tuple[Any, FloatArray, FloatArray]] = {}
-        for pair in {crease.pieces for crease in creases if crease.kind in ("joint", "seam")}:
-            curves = [c for c in creases if c.pieces == pair and c.kind in ("joint", "seam")]
-            x = np.concatenate([0.5 * (c.points[1:] + c.points[:-1]) for c in curves])
-            along = np.concatenate([np.diff(c.points, axis=0) for c in curves])
-            first, second = (splines[number].gradient(x) for number in pair)
-            across = np.cross(first / np.linalg.norm(first, axis=1, keepdims=True) + second, along)
-            across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
-            self._of[min(pair), max(pair)] = cKDTree(x), x, across
-
-    def near(
-        self, point: FloatArray, pairs: list[tuple[int, int]], reach: float
-    ) -> dict[tuple[int, int], tuple[float, ...]]:
-        """a (3) and b of the plane a.x = b nearest to a point, for each pair that has one."""
-        found = {}
-        for pair in pairs:
-            if pair in self._of:
-                tree, x, across = self._of[pair]
-                distance, k = tree.query(point)
-                if distance < reach:
-                    found[pair] = (*across[k].tolist(), float(across[k] @ x[k]))
-        return found
-
-
 def _program(
     nearest: int,
     among: tuple[tuple[tuple[int, int], int], ...],
@@ -291,18 +265,7 @@ def _program(
         if len(kept) >= MOST_PIECES // 2:
             break
         kept.append(number)
-        leaves[number] = (number,)
-        # along a chain of smooth neighbours, each beyond the plane through its joint with the one before
-        ends = [number]
-        while ends and len(chained) < LONGEST:
-            k = ends.pop()
-            for other in pieces:
-                plane = planes.get((min(k, other), max(k, other)))
-                if plane is not None and other not in chained and other not in kept:
-                    turn = 1.0 if k < other else -1.0
-                    leaves[number] = (*leaves[number], other, BESIDES, *(turn * value for value in plane))
-                    chained.add(other)
-                    ends.append(other)
+        leaves[number] = _chain(number, [k for k in pieces if k not in kept and k not in chained], planes, chained)
 
     def joined(members: list[int]) -> Program:
         if len(members) == 1:
@@ -327,6 +290,37 @@ def _program(
         return program
 
     return joined(kept)
+
+
+def _chain(
+    number: int, others: list[int], planes: Mapping[tuple[int, int], tuple[float, ...]], chained: set[int]
+) -> Program:
+    """A piece and its smooth neighbours, each beyond the plane through its joint with the one before; they are noted.
+
+    Where four meet in a point, the last is beyond one plane of its neighbour, within what is beyond another: chains are
+    nested, the longest outermost.
+    """
+    before: dict[int, list[int]] = {number: []}
+    ends = [number]
+    while ends:
+        k = ends.pop(0)
+        for other in others:
+            if (min(k, other), max(k, other)) in planes and other not in before and len(chained) < LONGEST:
+                before[k].append(other)
+                before[other] = []
+                chained.add(other)
+                ends.append(other)
+
+    def nested(k: int) -> Program:
+        program: Program = (k,)
+        parts = sorted(((nested(other), other) for other in before[k]), key=lambda part: len(part[0]))
+        for part, other in parts:
+            turn = 1.0 if k < other else -1.0
+            plane = planes[min(k, other), max(k, other)]
+            program = (*program, *part, BESIDES, *(turn * value for value in plane))
+        return program
+
+    return nested(number)
 
 
 def _table(origin: FloatArray, side: float, shape: IntArray, programs: list[Program], nearest: IntArray) -> FloatArray:

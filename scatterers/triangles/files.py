@@ -243,7 +243,7 @@ def _loaded(
 ) -> tuple[FloatArray, IntArray, str | None, tuple[tuple[str, int], ...]]:
     """Vertices and triangles of everything in the file, the unit it states, and its parts: name, triangles."""
     if suffix == ".3mf":
-        return *read_3mf(data, MOST_BYTES, MOST_TRIANGLES), ()
+        return read_3mf(data, MOST_BYTES, MOST_TRIANGLES)
     import trimesh
 
     # else all objects of an OBJ file are one part, by the name of the first

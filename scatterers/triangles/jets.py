@@ -22,6 +22,8 @@ AT_MOST = 112
 """Neighbours where the usual ones leave terms open, as on long triangles."""
 FEWEST = 36
 """Neighbours below which a jet of degree 6 is not fitted."""
+SHARE = 5000
+"""Vertices whose neighbours are sought at a time."""
 SAME_SHEET = 0.3
 """Cosine between the normals of a vertex and its neighbours."""
 
@@ -154,13 +156,15 @@ def _neighbours(vertices: FloatArray, normals: FloatArray) -> tuple[IntArray, In
     waiting, asked = np.arange(n), AT_MOST + 8
     for _ in range(3):
         asked = min(asked, n)
-        found = tree.query(vertices[waiting], asked)[1].reshape(len(waiting), asked)
-        cosine = np.einsum("ijk,ik->ij", normals[found], normals[waiting])
-        good = (cosine > SAME_SHEET) & (found != waiting[:, None])
-        # stable: the good ones first, in order of distance
-        order = np.argsort(~good, axis=1, kind="stable")[:, :AT_MOST]
-        near[waiting, : order.shape[1]] = np.take_along_axis(found, order, axis=1)
-        counts[waiting] = np.minimum(good.sum(axis=1), AT_MOST)
+        for start in range(0, len(waiting), SHARE):
+            some = waiting[start : start + SHARE]
+            found = tree.query(vertices[some], asked)[1].reshape(len(some), asked)
+            cosine = np.einsum("ijk,ik->ij", normals[found], normals[some])
+            good = (cosine > SAME_SHEET) & (found != some[:, None])
+            # stable: the good ones first, in order of distance
+            order = np.argsort(~good, axis=1, kind="stable")[:, :AT_MOST]
+            near[some, : order.shape[1]] = np.take_along_axis(found, order, axis=1)
+            counts[some] = np.minimum(good.sum(axis=1), AT_MOST)
         waiting = waiting[counts[waiting] < NEIGHBOURS]
         if not len(waiting) or asked == n:
             break

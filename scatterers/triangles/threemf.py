@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Read = tuple[FloatArray, IntArray, str, tuple[tuple[str, int], ...]]
 PART = "3d/3dmodel.model"
 DEEPEST = 16
 MOST_PARTS = 1000
 
 
-def read_3mf(data: bytes, limit: int, most_triangles: int) -> tuple[FloatArray, IntArray, str]:
-    """Vertices (n, 3) in the file's unit, triangles (m, 3) and the unit's name.
+def read_3mf(data: bytes, limit: int, most_triangles: int) -> Read:
+    """Vertices (n, 3) in the file's unit, triangles (m, 3), the unit's name, and the parts: name and triangles of each.
+
+    A part has the name of its object, else that of the object that it is a component of, else "object" and its number.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class _Model:
         self.triangles: dict[str, list[tuple[int, int, int]]] = defaultdict(list)
         self.components: dict[str, list[tuple[str, FloatArray]]] = defaultdict(list)
         self.items: list[tuple[str, FloatArray]] = []
+        self.names: dict[str, str] = {}
         self.object = ""
 
     def refuse(self, *_: Any) -> None:
@@ -78,6 +82,8 @@ class _Model:
                 self.unit = attributes.get("unit", self.unit)
             case "object":
                 self.object = attributes["id"]
+                if attributes.get("name"):
+                    self.names[self.object] = attributes["name"]
             case "vertex":
                 self.vertices[self.object].append(
                     (float(attributes["x"]), float(attributes["y"]), float(attributes["z"]))
@@ -92,13 +98,15 @@ class _Model:
                 placed = (attributes["objectid"], _matrix(attributes.get("transform")))
                 (self.items if kind == "item" else self.components[self.object]).append(placed)
 
-    def placed(self, most_triangles: int) -> tuple[FloatArray, IntArray, str]:
+    def placed(self, most_triangles: int) -> Read:
         """All objects that are built, each where it is put."""
         vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
-        waiting = [(name, matrix, 0) for name, matrix in self.items]
+        waiting = [(name, matrix, 0, "") for name, matrix in self.items]
         parts, repeated = 0, 0
+        names: list[tuple[str, int]] = []
         while waiting:
-            name, matrix, depth = waiting.pop()
+            name, matrix, depth, above = waiting.pop()
+            own = self.names.get(name, above)
             parts += 1
             inside = self.components.get(name, [])
             if depth > DEEPEST or parts + len(waiting) + len(inside) > MOST_PARTS:
@@ -107,7 +115,7 @@ class _Model:
             repeated += len(self.triangles.get(name, ()))
             if repeated > most_triangles:
                 raise ValueError(f"its objects, each where it is placed, have more than {most_triangles} triangles")
-            waiting += [(inner, np.asarray(m @ matrix), depth + 1) for inner, m in inside]
+            waiting += [(inner, np.asarray(m @ matrix), depth + 1, own) for inner, m in inside]
             if self.triangles.get(name):
                 points = np.array(self.vertices.get(name, []), dtype=float).reshape(-1, 3)
                 corners = np.array(self.triangles[name], dtype=np.int64)
@@ -117,8 +125,9 @@ class _Model:
                 # a placement that mirrors turns the triangles inside out
                 corners = corners if np.linalg.det(matrix[:3, :3]) > 0 else corners[:, ::-1]
                 triangles.append(corners + count)
+                names.append((own or f"object {name}", len(corners)))
                 count += len(points)
-        return np.concatenate(vertices), np.concatenate(triangles), self.unit
+        return np.concatenate(vertices), np.concatenate(triangles), self.unit, tuple(names)
 
 
 def _matrix(text: str | None) -> FloatArray:

@@ -194,6 +194,12 @@ def test_fillets_are_joints_and_halves_of_one_face_seams(files):
     assert np.all(halves.level(points) < 0) and np.all(halves.level(points * [1.05, 1.05, 1]) > 0)
 
 
+@pytest.mark.parametrize("name", ["ellipsoid.step", "torus.step"])
+def test_smooth_bodies_of_one_face_have_no_jumps(files, name):
+    body = sc.Cad(files / name, points=3000, cache=False)
+    assert not body.pieces and not body.creases
+
+
 def test_parts_of_a_cad_file_are_chosen_and_united(files):
     largest, second = (parted(files / "two.brep", points=2000, part=part) for part in ("largest", 2))
     directions = np.random.default_rng(8).normal(size=(50, 3))

@@ -346,3 +346,28 @@ def test_a_coarse_mesh_is_judged_by_its_fit():
 def test_unknown_units_are_refused():
     with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
         sc.Mesh(BALL, "yard", cache=False)
+
+
+@pytest.mark.parametrize("sides", [(1.0, 0.8, 0.6), (1.3, 1.0, 0.9)])
+def test_ten_thousand_vertices_are_fitted_as_well_as_their_spline_can(sides):
+    """What smooths F far from the body, where its distance has kinks, must not bend it on the body."""
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    body = sc.Mesh(trimesh.Trimesh(ball.vertices * sides, ball.faces, process=False), cache=False)
+    exact = sc.Ellipsoid(*sides)
+    x = np.random.default_rng(11).normal(size=(3000, 3))
+    x = exact.forward(x / np.linalg.norm(x, axis=1, keepdims=True))
+    n = exact.gradient(x)
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    e = np.cross(n, [0.3, -0.5, 0.8])
+    e /= np.linalg.norm(e, axis=1, keepdims=True)
+
+    def curvature(shape):
+        return np.einsum("ni,nij,nj->n", e, shape.hessian(x), e) / np.linalg.norm(shape.gradient(x), axis=1)
+
+    off = body.level(x) / np.linalg.norm(body.gradient(x), axis=1)
+    assert np.sqrt(np.mean(off**2)) < 4e-9
+    wanted = curvature(exact)
+    assert np.sqrt(np.mean((curvature(body) - wanted) ** 2)) < 2e-5 * np.sqrt(np.mean(wanted**2))
+    # and the coarser fit tells it
+    stated = np.sqrt(np.mean((curvature(body) - curvature(body.coarse_fit)) ** 2))
+    assert stated > np.sqrt(np.mean((curvature(body) - wanted) ** 2))

@@ -146,6 +146,17 @@ def test_operators_are_symmetric_and_positive(equations, rng, which):
         np.testing.assert_array_equal(image[-OVERREAD:], 0)
 
 
+def test_all_that_samples_see_is_unknown(equations):
+    for places in equations.samples:
+        cell = places.astype(int)
+        for step in np.ndindex(6, 6, 6):
+            assert np.all(equations.unknown[tuple((cell + step).T)])
+    # and no more: a box of six about each cell, along each axis
+    rows = np.flatnonzero(equations.unknown.any(axis=(1, 2)))
+    cells = np.concatenate([places[:, 0].astype(int) for places in equations.samples])
+    assert rows[0] == cells.min() and rows[-1] == cells.max() + 5
+
+
 def test_residual_is_the_slope_of_what_is_minimised(equations, rng):
     shape = np.array(equations.shape)
 

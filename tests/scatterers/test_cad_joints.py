@@ -1,0 +1,50 @@
+"""CAD bodies whose faces join smoothly while the curvature jumps: joints, and the side of each piece."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import scatterers as sc
+
+pytest.importorskip("gmsh", exc_type=ImportError)
+
+# gmsh keeps its state in the library, hence a process of its own
+MAKER = """
+import os, sys, gmsh
+os.chdir(sys.argv[1])
+gmsh.initialize(readConfigFiles=False, interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+make = gmsh.model.occ
+make.fillet([make.addBox(0, 0, 0, 60, 40, 30)], list(range(1, 13)), [6.0])
+make.synchronize()
+gmsh.write("filleted_box.step")
+"""
+
+
+def test_a_box_with_all_edges_filleted_is_told_by_its_joints(tmp_path):
+    """No edge, no bad vertex: the curvature jumps all over the mesh, so that jets see nothing odd."""
+    subprocess.run([sys.executable, "-c", MAKER, str(tmp_path)], check=True, capture_output=True)
+    path, r = tmp_path / "filleted_box.step", 6e-3
+    body = sc.Cad(path, points=3000, cache=False)
+    # 6 planes, 12 quarters of cylinders, 8 of balls; each of 24 + 24 joints a line or a quarter of a circle
+    half, inner = np.array([30e-3, 20e-3, 15e-3]), np.array([24e-3, 14e-3, 9e-3])
+    straight = [round(2 * side, 6) for side in inner for _ in range(8)]
+    assert len(body.pieces) == 26 and {crease.kind for crease in body.creases} == {"joint"}
+    lengths = np.sort([crease.length for crease in body.creases])
+    np.testing.assert_allclose(lengths, np.sort([*straight, *24 * [np.pi / 2 * r]]), rtol=5e-3)
+
+    def exact(x):
+        q = np.abs(x - half) - inner
+        return np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(axis=-1), 0) - r
+
+    # next to the body, where four pieces meet as well
+    x = half + np.random.default_rng(2).uniform(-1, 1, size=(40_000, 3)) * (half + 1e-3)
+    away = exact(x)
+    near = (np.abs(away) > 1e-6) & (np.abs(away) < 1e-4)
+    assert near.sum() > 500
+    np.testing.assert_array_equal(body.level(x[near]) > 0, away[near] > 0)
+    np.testing.assert_allclose(body.level(x[near]), away[near], atol=2e-6)
+    with pytest.raises(ValueError, match="not smooth enough: the curvature jumps where faces join"):
+        sc.Cad(path, points=10_000, strict=True, cache=False)
