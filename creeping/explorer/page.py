@@ -30,6 +30,7 @@ from creeping.explorer.text import legend, preview_text, refined_text
 from creeping.explorer.titled import titled
 from creeping.explorer.units import wave_scale
 from creeping.field.currents.kept import expected_nodes
+from creeping.field.lit_ground import convex
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
@@ -249,7 +250,9 @@ class Explorer:
             try:
                 if speed_of(self.flow.body) is not None or not self._follows(frame):
                     continue
-                cut = cut_svg(request, angles, far_cut(frame.fan, request, angles))
+                # currents of a body that faces itself take seconds
+                method = "auto" if convex(frame.fan) else "rays"
+                cut = cut_svg(request, angles, far_cut(frame.fan, request, angles, method))
                 self.cut_seconds.append(time.perf_counter() - began)
                 with self._drawing:
                     # the refined cut of this request, if it came first, is the better one

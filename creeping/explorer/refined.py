@@ -84,9 +84,10 @@ def refined_view(flow: Flow, frame: Preview, vertices: FloatArray, stale: IsStal
     return Refined(request, drawn, line, fan, levels, angles, far_cut(fan, request, angles))
 
 
-def far_cut(fan: RayFan, request: ViewRequest, angles: FloatArray) -> FarField:
+def far_cut(fan: RayFan, request: ViewRequest, angles: FloatArray, method: str = "auto") -> FarField:
     """Far field of the cut at theta (m,), degrees."""
-    return far_field(fan, cut_directions(angles, request.cut), wavenumber=request.wavenumber, boundary=request.kind)
+    directions = cut_directions(angles, request.cut)
+    return far_field(fan, directions, wavenumber=request.wavenumber, boundary=request.kind, method=method)
 
 
 def _body_levels(fan: RayFan, request: ViewRequest, vertices: FloatArray, stale: IsStale) -> FloatArray | None:

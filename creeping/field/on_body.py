@@ -19,7 +19,7 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
-from creeping.field.currents.second_kind import across_joints
+from creeping.field.currents.second_kind import by_the_equation
 from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
@@ -180,15 +180,13 @@ def total_on(
     if jointed or not convex(fan):
         currents = currents or _currents_of(fan, k, kind)
         left = currents.extinction if currents else np.nan
-        if currents and order == 2 and kind.kind in ("soft", "hard") and not jointed:
+        if currents and order == 2 and kind.kind in ("soft", "hard") and not (jointed or currents.solved):
             lit = lit[0] + _thrown(currents, points, lit[2]), *lit[1:]
     unit = k if kind.kind == "soft" else 1.0
     field = composed(fan, lit, rays, by, left, k, kind, unit)
-    if not jointed:
-        return field
-    if currents and order == 2:
-        field = across_joints(field, currents, points, lit[2], unit)
-    return without_tips(field)
+    if currents and order == 2 and (jointed or currents.solved):
+        field = by_the_equation(field, currents, points, lit[2], unit)
+    return without_tips(field) if jointed else field
 
 
 def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:

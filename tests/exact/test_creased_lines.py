@@ -95,7 +95,7 @@ def test_points_and_rays_of_open_curves():
     line = cr.shadow_line(cut_sphere(0.5), (1, 0, 0), n_points=65)
     curve = line.curves[0]
     np.testing.assert_allclose(curve.at(curve.arclength), curve.points, atol=1e-13)
-    np.testing.assert_array_equal(curve.at([-1.0, 9.0]), curve.points[[0, -1]])
+    np.testing.assert_allclose(curve.at([-1.0, 9.0]), curve.points[[0, -1]], rtol=0, atol=1e-15)
     launch = line.launch_points(10)
     np.testing.assert_allclose(launch.arclength[0], (np.arange(10) + 0.5) * curve.length / 10)
     assert not launch.closed.any() and launch.there.all()

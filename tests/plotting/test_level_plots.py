@@ -69,7 +69,7 @@ def test_vector_field_has_its_components():
     far = far_of(np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=-1), values, boundary="pec")
     ax = far.plot(quantity="amplitude", components=("tp",))
     (line,) = ax.lines
-    assert line.get_label() == "θφ"
+    assert line.get_label() == "θφ (VH)"
     np.testing.assert_allclose(line.get_ydata(), 20 * np.log10(2))
     np.testing.assert_allclose(line.get_xdata(), np.degrees(phi), atol=1e-9)
     assert ax.get_xlabel().startswith("φ at θ = 90°")

@@ -109,7 +109,9 @@ def marched_current(
     count, waves_of = len(points), electric.shape[1]
     sums = [
         one.reshape(count, 3, waves_of)
-        for one in beams_beside_rays(fan, waves, shed, points, own.reshape(len(own), -1), share, waves.components)
+        for one in beams_beside_rays(
+            fan, waves, shed, points, own.reshape(len(own), 3 * waves_of), share, waves.components
+        )
     ]
     eta, out = variation(fan, shed, y, slope, k), []
     for i in range(waves_of):

@@ -10,13 +10,18 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
 from creeping.field.currents.bounce import faces_itself
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
+from creeping.field.currents.lit_solution import solvable, solved_on_lit_ground
 from creeping.field.currents.nodes import lit_nodes, ray_nodes
 from creeping.field.currents.waves import lit_waves, ray_waves
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.geometry.arguments import one_of
+from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
+
+CUT = 1e-3
+"""Share of the shadow line without rays from which lit ground is not that of a convex body."""
 
 
 def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> SurfaceCurrents:
@@ -86,8 +91,11 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         wavenumber=k,
         boundary=kind,
     )
-    if kind.kind in ("soft", "hard", "conductor") and faces_itself(lit):
-        values[currents.lit] += currents.thrown(lit.points, lit.normals)
+    if kind.kind not in ("soft", "hard", "conductor") or not (faces_itself(lit) or currents.unserved > CUT):
+        return currents
+    if solvable(currents) and not is_creased(fan.body):
+        return solved_on_lit_ground(currents)
+    values[currents.lit] += currents.thrown(lit.points, lit.normals)
     return currents
 
 

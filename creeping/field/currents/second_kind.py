@@ -49,14 +49,15 @@ WHOLE = 0.5
 _EVERYWHERE: "WeakKeyDictionary[SurfaceCurrents, float]" = WeakKeyDictionary()
 
 
-def across_joints(
+def by_the_equation(
     field: Served, currents: SurfaceCurrents, points: FloatArray, share: FloatArray, unit: float
 ) -> Served:
-    """The field on a body, at points (n, 3), L, of which ``share`` (n,) is lit ground, with what joints make of that.
+    """The field on a body, at points (n, 3), L, of which ``share`` (n,) is lit ground, by the equation.
 
-    A step is taken as far as it changes more than it errs by itself, as a share of the incident wave's ``unit``.
+    A step is taken as far as it changes more than it errs by itself, as a share of the incident wave's ``unit``. Where
+    lit ground is solved, what a step would change on dark ground is what that is off by.
     """
-    at = np.flatnonzero(share > 0)
+    at = np.flatnonzero(((share > 0) | currents.solved) & np.isfinite(field.values))
     if not len(at):
         return field
     values = field.values[at]
@@ -66,7 +67,8 @@ def across_joints(
     reach = smoothstep(share[at], 0.0, WHOLE)
     wave, error = field.wave.copy(), field.error.copy()
     wave[at] += reach * taken * change
-    error[at] = np.hypot(error[at], reach * size * (1 - taken + STILL * taken))
+    kept = (1 if currents.solved else reach) - reach * taken * (1 - STILL)
+    error[at] = np.hypot(error[at], kept * size)
     return replace(field, wave=wave, error=error)
 
 
@@ -83,36 +85,51 @@ def _everywhere(currents: SurfaceCurrents, unit: float) -> float:
 
 def stepped(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, values: ComplexArray) -> ComplexArray:
     """Field u, or du/dn if soft, at points of the body with normals (m, 3) by one step from ``values`` (m,)."""
-    from creeping.field.kernels.second_kind import from_afar, from_beside
+    rest, own = received(currents, points, normals, NEAR / currents.wavenumber)
+    wave = twice_incident(currents, points, normals)
+    if currents.boundary.kind == "soft":
+        return wave + rest + own * values
+    eta = np.broadcast_to(currents.boundary.at(points).admittance, (len(points),))
+    share = eta / np.maximum(-normals @ currents.direction, LEAST)
+    return np.asarray((wave + rest + (own + share) * values) / (1 + share))
 
-    k, kind, d = currents.wavenumber, currents.boundary, currents.direction
-    soft, a = kind.kind == "soft", NEAR / currents.wavenumber
+
+def twice_incident(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray) -> ComplexArray:
+    """2 u_inc, or 2 du_inc/dn if soft, at points of the body with normals (m, 3)."""
+    k, d = currents.wavenumber, currents.direction
+    wave = 2 * np.exp(1j * k * (points @ d))
+    return np.asarray(1j * k * (normals @ d) * wave if currents.boundary.kind == "soft" else wave)
+
+
+def received(
+    currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """What points with normals (m, 3) receive of the currents, but for a share of their own; and that share: (m,) each.
+
+    ``window`` is a, L.
+    """
+    from creeping.field.kernels.second_kind import from_nodes
+
+    k, kind, a = currents.wavenumber, currents.boundary, window
+    soft = kind.kind == "soft"
     eta, ours = (
         np.zeros(len(x)) if soft else np.broadcast_to(kind.at(x).admittance, (len(x),))
         for x in (points, currents.points)
     )
-    # of the sums: at nodes, and of each point itself
+    # of the sums, at nodes
     double = currents.weights * currents.values / (4 * np.pi)
     both = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (1j * k * ours * double, double)]
-    here = 1j * k * eta * values
-    own = np.stack([here.real, here.imag, values.real, values.imag]) / (4 * np.pi)
     x, n, y, sides = (np.ascontiguousarray(part.T) for part in (points, normals, currents.points, currents.normals))
-    out = np.zeros((len(points), 4))
-    beside = currents.beside(points, NEIGHBOURS * a)
+    of_nodes = y, sides, currents.weights, currents.mean_curvature, currents.lit, *both
+    out = np.empty((len(points), 6))
 
     def work(part: slice) -> None:
-        from_afar(x, n, y, sides, *both, k, NEIGHBOURS * a, soft, part.start, part.stop, out)
+        from_nodes(x, n, *of_nodes, k, a, NEIGHBOURS * a, soft, part.start, part.stop, out)
 
     in_threads(work, len(points), least=16, multiple=1, seconds=EACH * len(double))
-    from_beside(
-        x, n, own, *beside, y, sides, currents.weights, currents.mean_curvature, currents.lit, *both, k, a, soft, out
-    )
-    cover, bent = out[:, 2] / (np.pi * a**2), out[:, 3] / (np.pi * a**2)
-    sign = 1 if soft else -1
-    put_back = here * cover * np.sqrt(np.pi) / 4 * a + sign * values * bent * np.sqrt(np.pi) / 8 * a
-    rest = 2 * (out[:, 0] + 1j * out[:, 1] + put_back)
-    wave = 2 * np.exp(1j * k * (points @ d))
-    if soft:
-        return np.asarray(1j * k * (normals @ d) * wave + rest)
-    share = eta / np.maximum(-normals @ d, LEAST)
-    return np.asarray((wave + rest + share * values) / (1 + share))
+    real, imaginary, area, bent, still, tilted = out.T
+    cover, bend = area / (np.pi * a**2), bent / (np.pi * a**2)
+    sign, root = 1 if soft else -1, np.sqrt(np.pi) * a
+    taken_off = (1j * k * eta * still + tilted) / (4 * np.pi)
+    put_back = 1j * k * eta * cover * root / 4 + sign * bend * root / 8
+    return 2 * (real + 1j * imaginary), np.asarray(2 * (put_back - taken_off))

@@ -25,13 +25,13 @@ Sources: [F46], [LK59], [CK13, sec. 3.2]; Derivations, F16 and F17.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary
@@ -50,6 +50,8 @@ RIM = 0.3
 """Share of the error, in the square, that stands next to the shadow line."""
 AHEAD = 1.0
 """What of epsilon the field itself is off by, where it is large."""
+ALONE = 1.4
+"""Factor of the error where lit ground is solved: what is left is of dark ground alone, whose waves go together."""
 POINTS = 100
 """Points inside at which they are judged."""
 
@@ -82,6 +84,8 @@ class SurfaceCurrents:
         Share of the shadow line from which no creeping ray starts: the currents behind it are missing.
     wavenumber : float, 1/L
     boundary : Boundary
+    solved : bool
+        Whether lit nodes satisfy the integral equation (`creeping.field.currents.lit_solution`).
 
     Examples
     --------
@@ -109,6 +113,7 @@ class SurfaceCurrents:
     unserved: float
     wavenumber: float
     boundary: Boundary
+    solved: bool = False
     _factors: ClassVar[tuple[float, float]] = (2.5, 2.0)
     """Factors of the error: of what all directions share, and of what the second order says of each."""
 
@@ -118,6 +123,12 @@ class SurfaceCurrents:
             f"k = {self.wavenumber:g}, {self.boundary.kind})\n"
             f"  {100 * self.unserved:.3g} % of the shadow line launch no ray"
         )
+
+    def part(self, which: BoolArray) -> SurfaceCurrents:
+        """Currents of some of the nodes (n,) alone."""
+        names = ("points", "normals", "weights", "travel", "values", "change", "lit")
+        found: SurfaceCurrents = replace(self, **{name: getattr(self, name)[which] for name in names})
+        return found
 
     def far(self, directions: ArrayLike) -> ComplexArray:
         """Far-field amplitude f, L, in directions (m, 3): (m,)."""
@@ -203,7 +214,8 @@ class SurfaceCurrents:
         share = self._amplitude / np.sqrt(1 + np.ndim(self._amplitude))
         along = self._together(r).reshape(-1, *(1,) * (change.ndim - 1))
         own = AHEAD * np.abs(self.far(r))
-        return np.asarray(self._left * np.hypot(np.hypot(level * share * along, own), shape * change))
+        left = self._left * (ALONE if self.solved else 1.0)
+        return np.asarray(left * np.hypot(np.hypot(level * share * along, own), shape * change))
 
     def changed(self, points: ArrayLike) -> FloatArray:
         """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
@@ -232,12 +244,6 @@ class SurfaceCurrents:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.points)
-
-    def beside(self, points: FloatArray, distance: float) -> tuple[IntArray, IntArray]:
-        """Numbers of the nodes within a distance, L, of points (m, 3), point by point, and where each ends (m,)."""
-        found = self._nodes.query_ball_point(points, distance, return_sorted=True)
-        ends = np.cumsum([len(near) for near in found], dtype=np.int64)
-        return np.concatenate([np.zeros(0, np.int64), *found]).astype(np.int64), ends
 
     @cached_property
     def mean_curvature(self) -> FloatArray:

@@ -22,13 +22,15 @@ TOUCHING = 1e-6
 
 
 @njit(**entry_options)
-def from_afar(x, normals, y, sides, single, double, k, near, soft, first, last, out):
-    """Fill rows first..last of out (m, 4), the first two columns, with the sums over nodes farther than ``near``.
+def from_nodes(x, normals, y, sides, weights, bends, alike, single, double, k, reach, near, soft, first, last, out):
+    """Fill rows first..last of out (m, 6): u, and the sums of chi w, chi w kappa and what a and b of x itself multiply.
 
     Points x and their normals (3, m), nodes y and theirs ``sides`` (3, n), single and double (2, n) the weights a and
-    b, real before imaginary parts.
+    b, real before imaginary parts. chi counts up to the distance ``near``, with w and kappa (n,) of the nodes that are
+    ``alike`` (n,) the points in phase.
     """
-    per, least = k / (2 * math.pi), near * near
+    per, wide, touching = k / (2 * math.pi), 1.0 / reach**2, (TOUCHING / k) ** 2
+    close = near * near
     for j in range(first, last):
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
@@ -36,8 +38,8 @@ def from_afar(x, normals, y, sides, single, double, k, near, soft, first, last, 
         for i in range(y.shape[1]):
             dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
             square = dx * dx + dy * dy + dz * dz
-            inverse = 1.0 / math.sqrt(max(square, least))
-            w = inverse if square > least else 0.0
+            inverse = 1.0 / math.sqrt(max(square, close))
+            w = inverse if square > close else 0.0
             across = sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz
             lean = (n0 * dx + n1 * dy + n2 * dz if soft else across) * inverse
             c, s = cosine_sine(per / inverse)
@@ -45,30 +47,16 @@ def from_afar(x, normals, y, sides, single, double, k, near, soft, first, last, 
             b = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
             p += w * (a * c - b * s)
             q += w * (a * s + b * c)
-        out[j, 0], out[j, 1] = p, q
-
-
-@njit(**entry_options)
-def from_beside(
-    x, normals, own, neighbours, ends, y, sides, weights, bends, alike, single, double, k, reach, soft, out
-):
-    """Add what nodes near each point give, numbers ``neighbours`` up to ``ends`` (m,), to all columns of out (m, 4).
-
-    The last two are the sums of chi w and chi w kappa, of w and kappa (n,) of the nodes that are ``alike`` (n,) the
-    points in phase. ``own`` (4, m) are the weights a and b of the points themselves, over w, by twos.
-    """
-    per, least, wide = k / (2 * math.pi), (TOUCHING / k) ** 2, 1.0 / reach**2
-    first = 0
-    for j in range(len(ends)):
-        p, q, area, bent = 0.0, 0.0, 0.0, 0.0
-        for place in range(first, ends[j]):
-            i = neighbours[place]
-            dx, dy, dz = x[0, j] - y[0, i], x[1, j] - y[1, i], x[2, j] - y[2, i]
+        area, bent, still, tilted = 0.0, 0.0, 0.0, 0.0
+        for i in range(y.shape[1]):
+            dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
             square = dx * dx + dy * dy + dz * dz
+            if square > close:
+                continue
             chi = math.exp(-square * wide) * weights[i] if alike[i] else 0.0
             area += chi
             bent += chi * bends[i]
-            if square < least:
+            if square < touching:
                 # (e^{ikR} - 1)/R is ik there
                 if alike[i]:
                     p -= k * single[1, i]
@@ -76,15 +64,13 @@ def from_beside(
                 continue
             inverse = 1.0 / math.sqrt(square)
             across = sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz
-            lean = (normals[0, j] * dx + normals[1, j] * dy + normals[2, j] * dz if soft else across) * inverse
+            lean = (n0 * dx + n1 * dy + n2 * dz if soft else across) * inverse
             c, s = cosine_sine(per / inverse)
             a = single[0, i] + lean * (double[0, i] * inverse + double[1, i] * k)
             b = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
             h = inverse * (1.0 if alike[i] else 1.0 - math.exp(-square * k * k))
-            still = chi * inverse
-            p += h * (a * c - b * s) - still * (own[0, j] + lean * inverse * own[2, j])
-            q += h * (a * s + b * c) - still * (own[1, j] + lean * inverse * own[3, j])
-        out[j, 0] += p
-        out[j, 1] += q
-        out[j, 2], out[j, 3] = area, bent
-        first = ends[j]
+            p += h * (a * c - b * s)
+            q += h * (a * s + b * c)
+            still += chi * inverse
+            tilted += chi * inverse * inverse * lean
+        out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = p, q, area, bent, still, tilted

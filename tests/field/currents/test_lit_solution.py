@@ -1,0 +1,91 @@
+"""Lit ground by the integral equation: exact currents satisfy it, ground that faces itself and dips come out right."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.currents import lit_solution
+from creeping.field.currents.lit_solution import WINDOW, solved_on_lit_ground
+from creeping.field.currents.second_kind import received, twice_incident
+from creeping.geometry.directions import fibonacci_directions
+from creeping.geometry.quadrature import body_nodes
+from studies.field_coverage import bodies
+from studies.reference import fundamental, sphere
+
+K = 10.0
+DIP = (0.3, 0.5, 0.812)
+"""Of the twisted ellipsoid: its shadow line is concave on a part."""
+
+
+def fan_on(body, direction, k=K):
+    return cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, direction), wavenumber=k, n_rays=64)
+
+
+@pytest.mark.parametrize("kind", ["hard", "soft"])
+def test_exact_currents_satisfy_the_equation(kind):
+    d = np.array([0.36, 0.48, 0.8])
+    nodes = body_nodes(sc.Sphere(), 2 * K)
+    currents = cr.surface_currents(fan_on(sc.Sphere(), d), wavenumber=K, boundary=kind)
+    series = sphere.surface_field if kind == "hard" else sphere.surface_derivative
+    exact = series(K, 1.0, nodes.normals @ d, kind)
+    places = {"points": nodes.points, "normals": nodes.normals, "weights": nodes.weights, "travel": nodes.normals}
+    whole = replace(currents, **places, values=exact, change=exact, lit=np.ones(len(exact), dtype=bool))
+    at = np.arange(0, len(exact), 7)
+    points, normals = nodes.points[at], nodes.normals[at]
+    rest, own = received(whole, points, normals, WINDOW / K)
+    gap = twice_incident(whole, points, normals) + rest + (own - 1) * exact[at]
+    assert np.sqrt(np.mean(np.abs(gap) ** 2)) < 0.015 * np.abs(exact[at]).max()
+
+
+def test_convex_bodies_are_not_solved_and_others_are():
+    assert not cr.surface_currents(fan_on(sc.Ellipsoid(1, 0.8, 0.6), (1, 2, 3)), wavenumber=K).solved
+    assert cr.surface_currents(fan_on(sc.TwistedEllipsoid(), DIP, 8.0), wavenumber=8.0, boundary="hard").solved
+
+
+def test_what_would_take_too_long_has_one_bounce(monkeypatch):
+    fan = fan_on(sc.TwistedEllipsoid(), DIP, 8.0)
+    monkeypatch.setattr(lit_solution, "MOST", 1e6)
+    bounced = cr.surface_currents(fan, wavenumber=8.0, boundary="hard")
+    assert not bounced.solved
+    monkeypatch.undo()
+    solved = solved_on_lit_ground(bounced)
+    rays = ~bounced.lit
+    np.testing.assert_array_equal(solved.values[rays], bounced.values[rays])
+    # the step that is left is small against what was changed
+    points, normals = solved.points[solved.lit], solved.normals[solved.lit]
+    rest, own = received(solved, points, normals, WINDOW / 8.0)
+    left = twice_incident(solved, points, normals) + rest + (own - 1) * solved.values[solved.lit]
+    changed = np.linalg.norm(solved.values - bounced.values)
+    assert 0 < np.linalg.norm(left) < 0.05 * changed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, direction, kind, far",
+    [
+        ("peanut", (0.2, 0.9, 0.4), "hard", 0.03),
+        ("peanut", (0.2, 0.9, 0.4), "soft", 0.01),
+        ("twisted", DIP, "hard", 0.03),
+    ],
+)
+def test_against_fundamental_solutions(name, direction, kind, far):
+    body, cloud, depth = bodies()[name]
+    k = 10.0 if name == "peanut" else 20.0
+    d = np.array(direction) / np.linalg.norm(direction)
+    exact = fundamental.scatter(cloud, k, d[None], kind, depth=depth, per_wavelength=7.0)
+    fan = fan_on(body, d, k)
+    directions = fibonacci_directions(200)
+    f = np.asarray(exact.far_field(directions)).reshape(200, -1)[:, 0]
+    found = cr.far_field(fan, directions, wavenumber=k, boundary=kind, method="currents")
+    off = np.abs(found.total - f)
+    assert np.sqrt(np.mean(off**2)) < far * np.abs(f).max()
+    assert np.mean(off <= found.error) > 0.95
+    if kind == "hard":
+        currents = cr.surface_currents(fan, wavenumber=k, boundary=kind)
+        lit = currents.lit & (currents.normals @ d < -0.1)
+        u = np.asarray(exact.total(currents.points[lit]))[:, 0]
+        wrong = np.abs(currents.values[lit] - u) ** 2
+        assert np.sqrt(np.average(wrong, weights=currents.weights[lit])) < 0.1
