@@ -78,7 +78,7 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     rows = []
     if wave:
         name = {"soft": "du/dn/k"}.get(frame.request.boundary, "u")
-        of = f"Re {name}: crest, trough; strong at {span[1]:g} dB"
+        of = f"Re {name}: pale at {span[0]:g} dB, full at {span[1]:g} dB"
         rows.append(_bar("wave", WAVE_COLOURS, ("trough", of, "crest")))
     elif frame.levels is not None:
         field = f"20 log10 {field_name(frame.request.boundary)}, rays and body"

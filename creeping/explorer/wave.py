@@ -5,6 +5,8 @@
 so that waves are seen through the whole range of the colours, deep in the shadow too. Between two steps of a ray the
 eikonal is linear, as it is along any ray, and the rest of the wave, which is slow to vary, is taken as linear; the
 quarter of a turn of a caustic is spread over the step that passes it.
+
+Sources: Derivations, F3.
 """
 
 from dataclasses import dataclass
