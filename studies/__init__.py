@@ -19,6 +19,7 @@ FIGURES = {
     "fig5-weighted": "figure5_weighted",
     "fig6-creeping": "figure6_creeping",
     "fig6-torus": "figure6_torus",
+    "source-rays": "figure_source_rays",
     "field-cut": "figure_field_cut",
     "field-body": "figure_field_body",
     "field-decay": "figure_field_decay",

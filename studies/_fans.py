@@ -27,6 +27,13 @@ def add_keys(
     figure: Any, drawings: Sequence[Drawing], levels: FloatArray, bar: tuple[float, float, float, float]
 ) -> None:
     """One legend under all panels, of whatever any of them shows, and one colour bar."""
+    add_legend(figure, drawings)
+    label = f"iso-phase curves: {drawings[0].colours.name} $t$"
+    add_level_bar(figure, drawings[0].colours, levels, label, cax=figure.add_axes(bar))
+
+
+def add_legend(figure: Any, drawings: Sequence[Drawing]) -> None:
+    """One legend under all panels, of whatever any of them shows."""
     from matplotlib.lines import Line2D
 
     named = {stroke.label: stroke for drawing in drawings for stroke in drawing.strokes if stroke.label}
@@ -36,5 +43,3 @@ def add_keys(
         for stroke in ordered
     ]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8)
-    label = f"iso-phase curves: {drawings[0].colours.name} $t$"
-    add_level_bar(figure, drawings[0].colours, levels, label, cax=figure.add_axes(bar))

@@ -53,6 +53,7 @@ LINEAR: Bytes = np.round(255 * np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SH
 )
 """Bytes of colours as the page takes them at vertices, where it has light and no sRGB."""
 FIELD_COLOURS = ColourTable("magma")
+WAVE_COLOURS = ColourTable("RdBu_r")
 LEVEL_COLOURS = ColourTable("viridis", 0.0, 0.9)
 
 

@@ -21,12 +21,13 @@ from creeping.errors import CreepingError
 from creeping.explorer.colours import Span, fitted_span
 from creeping.explorer.door import Door
 from creeping.explorer.latest import Latest
+from creeping.explorer.playing import Player
 from creeping.explorer.preview import Preview, preview_of, step_of
-from creeping.explorer.refined import far_cut, refined_view
+from creeping.explorer.refined import Refined, far_cut, refined_view
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles
-from creeping.explorer.scene import DrawnBody, Scene, turned
+from creeping.explorer.scene import DrawnBody, Paint, Scene, turned
 from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
-from creeping.explorer.text import legend, preview_text, refined_text
+from creeping.explorer.text import legend, preview_text, refined_text, wave_note
 from creeping.explorer.titled import titled
 from creeping.explorer.units import wave_scale
 from creeping.field.currents.kept import expected_nodes
@@ -99,6 +100,8 @@ class Explorer:
         self.cut_seconds: deque[float] = deque(maxlen=1000)
         self._span: Span | None = None
         self._refined = 0
+        self._drawn: tuple[Preview, Span, str] | None = None
+        self._found: Refined | None = None
         self._asking, self._drawing = RLock(), RLock()
         self._requests: Latest[ViewRequest] = Latest()
         self._frames: Latest[tuple[Preview, int]] = Latest()
@@ -139,6 +142,7 @@ class Explorer:
             queue.close()
         for worker in self._workers:
             worker.join(timeout=5.0)
+        self.player.close()
         self.server.stop()
 
     def _controls(self) -> None:
@@ -166,6 +170,7 @@ class Explorer:
         for name, handle in sliders.items():
             handle.on_update(lambda event, name=name: self._slid(name, event))
         self.scene.incidence.on_update(self._dragged)
+        self.player = Player(gui, self._redraw, self._recolour)
         self.status = gui.add_markdown("")
         self.found = gui.add_markdown("")
         self.bar = gui.add_html("")
@@ -224,15 +229,11 @@ class Explorer:
             try:
                 frame = preview_of(self.flow, request, self.step)
                 self._span = span = fitted_span(frame.levels, self._span)
-                plane, bar = preview_plane_svg(frame), legend(frame, span)
-                text = preview_text(frame, time.perf_counter() - began, span)
+                plane, text = preview_plane_svg(frame), preview_text(frame, time.perf_counter() - began, span)
                 with self._drawing:
-                    self.scene.show(frame, span)
+                    self._drawn, self._found = (frame, span, text), None
+                    self._draw()
                     self.found.content, self.plane.content = "", plane
-                    # what has not changed is not sent again
-                    if bar != self.bar.content:
-                        self.bar.content = bar
-                    self.status.content = text
                 self.seconds.append(time.perf_counter() - began)
             except Exception as error:
                 self.status.content = error_text(error)
@@ -240,6 +241,43 @@ class Explorer:
                 # after a request that failed the last frame is still the one on the page, and may be refined
                 self._frames.put((frame, number))
                 self._cuts.put((frame, number))
+
+    def _draw(self) -> None:
+        """Draw the last frame as level or wave; where the wave cannot be had, the level, and say so."""
+        assert self._drawn is not None
+        frame, span, text = self._drawn
+        asked = self.player.phase
+        phase = asked if asked is not None and frame.wave is not None else None
+        self.scene.show(frame, span, phase)
+        bar = legend(frame, span, wave=phase is not None)
+        # what has not changed is not sent again
+        if bar != self.bar.content:
+            self.bar.content = bar
+        on_body = self.scene.shows_wave_on_body(frame.request.wavenumber)
+        note = "" if asked is None else wave_note(frame, on_body)
+        self.status.content = f"{text}\n\n**{note}**" if note else text
+
+    def _redraw(self) -> None:
+        """Draw the last frame and what has followed it once more, after level or wave was chosen."""
+        with self._drawing:
+            if self._drawn is None:
+                return
+            self._draw()
+            if self._found is not None:
+                self.scene.refine(self._found, self._body_paint(self._found))
+
+    def _recolour(self) -> None:
+        """Turn the wave to the phase of the moment."""
+        with self._drawing:
+            phase = self.player.phase
+            if phase is not None:
+                self.scene.recolour(phase)
+
+    def _body_paint(self, found: Refined) -> Paint | None:
+        """The body as the last frame is shown."""
+        assert self._drawn is not None
+        frame, span, _ = self._drawn
+        return self.scene.painted_mesh(found, span, self.player.phase if frame.wave is not None else None)
 
     def _follow(self) -> None:
         """Let the far-field cut follow the frames, at a pace of its own: it takes longer than they do."""
@@ -285,12 +323,11 @@ class Explorer:
                     continue
                 text, plane = refined_text(found), plane_svg(found)
                 cut = cut_svg(found.request, found.cut_angles, found.far)
-                paint = self.scene.painted_mesh(found, self._span or fitted_span(found.body_levels))
                 with self._drawing:
                     # a frame that was shown meanwhile is newer than this
                     if not stale():
-                        self._refined = number
-                        self.scene.refine(found, paint)
+                        self._refined, self._found = number, found
+                        self.scene.refine(found, self._body_paint(found))
                         self.found.content, self.plane.content, self.cut.content = text, plane, cut
             except Exception as error:
                 with self._drawing:

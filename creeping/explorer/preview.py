@@ -8,10 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.explorer.request import ViewRequest
+from creeping.explorer.wave import RayWave, ray_wave, segments
 from creeping.field.decibels import decibels
-from creeping.field.on_rays import ray_magnitude
+from creeping.field.on_rays import ray_envelope
 from creeping.field.validity_range import Validity, validity
 from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.speed import speed_of
@@ -48,9 +49,21 @@ class Preview:
 
         -inf where a ray has ended, inf on caustics; None on a weighted body.
         """
+        return None if self.envelope is None else decibels(np.abs(self.envelope))
+
+    @cached_property
+    def envelope(self) -> ComplexArray | None:
+        """The field along the rays without e^{ik eikonal} (rays, steps); None on a weighted body."""
         if speed_of(self.fan.body) is not None:
             return None
-        return decibels(ray_magnitude(self.fan, wavenumber=self.request.wavenumber, boundary=self.request.on_rays))
+        return ray_envelope(self.fan, wavenumber=self.request.wavenumber, boundary=self.request.on_rays)
+
+    @cached_property
+    def wave(self) -> RayWave | None:
+        """The field along the rays, where it is one number a point and can be told from step to step."""
+        if self.envelope is None or self.levels is None or self.request.boundary == "pec":
+            return None
+        return ray_wave(self.fan, self.envelope, self.levels, self.request.wavenumber)
 
     @cached_property
     def ray_segments(self) -> FloatArray:
@@ -129,14 +142,6 @@ def requested_curves(request: ViewRequest, fan: RayFan) -> list[IsoPhaseCurve]:
 def joined(pieces: list[FloatArray]) -> FloatArray:
     """All segments of several lines (m, 2, 3)."""
     return np.concatenate([NOTHING, *pieces])
-
-
-def segments(points: FloatArray, *, closed: bool = False) -> FloatArray:
-    """Segments of lines (n, m, 3): (k, 2, 3) of float32."""
-    if closed:
-        points = np.concatenate([points, points[:, :1]], axis=1)
-    pairs = np.stack([points[:, :-1], points[:, 1:]], axis=2)
-    return np.ascontiguousarray(pairs.reshape(-1, 2, 3), dtype=np.float32)
 
 
 def outline(mesh: Triangulation, normals: FloatArray, direction: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import ComplexArray, FloatArray
 from creeping.explorer.preview import Preview
 from creeping.explorer.request import ViewRequest
 from creeping.field.currents.kept import affordable, kept_currents
@@ -18,7 +18,7 @@ from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.speed import speed_of
 from creeping.plotting.coloured_body import current_levels
-from creeping.plotting.field_pictures import surface_levels
+from creeping.plotting.field_pictures import levels_of, surface_values
 from creeping.rays.fan import RayFan, end_error, launch
 from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
@@ -48,6 +48,8 @@ class Refined:
     cut_angles : (m,), degrees
         Theta of the cut, from -180 to 180 through the directions of azimuth ``request.cut`` and its opposite.
     far : FarField or None
+    body_wave : (n,) complex or None
+        The field that ``body_levels`` are of, u, or du/dn/k of the soft boundary; None of a conductor as well.
     """
 
     request: ViewRequest
@@ -57,6 +59,7 @@ class Refined:
     body_levels: FloatArray | None
     cut_angles: FloatArray
     far: FarField | None
+    body_wave: ComplexArray | None = None
 
 
 def refined_view(flow: Flow, frame: Preview, vertices: FloatArray, stale: IsStale = lambda: False) -> Refined | None:
@@ -78,10 +81,10 @@ def refined_view(flow: Flow, frame: Preview, vertices: FloatArray, stale: IsStal
     angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
     if speed_of(body) is not None:
         return Refined(request, drawn, line, fan, None, angles, None)
-    levels = _body_levels(fan, request, vertices, stale)
+    levels, wave = _on_body(fan, request, vertices, stale)
     if stale():
         return None
-    return Refined(request, drawn, line, fan, levels, angles, far_cut(fan, request, angles))
+    return Refined(request, drawn, line, fan, levels, angles, far_cut(fan, request, angles), wave)
 
 
 def far_cut(fan: RayFan, request: ViewRequest, angles: FloatArray, method: str = "auto") -> FarField:
@@ -90,24 +93,29 @@ def far_cut(fan: RayFan, request: ViewRequest, angles: FloatArray, method: str =
     return far_field(fan, directions, wavenumber=request.wavenumber, boundary=request.kind, method=method)
 
 
-def _body_levels(fan: RayFan, request: ViewRequest, vertices: FloatArray, stale: IsStale) -> FloatArray | None:
-    """Levels of the total field at points of the body (n, 3); None with edges, and of currents that cost too much."""
+def _on_body(
+    fan: RayFan, request: ViewRequest, vertices: FloatArray, stale: IsStale
+) -> tuple[FloatArray | None, ComplexArray | None]:
+    """Levels of the total field at points of the body (n, 3), and its values, which a conductor does not have here.
+
+    Neither with edges, and of currents that cost too much.
+    """
     k = request.wavenumber
     if has_edges(fan.body) or (is_creased(fan.body) and request.boundary == "pec"):
         # the rays carry their own; that of all of them at a point needs a body without edges
-        return None
+        return None, None
     if request.boundary == "pec":
         # the far-field cut takes the same currents
         if not affordable(fan, 2 * round(360 / CUT_STEP), k, distant=True):
-            return None
-        return current_levels(kept_currents(fan, k, "pec"), vertices)
-    levels = np.empty(len(vertices))
+            return None, None
+        return current_levels(kept_currents(fan, k, "pec"), vertices), None
+    values = np.empty(len(vertices), dtype=complex)
     for first in range(0, len(vertices), BLOCK):
         part = slice(first, first + BLOCK)
-        levels[part] = surface_levels(fan, vertices[part], wavenumber=k, boundary=request.kind)
+        values[part] = surface_values(fan, vertices[part], wavenumber=k, boundary=request.kind)
         if stale():
-            return None
-    return levels
+            return None, None
+    return levels_of(values), values
 
 
 def cut_directions(angles: FloatArray, azimuth: float) -> FloatArray:

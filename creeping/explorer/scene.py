@@ -5,19 +5,22 @@ none of them is NaN. The drawn body is a little smaller than the true one, so th
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
-from creeping.explorer.colours import ENDED, LEVEL_COLOURS, LINEAR, Span, field_colours
-from creeping.explorer.preview import NOTHING, Preview, joined, outline, segments
+from creeping._typing import Any, ComplexArray, FloatArray
+from creeping.explorer.colours import ENDED, LEVEL_COLOURS, LINEAR, Bytes, Span, field_colours
+from creeping.explorer.preview import NOTHING, Preview, joined, outline
 from creeping.explorer.refined import Refined
+from creeping.explorer.wave import segments, strengths, wave_colours
 from creeping.field.on_rays import creeps
 from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, line_pieces
 from creeping.plotting._view import shadow_view
+from creeping.plotting.body_fronts import LEAST_SAMPLES, samples_a_wave
 
 CELLS = 44
 """Of the drawn body along each side of its box."""
@@ -56,10 +59,30 @@ class DrawnBody:
         box = np.asarray(body.bounds, dtype=float)
         return cls(body, mesh, normals, size(body), box.mean(axis=0))
 
+    @cached_property
+    def samples(self) -> float:
+        """Edges of the mesh a wavelength, times the wavenumber."""
+        return samples_a_wave(self.mesh, 1.0)
+
     @property
     def inset(self) -> FloatArray:
         """Vertices as drawn (n, 3)."""
         return np.asarray(self.mesh.vertices - INSET * size(self.body) * self.normals)
+
+
+@dataclass(frozen=True, eq=False)
+class Paint:
+    """The body in colours.
+
+    Attributes
+    ----------
+    mesh : trimesh.Trimesh
+    strength : (n,) complex or None
+        Of the wave at its vertices, as of `creeping.explorer.wave`; None where colours are those of levels.
+    """
+
+    mesh: Any
+    strength: ComplexArray | None = None
 
 
 class Scene:
@@ -81,6 +104,8 @@ class Scene:
             "/body", model.inset, model.mesh.triangles, color=rgb(BODY_COLOUR), cast_shadow=False, receive_shadow=False
         )
         self.painted: Any = None
+        self._paint: Paint | None = None
+        self._strength: ComplexArray | None = None
         self._lines: dict[str, Any] = {}
         if still:
             self.incidence: Any = self.scene.add_frame("/incidence", show_axes=False, position=model.centre)
@@ -116,51 +141,85 @@ class Scene:
         """Turn the arrow of the incidence."""
         self.incidence.wxyz = quaternion(direction)
 
-    def show(self, frame: Preview, span: Span) -> None:
-        """Draw what follows at once; the field on the body is hidden until it is known again."""
-        levels = frame.levels
-        if levels is None:
+    def show(self, frame: Preview, span: Span, phase: float | None = None) -> None:
+        """Draw what follows at once; the field on the body is hidden until it is known again.
+
+        With a phase, radians, rays have the colours of the wave, if the frame has one.
+        """
+        levels, wave, rays = frame.levels, None if phase is None else frame.wave, frame.ray_segments
+        self._paint = self._strength = None
+        if wave is not None and phase is not None:
+            self._strength, rays = strengths(wave.values, wave.levels, span), wave.segments
+            colours = wave_colours(self._strength, phase)
+        elif levels is None:
             alive = creeps(frame.fan)[..., None]
             colours = np.where(alive, np.array(rgb(RAY_COLOUR)), np.array(ENDED)).astype(np.uint8)
         else:
             colours = field_colours(levels, span)
-        pairs = np.stack([colours[:, :-1], colours[:, 1:]], axis=2).reshape(-1, 2, 3)
         curves, of = frame.level_segments
         shades = np.repeat(LEVEL_COLOURS(of / frame.fan.length)[:, None], 2, axis=1)
         with self.server.atomic():
             if self.painted is not None:
                 self.painted.visible = False
             self.plain.visible = True
-            self._line("rays", frame.ray_segments, pairs)
+            self._line("rays", rays, _paired(colours))
             self._line("levels", curves, shades)
             self._line("outline", outline(self.model.mesh, self.model.normals, frame.request.direction), RAY_COLOUR)
             self._line("line/attached", frame.launch_segments, STATUS_COLOURS["attached"])
             for status in ("occluded", "concave"):
                 self._line(f"line/{status}", NOTHING, STATUS_COLOURS[status])
 
-    def painted_mesh(self, found: Refined, span: Span) -> Any:
-        """The body in the colours of the field on it, None without a field."""
-        import trimesh
+    def recolour(self, phase: float) -> None:
+        """Turn the wave that is shown to a phase, radians: only colours are made anew."""
+        rays = None if self._strength is None else LINEAR[_paired(wave_colours(self._strength, phase))]
+        paint, body = self._paint, None
+        if paint is not None and paint.strength is not None:
+            body = self._coloured(wave_colours(paint.strength, phase)).export(file_type="glb")
+        with self.server.atomic():
+            if rays is not None and len(rays):
+                self._lines["rays"].colors = rays
+            if body is not None:
+                self.painted.glb_data = body
 
+    def shows_wave_on_body(self, wavenumber: float) -> bool:
+        """Whether the body's mesh is fine enough for the wave."""
+        return self.model.samples / wavenumber >= LEAST_SAMPLES
+
+    def painted_mesh(self, found: Refined, span: Span, phase: float | None = None) -> Paint | None:
+        """The body in the colours of the field on it, of its wave with a phase; None without such."""
         if found.body_levels is None:
             return None
+        if phase is None:
+            return Paint(self._coloured(field_colours(found.body_levels, span)))
+        if found.body_wave is None or not self.shows_wave_on_body(found.request.wavenumber):
+            return None
+        strength = strengths(found.body_wave, found.body_levels, span)
+        return Paint(self._coloured(wave_colours(strength, phase)), strength)
+
+    def _coloured(self, colours: Bytes) -> Any:
+        """The mesh of the body with colours (n, 3) at its vertices."""
+        import trimesh
+
         return trimesh.Trimesh(
             self.model.inset,
             self.model.mesh.triangles,
             vertex_normals=self.model.normals,
-            vertex_colors=LINEAR[field_colours(found.body_levels, span)],
+            vertex_colors=LINEAR[colours],
             process=False,
         )
 
-    def refine(self, found: Refined, paint: Any) -> None:
+    def refine(self, found: Refined, paint: Paint | None) -> None:
         """Draw what takes longer, with what `painted_mesh` has made."""
         with self.server.atomic():
             for status, colour in STATUS_COLOURS.items():
                 pieces = line_pieces(found.line, status)
                 self._line(f"line/{status}", joined([segments(p[None]) for p in pieces]), colour)
             self._line("outline", NOTHING, RAY_COLOUR)
+            self._paint = paint
             if paint is not None:
-                self.painted = self.scene.add_mesh_trimesh("/field", paint, cast_shadow=False, receive_shadow=False)
+                self.painted = self.scene.add_mesh_trimesh(
+                    "/field", paint.mesh, cast_shadow=False, receive_shadow=False
+                )
                 self.plain.visible = False
 
     def _line(self, name: str, points: FloatArray, colours: Any) -> None:
@@ -179,6 +238,11 @@ class Scene:
             )
             return
         handle.points, handle.colors, handle.visible = points, paint, True
+
+
+def _paired(colours: Bytes) -> Bytes:
+    """Colours of the points of rays (rays, points, 3) as those of the ends of their segments (m, 2, 3)."""
+    return np.stack([colours[:, :-1], colours[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from creeping._version import __version__
-from creeping.explorer.colours import ENDED, FIELD_COLOURS, LEVEL_COLOURS, ColourTable, Span
+from creeping.explorer.colours import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, ColourTable, Span
 from creeping.explorer.preview import Preview
 from creeping.explorer.refined import Refined
 from creeping.explorer.units import wave_text
@@ -62,10 +62,25 @@ def field_name(boundary: str) -> str:
     return {"soft": "|du/dn|/k", "pec": "|n × H|"}.get(boundary, "|u|")
 
 
-def legend(frame: Preview, span: Span, *, still: bool = False) -> str:
+def wave_note(frame: Preview, on_body: bool) -> str:
+    """What is left out where the wave is asked for, in words; ``on_body`` says if the mesh is fine enough for it."""
+    if frame.levels is None:
+        return "a weighted body has no field, and no wave to show"
+    if frame.request.boundary == "pec":
+        return "n × H of a conductor is a vector of two polarisations: its level is shown, not a wave"
+    if frame.wave is None:
+        return "the wave is too short for so many steps and rays: levels are shown; ask for shorter or fewer rays"
+    return "" if on_body else "the wave is too short for the mesh of the body, which stays without"
+
+
+def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = False) -> str:
     """What the colours in space stand for, as SVG; with the arcs that turn the incidence unless ``still``."""
     rows = []
-    if frame.levels is not None:
+    if wave:
+        name = {"soft": "du/dn/k"}.get(frame.request.boundary, "u")
+        of = f"Re {name}: pale at {span[0]:g} dB, full at {span[1]:g} dB"
+        rows.append(_bar("wave", WAVE_COLOURS, ("trough", of, "crest")))
+    elif frame.levels is not None:
         field = f"20 log10 {field_name(frame.request.boundary)}, rays and body"
         rows.append(_bar("field", FIELD_COLOURS, (f"{span[0]:g} dB", field, f"{span[1]:g} dB")))
     if frame.request.spacing:

@@ -9,6 +9,7 @@ from .mat_reader import read_mat as read_mat
 from .measured import MeasuredCut as MeasuredCut
 from .measured import read_cut as read_cut
 from .polylines import polydata as polydata
+from .sofa import write_sofa as write_sofa
 from .stk import write_stk as write_stk
 from .tables import write_csv as write_csv
 from .tables import write_text as write_text

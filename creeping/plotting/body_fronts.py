@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, ComplexArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.point_result import PointField
 from creeping.geometry.surface import Surface, project
@@ -18,6 +18,26 @@ from creeping.plotting._strokes import Stroke
 COLOUR, FRONT_WIDTH = "#00c2d1", 0.6
 LEAST_SAMPLES = 4.5
 """Edges of triangles, or points of a grid, a wavelength from which fronts can be told."""
+
+SIDES = [[0, 1], [1, 2], [2, 0]]
+
+
+def at_phase(wave: ComplexArray, phase: float) -> FloatArray:
+    """The wave as it is when omega t = phase, radians: Re(u e^{-i phase}) of u (...).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> at_phase(np.array([1.0, 1j]), np.pi / 2).round(12).tolist()
+    [0.0, 1.0]
+    """
+    return np.asarray(wave.real * np.cos(phase) + wave.imag * np.sin(phase))
+
+
+def samples_a_wave(mesh: Triangulation, wavenumber: float) -> float:
+    """Edges of a mesh a wavelength, by its median edge."""
+    sides = mesh.vertices[mesh.triangles[:, SIDES]]
+    return 2 * np.pi / (wavenumber * float(np.median(np.linalg.norm(np.diff(sides, axis=2), axis=-1))))
 
 
 def front_strokes(
@@ -36,15 +56,14 @@ def front_strokes(
     InvalidInputError
         If the mesh is too coarse for the wavelength.
     """
-    edges = mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]]
-    length = float(np.median(np.linalg.norm(np.diff(mesh.vertices[edges], axis=2), axis=-1)))
-    there = 2 * np.pi / (wavenumber * length)
+    edges = mesh.triangles[:, SIDES]
+    there = samples_a_wave(mesh, wavenumber)
     if there < LEAST_SAMPLES:
         raise InvalidInputError(
             f"wave fronts on a mesh of {there:.2g} edges a wavelength; {LEAST_SAMPLES:g} are the least: give "
             f"{LEAST_SAMPLES / there:.2g} times the cells, or leave fronts out"
         )
-    real = (np.where(known, wave, 0.0) * np.exp(-1j * phase)).real
+    real = at_phase(np.where(known, wave, 0.0), phase)
     edges = edges[np.all(known[mesh.triangles], axis=1)]
     # a corner at 0 counts as positive: each triangle is crossed by none of its edges or by two
     crossed = (real[edges[..., 0]] < 0) != (real[edges[..., 1]] < 0)

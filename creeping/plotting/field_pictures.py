@@ -9,7 +9,7 @@ import os
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
@@ -93,7 +93,7 @@ def surface_field_picture(
     field = surface_field(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
     if fronts:
         drawing = with_fronts(drawing, field, phase)
-    levels = _levels(field, kind)
+    levels = levels_of(_scaled(field, kind))
     label = f"{_name(kind)}\n{wave or f'k = {k:g}/{unit_of(fan.body)}'}, {_boundary_name(kind)}"
     return save_painted(path, drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
 
@@ -105,12 +105,24 @@ def surface_levels(
 
     |u|, or |du/dn|/k of the soft boundary; NaN in the shadow where no ray passes, inf on a caustic.
     """
+    return levels_of(surface_values(fan, points, wavenumber=wavenumber, boundary=boundary, order=order))
+
+
+def surface_values(
+    fan: RayFan, points: FloatArray, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> ComplexArray:
+    """The field at points of the body, u, or du/dn/k of the soft boundary: (n, 3) -> (n,), 0 where no ray passes."""
     field = surface_field(fan, points, wavenumber=wavenumber, boundary=boundary, order=order)
-    return _levels(field, scalar_boundary(boundary))
+    return _scaled(field, scalar_boundary(boundary))
 
 
-def _levels(field: SurfaceField, kind: Boundary) -> FloatArray:
-    size = np.abs(field.values) / (field.wavenumber if kind.kind == "soft" else 1.0)
+def _scaled(field: SurfaceField, kind: Boundary) -> ComplexArray:
+    return np.asarray(field.values / (field.wavenumber if kind.kind == "soft" else 1.0))
+
+
+def levels_of(values: ComplexArray) -> FloatArray:
+    """20 log10 of magnitudes (n,): NaN where they are 0, inf where they are NaN, on a caustic."""
+    size = np.abs(values)
     size = np.where(np.isnan(size), np.inf, size)
     return decibels(np.where(size > 0, size, np.nan))
 

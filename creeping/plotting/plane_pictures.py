@@ -11,7 +11,7 @@ from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.cut_result import FieldCut
 from creeping.field.decibels import decibels, shown_range
-from creeping.plotting.body_fronts import LEAST_SAMPLES
+from creeping.plotting.body_fronts import LEAST_SAMPLES, at_phase
 from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.coloured_body import NOTHING
 from creeping.plotting.pictures import axes_or_new, new_figure, save_figure
@@ -139,7 +139,7 @@ def field_cut_picture(
 def _draw(
     cut: FieldCut, ax: Any, *, quantity: str | None, show: str, fronts: bool | None, phase: float, span: float
 ) -> None:
-    size, wave = cut.magnitude(quantity), (cut.wave(quantity) * np.exp(-1j * phase)).real
+    size, wave = cut.magnitude(quantity), at_phase(cut.wave(quantity), phase)
     name = quantity or cut.quantities[0]
     missing = missing_of(cut)
     look: dict[str, Any]

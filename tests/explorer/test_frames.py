@@ -8,12 +8,13 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.explorer.colours import ENDED, FIELD_COLOURS, LINEAR, field_colours, fitted_span
-from creeping.explorer.preview import outline, preview_of, segments, step_of, steps_of
+from creeping.explorer.preview import outline, preview_of, step_of, steps_of
 from creeping.explorer.refined import cut_directions, refined_view
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
 from creeping.explorer.text import legend, preview_text, refined_text
 from creeping.explorer.units import far_levels, wave_scale, wave_text
+from creeping.explorer.wave import segments
 from creeping.geometry.surface import normal
 from creeping.geometry.triangulation import triangulate
 

@@ -319,4 +319,4 @@ def test_nothing_works_on_after_the_end():
 
     made = Explorer(cr.DirectFlow(BODY, rtol=1e-6), REQUEST, port=8150)
     made.close()
-    assert not any(worker.is_alive() for worker in made._workers)
+    assert not any(worker.is_alive() for worker in made._workers) and not made.player.is_alive()

@@ -58,6 +58,23 @@ def test_field_cut_lies_on_the_exact_curve(drawn):
     assert card["error"]["field"]["median_relative"] < 0.01
 
 
+def test_rays_of_sources_start_on_circles_of_closed_form(drawn):
+    card, pixels, _ = drawn("source-rays")
+    sphere, torus = card["error"]["sphere"], card["error"]["torus_axis"]
+    # the horizon of a source half a radius up, as seamen know it, and of the far one nearly all of a quarter
+    assert np.cos(np.radians(sphere["angle"])) == pytest.approx([1 / 1.05, 1 / 1.5, 1 / 3, 1 / 30])
+    assert max(sphere["off"] + torus["off"]) < 1e-9 and max(sphere["front_off"]) < 1e-6
+    # in the middle of the ring cos theta = -r/R
+    assert [torus["outer"][0], torus["inner"][0]] == pytest.approx([120.0, 240.0])
+    for name, case in card["parameters"]["cases"].items():
+        assert card["error"][name]["largest_grazing_angle"] < 1e-9
+        assert 0 < card["error"][name]["rays"]["rms"] <= GROWTH * 1.5 / case["T0"] * card["error"][name]["map"]["rms"]
+    # the torus hides a part of its own line, and some of it is hollow
+    assert min(card["parameters"]["cases"]["torus"]["shadow_line"].values()) > 0.1
+    assert 0.1 < np.mean(~np.all(pixels > 0.99, axis=-1)) < 0.9
+    assert np.mean(np.ptp(pixels, axis=-1) > 0.3) > 0.005
+
+
 @pytest.mark.slow
 def test_field_on_the_body_is_measured(drawn):
     card, _, _ = drawn("field-body")

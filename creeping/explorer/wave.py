@@ -1,0 +1,93 @@
+"""The wave itself, as colours that move with its phase: crests and troughs along the rays and on the body.
+
+    colour = h Re(u e^{-i omega t})/|u|,   h = (20 log10 |u| - low)/(high - low), within 0..1
+
+so that waves are seen through the whole range of the colours, deep in the shadow too. Between two steps of a ray the
+eikonal is linear, as it is along any ray, and the rest of the wave, which is slow to vary, is taken as linear; the
+quarter of a turn of a caustic is spread over the step that passes it.
+
+Sources: Derivations, F3.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray
+from creeping.explorer.colours import ENDED, WAVE_COLOURS, Bytes, Span
+from creeping.plotting.body_fronts import LEAST_SAMPLES, at_phase
+from creeping.rays.fan import RayFan
+
+SAMPLES, MOST_SEGMENTS = 6.0, 60_000
+"""Points of a ray a wavelength, and segments of all rays up to which there are as many."""
+
+
+@dataclass(frozen=True, eq=False)
+class RayWave:
+    """The field along rays, fine enough to show its phase.
+
+    Attributes
+    ----------
+    segments : (rays (points - 1), 2, 3) of float32
+    values : (rays, points) complex
+        Of modulus 1: e^{i arg u}.
+    levels : (rays, points), dB
+        -inf where a ray has ended.
+    """
+
+    segments: FloatArray
+    values: ComplexArray
+    levels: FloatArray
+
+
+def ray_wave(fan: RayFan, envelope: ComplexArray, levels: FloatArray, wavenumber: float) -> RayWave | None:
+    """The wave of rays from its envelope and levels at their steps (rays, steps); None if too short to be drawn."""
+    rays, steps = levels.shape
+    if not rays:
+        return None
+    waves = wavenumber * float(fan.travel_time[1] - fan.travel_time[0]) / (2 * np.pi)
+    parts = max(1, min(int(np.ceil(SAMPLES * waves)), MOST_SEGMENTS // (rays * (steps - 1))))
+    if parts < LEAST_SAMPLES * waves:
+        return None
+    slow = np.unwrap(np.angle(np.where(np.isfinite(envelope), envelope, 1.0)), axis=1)
+    ended = _between(np.isneginf(levels).astype(float), parts) > 0
+    fine = _between(np.clip(levels, -1e3, 1e3), parts)
+    return RayWave(
+        segments(_between(fan.points, parts)),
+        np.exp(1j * _between(wavenumber * fan.eikonal + slow, parts)),
+        np.where(ended, -np.inf, fine),
+    )
+
+
+def strengths(values: ComplexArray, levels: FloatArray, span: Span) -> ComplexArray:
+    """h u/|u| of fields (...) and their levels, dB: NaN where there is none, of modulus 1 at most."""
+    low, high = span
+    share = np.clip((np.nan_to_num(levels, nan=low, posinf=high, neginf=low) - low) / (high - low), 0.0, 1.0)
+    size = np.abs(values)
+    known = np.isfinite(size) & (size > 0)
+    unit = np.where(known, values, 1.0) / np.where(known, size, 1.0)
+    return np.where(levels > -np.inf, share * unit, np.nan)
+
+
+def wave_colours(strength: ComplexArray, phase: float) -> Bytes:
+    """Colours of `strengths` (...) when omega t = phase, radians: (..., 3); ENDED where there is no field."""
+    height = at_phase(strength, phase)
+    out = WAVE_COLOURS(0.5 + 0.5 * np.nan_to_num(height))
+    out[np.isnan(height)] = ENDED
+    return out
+
+
+def segments(points: FloatArray, *, closed: bool = False) -> FloatArray:
+    """Segments of lines (n, m, 3): (k, 2, 3) of float32."""
+    if closed:
+        points = np.concatenate([points, points[:, :1]], axis=1)
+    pairs = np.stack([points[:, :-1], points[:, 1:]], axis=2)
+    return np.ascontiguousarray(pairs.reshape(-1, 2, 3), dtype=np.float32)
+
+
+def _between(values: FloatArray, parts: int) -> FloatArray:
+    """Values (rays, steps, ...) with each step cut into equal parts, linear: (rays, (steps - 1) parts + 1, ...)."""
+    share = (np.arange(parts) / parts).reshape(-1, *[1] * (values.ndim - 2))
+    first, last = values[:, :-1, None], values[:, 1:, None]
+    cut = (first + share * (last - first)).reshape(len(values), -1, *values.shape[2:])
+    return np.concatenate([cut, values[:, -1:]], axis=1)

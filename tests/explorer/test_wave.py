@@ -1,0 +1,186 @@
+"""The wave that runs on the page: its phase is that of the field, only colours move, and what has none is told."""
+
+import time
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.explorer.colours import ENDED, WAVE_COLOURS
+from creeping.explorer.preview import preview_of, step_of
+from creeping.explorer.refined import refined_view
+from creeping.explorer.request import ViewRequest
+from creeping.explorer.text import legend, wave_note
+from creeping.explorer.wave import MOST_SEGMENTS, SAMPLES, strengths, wave_colours
+from creeping.geometry.triangulation import triangulate
+from creeping.plotting.body_fronts import at_phase
+from studies.reference import sphere
+
+REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
+SPAN = (-50.0, 5.0)
+
+
+def frame_of(body, request=REQUEST):
+    return preview_of(cr.DirectFlow(body, rtol=1e-9), request, step_of(body))
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard", "impedance:0.5+0.2j"])
+def test_the_phase_along_rays_is_that_of_the_field(boundary):
+    """At points between the steps, too: of a fan that has so many of its own, by the field on the surface."""
+    request = REQUEST.changed(boundary=boundary, length=1.5)
+    frame = frame_of(sc.TwistedEllipsoid(), request)
+    parts = (frame.wave.values.shape[1] - 1) // (frame.levels.shape[1] - 1)
+    assert parts > 1
+    line, n_steps = frame.fan.line, frame.wave.values.shape[1] - 1
+    fine = cr.launch(
+        cr.DirectFlow(line.body, rtol=1e-9), line, length=frame.fan.length, n_rays=64, n_steps=n_steps, max_gap=np.inf
+    )
+    np.testing.assert_allclose(fine.points[:, 0], frame.fan.points[:, 0], atol=1e-9)
+    u = cr.surface_field(fine, wavenumber=30.0, boundary=request.kind, order=1).values
+    # in the step that passes a caustic the quarter of a turn is spread over it
+    passing = np.repeat(np.diff(frame.fan.caustic_index, axis=1) != 0, parts, axis=1)
+    # what colours show: below, in the last step before a ray detaches, the phase turns by a tenth
+    held = (frame.wave.levels > -60) & (np.abs(fine.spreading) > 0.01)
+    held[:, :-1] &= ~passing
+    assert np.mean(held) > 0.3 and np.any(fine.caustic_index[held])
+    turn = np.abs(np.angle(u[held] / frame.wave.values[held]))
+    # the slow part of the phase between steps is a chord
+    assert np.max(turn) < 0.05
+    np.testing.assert_allclose(np.abs(frame.wave.values), 1.0, rtol=1e-12)
+
+
+def test_there_are_points_enough_a_wavelength_and_no_nan():
+    frame = frame_of(sc.TwistedEllipsoid(), REQUEST.changed(wavenumber=60.0))
+    wave = frame.wave
+    gap = np.linalg.norm(wave.segments[:, 1] - wave.segments[:, 0], axis=1).max()
+    assert gap <= 2 * np.pi / 60.0 / SAMPLES * 1.001
+    assert wave.segments.dtype == np.float32 and np.all(np.isfinite(wave.segments))
+    assert wave.segments.shape[0] == 64 * (wave.values.shape[1] - 1) <= MOST_SEGMENTS
+    # rays that have ended stay so
+    ended = np.isneginf(frame.levels[:, -1])
+    assert np.any(ended) and np.array_equal(np.isneginf(wave.levels[:, -1]), ended)
+
+
+def test_colours_are_crests_and_troughs_of_the_range():
+    values = np.array([2.0, -2.0, 2j, 1e-9, 0.0, np.nan])
+    levels = np.array([5.0, 5.0, 5.0, -180.0, np.nan, np.inf])
+    found = strengths(values, levels, SPAN)
+    np.testing.assert_allclose(found[:4], [1, -1, 1j, 0])
+    assert np.isnan(found[4]) and found[5] == 1
+    crest, trough = WAVE_COLOURS.table[255].tolist(), WAVE_COLOURS.table[0].tolist()
+    middle = WAVE_COLOURS(np.array(0.5)).tolist()
+    assert wave_colours(found, 0.0).tolist() == [crest, trough, middle, middle, list(ENDED), crest]
+    # a quarter of a period later u = i is up: e^{-i omega t}
+    assert wave_colours(found, np.pi / 2)[2].tolist() == crest
+    assert wave_colours(found, np.pi)[:2].tolist() == [trough, crest]
+    # halfway up the range of dB
+    half = strengths(np.array([3j]), np.array([-22.5]), SPAN)
+    np.testing.assert_allclose(at_phase(half, np.pi / 2), 0.5)
+
+
+def test_the_wave_on_the_body_is_that_of_the_series():
+    body, request = sc.Sphere(), REQUEST.changed(theta=0.0, phi=0.0, length=6.0, rays=96)
+    mesh = triangulate(body.level, body.gradient, body.bounds, cells=16)
+    frame = frame_of(body, request)
+    found = refined_view(frame.fan.flow, frame, mesh.vertices)
+    exact = sphere.total_field(30.0, 1.0, mesh.vertices * (1 + 1e-12), np.array([0.0, 0.0, 1.0]), "hard")
+    known = np.isfinite(found.body_levels)
+    assert np.mean(known) > 0.95
+    assert np.median(np.abs(found.body_wave - exact)[known]) < 0.01
+    shown = strengths(found.body_wave, found.body_levels, SPAN)
+    bright = np.abs(exact) > 0.3
+    for phase in (0.0, 2.0):
+        expected = at_phase(exact / np.abs(exact), phase)
+        level = np.clip((20 * np.log10(np.abs(exact)) + 50) / 55, 0, 1)
+        assert np.max(np.abs(at_phase(shown, phase) - level * expected)[bright & known]) < 0.15
+
+
+def test_what_has_no_wave_is_told():
+    assert "crest" in legend(frame_of(sc.Sphere()), SPAN, wave=True)
+    assert wave_note(frame_of(sc.Sphere()), True) == ""
+    assert "mesh" in wave_note(frame_of(sc.Sphere()), False)
+    conductor = frame_of(sc.Sphere(), REQUEST.changed(boundary="pec"))
+    assert conductor.wave is None and "vector" in wave_note(conductor, True)
+    weighted = frame_of(sc.Sphere(speed="1 + 0.3*x"))
+    assert weighted.wave is None and "weighted" in wave_note(weighted, True)
+    short = frame_of(sc.Sphere(), REQUEST.changed(wavenumber=3e4))
+    assert short.wave is None and "too short" in wave_note(short, True)
+
+
+@pytest.fixture
+def page():
+    pytest.importorskip("viser")
+    from creeping.explorer.page import Explorer
+
+    made = Explorer(cr.DirectFlow(sc.TwistedEllipsoid(), rtol=1e-9), REQUEST, port=8180)
+    yield made
+    made.close()
+
+
+def until(condition, page, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, page.status.content
+        time.sleep(0.05)
+
+
+def test_playing_computes_no_field(page, monkeypatch):
+    from creeping.explorer import page as module
+
+    until(lambda: page.found.content, page)
+
+    def fail(*_, **__):
+        raise AssertionError("a field was computed for a picture of the same wave")
+
+    for name in ("preview_of", "refined_view", "far_cut"):
+        monkeypatch.setattr(module, name, fail)
+    level, body = page.scene._lines["rays"].colors.copy(), page.scene.painted.glb_data
+    page.player.show.value = "wave"
+    until(lambda: "crest" in page.bar.content, page)
+    rays = page.scene._lines["rays"]
+    assert len(rays.points) == len(page._drawn[0].wave.segments)
+    points, first, still = rays.points, rays.colors.copy(), page.scene.painted.glb_data
+    assert still != body and page.player.slider.value == 0
+    page.player.play.value = True
+    until(lambda: page.player.slider.value >= 90 and page.scene.painted.glb_data != still, page)
+    assert rays.points is points and np.any(rays.colors != first)
+    page.player.play.value = False
+    # back to what was: the same colours
+    page.player.show.value = "level"
+    until(lambda: "rays and body" in page.bar.content, page)
+    assert np.array_equal(page.scene._lines["rays"].colors, level) and page.scene.painted.glb_data == body
+    assert "failed" not in page.status.content
+
+
+def test_a_hand_on_the_phase_turns_the_wave(page):
+    until(lambda: page.found.content, page)
+
+    class Event:
+        client, target = object(), page.player.slider
+
+    rays = page.scene._lines["rays"]
+    page.player.slider.value = 180
+    page.player._slid(Event)
+    assert "crest" not in page.bar.content
+    page.player.show.value = "wave"
+    until(lambda: "crest" in page.bar.content, page)
+    turned = rays.colors.copy()
+    page.player.slider.value = 0
+    page.player._slid(Event)
+    assert np.any(rays.colors != turned)
+    page.ask(boundary="pec")
+    until(lambda: "vector" in page.status.content, page)
+    assert "crest" not in page.bar.content and len(rays.points) == len(page._drawn[0].ray_segments)
+
+
+def test_the_browser_has_the_colours_of_the_phase(page, browser):
+    browser.open(page.address)
+    until(lambda: page.found.content, page)
+    page.player.show.value = "wave"
+    held = browser.segments(len(page._drawn[0].wave.segments))
+    np.testing.assert_allclose(held, page._drawn[0].wave.segments, rtol=0, atol=1e-6)
+    page.player.play.value = True
+    until(lambda: page.player.slider.value >= 60, page)
+    page.player.play.value = False
+    assert browser.errors() == []
