@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scatterers.pieces.crease import Crease
 from scatterers.pieces.curved import curved, divided
-from scatterers.pieces.patch import COARSER, SPACING, Patch, polynomial_patch, spline_patch
+from scatterers.pieces.patch import COARSER, SPACING, TIP, Patch, polynomial_patch, spline_patch, tip_of
 from scatterers.pieces.regions import Regions
 from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
 from scatterers.spline.compared import curvatures
@@ -41,6 +41,8 @@ JUMP = 0.1
 """Jump of the curvature across a joint, relative to the larger, below which it is none,"""
 NONE = 1e-6
 """and times the length of the joint, for parts of one plane."""
+AT_TIP = 2.0
+"""Sides of the nearest triangle within which the tip of a cone belongs to a piece: some meshes blunt it."""
 SHARE = 500
 """Triangles cut at a time."""
 ROUGH = 0.05
@@ -140,7 +142,7 @@ def fitted_pieces(
         Outward at the corners of the triangles, where they are known; those of the triangles if not.
     """
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    piece = _parted(vertices, triangles, regions)
+    piece = _parted(vertices, triangles, regions, normals, size)
     count = int(piece.max()) + 1
     patches, at_corners = [], np.empty((len(triangles), 3, 3))
     for number in range(count):
@@ -151,6 +153,7 @@ def fitted_pieces(
         at_corners[own] = corner_normals
     points, owner = _spread(vertices[triangles], at_corners, piece)
     creases = tuple(_judged(crease, patches) for crease in regions.creases(vertices, piece))
+    creases += _tips(vertices, triangles, piece, patches)
     fine = piece_space([patch.fine for patch in patches], points, owner, creases)
     coarse = fine.with_splines([patch.coarse for patch in patches])
     astray = _astray(fine, patches, points, owner, size)
@@ -187,6 +190,21 @@ def _judged(crease: Crease, patches: list[Patch]) -> Crease:
     return replace(crease, kind="seam") if jump <= max(JUMP * largest, NONE / crease.length) else crease
 
 
+def _tips(vertices: FloatArray, triangles: IntArray, piece: IntArray, patches: list[Patch]) -> tuple[Crease, ...]:
+    """Tips of cones, where these are there: within the side of a triangle of a vertex."""
+    found = []
+    for number, patch in enumerate(patches):
+        tip = tip_of(patch)
+        if tip is None:
+            continue
+        corners = vertices[triangles[piece == number]]
+        nearest = int(np.argmin(np.min(np.linalg.norm(corners - tip, axis=2), axis=1)))
+        sides = np.linalg.norm(np.roll(corners[nearest], -1, axis=0) - corners[nearest], axis=1)
+        if np.min(np.linalg.norm(corners[nearest] - tip, axis=1)) < AT_TIP * sides.max():
+            found.append(Crease("tip", (number, number), tip[None]))
+    return tuple(found)
+
+
 def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[FloatArray, IntArray]:
     """Points (k, 3), L, all over the body, closer to each other than a voxel, and their pieces (k,)."""
     box = np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
@@ -204,8 +222,10 @@ def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[
     return np.concatenate(points), np.concatenate(owner)
 
 
-def _parted(vertices: FloatArray, triangles: IntArray, regions: Regions) -> IntArray:
-    """Piece of each triangle: its region, or a part of one that folds."""
+def _parted(
+    vertices: FloatArray, triangles: IntArray, regions: Regions, normals: FloatArray | None, size: float
+) -> IntArray:
+    """Piece of each triangle: its region, or a part of one that folds and is no quadric, which has both sides."""
     from scipy.spatial import cKDTree
 
     corners = vertices[triangles]
@@ -226,6 +246,7 @@ def _parted(vertices: FloatArray, triangles: IntArray, regions: Regions) -> IntA
             tree = cKDTree(np.einsum("kj,kjc->kc", place.mean(axis=1), corners[own][origin]))
             pairs = own[origin][tree.query_pairs(reach, output_type="ndarray")]
             folds = bool(np.any(np.sum(normal[pairs[:, 0]] * normal[pairs[:, 1]], axis=1) < 0))
+            folds = folds and polynomial_patch(*_known(vertices, triangles, own, normals)[1:], size) is None
         if not folds:
             piece[own] = count
             count += 1
@@ -275,6 +296,29 @@ def _spacing(corners: FloatArray) -> float:
     return float(np.median(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1)))
 
 
+def _known(
+    vertices: FloatArray, triangles: IntArray, members: IntArray, normals: FloatArray | None
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Triangles with these numbers by their own vertices (n, 3), these, and outward normals there."""
+    used, local = np.unique(triangles[members], return_inverse=True)
+    local = local.reshape(-1, 3)
+    x = vertices[used]
+    if normals is None:
+        return local, x, angle_weighted_normals(x, local)
+    n = np.zeros_like(x)
+    np.add.at(n, local.ravel(), normals[members].reshape(-1, 3))
+    return local, x, n / np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300)
+
+
+def _corner_normals(patch: Patch, corners: FloatArray) -> FloatArray:
+    """Normals of a plane or quadric at corners (m, 3, 3), those of the triangles at a tip."""
+    gradient = patch.fine.gradient(corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    slope = np.linalg.norm(gradient, axis=2, keepdims=True)
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    return np.where(slope > TIP * np.median(slope), gradient / np.maximum(slope, 1e-300), flat[:, None])
+
+
 def _patch(
     vertices: FloatArray,
     triangles: IntArray,
@@ -284,22 +328,12 @@ def _patch(
     size: float,
 ) -> tuple[Patch, FloatArray]:
     """F of a piece from its triangles and those next to it, and the normals at the corners of its own."""
-    used, local = np.unique(triangles[members], return_inverse=True)
-    local = local.reshape(-1, 3)
-    x = vertices[used]
-    if normals is None:
-        n = angle_weighted_normals(x, local)
-    else:
-        n = np.zeros_like(x)
-        np.add.at(n, local.ravel(), normals[members].reshape(-1, 3))
-        n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300)
+    local, x, n = _known(vertices, triangles, members, normals)
     corners = x[local]
     mine = np.isin(members, own)
     polynomial = polynomial_patch(x, n, size)
     if polynomial is not None:
-        gradient = polynomial.fine.gradient(corners[mine].reshape(-1, 3))
-        gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
-        return polynomial, gradient.reshape(-1, 3, 3)
+        return polynomial, _corner_normals(polynomial, corners[mine])
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     jets = _sound_jets(x, local, n, normals is not None)
     even = float(np.percentile(side, 90)) < 4 * float(np.percentile(side, 10))
