@@ -160,8 +160,8 @@ def _with_joints(quality: MeshQuality, found: CadPoints) -> MeshQuality:
         return replace(
             quality,
             verdict="sharp",
-            reasons=f"{count} of {quality.vertices} vertices lie on edges, at which faces do not join smoothly; the body "
-            "is taken in smooth pieces, where rays end; round the edges off for a smooth one",
+            reasons=f"{count} of {quality.vertices} vertices lie on edges, at which faces do not join smoothly; the "
+            "body is taken in smooth pieces, where rays end; round the edges off for a smooth one",
         )
     if not found.jumps.any():
         return quality

@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.pieces.absorbed import absorbed
 from scatterers.pieces.crease import Crease
 from scatterers.pieces.curved import curved, divided
 from scatterers.pieces.patch import COARSER, SPACING, TIP, Patch, polynomial_patch, spline_patch, tip_of
 from scatterers.pieces.regions import Regions
 from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
+from scatterers.pieces.trust import astray, doubtful, rough
 from scatterers.spline.compared import curvatures
 from scatterers.spline.fitting import SMOOTHING, tangents
 from scatterers.spline.report import FitReport
@@ -35,8 +37,6 @@ GOOD = 0.7
 """Share of the vertices of a piece whose jets are sound, from which on jets are used."""
 EVEN, MOST_POINTS = 400, 6_000
 """Fewest points of a piece that is known from few vertices, and the most."""
-MISSED = 1e-4
-"""Distance in body sizes between a point and the level there, beyond which the level is not trusted about it."""
 JUMP = 0.1
 """Jump of the curvature across a joint, relative to the larger, below which it is none,"""
 NONE = 1e-6
@@ -45,12 +45,6 @@ AT_TIP = 2.0
 """Sides of the nearest triangle within which the tip of a cone belongs to a piece: some meshes blunt it."""
 SHARE = 500
 """Triangles cut at a time."""
-ROUGH = 0.05
-"""Misfit, in spacings of the points, beyond which nothing of a piece is trusted."""
-FAR_OFF = 0.5
-"""Largest distance of its points from F = 0, in their spacings, that a piece may have."""
-SLOPES = (0.5, 1.6)
-"""|grad F| at the points: beyond, nothing of a piece is trusted either."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +65,8 @@ class FittedPieces:
     samples, owner : (k, 3), L, and (k,)
         Points spread over the body, and their pieces.
     astray : (j, 3), L
-        Those at which another piece stands for the body, that is not there: features are too fine for the voxels.
+        Points at which another piece stands for the body, that is not there: features are too fine for the voxels; and
+        vertices at which a fit turns away from the normals of its triangles or faces: it does not follow them.
     """
 
     fine: PieceSpace
@@ -142,35 +137,35 @@ def fitted_pieces(
         Outward at the corners of the triangles, where they are known; those of the triangles if not.
     """
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    regions = absorbed(
+        vertices,
+        triangles,
+        regions,
+        lambda members: polynomial_patch(*_known(vertices, triangles, members, normals)[1:], size),
+        size,
+    )
     piece = _parted(vertices, triangles, regions, normals, size)
     count = int(piece.max()) + 1
-    patches, at_corners = [], np.empty((len(triangles), 3, 3))
+    patches, at_corners, doubted = [], np.empty((len(triangles), 3, 3)), [np.zeros((0, 3))]
     for number in range(count):
         progress(f"piece {number + 1} of {count}")
         own = np.flatnonzero(piece == number)
-        patch, corner_normals = _patch(vertices, triangles, _grown(piece, number, regions), own, normals, size)
+        members = _grown(piece, number, regions)
+        patch, corner_normals = _patch(vertices, triangles, members, own, normals, size)
         patches.append(patch)
         at_corners[own] = corner_normals
+        local, x, n = _known(vertices, triangles, members, normals)
+        # at the border of the members normals are one-sided
+        inner = np.unique(local[np.isin(members, own)])
+        doubted.append(doubtful(patch, x[inner], n[inner]))
     points, owner = _spread(vertices[triangles], at_corners, piece)
     creases = tuple(_judged(crease, patches) for crease in regions.creases(vertices, piece))
     creases += _tips(vertices, triangles, piece, patches)
     fine = piece_space([patch.fine for patch in patches], points, owner, creases)
     coarse = fine.with_splines([patch.coarse for patch in patches])
-    astray = _astray(fine, patches, points, owner, size)
-    rough = np.array([_rough(patch, points[owner == k], size) for k, patch in enumerate(patches)])
-    return FittedPieces(fine, coarse, tuple(patches), piece, at_corners, creases, rough, points, owner, astray)
-
-
-def _astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: IntArray, size: float) -> FloatArray:
-    """Points (k, 3) that the level of the body misses by more than `MISSED` of its size."""
-    number = space.numbers(points)
-    wrong = np.flatnonzero(number != owner)
-    missed = np.zeros(len(wrong))
-    for k in np.unique(number[wrong]):
-        mine = number[wrong] == k
-        value, gradient = patches[k].fine.value_and_gradient(points[wrong[mine]])
-        missed[mine] = np.abs(value) / np.linalg.norm(gradient, axis=1)
-    return np.asarray(points[wrong[missed > MISSED * size]])
+    lost = np.concatenate([astray(fine, patches, points, owner, size), *doubted])
+    untrusted = np.array([rough(patch, points[owner == k], size) for k, patch in enumerate(patches)])
+    return FittedPieces(fine, coarse, tuple(patches), piece, at_corners, creases, untrusted, points, owner, lost)
 
 
 def _judged(crease: Crease, patches: list[Patch]) -> Crease:
@@ -361,19 +356,6 @@ def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray, exact: 
     corners = x[triangles]
     edge = float(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).mean())
     doubt = edge * np.abs(jets.principal4 - jets.principal).max(axis=1) / 3
-    astray = np.linalg.norm(jets.normals - normals, axis=1) > 0.5
-    sound = jets.fitted & (np.maximum(jets.tilt, doubt) < BAD) & ~astray
+    apart = np.linalg.norm(jets.normals - normals, axis=1) > 0.5
+    sound = jets.fitted & (np.maximum(jets.tilt, doubt) < BAD) & ~apart
     return jets if np.mean(sound) >= GOOD else None
-
-
-def _rough(patch: Patch, points: FloatArray, size: float) -> bool:
-    """Whether F of a patch is no distance at points of its piece, or misses them, or it is a speck of the body."""
-    if float(np.max(np.ptp(points, axis=0))) < MISSED * size:
-        return True
-    if patch.kind != "spline":
-        return False
-    value, gradient = patch.fine.value_and_gradient(points)
-    slope = np.linalg.norm(gradient, axis=1)
-    if patch.misfit > ROUGH * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1]:
-        return True
-    return bool(np.max(np.abs(value) / slope) > FAR_OFF * patch.spacing)

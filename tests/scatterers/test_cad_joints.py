@@ -74,5 +74,7 @@ def test_check_tells_of_joints_that_jets_do_not_see(filleted, capsys, tmp_path, 
     assert jumps == pytest.approx((straight + 24 * np.pi / 2 * 6e-3) / edge, rel=0.15)
     assert answer["quality"]["verdict"] == "curvature jumps" and answer["quality"]["bad_share"] == 0
     assert answer["pieces"] == 26 and [crease["kind"] for crease in answer["creases"]] == 48 * ["joint"]
-    assert "verdict                    curvature jumps" in told and f"curvature jumps at         {jumps} vertices" in told
+    assert (
+        "verdict                    curvature jumps" in told and f"curvature jumps at         {jumps} vertices" in told
+    )
     assert "26 smooth pieces, 48 joints, area" in told and "all of planes and quadrics" in told
