@@ -4,6 +4,7 @@ gmsh is an optional library under the GPL: ``pip install 'creeping[cad]'``.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 
 from scatterers.base.clouds import PieceCloud, PointCloud
 from scatterers.base.fitted_body import FittedBody, checked_options
-from scatterers.cad_file.files import CadReading, kind_of, read_cad
+from scatterers.cad_file.files import CadPoints, CadReading, kind_of, read_cad
 from scatterers.pieces.regions import regions_of
 from scatterers.spline.cache import key_of
 from scatterers.triangles.choice import Choice
 from scatterers.triangles.jet_points import signed_distance
 from scatterers.triangles.jets import osculating_jets
-from scatterers.triangles.quality import assess
+from scatterers.triangles.quality import MeshQuality, assess
+from scatterers.triangles.topology import edges_of
 
 FloatArray = NDArray[np.float64]
 POINTS = 10_000
@@ -119,18 +121,13 @@ class Cad(FittedBody):
         progress("reading the CAD file")
         found = read_cad(path, reading, progress=progress)
         jets = osculating_jets(found.mesh.vertices, found.mesh.triangles)
-        quality = assess(found.mesh, jets)
+        quality = _with_joints(assess(found.mesh, jets), found)
         if found.edges and strict:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
         notes = {"source": path.name, "edges": list(found.edges)}
         if quality.verdict != "smooth" and strict:
             raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
-        if found.jumps and strict:
-            raise ValueError(
-                f"{path.name} is not smooth enough: the curvature jumps where faces join, as where a fillet meets a "
-                "plane; blend them with continuous curvature, or leave strict out"
-            )
-        if found.creases.any() or found.jumps or (quality.verdict != "smooth" and found.level.any()):
+        if found.creases.any() or found.jumps.any() or (quality.verdict != "smooth" and found.level.any()):
             # fillets ask for more points than faces
             found = read_cad(path, reading, curved=CURVED, progress=progress)
             mesh, normals = found.mesh, found.corner_normals
@@ -151,3 +148,29 @@ class Cad(FittedBody):
             quality=quality,
             notes=notes | {"repairs": list(found.mesh.repairs)},
         )
+
+
+def _with_joints(quality: MeshQuality, found: CadPoints) -> MeshQuality:
+    """What jets make of the points, corrected by the faces: joints all over a mesh are nothing odd to jets."""
+    ends = edges_of(found.mesh.triangles).ends
+    if found.creases.any():
+        if quality.verdict != "smooth":
+            return quality
+        count = len(np.unique(ends[found.creases]))
+        return replace(
+            quality,
+            verdict="sharp",
+            reasons=f"{count} of {quality.vertices} vertices lie on edges, at which faces do not join smoothly; the "
+            "body is taken in smooth pieces, where rays end; round the edges off for a smooth one",
+        )
+    if not found.jumps.any():
+        return quality
+    count = len(np.unique(ends[found.jumps]))
+    return replace(
+        quality,
+        verdict="curvature jumps",
+        jumps=count,
+        reasons=f"the curvature jumps at {count} of {quality.vertices} vertices, on joints of faces, as where a fillet "
+        "meets a plane; the body is taken in smooth pieces, and rays across their joints are of low order: blend the "
+        "faces with continuous curvature for a smooth one",
+    )

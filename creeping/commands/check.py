@@ -81,6 +81,9 @@ def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts
     report = check_surface(shape)
     rows = [asdict(c) | {"ok": c.ok} for c in report.checks]
     answer |= {"genus": report.genus, "area": report.area, "checks": rows}
+    if report.creases:
+        creases = [{"kind": c.kind, "pieces": [int(number) for number in c.pieces]} for c in report.creases]
+        answer |= {"pieces": report.pieces, "creases": creases}
     if getattr(shape, "fit", None) is not None:
         told = "quality" in answer
         answer |= {"fit": shape.fit.to_json(), "quality": shape.quality.to_json(), "repairs": list(shape.repairs)}

@@ -19,7 +19,7 @@ from creeping._typing import FloatArray, IntArray
 from creeping.errors import IntegrationError
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.hermite import Sliding, sliding
-from creeping.geodesics.integrator import trace_states
+from creeping.geodesics.integrator import MAX_STEPS, trace_states
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK, in_slices, in_threads
@@ -142,6 +142,7 @@ def with_attenuation(
     rtol: float,
     step: float | None = None,
     transport: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
+    limit: int = MAX_STEPS,
 ) -> FloatArray:
     """Advance states (n, 12) to the ascending times (m,) by one trace: (n, m, 12).
 
@@ -155,6 +156,8 @@ def with_attenuation(
         Longest of equal steps, taken instead of adapted ones.
     transport : callable, optional
         Gives the first ten lanes of the result instead of the trace.
+    limit : int
+        Most steps between fine times, as for `trace_states`.
     """
     times = np.asarray(times, dtype=float)
     out = np.empty((len(states), len(times), 12))
@@ -175,16 +178,16 @@ def with_attenuation(
         part = slice(start, start + rays)
         out[part, 0, 10:] = states[part, 10:]
         # the traced states bear no name here, or two slices would be in memory at once
-        _along(body, _traced(body, states[:, :lanes], part, fine.times, adapted, step), fine, place, out[part])
+        _along(body, _traced(body, states[:, :lanes], part, fine.times, adapted, step, limit), fine, place, out[part])
     return out
 
 
 def _traced(
-    body: Surface, states: FloatArray, part: slice, times: FloatArray, rtol: float, step: float | None
+    body: Surface, states: FloatArray, part: slice, times: FloatArray, rtol: float, step: float | None, limit: int
 ) -> FloatArray:
     """`trace_states` of a part of the rays, its errors in numbers of all."""
     try:
-        return trace_states(body, states[part], times, rtol=rtol, step=step)
+        return trace_states(body, states[part], times, rtol=rtol, step=step, limit=limit)
     except IntegrationError as error:
         if part.start == 0:
             raise

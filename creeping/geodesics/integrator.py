@@ -123,10 +123,12 @@ def trace_states(
     rtol: float = 1e-10,
     step: float | None = None,
     method: Method = DORMAND_PRINCE_8,
+    limit: int = MAX_STEPS,
 ) -> FloatArray:
     """Trace states (n, 6, 10 or 11) to the ascending times (m,): (n, m, the same).
 
     ``rtol = 0`` takes equal steps of at most ``step`` between outputs, by any ``method``; else it is the first.
+    Rays that need more than ``limit`` steps between outputs, and those of their block, fail.
     Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c, lane 10 the attenuation integral; see
     `creeping.geodesics.kernels.integrator`.
 
@@ -137,7 +139,7 @@ def trace_states(
     IntegrationError
         If a ray does not reach its end; ``failed`` lists the rays.
     """
-    return counted_states(body, states, times, rtol=rtol, step=step, method=method)[0]
+    return counted_states(body, states, times, rtol=rtol, step=step, method=method, limit=limit)[0]
 
 
 def counted_states(
@@ -148,6 +150,7 @@ def counted_states(
     rtol: float = 1e-10,
     step: float | None = None,
     method: Method = DORMAND_PRINCE_8,
+    limit: int = MAX_STEPS,
 ) -> tuple[FloatArray, int]:
     """Do what `trace_states` does, and count the steps of all blocks of rays, refused ones too."""
     if states.shape[1] > 11:
@@ -163,7 +166,7 @@ def counted_states(
     scale = error_scale(body, states.shape[1])
     ends = np.asarray(times, dtype=float)
     taken: list[int] = []
-    controls = scale, float(rtol), float(step), MAX_STEPS, BUDGET
+    controls = scale, float(rtol), float(step), int(limit), BUDGET
     with evaluators(body) as parts:
 
         def run(part: slice) -> None:
@@ -176,7 +179,7 @@ def counted_states(
     failed = np.flatnonzero(~np.all(np.isfinite(out), axis=(1, 2)))
     if len(failed):
         raise IntegrationError(
-            f"{len(failed)} of {len(states)} rays left the finite numbers or needed more than {MAX_STEPS} steps "
+            f"{len(failed)} of {len(states)} rays left the finite numbers or needed more than {limit} steps "
             f"(first: ray {failed[0]}); "
             + (
                 f"shorten the step {step:.3g}, unless that many are needed"

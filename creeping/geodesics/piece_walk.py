@@ -41,6 +41,9 @@ SHORTEST = 1e-7
 """Shortest step, in body sizes, of a ray that has no states through a window."""
 ROUNDS = 400
 """Rounds of a window: next to a tip a ray goes half of REACH in each, and a step is halved 20 times."""
+STEPS = 1000
+"""Between outputs, after which rays are given up that are traced together: where a piece is known some tens do, far
+beyond its borders F may be anything."""
 OWN = 1e-12
 """Relative tolerance of what rays do by themselves, where they go by equal steps else."""
 
@@ -286,6 +289,6 @@ class Walk:
         piece = self.pieces[number]
         with np.errstate(all="ignore"):
             if self.lanes == WHOLE:
-                return with_attenuation(piece, states, times, rtol=self.rtol, step=self.step)
+                return with_attenuation(piece, states, times, rtol=self.rtol, step=self.step, limit=STEPS)
             rtol = self.rtol if self.step is None else 0.0
-            return trace_states(piece, states, times, rtol=rtol, step=self.step)
+            return trace_states(piece, states, times, rtol=rtol, step=self.step, limit=STEPS)

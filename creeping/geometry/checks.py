@@ -1,5 +1,6 @@
 """Numerical verification of a body: derivatives, closedness, orientation, cover and overlap of its charts."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import SurfaceError
 from creeping.geometry.arguments import checked_body
-from creeping.geometry.creased import is_creased, pieces_of, tiles_of
+from creeping.geometry.creased import KINDS, is_creased, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import triangulate
 from creeping.geometry.unit import UNKNOWN, unit_of
@@ -41,6 +42,8 @@ class SurfaceReport:
         In squares of the unit, of a triangulation: a few digits.
     pieces : int
         Smooth pieces that bound it.
+    creases : tuple
+        Edges, joints, seams and tips at which these meet, as the body's ``creases``.
     unit : str
         Of lengths: "m" where the body knows it, else "L".
     """
@@ -49,6 +52,7 @@ class SurfaceReport:
     genus: int | None
     area: float
     pieces: int = 1
+    creases: tuple[Any, ...] = ()
     unit: str = UNKNOWN
 
     @property
@@ -64,7 +68,9 @@ class SurfaceReport:
 
     def __repr__(self) -> str:
         rows = [f"  {'ok ' if c.ok else 'BAD'} {c.name}: {c.worst:.2g} (limit {c.limit:.2g})" for c in self.checks]
-        made = f"{self.pieces} smooth pieces" if self.genus is None else f"genus {self.genus}"
+        counts = Counter(crease.kind for crease in self.creases)
+        meeting = [f"{counts[kind]} {kind}{'s' * (counts[kind] > 1)}" for kind in KINDS if counts[kind]]
+        made = ", ".join([f"{self.pieces} smooth pieces", *meeting]) if self.genus is None else f"genus {self.genus}"
         return "\n".join([f"SurfaceReport({made}, area {self.area:.4g} {self.unit}^2)", *rows])
 
 
@@ -137,7 +143,14 @@ def _creased_report(body: Any) -> SurfaceReport:
                             "mend tiles()"))  # fmt: skip
         checks += [Check(f"piece {number}: {c.name}", c.worst, c.limit, c.remedy) for c in _derivative_checks(piece, x)]
     checks.append(Check("share of points where F has the wrong sign outside or inside", out, 0.01, "mend level()"))
-    return SurfaceReport(checks=tuple(checks), genus=None, area=area, pieces=len(pieces), unit=unit_of(body))
+    return SurfaceReport(
+        checks=tuple(checks),
+        genus=None,
+        area=area,
+        pieces=len(pieces),
+        creases=tuple(body.creases),
+        unit=unit_of(body),
+    )
 
 
 def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:

@@ -52,8 +52,8 @@ class CadPoints:
     creases, level : (e,) bool
         Edges, in the order of `scatterers.triangles.topology.edges_of`, at which faces do not join smoothly, and at
         which they do.
-    jumps : bool
-        Whether the curvature jumps where faces join smoothly, as where a fillet meets a plane.
+    jumps : (e,) bool
+        Edges at which faces join smoothly while the curvature jumps, as where a fillet meets a plane.
     edges : tuple of str
         Where faces do not join smoothly.
     non_smooth : (k, 3), m
@@ -65,7 +65,7 @@ class CadPoints:
     corner_normals: FloatArray
     creases: NDArray[np.bool_]
     level: NDArray[np.bool_]
-    jumps: bool
+    jumps: NDArray[np.bool_]
     edges: tuple[str, ...]
     non_smooth: FloatArray
 

@@ -1,4 +1,4 @@
-"""Whether the curvature jumps where faces of a CAD file join smoothly, from the normals that the faces have.
+"""Where faces of a CAD file join smoothly while the curvature jumps, from the normals that the faces have.
 
 Across an edge of the mesh that lies on the joint of two faces, each face bends by
 
@@ -26,8 +26,8 @@ FLAT = 1e-3
 
 def curvature_jumps(
     vertices: FloatArray, triangles: IntArray, faces: IntArray, normals: FloatArray, level: NDArray[np.bool_]
-) -> bool:
-    """Whether the curvature jumps along some joint of two faces.
+) -> NDArray[np.bool_]:
+    """Edges (e,) of the joints of two faces along which the curvature jumps.
 
     Parameters
     ----------
@@ -39,8 +39,10 @@ def curvature_jumps(
     level : (e,) bool
         Edges, in the order of `scatterers.triangles.topology.edges_of`, at which faces join smoothly.
     """
+    jumps = np.zeros(len(level), dtype=bool)
     if not level.any():
-        return False
+        return jumps
+    at = np.flatnonzero(level)
     order = np.argsort(edges_of(triangles).number, kind="stable").reshape(-1, 2)[level]
     bends = np.stack([_bend(vertices, triangles, normals, side) for side in order.T], axis=1)
     sides = np.sort(faces[order // 3], axis=1)
@@ -53,8 +55,8 @@ def curvature_jumps(
         jump = abs(float(np.median(bends[mine, 0] - bends[mine, 1])))
         larger = float(np.median(np.abs(bends[mine]).max(axis=1)))
         if larger * float(np.median(length[mine])) > FLAT and jump > JUMP * larger:
-            return True
-    return False
+            jumps[at[mine]] = True
+    return jumps
 
 
 def _next(triangles: IntArray, corner: IntArray) -> IntArray:

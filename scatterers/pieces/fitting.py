@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.pieces.absorbed import absorbed
 from scatterers.pieces.crease import Crease
 from scatterers.pieces.curved import curved, divided
-from scatterers.pieces.patch import COARSER, SPACING, Patch, polynomial_patch, spline_patch
+from scatterers.pieces.patch import COARSER, SPACING, TIP, Patch, polynomial_patch, spline_patch, tip_of
 from scatterers.pieces.regions import Regions
 from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
+from scatterers.pieces.trust import astray, doubtful, rough
 from scatterers.spline.compared import curvatures
 from scatterers.spline.fitting import SMOOTHING, tangents
 from scatterers.spline.report import FitReport
@@ -35,20 +37,14 @@ GOOD = 0.7
 """Share of the vertices of a piece whose jets are sound, from which on jets are used."""
 EVEN, MOST_POINTS = 400, 6_000
 """Fewest points of a piece that is known from few vertices, and the most."""
-MISSED = 1e-4
-"""Distance in body sizes between a point and the level there, beyond which the level is not trusted about it."""
 JUMP = 0.1
 """Jump of the curvature across a joint, relative to the larger, below which it is none,"""
 NONE = 1e-6
 """and times the length of the joint, for parts of one plane."""
+AT_TIP = 2.0
+"""Sides of the nearest triangle within which the tip of a cone belongs to a piece: some meshes blunt it."""
 SHARE = 500
 """Triangles cut at a time."""
-ROUGH = 0.05
-"""Misfit, in spacings of the points, beyond which nothing of a piece is trusted."""
-FAR_OFF = 0.5
-"""Largest distance of its points from F = 0, in their spacings, that a piece may have."""
-SLOPES = (0.5, 1.6)
-"""|grad F| at the points: beyond, nothing of a piece is trusted either."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +65,8 @@ class FittedPieces:
     samples, owner : (k, 3), L, and (k,)
         Points spread over the body, and their pieces.
     astray : (j, 3), L
-        Those at which another piece stands for the body, that is not there: features are too fine for the voxels.
+        Points at which another piece stands for the body, that is not there: features are too fine for the voxels; and
+        vertices at which a fit turns away from the normals of its triangles or faces: it does not follow them.
     """
 
     fine: PieceSpace
@@ -140,34 +137,35 @@ def fitted_pieces(
         Outward at the corners of the triangles, where they are known; those of the triangles if not.
     """
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    piece = _parted(vertices, triangles, regions)
+    regions = absorbed(
+        vertices,
+        triangles,
+        regions,
+        lambda members: polynomial_patch(*_known(vertices, triangles, members, normals)[1:], size),
+        size,
+    )
+    piece = _parted(vertices, triangles, regions, normals, size)
     count = int(piece.max()) + 1
-    patches, at_corners = [], np.empty((len(triangles), 3, 3))
+    patches, at_corners, doubted = [], np.empty((len(triangles), 3, 3)), [np.zeros((0, 3))]
     for number in range(count):
         progress(f"piece {number + 1} of {count}")
         own = np.flatnonzero(piece == number)
-        patch, corner_normals = _patch(vertices, triangles, _grown(piece, number, regions), own, normals, size)
+        members = _grown(piece, number, regions)
+        patch, corner_normals = _patch(vertices, triangles, members, own, normals, size)
         patches.append(patch)
         at_corners[own] = corner_normals
+        local, x, n = _known(vertices, triangles, members, normals)
+        # at the border of the members normals are one-sided
+        inner = np.unique(local[np.isin(members, own)])
+        doubted.append(doubtful(patch, x[inner], n[inner]))
     points, owner = _spread(vertices[triangles], at_corners, piece)
     creases = tuple(_judged(crease, patches) for crease in regions.creases(vertices, piece))
+    creases += _tips(vertices, triangles, piece, patches)
     fine = piece_space([patch.fine for patch in patches], points, owner, creases)
     coarse = fine.with_splines([patch.coarse for patch in patches])
-    astray = _astray(fine, patches, points, owner, size)
-    rough = np.array([_rough(patch, points[owner == k], size) for k, patch in enumerate(patches)])
-    return FittedPieces(fine, coarse, tuple(patches), piece, at_corners, creases, rough, points, owner, astray)
-
-
-def _astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: IntArray, size: float) -> FloatArray:
-    """Points (k, 3) that the level of the body misses by more than `MISSED` of its size."""
-    number = space.numbers(points)
-    wrong = np.flatnonzero(number != owner)
-    missed = np.zeros(len(wrong))
-    for k in np.unique(number[wrong]):
-        mine = number[wrong] == k
-        value, gradient = patches[k].fine.value_and_gradient(points[wrong[mine]])
-        missed[mine] = np.abs(value) / np.linalg.norm(gradient, axis=1)
-    return np.asarray(points[wrong[missed > MISSED * size]])
+    lost = np.concatenate([astray(fine, patches, points, owner, size), *doubted])
+    untrusted = np.array([rough(patch, points[owner == k], size) for k, patch in enumerate(patches)])
+    return FittedPieces(fine, coarse, tuple(patches), piece, at_corners, creases, untrusted, points, owner, lost)
 
 
 def _judged(crease: Crease, patches: list[Patch]) -> Crease:
@@ -187,6 +185,21 @@ def _judged(crease: Crease, patches: list[Patch]) -> Crease:
     return replace(crease, kind="seam") if jump <= max(JUMP * largest, NONE / crease.length) else crease
 
 
+def _tips(vertices: FloatArray, triangles: IntArray, piece: IntArray, patches: list[Patch]) -> tuple[Crease, ...]:
+    """Tips of cones, where these are there: within the side of a triangle of a vertex."""
+    found = []
+    for number, patch in enumerate(patches):
+        tip = tip_of(patch)
+        if tip is None:
+            continue
+        corners = vertices[triangles[piece == number]]
+        nearest = int(np.argmin(np.min(np.linalg.norm(corners - tip, axis=2), axis=1)))
+        sides = np.linalg.norm(np.roll(corners[nearest], -1, axis=0) - corners[nearest], axis=1)
+        if np.min(np.linalg.norm(corners[nearest] - tip, axis=1)) < AT_TIP * sides.max():
+            found.append(Crease("tip", (number, number), tip[None]))
+    return tuple(found)
+
+
 def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[FloatArray, IntArray]:
     """Points (k, 3), L, all over the body, closer to each other than a voxel, and their pieces (k,)."""
     box = np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
@@ -204,8 +217,10 @@ def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[
     return np.concatenate(points), np.concatenate(owner)
 
 
-def _parted(vertices: FloatArray, triangles: IntArray, regions: Regions) -> IntArray:
-    """Piece of each triangle: its region, or a part of one that folds."""
+def _parted(
+    vertices: FloatArray, triangles: IntArray, regions: Regions, normals: FloatArray | None, size: float
+) -> IntArray:
+    """Piece of each triangle: its region, or a part of one that folds and is no quadric, which has both sides."""
     from scipy.spatial import cKDTree
 
     corners = vertices[triangles]
@@ -226,6 +241,7 @@ def _parted(vertices: FloatArray, triangles: IntArray, regions: Regions) -> IntA
             tree = cKDTree(np.einsum("kj,kjc->kc", place.mean(axis=1), corners[own][origin]))
             pairs = own[origin][tree.query_pairs(reach, output_type="ndarray")]
             folds = bool(np.any(np.sum(normal[pairs[:, 0]] * normal[pairs[:, 1]], axis=1) < 0))
+            folds = folds and polynomial_patch(*_known(vertices, triangles, own, normals)[1:], size) is None
         if not folds:
             piece[own] = count
             count += 1
@@ -275,6 +291,29 @@ def _spacing(corners: FloatArray) -> float:
     return float(np.median(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1)))
 
 
+def _known(
+    vertices: FloatArray, triangles: IntArray, members: IntArray, normals: FloatArray | None
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Triangles with these numbers by their own vertices (n, 3), these, and outward normals there."""
+    used, local = np.unique(triangles[members], return_inverse=True)
+    local = local.reshape(-1, 3)
+    x = vertices[used]
+    if normals is None:
+        return local, x, angle_weighted_normals(x, local)
+    n = np.zeros_like(x)
+    np.add.at(n, local.ravel(), normals[members].reshape(-1, 3))
+    return local, x, n / np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300)
+
+
+def _corner_normals(patch: Patch, corners: FloatArray) -> FloatArray:
+    """Normals of a plane or quadric at corners (m, 3, 3), those of the triangles at a tip."""
+    gradient = patch.fine.gradient(corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    slope = np.linalg.norm(gradient, axis=2, keepdims=True)
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    return np.where(slope > TIP * np.median(slope), gradient / np.maximum(slope, 1e-300), flat[:, None])
+
+
 def _patch(
     vertices: FloatArray,
     triangles: IntArray,
@@ -284,22 +323,12 @@ def _patch(
     size: float,
 ) -> tuple[Patch, FloatArray]:
     """F of a piece from its triangles and those next to it, and the normals at the corners of its own."""
-    used, local = np.unique(triangles[members], return_inverse=True)
-    local = local.reshape(-1, 3)
-    x = vertices[used]
-    if normals is None:
-        n = angle_weighted_normals(x, local)
-    else:
-        n = np.zeros_like(x)
-        np.add.at(n, local.ravel(), normals[members].reshape(-1, 3))
-        n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300)
+    local, x, n = _known(vertices, triangles, members, normals)
     corners = x[local]
     mine = np.isin(members, own)
     polynomial = polynomial_patch(x, n, size)
     if polynomial is not None:
-        gradient = polynomial.fine.gradient(corners[mine].reshape(-1, 3))
-        gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
-        return polynomial, gradient.reshape(-1, 3, 3)
+        return polynomial, _corner_normals(polynomial, corners[mine])
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     jets = _sound_jets(x, local, n, normals is not None)
     even = float(np.percentile(side, 90)) < 4 * float(np.percentile(side, 10))
@@ -327,19 +356,6 @@ def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray, exact: 
     corners = x[triangles]
     edge = float(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).mean())
     doubt = edge * np.abs(jets.principal4 - jets.principal).max(axis=1) / 3
-    astray = np.linalg.norm(jets.normals - normals, axis=1) > 0.5
-    sound = jets.fitted & (np.maximum(jets.tilt, doubt) < BAD) & ~astray
+    apart = np.linalg.norm(jets.normals - normals, axis=1) > 0.5
+    sound = jets.fitted & (np.maximum(jets.tilt, doubt) < BAD) & ~apart
     return jets if np.mean(sound) >= GOOD else None
-
-
-def _rough(patch: Patch, points: FloatArray, size: float) -> bool:
-    """Whether F of a patch is no distance at points of its piece, or misses them, or it is a speck of the body."""
-    if float(np.max(np.ptp(points, axis=0))) < MISSED * size:
-        return True
-    if patch.kind != "spline":
-        return False
-    value, gradient = patch.fine.value_and_gradient(points)
-    slope = np.linalg.norm(gradient, axis=1)
-    if patch.misfit > ROUGH * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1]:
-        return True
-    return bool(np.max(np.abs(value) / slope) > FAR_OFF * patch.spacing)

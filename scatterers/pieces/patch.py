@@ -29,6 +29,12 @@ EXACT = 1e-6
 CLOSE = 2e-4
 LEAN = 0.35
 """Angle between the normals of triangles and a quadric through their corners, radians."""
+SLIGHT, FEW = 0.1, 0.3
+"""Of the median slope of a quadric: with less, as next to the tip of a cone, it turns much within a triangle, and
+normals need only be on the same side; and the largest share of such points."""
+TIP = 1e-3
+"""Of the median slope: with less there is no normal to compare. Also the share of a piece's size by which the sheets of
+a cone may miss their tip."""
 ON = 1e4
 """Weight of points against normals, which those of triangles give roughly."""
 SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
@@ -131,18 +137,39 @@ def polynomial_through(
         lean = np.sum(g * normals, axis=1) / np.maximum(steep, 1e-300)
         if np.median(lean) < 0:
             f, g, lean, q = -f, -g, -lean, -q
-        off = np.abs(f) / np.maximum(steep, 1e-300) * half
+        bend = _bend(q, powers)
+        # the nearest point with Q = 0, of second order: next to the tip of a cone there is no slope to divide by
+        off = 2 * np.abs(f) / (steep + np.sqrt(steep**2 + 2 * bend * np.abs(f)) + 1e-300) * half
         # a quadric may be a pair of sheets, of which the points take one
-        curved = CLOSE * _bend(q, powers, steep) * half / 8 if kind == "quadric" else 0.0
-        if np.all(off <= max(tolerance, curved)) and np.all(lean > np.cos(LEAN)):
+        curved = CLOSE * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
+        slope = steep / np.median(steep)
+        least = np.select([slope > SLIGHT, slope > TIP], [np.cos(LEAN), 0.0], -1.0)
+        few = np.mean(slope <= SLIGHT) < FEW and np.sum(slope <= TIP) <= 1
+        if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and few:
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
     return None
 
 
-def _bend(q: FloatArray, powers: list[tuple[int, int, int]], steep: FloatArray) -> float:
-    """Median size of the second derivatives of Q over |grad Q|, in the variables of the monomials."""
+def tip_of(patch: Patch) -> FloatArray | None:
+    """The point (3,), L, at which a quadric has no slope, if it lies on it: the tip of a cone."""
+    if patch.kind != "quadric":
+        return None
+    spline = patch.fine
+    middle = spline.origin + 0.5 * spline.spacing
+    hessian = spline.hessian(middle[None])[0]
+    strength = np.abs(np.linalg.eigvalsh(hessian))
+    if strength.min() < TIP * strength.max():
+        return None
+    tip = np.asarray(middle - np.linalg.solve(hessian, spline.gradient(middle[None])[0]))
+    # Q = 0 is a cone or nearly one: its sheets come as near as that to the tip
+    gap = np.sqrt(2 * abs(float(spline.value(tip[None])[0])) / strength.max())
+    return tip if gap < TIP * float(spline.spacing[0]) else None
+
+
+def _bend(q: FloatArray, powers: list[tuple[int, int, int]]) -> float:
+    """Size of the second derivatives of Q, in the variables of the monomials."""
     second = np.array([[2.0 if 2 in p else 1.0] for p in powers]) * (np.sum(powers, axis=1) == 2)[:, None]
-    return float(np.linalg.norm(q[:, None] * second) / np.median(steep))
+    return float(np.linalg.norm(q[:, None] * second))
 
 
 def _monomials(x: FloatArray, powers: list[tuple[int, int, int]]) -> tuple[FloatArray, FloatArray]:

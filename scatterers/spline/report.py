@@ -57,6 +57,8 @@ class FitReport:
         return cls(**content | {"nodes": tuple(content["nodes"]), "slope": tuple(content["slope"])})
 
     def __str__(self) -> str:
+        if not self.spacing:
+            return f"fit: {self.points} points, all of planes and quadrics, which are exact"
         # a box has no curvature at all
         kappa = self.normal_curvature_error / (self.normal_curvature or 1.0)
         gauss = self.gaussian_curvature_error / (self.gaussian_curvature or 1.0)

@@ -86,10 +86,19 @@ def _proper(name: str, triangles: IntArray, note: Note) -> IntArray:
         note(f"{dropped} of {len(triangles)} triangles of {name} were degenerate (two equal corners); dropped")
     if not len(kept):
         return kept
-    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
-    if doubled := len(kept) - len(first):
-        note(f"{doubled} of {len(kept)} triangles of {name} were doubles of others; dropped")
-    return np.asarray(kept[np.sort(first)])
+    _, first, count = np.unique(np.sort(kept, axis=1), axis=0, return_index=True, return_counts=True)
+    if not (doubled := len(kept) - len(first)):
+        return np.asarray(kept)
+    note(f"{doubled} of {len(kept)} triangles of {name} were doubles of others; dropped")
+    order = np.argsort(first)
+    single = kept[first[order]]
+    # two triangles back to back are a flap on a closed surface: without either, each of its edges has two triangles
+    edges = edges_of(single)
+    flap = (count[order] > 1) & np.all(edges.faces[edges.number].reshape(-1, 3) % 2 == 1, axis=1)
+    if not flap.any() or flap.all():
+        return np.asarray(single)
+    note(f"{int(flap.sum())} flaps of two triangles back to back stood on {name}; dropped")
+    return np.asarray(single[~flap])
 
 
 def _close_gaps(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> tuple[FloatArray, IntArray]:

@@ -1,5 +1,6 @@
 """CAD bodies whose faces join smoothly while the curvature jumps: joints, and the side of each piece."""
 
+import json
 import subprocess
 import sys
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import scatterers as sc
+from creeping.commands import main as cli
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 
@@ -23,10 +25,16 @@ gmsh.write("filleted_box.step")
 """
 
 
-def test_a_box_with_all_edges_filleted_is_told_by_its_joints(tmp_path):
+@pytest.fixture(scope="module")
+def filleted(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cad")
+    subprocess.run([sys.executable, "-c", MAKER, str(folder)], check=True, capture_output=True)
+    return folder / "filleted_box.step"
+
+
+def test_a_box_with_all_edges_filleted_is_told_by_its_joints(filleted):
     """No edge, no bad vertex: the curvature jumps all over the mesh, so that jets see nothing odd."""
-    subprocess.run([sys.executable, "-c", MAKER, str(tmp_path)], check=True, capture_output=True)
-    path, r = tmp_path / "filleted_box.step", 6e-3
+    path, r = filleted, 6e-3
     body = sc.Cad(path, points=3000, cache=False)
     # 6 planes, 12 quarters of cylinders, 8 of balls; each of 24 + 24 joints a line or a quarter of a circle
     half, inner = np.array([30e-3, 20e-3, 15e-3]), np.array([24e-3, 14e-3, 9e-3])
@@ -46,5 +54,27 @@ def test_a_box_with_all_edges_filleted_is_told_by_its_joints(tmp_path):
     assert near.sum() > 500
     np.testing.assert_array_equal(body.level(x[near]) > 0, away[near] > 0)
     np.testing.assert_allclose(body.level(x[near]), away[near], atol=2e-6)
-    with pytest.raises(ValueError, match="not smooth enough: the curvature jumps where faces join"):
+    with pytest.raises(ValueError, match=r"not smooth enough \(curvature jumps\): the curvature jumps at \d+ of \d+ "):
         sc.Cad(path, points=10_000, strict=True, cache=False)
+
+
+def test_check_tells_of_joints_that_jets_do_not_see(filleted, capsys, tmp_path, monkeypatch):
+    """Verdict, vertices on joints and the pieces' kinds are those of the faces, whatever polynomials make of points."""
+    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))
+    texts = {}
+    for form in ([], ["--json"]):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["check", str(filleted), *form])
+        texts[bool(form)] = capsys.readouterr().out
+        assert ended.value.code == 0, texts
+    answer, told = json.loads(texts[True]), texts[False]
+    jumps, edge = answer["quality"]["jumps"], answer["quality"]["edge_mean"]
+    # 24 straight joints and 24 quarters of circles, 0.98 m in all, with a vertex to each edge
+    straight = 8 * (48e-3 + 28e-3 + 18e-3)
+    assert jumps == pytest.approx((straight + 24 * np.pi / 2 * 6e-3) / edge, rel=0.15)
+    assert answer["quality"]["verdict"] == "curvature jumps" and answer["quality"]["bad_share"] == 0
+    assert answer["pieces"] == 26 and [crease["kind"] for crease in answer["creases"]] == 48 * ["joint"]
+    assert (
+        "verdict                    curvature jumps" in told and f"curvature jumps at         {jumps} vertices" in told
+    )
+    assert "26 smooth pieces, 48 joints, area" in told and "all of planes and quadrics" in told
