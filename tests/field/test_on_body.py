@@ -96,7 +96,8 @@ def test_ground_without_rays_is_not_zero_in_silence(monkeypatch):
 
     u = cr.surface_field(fan, project(peanut, x), wavenumber=20.0, boundary="hard")
     bare = u == 0
-    assert bare.any() and not np.any(u.ok[bare]) and np.all(u.error[bare] == 1)
+    # a bound: the incident wave, and what a step of the equation would change
+    assert bare.any() and not np.any(u.ok[bare]) and np.all(u.error[bare] >= 1)
     short = fan_of(0.3)
     u = cr.surface_field(short, at([60.0, 170.0]), wavenumber=20.0, boundary="soft")
     assert u.status.tolist() == [FieldStatus.OK, FieldStatus.TRUNCATED] and u.error[1] == 20.0
@@ -129,7 +130,7 @@ def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
     import creeping.field.on_body as module
 
     class Unknown:
-        body, extinction = torus.body, float("nan")
+        body, extinction, solved = torus.body, float("nan"), False
 
         def thrown(self, points, normals):
             return np.zeros(len(points))
