@@ -2,7 +2,8 @@
 
     hard   u = 2 u_inc + 2 int u dG/dn_y dS,   soft   du/dn = 2 du_inc/dn - 2 int du/dn dG/dn_x dS
 
-at the nodes of lit ground, unknown, with the currents of rays as they are. Optics knows neither what other parts of the
+at the nodes of lit ground, unknown, with the currents of rays as they are; and at those of dark ground to which no ray
+comes, since part of the shadow line launches none. Optics knows neither what other parts of the
 body throw on a place, to and fro, nor that light which has just passed a hump is no plane wave behind it: there it is
 off by as much as the incident wave. On lit ground the equation is well posed and a few steps of GMRES solve it; dark
 ground, where waves creep and errors would spread with them, keeps its expansions.
@@ -14,10 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
+from scipy.spatial import cKDTree
 
-from creeping._typing import ComplexArray
+from creeping._typing import Any, ComplexArray
 from creeping.field.currents.second_kind import received, twice_incident
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.geometry.quadrature import body_nodes
 
 WINDOW = 0.8
 """Width of the window of `creeping.field.currents.second_kind`, over 1/k: some distances between nodes."""
@@ -25,6 +28,10 @@ MOST = 1e9
 """Pairs of a lit node and another up to which the equation is solved: some ten seconds of one core."""
 ENOUGH, STEPS = 0.02, 12
 """What is left of the first step's change, and steps at most."""
+AROUND, BARE = 1.5, 0.7
+"""Distance, over 1/k, within which nodes cover a place, and the share of its area below which that is bare."""
+DARK = -0.3
+"""n.d from which ground may be dark."""
 
 
 def solvable(currents: SurfaceCurrents) -> bool:
@@ -34,8 +41,9 @@ def solvable(currents: SurfaceCurrents) -> bool:
 
 
 def solved_on_lit_ground(currents: SurfaceCurrents) -> SurfaceCurrents:
-    """Currents of a soft or hard body whose lit nodes satisfy the equation, those of its rays unchanged."""
-    at = currents.lit
+    """Currents of a soft or hard body whose lit and bare nodes satisfy the equation, those of its rays unchanged."""
+    currents = with_bare_ground(currents)
+    at = currents.even
     points, normals, values = currents.points[at], currents.normals[at], currents.values[at]
     window = WINDOW / currents.wavenumber
     rest, own = received(currents, points, normals, window)
@@ -51,3 +59,32 @@ def solved_on_lit_ground(currents: SurfaceCurrents) -> SurfaceCurrents:
     found = currents.values.copy()
     found[at] = values + change
     return replace(currents, values=found, solved=True)
+
+
+def with_bare_ground(currents: SurfaceCurrents) -> SurfaceCurrents:
+    """The same with nodes, of no current yet, where the others leave dark ground out."""
+    k, d = currents.wavenumber, currents.direction
+    nodes = body_nodes(currents.body, 2 * k)
+    dark = np.flatnonzero(nodes.normals @ d > DARK)
+    if not len(dark):
+        return replace(currents, bare=np.zeros(len(currents.lit), dtype=bool))
+    all_of_it, present = cKDTree(nodes.points), cKDTree(currents.points)
+    around = [
+        np.array([weights[near].sum() for near in tree.query_ball_point(nodes.points[dark], AROUND / k)])
+        for tree, weights in ((present, currents.weights), (all_of_it, nodes.weights))
+    ]
+    covered = around[0] / around[1]
+    few = covered < BARE
+    at = dark[few]
+    nothing = np.zeros(len(at), dtype=currents.values.dtype)
+    more: dict[str, Any] = {
+        "points": nodes.points[at],
+        "normals": nodes.normals[at],
+        "weights": nodes.weights[at] * (1 - covered[few]),
+        "travel": np.broadcast_to(d, (len(at), 3)),
+        "values": nothing,
+        "change": nothing,
+        "lit": np.zeros(len(at), dtype=bool),
+    }
+    both: dict[str, Any] = {name: np.concatenate([getattr(currents, name), values]) for name, values in more.items()}
+    return replace(currents, **both, bare=np.arange(len(both["lit"])) >= len(currents.lit))

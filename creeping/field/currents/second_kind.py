@@ -120,7 +120,7 @@ def received(
     double = currents.weights * currents.values / (4 * np.pi)
     both = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (1j * k * ours * double, double)]
     x, n, y, sides = (np.ascontiguousarray(part.T) for part in (points, normals, currents.points, currents.normals))
-    of_nodes = y, sides, currents.weights, currents.mean_curvature, currents.lit, *both
+    of_nodes = y, sides, currents.weights, currents.mean_curvature, currents.even, *both
     out = np.empty((len(points), 6))
 
     def work(part: slice) -> None:

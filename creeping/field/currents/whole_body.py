@@ -85,7 +85,9 @@ class SurfaceCurrents:
     wavenumber : float, 1/L
     boundary : Boundary
     solved : bool
-        Whether lit nodes satisfy the integral equation (`creeping.field.currents.lit_solution`).
+        Whether lit and bare nodes satisfy the integral equation (`creeping.field.currents.lit_solution`).
+    bare : (n,) of bool, optional
+        Dark ground to which no ray comes.
 
     Examples
     --------
@@ -114,6 +116,7 @@ class SurfaceCurrents:
     wavenumber: float
     boundary: Boundary
     solved: bool = False
+    bare: BoolArray | None = None
     _factors: ClassVar[tuple[float, float]] = (2.5, 2.0)
     """Factors of the error: of what all directions share, and of what the second order says of each."""
 
@@ -126,9 +129,15 @@ class SurfaceCurrents:
 
     def part(self, which: BoolArray) -> SurfaceCurrents:
         """Currents of some of the nodes (n,) alone."""
-        names = ("points", "normals", "weights", "travel", "values", "change", "lit")
+        names = ["points", "normals", "weights", "travel", "values", "change", "lit"]
+        names += ["bare"] if self.bare is not None else []
         found: SurfaceCurrents = replace(self, **{name: getattr(self, name)[which] for name in names})
         return found
+
+    @property
+    def even(self) -> BoolArray:
+        """Nodes whose current is one function of place (n,); to a place on rays several may come."""
+        return self.lit if self.bare is None else self.lit | self.bare
 
     def far(self, directions: ArrayLike) -> ComplexArray:
         """Far-field amplitude f, L, in directions (m, 3): (m,)."""

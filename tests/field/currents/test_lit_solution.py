@@ -8,7 +8,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.currents import lit_solution
-from creeping.field.currents.lit_solution import WINDOW, solved_on_lit_ground
+from creeping.field.currents.lit_solution import WINDOW, solved_on_lit_ground, with_bare_ground
 from creeping.field.currents.second_kind import received, twice_incident
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.quadrature import body_nodes
@@ -52,14 +52,27 @@ def test_what_would_take_too_long_has_one_bounce(monkeypatch):
     assert not bounced.solved
     monkeypatch.undo()
     solved = solved_on_lit_ground(bounced)
-    rays = ~bounced.lit
+    rays = np.flatnonzero(~bounced.lit)
     np.testing.assert_array_equal(solved.values[rays], bounced.values[rays])
     # the step that is left is small against what was changed
-    points, normals = solved.points[solved.lit], solved.normals[solved.lit]
+    points, normals, values = solved.points[solved.even], solved.normals[solved.even], solved.values[solved.even]
     rest, own = received(solved, points, normals, WINDOW / 8.0)
-    left = twice_incident(solved, points, normals) + rest + (own - 1) * solved.values[solved.lit]
-    changed = np.linalg.norm(solved.values - bounced.values)
+    left = twice_incident(solved, points, normals) + rest + (own - 1) * values
+    changed = np.linalg.norm(values[: bounced.lit.sum()] - bounced.values[bounced.lit])
     assert 0 < np.linalg.norm(left) < 0.05 * changed
+
+
+def test_dark_ground_to_which_no_ray_comes_has_nodes(monkeypatch):
+    fan = fan_on(sc.TwistedEllipsoid(), (0.3, 0.2, 0.9), 8.0)
+    monkeypatch.setattr(lit_solution, "MOST", 1.0)
+    currents = cr.surface_currents(fan, wavenumber=8.0, boundary="hard")
+    whole = with_bare_ground(currents)
+    assert currents.unserved > 0.1 and np.sum(whole.bare) > 300 and not np.any(whole.bare & whole.lit)
+    # dark, and no nearer to other nodes than these are to each other but at its edge
+    assert np.all(whole.normals[whole.bare] @ fan.line.direction > -0.3)
+    area = body_nodes(fan.body, 16.0).weights.sum()
+    assert 0.005 * area < whole.weights[whole.bare].sum() < 0.1 * area
+    np.testing.assert_array_equal(whole.values[whole.bare], 0.0)
 
 
 @pytest.mark.slow
