@@ -15,7 +15,6 @@ from creeping.field.currents.nodes import lit_nodes, ray_nodes
 from creeping.field.currents.waves import lit_waves, ray_waves
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.geometry.arguments import one_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
@@ -91,11 +90,11 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         wavenumber=k,
         boundary=kind,
     )
-    if kind.kind not in ("soft", "hard", "conductor") or not (faces_itself(lit) or currents.unserved > CUT):
-        return currents
-    if solvable(currents) and not is_creased(fan.body):
+    facing = faces_itself(lit)
+    if (facing or currents.unserved > CUT) and solvable(currents):
         return solved_on_lit_ground(currents)
-    values[currents.lit] += currents.thrown(lit.points, lit.normals)
+    if facing and kind.kind in ("soft", "hard", "conductor"):
+        values[currents.lit] += currents.thrown(lit.points, lit.normals)
     return currents
 
 

@@ -1,12 +1,13 @@
 """Currents of lit ground that faces other parts of a body, or lies behind a dip: the integral equation, solved there.
 
-    hard   u = 2 u_inc + 2 int u dG/dn_y dS,   soft   du/dn = 2 du_inc/dn - 2 int du/dn dG/dn_x dS
+    (1 - K_ee) u_e = 2 u_inc + K_er u_r
 
-at the nodes of lit ground, unknown, with the currents of rays as they are; and at those of dark ground to which no ray
-comes, since part of the shadow line launches none. Optics knows neither what other parts of the
-body throw on a place, to and fro, nor that light which has just passed a hump is no plane wave behind it: there it is
-off by as much as the incident wave. On lit ground the equation is well posed and a few steps of GMRES solve it; dark
-ground, where waves creep and errors would spread with them, keeps its expansions.
+u_e at the nodes of lit ground, and of dark ground to which no ray comes since part of the shadow line launches none;
+u_r at those of rays, as they are; K the sums of `creeping.field.currents.second_kind`, du/dn for u of a soft body.
+Optics knows neither what other parts of the body throw on a place, to and fro, nor that light which has just passed a
+hump is no plane wave behind it: there it is off by as much as the incident wave. On lit ground the equation is well
+posed and a few steps of GMRES solve it; dark ground with rays, where waves creep and errors would spread with them,
+keeps its expansions.
 
 Sources: [SS86]; Derivations, F32.
 """
@@ -15,29 +16,30 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
-from scipy.spatial import cKDTree
 
-from creeping._typing import Any, ComplexArray
-from creeping.field.currents.second_kind import received, twice_incident
+from creeping._typing import Any, ComplexArray, FloatArray
+from creeping.field.currents.second_kind import NodeSums, twice_incident
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.geometry.creased import is_creased
 from creeping.geometry.quadrature import body_nodes
+from creeping.kernels.threads import in_threads
 
-WINDOW = 0.8
-"""Width of the window of `creeping.field.currents.second_kind`, over 1/k: some distances between nodes."""
+WINDOW, APART = 0.8, 3.0
+"""Width of the window of `creeping.field.currents.second_kind`, over 1/k and, at most, over the spacing of nodes."""
 MOST = 1e9
 """Pairs of a lit node and another up to which the equation is solved: some ten seconds of one core."""
 ENOUGH, STEPS = 0.02, 12
 """What is left of the first step's change, and steps at most."""
 AROUND, BARE = 1.5, 0.7
 """Distance, over 1/k, within which nodes cover a place, and the share of its area below which that is bare."""
-DARK = -0.3
-"""n.d from which ground may be dark."""
+EACH = 6e-10
+"""Seconds of one pair when areas are added up, about."""
 
 
 def solvable(currents: SurfaceCurrents) -> bool:
-    """Whether the equation of lit ground costs little enough."""
-    lit = int(currents.lit.sum())
-    return currents.boundary.kind in ("soft", "hard") and 0 < lit * len(currents.lit) <= MOST
+    """Whether the equation of lit ground is that of the body, without joints, and costs little enough."""
+    pairs = int(currents.lit.sum()) * len(currents.lit)
+    return currents.boundary.kind in ("soft", "hard") and not is_creased(currents.body) and 0 < pairs <= MOST
 
 
 def solved_on_lit_ground(currents: SurfaceCurrents) -> SurfaceCurrents:
@@ -45,13 +47,13 @@ def solved_on_lit_ground(currents: SurfaceCurrents) -> SurfaceCurrents:
     currents = with_bare_ground(currents)
     at = currents.even
     points, normals, values = currents.points[at], currents.normals[at], currents.values[at]
-    window = WINDOW / currents.wavenumber
-    rest, own = received(currents, points, normals, window)
+    window = min(WINDOW / currents.wavenumber, APART * body_nodes(currents.body, 2 * currents.wavenumber).spacing)
+    rest, own = NodeSums(currents, points, normals, window).of(currents.values)
     wrong = twice_incident(currents, points, normals) + rest + (own - 1) * values
-    part = currents.part(at)
+    sums = NodeSums(currents.part(at), points, normals, window)
 
     def left_side(change: ComplexArray) -> ComplexArray:
-        return np.asarray((1 - own) * change - received(replace(part, values=change), points, normals, window)[0])
+        return np.asarray((1 - own) * change - sums.of(change)[0])
 
     count = len(values)
     operator = LinearOperator((count, count), matvec=left_side, dtype=complex)
@@ -62,29 +64,34 @@ def solved_on_lit_ground(currents: SurfaceCurrents) -> SurfaceCurrents:
 
 
 def with_bare_ground(currents: SurfaceCurrents) -> SurfaceCurrents:
-    """The same with nodes, of no current yet, where the others leave dark ground out."""
-    k, d = currents.wavenumber, currents.direction
-    nodes = body_nodes(currents.body, 2 * k)
-    dark = np.flatnonzero(nodes.normals @ d > DARK)
-    if not len(dark):
-        return replace(currents, bare=np.zeros(len(currents.lit), dtype=bool))
-    all_of_it, present = cKDTree(nodes.points), cKDTree(currents.points)
-    around = [
-        np.array([weights[near].sum() for near in tree.query_ball_point(nodes.points[dark], AROUND / k)])
-        for tree, weights in ((present, currents.weights), (all_of_it, nodes.weights))
-    ]
-    covered = around[0] / around[1]
-    few = covered < BARE
-    at = dark[few]
-    nothing = np.zeros(len(at), dtype=currents.values.dtype)
+    """The same with nodes, of no current yet, where the others leave ground out: dark, or hidden by other parts."""
+    nodes, reach = body_nodes(currents.body, 2 * currents.wavenumber), AROUND / currents.wavenumber
+    covered = _area(nodes.points, currents.points, currents.weights, reach)
+    covered /= _area(nodes.points, nodes.points, nodes.weights, reach)
+    at = covered < BARE
+    nothing = np.zeros(int(at.sum()), dtype=currents.values.dtype)
     more: dict[str, Any] = {
         "points": nodes.points[at],
         "normals": nodes.normals[at],
-        "weights": nodes.weights[at] * (1 - covered[few]),
-        "travel": np.broadcast_to(d, (len(at), 3)),
+        "weights": nodes.weights[at] * (1 - covered[at]),
+        "travel": np.broadcast_to(currents.direction, (len(nothing), 3)),
         "values": nothing,
         "change": nothing,
-        "lit": np.zeros(len(at), dtype=bool),
+        "lit": np.zeros(len(nothing), dtype=bool),
     }
     both: dict[str, Any] = {name: np.concatenate([getattr(currents, name), values]) for name, values in more.items()}
     return replace(currents, **both, bare=np.arange(len(both["lit"])) >= len(currents.lit))
+
+
+def _area(points: FloatArray, nodes: FloatArray, weights: FloatArray, reach: float) -> FloatArray:
+    """Area (m,), L^2, that the nodes (n, 3) within ``reach`` of points (m, 3) stand for."""
+    from creeping.field.kernels.second_kind import area_within
+
+    x, y = np.ascontiguousarray(points.T), np.ascontiguousarray(nodes.T)
+    out = np.empty(len(points))
+
+    def work(part: slice) -> None:
+        area_within(x, y, weights, reach, part.start, part.stop, out)
+
+    in_threads(work, len(points), least=64, multiple=1, seconds=EACH * len(nodes))
+    return out

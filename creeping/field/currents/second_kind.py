@@ -1,22 +1,22 @@
-"""Lit ground next to joints: one step of the integral equation from the currents of the whole body.
+"""The integral equation of the second kind on a body's surface, and one step of it from the currents of the body.
 
     hard        u = 2 u_inc + 2 int u dG/dn_y dS_y
     soft        du/dn = 2 du_inc/dn - 2 int du/dn dG/dn_x dS_y
     impedance   (1 + eta/c) u = 2 u_inc + 2 int u (dG/dn_y + ik eta_y G) dS_y + (eta/c) u,   c = -n.d
 
-The expansions of lit ground know its curvature at a place and no more; where it jumps the true field passes from one to
-the other over the paths by which waves come from either side. The right side, with the expansions in it, holds these
-waves. On lit ground a step makes what is wrong smaller, by what a wave that grazes less than c suffers from one place
-to the next, kappa/(k c^3); behind the line it does not, and there rays serve. What an impedance does to a plane mirror,
-(eta/c) u, stands on the left too: it is not small.
+The expansions of lit ground know its curvature at a place and no more; where it jumps, at a joint, the true field
+passes from one to the other over the paths by which waves come from either side. The right side, with the expansions
+in it, holds these waves. On lit ground a step makes what is wrong smaller, by what a wave that grazes less than c
+suffers from one place to the next, kappa/(k c^3); behind the line it does not, and there rays serve. What an impedance
+does to a plane mirror, (eta/c) u, stands on the left too: it is not small.
 
-Next to x the integrals are weakly singular. With chi = e^{-(R/a)^2}, a = 2/k, kappa = (kappa_1 + kappa_2)/2,
+Next to x the integrals are weakly singular. With chi = e^{-(R/a)^2}, a some 1/k, kappa = (kappa_1 + kappa_2)/2,
 
     int chi dG_0/dn dS = -(sqrt(pi)/8) a kappa,   int chi G_0 dS = (sqrt(pi)/4) a
 
 are taken off from the sums over nodes, with the current at x, and put back.
 
-Source: Derivations, F30.
+Source: Derivations, F30 and F32.
 """
 
 from dataclasses import replace
@@ -85,7 +85,7 @@ def _everywhere(currents: SurfaceCurrents, unit: float) -> float:
 
 def stepped(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, values: ComplexArray) -> ComplexArray:
     """Field u, or du/dn if soft, at points of the body with normals (m, 3) by one step from ``values`` (m,)."""
-    rest, own = received(currents, points, normals, NEAR / currents.wavenumber)
+    rest, own = NodeSums(currents, points, normals, NEAR / currents.wavenumber).of(currents.values)
     wave = twice_incident(currents, points, normals)
     if currents.boundary.kind == "soft":
         return wave + rest + own * values
@@ -101,35 +101,49 @@ def twice_incident(currents: SurfaceCurrents, points: FloatArray, normals: Float
     return np.asarray(1j * k * (normals @ d) * wave if currents.boundary.kind == "soft" else wave)
 
 
-def received(
-    currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: float
-) -> tuple[ComplexArray, ComplexArray]:
-    """What points with normals (m, 3) receive of the currents, but for a share of their own; and that share: (m,) each.
+class NodeSums:
+    """The sums over nodes of currents at points of the body with normals (m, 3), for any values at the nodes.
 
-    ``window`` is a, L.
+    Parameters
+    ----------
+    currents : SurfaceCurrents
+        Whose nodes, not values, are taken.
+    points, normals : (m, 3), L and 1
+    window : float, L
+        The width a.
     """
-    from creeping.field.kernels.second_kind import from_nodes
 
-    k, kind, a = currents.wavenumber, currents.boundary, window
-    soft = kind.kind == "soft"
-    eta, ours = (
-        np.zeros(len(x)) if soft else np.broadcast_to(kind.at(x).admittance, (len(x),))
-        for x in (points, currents.points)
-    )
-    # of the sums, at nodes
-    double = currents.weights * currents.values / (4 * np.pi)
-    both = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (1j * k * ours * double, double)]
-    x, n, y, sides = (np.ascontiguousarray(part.T) for part in (points, normals, currents.points, currents.normals))
-    of_nodes = y, sides, currents.weights, currents.mean_curvature, currents.even, *both
-    out = np.empty((len(points), 6))
+    def __init__(self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: float) -> None:
+        self.k, kind, self.window = currents.wavenumber, currents.boundary, window
+        self.soft = kind.kind == "soft"
+        self._eta, ours = (
+            np.zeros(len(x)) if self.soft else np.broadcast_to(kind.at(x).admittance, (len(x),))
+            for x in (points, currents.points)
+        )
+        self._double = currents.weights / (4 * np.pi)
+        self._single = 1j * self.k * ours * self._double
+        self._points = [np.ascontiguousarray(part.T) for part in (points, normals)]
+        places = [np.ascontiguousarray(part.T) for part in (currents.points, currents.normals)]
+        self._nodes = *places, currents.weights, currents.mean_curvature, currents.even
 
-    def work(part: slice) -> None:
-        from_nodes(x, n, *of_nodes, k, a, NEIGHBOURS * a, soft, part.start, part.stop, out)
+    def of(self, values: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """What the points receive of values (n,) at the nodes, but for a share of their own; and that share: (m,)."""
+        from creeping.field.kernels.second_kind import from_nodes
 
-    in_threads(work, len(points), least=16, multiple=1, seconds=EACH * len(double))
-    real, imaginary, area, bent, still, tilted = out.T
-    cover, bend = area / (np.pi * a**2), bent / (np.pi * a**2)
-    sign, root = 1 if soft else -1, np.sqrt(np.pi) * a
-    taken_off = (1j * k * eta * still + tilted) / (4 * np.pi)
-    put_back = 1j * k * eta * cover * root / 4 + sign * bend * root / 8
-    return 2 * (real + 1j * imaginary), np.asarray(2 * (put_back - taken_off))
+        k, a, soft = self.k, self.window, self.soft
+        both = [
+            np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (self._single * values, self._double * values)
+        ]
+        out = np.empty((len(self._eta), 6))
+
+        def work(part: slice) -> None:
+            given = (*self._points, *self._nodes, *both, k, a, NEIGHBOURS * a, soft)
+            from_nodes(*given, part.start, part.stop, out)
+
+        in_threads(work, len(out), least=16, multiple=1, seconds=EACH * len(values))
+        real, imaginary, area, bent, still, tilted = out.T
+        cover, bend = area / (np.pi * a**2), bent / (np.pi * a**2)
+        sign, root = 1 if soft else -1, np.sqrt(np.pi) * a
+        taken_off = (1j * k * self._eta * still + tilted) / (4 * np.pi)
+        put_back = 1j * k * self._eta * cover * root / 4 + sign * bend * root / 8
+        return 2 * (real + 1j * imaginary), np.asarray(2 * (put_back - taken_off))

@@ -74,3 +74,14 @@ def from_nodes(x, normals, y, sides, weights, bends, alike, single, double, k, r
             still += chi * inverse
             tilted += chi * inverse * inverse * lean
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = p, q, area, bent, still, tilted
+
+
+@njit(**entry_options)
+def area_within(x, y, weights, reach, first, last, out):
+    """Fill rows first..last of out (m,): the weights (n,) of nodes y (3, n) within ``reach`` of points x, added up."""
+    for j in range(first, last):
+        total = 0.0
+        for i in range(y.shape[1]):
+            dx, dy, dz = x[0, j] - y[0, i], x[1, j] - y[1, i], x[2, j] - y[2, i]
+            total += weights[i] if dx * dx + dy * dy + dz * dz <= reach * reach else 0.0
+        out[j] = total

@@ -9,7 +9,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.field.currents import lit_solution
 from creeping.field.currents.lit_solution import WINDOW, solved_on_lit_ground, with_bare_ground
-from creeping.field.currents.second_kind import received, twice_incident
+from creeping.field.currents.second_kind import NodeSums, twice_incident
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.quadrature import body_nodes
 from studies.field_coverage import bodies
@@ -35,7 +35,7 @@ def test_exact_currents_satisfy_the_equation(kind):
     whole = replace(currents, **places, values=exact, change=exact, lit=np.ones(len(exact), dtype=bool))
     at = np.arange(0, len(exact), 7)
     points, normals = nodes.points[at], nodes.normals[at]
-    rest, own = received(whole, points, normals, WINDOW / K)
+    rest, own = NodeSums(whole, points, normals, WINDOW / K).of(exact)
     gap = twice_incident(whole, points, normals) + rest + (own - 1) * exact[at]
     assert np.sqrt(np.mean(np.abs(gap) ** 2)) < 0.015 * np.abs(exact[at]).max()
 
@@ -56,7 +56,7 @@ def test_what_would_take_too_long_has_one_bounce(monkeypatch):
     np.testing.assert_array_equal(solved.values[rays], bounced.values[rays])
     # the step that is left is small against what was changed
     points, normals, values = solved.points[solved.even], solved.normals[solved.even], solved.values[solved.even]
-    rest, own = received(solved, points, normals, WINDOW / 8.0)
+    rest, own = NodeSums(solved, points, normals, WINDOW / 8.0).of(solved.values)
     left = twice_incident(solved, points, normals) + rest + (own - 1) * values
     changed = np.linalg.norm(values[: bounced.lit.sum()] - bounced.values[bounced.lit])
     assert 0 < np.linalg.norm(left) < 0.05 * changed
@@ -73,6 +73,18 @@ def test_dark_ground_to_which_no_ray_comes_has_nodes(monkeypatch):
     area = body_nodes(fan.body, 16.0).weights.sum()
     assert 0.005 * area < whole.weights[whole.bare].sum() < 0.1 * area
     np.testing.assert_array_equal(whole.values[whole.bare], 0.0)
+
+
+@pytest.mark.slow
+def test_the_body_times_s_has_the_field_of_k_over_s():
+    def of(s):
+        text = f"((x/{s})**2 + (y/{s})**2 + (z/{s})**2 + 0.64)**2 - 2.56*(x/{s})**2 - 0.9**4"
+        fan = fan_on(sc.Implicit(text, bounds=[[-1.4 * s] * 3, [1.4 * s] * 3]), (0.2, 0.9, 0.4), 8.0 / s)
+        return cr.far_field(fan, fibonacci_directions(20), wavenumber=8.0 / s, boundary="soft", method="currents")
+
+    one, other = of(1.0), of(1000.0)
+    np.testing.assert_allclose(other.total / 1000, one.total, rtol=0, atol=1e-6 * np.abs(one.total).max())
+    np.testing.assert_allclose(other.error / 1000, one.error, rtol=1e-4)
 
 
 @pytest.mark.slow
