@@ -2,13 +2,13 @@
 
 import importlib.util
 import os
-import subprocess
 import sys
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cad_files import made
 
 import creeping as cr
 import scatterers as sc
@@ -19,19 +19,7 @@ from scatterers.triangles.choice import Choice
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 
-# gmsh keeps its state in the library, hence a process of its own
 MAKER = """
-import os, sys, gmsh
-os.chdir(sys.argv[1])
-gmsh.initialize(readConfigFiles=False, interruptible=False)
-gmsh.option.setNumber("General.Terminal", 0)
-make = gmsh.model.occ
-def write(*names):
-    make.synchronize()
-    for name in names:
-        gmsh.write(name)
-    gmsh.model.remove()
-    gmsh.model.add("next")
 ball = make.addSphere(0, 0, 0, 1)
 make.dilate([(3, ball)], 0, 0, 0, 1.2, 0.8, 0.8)
 write("ellipsoid.brep")
@@ -74,10 +62,7 @@ CLOSED = ("ellipsoid.step", "ellipsoid.brep", "torus.step")
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("cad")
-    done = subprocess.run([sys.executable, "-c", MAKER, str(folder)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return folder
+    return made(tmp_path_factory.mktemp("cad"), MAKER)
 
 
 def read(path, units, points):

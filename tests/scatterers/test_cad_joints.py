@@ -1,35 +1,25 @@
 """CAD bodies whose faces join smoothly while the curvature jumps: joints, and the side of each piece."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from cad_files import made
 
 import scatterers as sc
 from creeping.commands import main as cli
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 
-# gmsh keeps its state in the library, hence a process of its own
 MAKER = """
-import os, sys, gmsh
-os.chdir(sys.argv[1])
-gmsh.initialize(readConfigFiles=False, interruptible=False)
-gmsh.option.setNumber("General.Terminal", 0)
-make = gmsh.model.occ
 make.fillet([make.addBox(0, 0, 0, 60, 40, 30)], list(range(1, 13)), [6.0])
-make.synchronize()
-gmsh.write("filleted_box.step")
+write("filleted_box.step")
 """
 
 
 @pytest.fixture(scope="module")
 def filleted(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("cad")
-    subprocess.run([sys.executable, "-c", MAKER, str(folder)], check=True, capture_output=True)
-    return folder / "filleted_box.step"
+    return made(tmp_path_factory.mktemp("cad"), MAKER) / "filleted_box.step"
 
 
 def test_a_box_with_all_edges_filleted_is_told_by_its_joints(filleted):
