@@ -4,6 +4,7 @@ from creeping._typing import Any
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.frequency import frequency as hertz_of
+from creeping.field.frequency import suited
 from creeping.field.frequency import wavenumber as wavenumber_of
 
 
@@ -15,7 +16,7 @@ def frequency_words(hertz: float) -> str:
     >>> frequency_words(1e10), frequency_words(38e3), frequency_words(0.5)
     ('10 GHz', '38 kHz', '0.5 Hz')
     """
-    scale, name = next((one for one in ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz")) if hertz >= one[0]), (1.0, "Hz"))
+    scale, name = suited(hertz)
     return f"{hertz / scale:.6g} {name}"
 
 

@@ -7,9 +7,7 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.explorer.request import ViewRequest
 from creeping.field.decibels import cross_section_decibels, decibels
-from creeping.field.frequency import frequency
-
-PREFIXES = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (0.0, "Hz"))
+from creeping.field.frequency import frequency, suited
 
 
 class WaveScale(NamedTuple):
@@ -23,18 +21,18 @@ def wave_scale(request: ViewRequest) -> WaveScale:
     """Wavenumber in 1/L, or of a body in metres the frequency in the unit that suits the request's."""
     if not request.metres:
         return WaveScale("wavenumber (1/L)", 1.0)
-    hertz, unit = _hertz(request)
+    hertz, size, unit = _hertz(request)
     # one hertz is so much of k
-    return WaveScale(f"frequency ({unit})", request.wavenumber / (hertz / _factor(unit)))
+    return WaveScale(f"frequency ({unit})", request.wavenumber / (hertz / size))
 
 
 def wave_text(request: ViewRequest) -> str:
     """The wave in words."""
     if not request.metres:
         return f"k = {request.wavenumber:g} 1/L"
-    hertz, unit = _hertz(request)
+    hertz, size, unit = _hertz(request)
     return (
-        f"{hertz / _factor(unit):.4g} {unit}, wavelength {2 * np.pi / request.wavenumber:.3g} m, "
+        f"{hertz / size:.4g} {unit}, wavelength {2 * np.pi / request.wavenumber:.3g} m, "
         f"k = {request.wavenumber:.4g} 1/m"
     )
 
@@ -51,10 +49,7 @@ def far_name(request: ViewRequest) -> str:
     return "4π|f|² (dBsm)" if request.metres else "4π|f|² (dB re L²)"
 
 
-def _hertz(request: ViewRequest) -> tuple[float, str]:
+def _hertz(request: ViewRequest) -> tuple[float, float, str]:
+    """Frequency, and the size and the name of the unit that suits it."""
     hertz = float(frequency(request.wavenumber, sound_speed=request.sound_speed))
-    return hertz, next(unit for least, unit in PREFIXES if hertz * (1 + 1e-9) >= least)
-
-
-def _factor(unit: str) -> float:
-    return next(factor or 1.0 for factor, name in PREFIXES if name == unit)
+    return hertz, *suited(hertz)

@@ -21,6 +21,8 @@ HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "thz": 1e12}
 """Units of frequency by their names in small letters, 1/s."""
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 """Units of wavelength, m."""
+UNITS = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
+"""Units in which frequencies are shown, the largest first."""
 MOST = 100_000
 """Frequencies of one range."""
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -92,6 +94,17 @@ def frequency(wavenumber: ArrayLike, *, sound_speed: float | None = None) -> flo
     """
     found = _positive(wavenumber, "wavenumber") * _speed(sound_speed) / (2 * np.pi)
     return float(found) if found.ndim == 0 else np.asarray(found)
+
+
+def suited(value: float, units: tuple[tuple[float, str], ...] = UNITS) -> tuple[float, str]:
+    """Size and name of the largest unit that a value reaches; of the smallest if it reaches none.
+
+    Examples
+    --------
+    >>> suited(38e3), suited(0.5)
+    ((1000.0, 'kHz'), (1.0, 'Hz'))
+    """
+    return next((unit for unit in units if value * (1 + 1e-9) >= unit[0]), units[-1])
 
 
 def _speed(sound_speed: float | None) -> float:

@@ -106,7 +106,7 @@ def of_far(far: "FarField") -> Facts:
         angles = np.degrees(angles_of(far.directions))
         yield "theta", _range(angles[:, 0], "degrees")
         yield "phi", _range(angles[:, 1], "degrees")
-    yield "wavenumber", f"{far.wavenumber:g} 1/{far.unit} (wavelength {2 * np.pi / far.wavenumber:.6g} {far.unit})"
+    yield "wavenumber", wave_words(far.wavenumber, far.unit)
     yield "boundary", far.boundary
     yield "order", str(far.order)
     if total.ndim == 3:
@@ -127,10 +127,7 @@ def of_points(field: "PointData") -> Facts:
     """Facts of a near or surface field."""
     unit = field.length_unit
     yield "points", " x ".join(map(str, field.points.shape[:-1])) or "1"
-    yield (
-        "wavenumber",
-        f"{field.wavenumber:g} 1/{unit} (wavelength {2 * np.pi / field.wavenumber:.6g} {unit})",
-    )
+    yield "wavenumber", wave_words(field.wavenumber, unit)
     yield "boundary", field.boundary
     yield "order", str(field.order)
     for name, count in sorted(Counter(field.method.ravel().tolist()).items()):
@@ -187,6 +184,11 @@ def _wave(source: Incident) -> tuple[str, str]:
     if isinstance(source, PointSource):
         return "source at", _direction(np.array(source.position))
     return "direction", _direction(np.array(source.direction))
+
+
+def wave_words(wavenumber: float, unit: str) -> str:
+    """A wavenumber and its wavelength, lengths in ``unit``."""
+    return f"{wavenumber:g} 1/{unit} (wavelength {2 * np.pi / wavenumber:.6g} {unit})"
 
 
 def _direction(d: FloatArray) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from creeping._presenting import brief
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.plotting._facts import Facts
+from creeping.plotting._facts import Facts, wave_words
 
 if TYPE_CHECKING:
     from creeping.field.coupling_result import Coupling
@@ -72,8 +72,7 @@ def of_echo(found: "Echo") -> Facts:
 
 
 def _wave(found: Any) -> Facts:
-    unit, k = found.length_unit, found.wavenumber
-    yield "wavenumber", f"{k:g} 1/{unit} (wavelength {2 * np.pi / k:.6g} {unit})"
+    yield "wavenumber", wave_words(found.wavenumber, found.length_unit)
     yield "boundary", found.boundary
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import shown_range
+from creeping.field.frequency import suited
 from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.far_cuts import Curve, draw_cut, dressed, minus
 from creeping.plotting.palette import GREY, curve_style
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from creeping.field.echo import Echo
     from creeping.field.slant_range import RangeProfile
 
-PREFIXES = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
 SPAN = 60.0
 """Range of levels, dB."""
 VEIL = 0.7
@@ -59,11 +59,7 @@ def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
     curves = _curves(echo, (slice(None), 0))
     heights = shown_range([curve.levels for curve in curves], span)
     curves = _told_if_low(curves, heights[0])
-    draw_cut(ax, np.radians(echo.angles), curves, heights, quantity="rcs", angle_name=echo.angle_name, unit="m")
-    if ax.name == "polar":
-        ax.set_xlabel(f"{echo.angle_name}; rings: {_level(echo)}", fontsize=9)
-    else:
-        ax.set_ylabel(_level(echo), fontsize=9)
+    draw_cut(ax, np.radians(echo.angles), curves, heights, level=_level(echo), angle_name=echo.angle_name)
 
 
 def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
@@ -82,7 +78,7 @@ def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
     curves = _curves(echo, (0, slice(None)))
     low, high = shown_range([curve.levels for curve in curves], span)
     curves = _told_if_low(curves, low)
-    scale, unit = _prefix(echo.hertz)
+    scale, unit = suited(float(echo.hertz.max()))
     x = echo.hertz / scale
     for curve in reversed(curves):
         floor = low - (high - low)
@@ -95,7 +91,7 @@ def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
         ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=GREY, clip_on=False, label="unresolved")
     ax.set_xlim(x[0], x[-1])
     ax.set_ylim(low, high)
-    dressed(ax, f"frequency ({unit})", _level(echo), "")
+    dressed(ax, f"frequency ({unit})", _level(echo))
 
 
 def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
@@ -124,7 +120,7 @@ def draw_echo_map(ax: Any, echo: "Echo", number: int, heights: tuple[float, floa
     from matplotlib.colors import ListedColormap
 
     levels, (low, high) = echo.levels()[number], heights
-    scale, unit = _prefix(echo.hertz)
+    scale, unit = suited(float(echo.hertz.max()))
     at = echo.angles, echo.hertz / scale
     # nulls are low, what is not there stays white
     grid = np.where(np.isneginf(levels), low, levels)
@@ -132,7 +128,7 @@ def draw_echo_map(ax: Any, echo: "Echo", number: int, heights: tuple[float, floa
     doubtful = echo.unresolved[number]
     veil = np.ma.masked_where(~doubtful, np.ones(doubtful.shape)).T
     ax.pcolormesh(*at, veil, cmap=ListedColormap(["white"]), alpha=VEIL, shading="nearest")
-    dressed(ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})", "")
+    dressed(ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})")
     ax.grid(visible=False)
     add_bar(ax.figure, image, _level(echo), extend=beyond(levels, low, high), fontsize=9, ax=ax)
 
@@ -229,7 +225,7 @@ def comparison_picture(
         If the file cannot be written.
     """
     band = len(echo.wavenumbers) > 1
-    scale, unit = _prefix(echo.hertz) if band else (1.0, "degrees")
+    scale, unit = suited(float(echo.hertz.max())) if band else (1.0, "degrees")
     figure = new_figure((6.4, 5.6))
     figure.set_layout_engine("constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
@@ -243,7 +239,7 @@ def comparison_picture(
     below.axhline(0.0, color=GREY, linewidth=0.6)
     below.margins(x=0)
     dressed(above, "", _level(echo), title)
-    dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)", "")
+    dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)")
     add_legend(above, fresh=True)
     save_figure(figure, path, dpi)
 
@@ -271,7 +267,3 @@ def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
 def _level(echo: "Echo") -> str:
     name, unit = echo.level_name
     return f"{name} ({unit})"
-
-
-def _prefix(hertz: FloatArray) -> tuple[float, str]:
-    return next((one for one in PREFIXES if hertz.max() >= one[0]), PREFIXES[-1])

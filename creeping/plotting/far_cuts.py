@@ -14,7 +14,7 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import cross_section_decibels, decibels, shown_range
 from creeping.plotting.palette import COLOURS, EXACT, curve_style
-from creeping.plotting.pictures import add_legend, new_figure, save_figure
+from creeping.plotting.pictures import add_legend, new_figure, save_figure, wave_title
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
@@ -121,7 +121,7 @@ def far_cut_picture(
     figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
-    draw_cut(ax, angle, curves, heights, quantity=quantity, angle_name=angle_name, unit=unit or _unit(fields))
+    draw_cut(ax, angle, curves, heights, level=level_name(quantity, unit or _unit(fields)), angle_name=angle_name)
     ax.set_title(_title(fields) if title is None else title, fontsize=9)
     add_legend(ax, fresh=True)
     save_figure(figure, path, dpi)
@@ -133,24 +133,21 @@ def draw_cut(
     curves: Sequence[Curve],
     heights: tuple[float, float],
     *,
-    quantity: str,
+    level: str,
     angle_name: str,
-    unit: str = "L",
 ) -> None:
     """Draw curves over an angle (m,), radians: straight axes in degrees, or polar ones; the first curve on top.
 
-    Axes that have curves already keep room for them. For the arguments see `far_cut_picture`; ``unit`` is that of
-    lengths.
+    Axes that have curves already keep room for them. ``level`` names what the curves are, with its unit.
     """
     low, high = heights
     if ax.lines:
         low, high = min(low, ax.get_ylim()[0]), max(high, ax.get_ylim()[1])
-    label = level_name(quantity, unit)
     polar = ax.name == "polar"
     if polar:
-        _round_axes(ax, (low, high), label, angle_name)
+        _round_axes(ax, (low, high), level, angle_name)
     else:
-        _straight_axes(ax, angle, (low, high), label, angle_name)
+        _straight_axes(ax, angle, (low, high), level, angle_name)
     for curve in reversed(curves):
         # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
         levels = np.maximum(curve.levels, low if polar else low - (high - low))
@@ -288,10 +285,7 @@ def _straight_axes(ax: Any, angle: FloatArray, heights: tuple[float, float], lab
     ax.set_ylim(*heights)
     # multiples of 15, 30, 45, ... degrees
     ax.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 1.5, 2, 3, 4.5, 6, 9, 10]))
-    ax.set_xlabel(f"{angle_name} (degrees)", fontsize=9)
-    ax.set_ylabel(label, fontsize=9)
-    ax.grid(color="#d9dde0", linewidth=0.5)
-    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
+    dressed(ax, f"{angle_name} (degrees)", label)
     for spine in ax.spines.values():
         spine.set_linewidth(0.5)
 
@@ -321,11 +315,12 @@ def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: s
     ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
 
 
-def dressed(ax: Any, across: str, up: str, title: str) -> None:
-    """Give straight axes their names, title, grid and ticks."""
+def dressed(ax: Any, across: str, up: str, title: str | None = None) -> None:
+    """Give straight axes their names, grid and ticks, and a title."""
     ax.set_xlabel(across, fontsize=9)
     ax.set_ylabel(up, fontsize=9)
-    ax.set_title(title, fontsize=9, parse_math=False)
+    if title is not None:
+        ax.set_title(title, fontsize=9, parse_math=False)
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
 
@@ -343,7 +338,7 @@ def _unit(fields: Mapping[str, Any]) -> str:
 
 def _title(fields: Mapping[str, Any]) -> str:
     known = {
-        f"k = {field.wavenumber:g}/{getattr(field, 'unit', 'L')}, {field.boundary} boundary"
+        f"{wave_title(field, getattr(field, 'unit', 'L'))} boundary"
         for field in fields.values()
         if hasattr(field, "total")
     }

@@ -11,9 +11,9 @@ from creeping.errors import InvalidInputError
 from creeping.field.decibels import shown_range
 from creeping.geometry.unit import unit_of
 from creeping.plotting._cut_angles import CutAngles, cut_angles
-from creeping.plotting.far_cuts import Curve, checked_angles, cut_curves, draw_cut
+from creeping.plotting.far_cuts import Curve, checked_angles, cut_curves, draw_cut, level_name
 from creeping.plotting.palette import COLOURS, GREY, curve_style
-from creeping.plotting.pictures import add_legend, axes_or_new
+from creeping.plotting.pictures import add_legend, axes_or_new, wave_title
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
@@ -80,13 +80,11 @@ def plot_far(
     heights = shown_range([curve.levels for curve in curves if curve.thick], span)
     curves = [curve.ordered(cut.order, _short(curve.label)) for curve in curves]
     fresh, ax = axes_or_new(ax, PAGE)
-    draw_cut(ax, cut.values[cut.order], curves, heights, quantity=quantity, unit=unit or far.unit, angle_name=cut.name)
+    unit = unit or far.unit
+    draw_cut(ax, cut.values[cut.order], curves, heights, level=level_name(quantity, unit), angle_name=cut.name)
     _mark(ax, cut.values[cut.order], curves, heights[1])
     if fresh:
-        # a boundary's name is the user's and no formula
-        ax.set_title(
-            f"k = {far.wavenumber:g}/{unit or far.unit}, {far.boundary} boundary", fontsize=9, parse_math=False
-        )
+        ax.set_title(f"{wave_title(far, unit)} boundary", fontsize=9, parse_math=False)
     add_legend(ax, fresh, legend)
     return ax
 

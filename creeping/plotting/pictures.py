@@ -157,6 +157,11 @@ def add_legend(ax: Any, fresh: bool, legend: bool | None = None) -> None:
         ax.legend(handles[::-1], labels[::-1], **look)
 
 
+def wave_title(field: Any, unit: str) -> str:
+    """Wavenumber and boundary of a field, lengths in ``unit``: a title that is no formula, boundaries being users'."""
+    return f"k = {field.wavenumber:g}/{unit}, {field.boundary}"
+
+
 def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
     """Write the figure as PNG, at once when complete."""
     with written_aside(path) as aside:

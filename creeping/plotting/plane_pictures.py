@@ -14,7 +14,7 @@ from creeping.field.decibels import decibels, shown_range
 from creeping.plotting.body_fronts import LEAST_SAMPLES, at_phase
 from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.coloured_body import NOTHING
-from creeping.plotting.pictures import axes_or_new, new_figure, save_figure
+from creeping.plotting.pictures import axes_or_new, new_figure, save_figure, wave_title
 from creeping.plotting.plane_marks import FRONT, add_cut_legend, dress, hatch, missing_of
 
 SHOWS = ("level", "magnitude", "wave")
@@ -227,7 +227,7 @@ def _title(cut: FieldCut) -> str:
     ok = field.ok & np.isfinite(field.error)
     off = field.error[ok]
     told = f"; error {np.median(off):.1g} {field.unit} in the median, {off.max():.1g} at most" if off.size else ""
-    return f"k = {field.wavenumber:g}/{field.length_unit}, {field.boundary}{told}"
+    return f"{wave_title(field, field.length_unit)}{told}"
 
 
 def _page(cut: FieldCut) -> tuple[float, float]:

@@ -9,9 +9,9 @@ from creeping.errors import InvalidInputError
 from creeping.field.decibels import decibels, shown_range
 from creeping.plotting._cut_angles import cut_angles
 from creeping.plotting.colour_bar import add_bar, beyond
-from creeping.plotting.far_cuts import Curve, draw_cut
+from creeping.plotting.far_cuts import Curve, draw_cut, minus
 from creeping.plotting.palette import COLOURS, curve_style
-from creeping.plotting.pictures import add_legend, axes_or_new
+from creeping.plotting.pictures import add_legend, axes_or_new, wave_title
 
 if TYPE_CHECKING:
     from creeping.field.coupling_result import Coupling
@@ -62,7 +62,7 @@ def plot_coupling(found: "Coupling", ax: Any = None, *, span: float = 60.0, lege
     ax.xaxis.get_major_locator().set_params(integer=True)
     ax.yaxis.get_major_locator().set_params(integer=True)
     if fresh:
-        ax.set_title(f"k = {found.wavenumber:g}/{found.length_unit}, {found.boundary}", fontsize=9, parse_math=False)
+        ax.set_title(wave_title(found, found.length_unit), fontsize=9, parse_math=False)
     add_legend(ax, fresh, legend)
     return ax
 
@@ -98,14 +98,10 @@ def plot_pattern(found: "SourcePattern", ax: Any = None, *, span: float = 60.0, 
     curves = [_curve(found, number).ordered(cut.order, _named(found, number)) for number in range(len(found.sources))]
     heights = shown_range([curve.levels for curve in curves], span)
     fresh, ax = axes_or_new(ax, PAGE)
-    draw_cut(ax, cut.values[cut.order], curves, heights, quantity="amplitude", angle_name=cut.name)
     level = "20 log$_{10}$|F| (dB re no body)"
-    if ax.name == "polar":
-        ax.set_xlabel(f"{cut.name}; rings: {level}", fontsize=9)
-    else:
-        ax.set_ylabel(level, fontsize=9)
+    draw_cut(ax, cut.values[cut.order], curves, heights, level=level, angle_name=cut.name)
     if fresh:
-        ax.set_title(f"k = {found.wavenumber:g}/{found.length_unit}, {found.boundary}", fontsize=9, parse_math=False)
+        ax.set_title(wave_title(found, found.length_unit), fontsize=9, parse_math=False)
     add_legend(ax, fresh, legend)
     return ax
 
@@ -127,5 +123,12 @@ def _numbered(ax: Any, levels: FloatArray, middle: float) -> None:
     """Write the levels into their cells, dark on light and light on dark."""
     for row, column in zip(*np.nonzero(np.isfinite(levels)), strict=True):
         value = levels[row, column]
-        text = f"{value:.0f}".replace("-", "\N{MINUS SIGN}")
-        ax.text(column, row, text, ha="center", va="center", fontsize=7, color="black" if value > middle else "white")
+        ax.text(
+            column,
+            row,
+            minus(round(value)),
+            ha="center",
+            va="center",
+            fontsize=7,
+            color="black" if value > middle else "white",
+        )

@@ -7,6 +7,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.decibels import decibels, shown_range
+from creeping.field.frequency import suited
 from creeping.plotting.far_cuts import dressed
 from creeping.plotting.palette import COLOURS, GREY, curve_style
 from creeping.plotting.pictures import add_legend, axes_or_new
@@ -58,7 +59,7 @@ def plot_impulse(
     if envelope.shape[1] > MOST:
         raise InvalidInputError(f"{envelope.shape[1]} responses in one picture; draw {MOST} at most, or one by one")
     low, high = _ends(found.delay, start, end)
-    scale, unit = (1.0, found.unit) if found.unit != "s" else _seconds(max(abs(low), abs(high)))
+    scale, unit = (1.0, found.unit) if found.unit != "s" else suited(max(abs(low), abs(high)), SECONDS)
     shown = (found.delay >= low) & (found.delay <= high)
     levels = decibels(envelope)
     heights = shown_range([levels[shown]], span)
@@ -79,7 +80,7 @@ def plot_impulse(
     ax.set_ylim(*heights)
     what = "length of the path" if found.unit == "L" else "delay"
     title = f"resolution {found.resolution / scale:.3g} {unit}, repeats after {found.period / scale:.4g} {unit}"
-    dressed(ax, f"{what} ({unit})", "envelope (dB)", title if fresh else "")
+    dressed(ax, f"{what} ({unit})", "envelope (dB)", title if fresh else None)
     add_legend(ax, fresh, legend)
     return ax
 
@@ -106,7 +107,7 @@ def plot_profile(
     ax.plot(found.range, np.maximum(levels, floor), label="profile", **curve_style(0))
     ax.set_xlim(low, high)
     ax.set_ylim(*heights)
-    title = f"resolution {found.resolution:.3g} {unit}" if fresh else ""
+    title = f"resolution {found.resolution:.3g} {unit}" if fresh else None
     dressed(ax, f"range along the line of sight ({unit})", f"20 log$_{{10}}$|h| (dB re 1 {unit})", title)
     add_legend(ax, False, legend)
     return ax
@@ -123,7 +124,3 @@ def _ends(values: FloatArray, start: float | None, end: float | None) -> tuple[f
             f"values reach from {values[0]:g} to {values[-1]:g}"
         )
     return low, high
-
-
-def _seconds(largest: float) -> tuple[float, str]:
-    return next((one for one in SECONDS if largest >= one[0]), SECONDS[-1])
