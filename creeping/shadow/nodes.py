@@ -7,7 +7,7 @@ Sources: Derivations, R6 and R8.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -174,10 +174,39 @@ def polished(body: Surface, wave: FloatArray, points: FloatArray) -> tuple[Float
     return np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T), curvature
 
 
+class Breaks(NamedTuple):
+    """Where the state of a line may change: places and curves in order, the extreme nodes of its picture."""
+
+    at: FloatArray
+    where: IntArray
+    number: int
+    extreme: tuple[int, int, int, int]
+    certain: bool
+
+
 def finished(body: Surface, wave: FloatArray, nodes: LineNodes, n_rays: int, *, every: bool = False) -> Finished:
     """Arcs of a line, and so many launch points: on its attached arcs, or with ``every`` on the whole of it."""
+    return shared(body, wave, nodes, _breaks(body, wave, nodes), n_rays, every=every)
+
+
+def _breaks(body: Surface, wave: FloatArray, nodes: LineNodes) -> Breaks:
     from creeping.shadow.kernels.crossings import LIMIT
-    from creeping.shadow.kernels.trace import ERROR, LAUNCHED, LENGTH, SHARES, SUMMARY, finish
+    from creeping.shadow.kernels.trace import find_breaks
+
+    at, where = np.empty(LIMIT), np.empty(LIMIT, np.int64)
+    certain, count, extreme = find_breaks(
+        box_of(body), rows_of(wave), nodes.points, nodes.tangents, nodes.curvature, nodes.starts, len(nodes.spacing),
+        nodes.spacing, at, where,
+    )  # fmt: skip
+    return Breaks(at, where, int(count), extreme, bool(certain))
+
+
+def shared(
+    body: Surface, wave: FloatArray, nodes: LineNodes, breaks: Breaks, n_rays: int, *, every: bool = False
+) -> Finished:
+    """Arcs between the breaks of a line, and launch points, as of `finished`."""
+    from creeping.shadow.kernels.crossings import LIMIT
+    from creeping.shadow.kernels.trace import ERROR, LAUNCHED, LENGTH, SHARES, SUMMARY, share_line
     from creeping.shadow.status import NO_RAY
 
     curves = len(nodes.spacing)
@@ -185,13 +214,14 @@ def finished(body: Surface, wave: FloatArray, nodes: LineNodes, n_rays: int, *, 
     summary[LENGTH], summary[ERROR] = nodes.length, nodes.error
     which = np.empty((2, LIMIT + curves), np.int64)
     launched, places = np.full((n_rays, LAUNCHED), np.nan), np.full(n_rays, NO_RAY, np.int16)
+    at, where, number, extreme, certain = breaks
     with evaluators(body) as parts:
-        certain, total = finish(
-            *parts[:2], box_of(body), rows_of(wave), nodes.points, nodes.tangents, nodes.curvature, nodes.starts,
-            curves, nodes.spacing, every, summary, launched, places, arcs, which,
+        known, total = share_line(
+            *parts[:2], box_of(body), rows_of(wave), nodes.points, nodes.starts, curves, nodes.spacing, extreme, at,
+            where, number, every, summary, launched, places, arcs, which,
         )  # fmt: skip
     shares = summary[SHARES : SHARES + 3]
-    return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, bool(certain))
+    return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, certain and bool(known))
 
 
 def shares_of(line: "ShadowLine") -> dict[str, float]:

@@ -115,7 +115,7 @@ def trace_lines(level, level_par, box, mesh, waves, every, summary, certain_line
             certain &= finish(
                 level, level_par, box, wave, x, T, work[4][0], starts, components, spacing, every, summary[row],
                 launched[row], places[row], arcs, which,
-            )[0]  # fmt: skip
+            )  # fmt: skip
         certain_lines[row] = found and certain
 
 
@@ -239,16 +239,29 @@ def find_nodes(level, level_par, box, mesh, wave, number, work, starts, spacing)
 def finish(
     level, level_par, box, wave, x, T, kappa, starts, components, spacing, every, summary, launched, places, arcs, which
 ):
-    """Arcs and rays of a line with equally spaced nodes.
+    """Arcs and rays of a line with equally spaced nodes, by `find_breaks` and `share_line`; whether it is certain."""
+    at, where = np.empty(LIMIT), np.empty(LIMIT, np.int64)
+    certain, count, extreme = find_breaks(box, wave, x, T, kappa, starts, components, spacing, at, where)
+    # two kernels, which two processes can compile
+    return (
+        certain
+        & share_line(
+            level, level_par, box, wave, x, starts, components, spacing, extreme, at, where, count, every, summary,
+            launched, places, arcs, which,
+        )[0]
+    )  # fmt: skip
 
-    arcs (LIMIT + components, 2) gets their ends, as numbers of nodes with fractions, and ``which`` (2, the same) their
-    component and state. Shares and rays are filled in; returns whether every step was certain, and the number of arcs.
+
+@njit(**options)
+def find_breaks(box, wave, x, T, kappa, starts, components, spacing, at, where):
+    """Where the state of a line may change: cusps and crossings of its picture seen along q.
+
+    ``at`` and ``where`` (LIMIT) get their places and components, in order; returns whether every step was certain,
+    how many they are, and the four extreme nodes of the picture.
     """
     certain = True
     n = starts[components]
-    owner, state = which[0], which[1]
-    plane, boxes, scratch = np.empty((5, n)), np.empty((6, n // BOX + 1)), aligned(18, BLOCK)
-    at, where = np.empty(LIMIT), np.empty(LIMIT, np.int64)
+    plane, boxes, owner_of_box = np.empty((5, n)), np.empty((6, n // BOX + 1)), np.empty(n // BOX + 1, np.int64)
     count = 0
     for c in range(components):
         some, hidden = cusps(kappa, starts[c], starts[c + 1] - starts[c], at[count:])
@@ -256,7 +269,6 @@ def finish(
         count += some
         certain &= not hidden
     extreme = project(x, T, n, wave, box, plane)
-    owner_of_box = np.empty(n // BOX + 1, np.int64)
     if not convex(plane, starts, components):
         some = crossings(plane, starts, components, spacing, boxes, owner_of_box, at[count:], where[count:])
         certain &= some >= 0
@@ -265,10 +277,25 @@ def finish(
     for c in range(components):
         number[c] = starts[c + 1] - starts[c]
     order_breaks(at, where, count, number)
+    return certain, count, extreme
+
+
+@njit(**options)
+def share_line(
+    level, level_par, box, wave, x, starts, components, spacing, extreme, at, where, count, every, summary, launched,
+    places, arcs, which,
+):  # fmt: skip
+    """Arcs between the breaks of a line, their states, and its rays.
+
+    arcs (LIMIT + components, 2) gets their ends, as numbers of nodes with fractions, and ``which`` (2, the same) their
+    component and state. Shares and rays are filled in; returns whether every state is certain, and the number of arcs.
+    """
+    owner, state = which[0], which[1]
+    scratch = aligned(18, BLOCK)
     total = arcs_of(at, where, count, starts, components, arcs, owner)
     extent = max(box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[1, 2] - box[0, 2])
     reach = 0.01 * extent
-    certain &= classify(level, level_par, box, wave, x, starts, extreme, arcs, owner, total, reach, scratch, state)
+    certain = classify(level, level_par, box, wave, x, starts, extreme, arcs, owner, total, reach, scratch, state)
     total = merge(arcs, owner, state, total, starts)
     summary[SHARES : SHARES + 3] = 0.0
     for k in range(total):
@@ -276,7 +303,7 @@ def finish(
     if every:
         whole, bearing, open_ = np.zeros((components, 2)), np.arange(components), np.full(components, ATTACHED)
         for c in range(components):
-            whole[c, 1] = number[c]
+            whole[c, 1] = starts[c + 1] - starts[c]
         filled = _share(whole, bearing, open_, components, starts, spacing, x, launched, places)
     else:
         filled = _share(arcs, owner, state, total, starts, spacing, x, launched, places)
@@ -295,7 +322,7 @@ def finish(
             # rounding may leave a place between two arcs: a concave point launches no creeping ray
             launched[m, STATE] = CONCAVE
         for k in range(total if every else 0):
-            if owner[k] == c and (place - arcs[k, 0]) % number[c] < arcs[k, 1] - arcs[k, 0]:
+            if owner[k] == c and (place - arcs[k, 0]) % (starts[c + 1] - starts[c]) < arcs[k, 1] - arcs[k, 0]:
                 launched[m, STATE] = state[k]
     return certain, total
 
