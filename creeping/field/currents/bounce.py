@@ -16,6 +16,10 @@ from scipy.spatial import cKDTree
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.currents.nodes import LitNodes
+from creeping.geodesics.equations import points_of_charts
+from creeping.geometry.curvature import curvature_norms, gaussian_curvature
+from creeping.geometry.kept import kept
+from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 
 LOW = 0.3
@@ -37,6 +41,18 @@ def faces_itself(part: LitNodes) -> bool:
     total = part.along + part.across
     gauss = part.along * part.across - part.twist**2
     return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(total**2, initial=0.0))
+
+
+def may_face_itself(body: Surface) -> bool:
+    """`faces_itself` of all ground, by points all over a body."""
+
+    def found() -> bool:
+        points = points_of_charts(body)
+        gauss = gaussian_curvature(body, points)
+        total = curvature_norms(body, points) ** 2 + 2 * gauss
+        return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(total, initial=0.0))
+
+    return kept(body, "may face itself", found)
 
 
 def received(

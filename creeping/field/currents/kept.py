@@ -12,10 +12,13 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.field.boundary import BoundaryLike
-from creeping.field.currents.assembly import surface_currents
+from creeping.field.currents.assembly import CUT, surface_currents
+from creeping.field.currents.bounce import may_face_itself
+from creeping.field.currents.lit_solution import MOST
 from creeping.field.currents.nodes import RAYS, STEPS
 from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.geometry.creased import is_creased
 from creeping.geometry.quadrature import node_count
 from creeping.rays.fan import RayFan
 from creeping.rays.reach import ray_length
@@ -30,6 +33,8 @@ MAKING = 2700.0
 """What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
 SECONDS = 3.3e-9
 """Of one node at one place."""
+SOLVING = 1.6e-8
+"""Of one pair of nodes between which the equation of lit ground is solved."""
 LIT = 0.6
 """Share of a body's nodes that are lit or in the penumbra."""
 KEPT = 2
@@ -52,7 +57,17 @@ def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = F
 def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int) -> float:
     """About what currents of one incidence at wavenumbers (k,), 1/L, and their far field cost, where they are taken."""
     known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
-    return SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
+    plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
+    return plain + SOLVING * sum(expected_pairs(fan, k) for k in known)
+
+
+def expected_pairs(fan: RayFan, wavenumber: float) -> int:
+    """About between how many pairs of nodes the equation of lit ground is solved for a fan, 0 if it is not."""
+    open_line = 1.0 - fan.line.fractions["attached"] > CUT
+    if is_creased(fan.body) or not (open_line or may_face_itself(fan.body)):
+        return 0
+    pairs = int(LIT * node_count(fan.body, 2 * wavenumber)) * expected_nodes(fan, wavenumber)
+    return pairs if pairs <= MOST else 0
 
 
 def expected_nodes(fan: RayFan, wavenumber: float) -> int:
