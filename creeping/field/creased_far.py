@@ -96,7 +96,7 @@ class CreasedParts(Parts):
         self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
         r, m, body = geometry.directions, len(geometry.directions), fan.body
         self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
-        self.doubt, self.failing_size = self._zeros().real, np.zeros(m)
+        self.doubt, self.sizes, self.failing_size = self._zeros().real, np.zeros(m), np.zeros(m)
         self.shed_waves, self.specular_waves = [], []
         theta = geometry.angle
         self.in_forward = 1 - smoothstep(geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta, *FORWARD)

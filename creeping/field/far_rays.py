@@ -46,6 +46,8 @@ MATTERS = 0.05
 """Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
 DARK = 0.5
 """Share of the field that ground without rays may have before a direction is unresolved."""
+VAGUE = 0.5
+"""Error over the sizes of all contributions from which a direction is unresolved."""
 HIDDEN = 0.01
 """Share of the shadow line from which hidden parts leave the forward lobe unresolved."""
 THIRD, UNSURE = 3.0, 1.5
@@ -118,7 +120,7 @@ class Parts:
         m = len(geometry.directions)
         self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
         self.doubt = self._zeros().real
-        self.failing_size, self.missing = np.zeros(m), np.zeros(m, dtype=bool)
+        self.sizes, self.failing_size, self.missing = np.zeros(m), np.zeros(m), np.zeros(m, dtype=bool)
         theta = geometry.angle
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
         self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
@@ -161,6 +163,8 @@ class Parts:
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
         failing = np.maximum(self.failing_size, self.left_out)
         without = ~(self.dark <= DARK * largest)
+        # contributions may cancel: a deep null is none the worse for it; of a conductor two come for every wave
+        without |= ~(_sizes(self.error()) <= VAGUE * self.sizes / np.sqrt(2 if self.vector else 1))
         return np.asarray((self.missing & (self.in_forward > 0)) | ~(failing <= MATTERS * largest) | without)
 
     def error(self) -> FloatArray:
@@ -270,7 +274,9 @@ class Parts:
             wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(line, g.directions[ahead], k)
             # any normal of the plane of d and r will do, and any vector across d where they are one
             aside = np.cross(line.direction, off_axis(g.directions[ahead], line.direction))
-            self.forward += self._summed(number, ahead, np.asarray(wave), aside, aside)
+            lobe = self._summed(number, ahead, np.asarray(wave), aside, aside)
+            self.forward += lobe
+            self.sizes += _sizes(lobe)
 
     def _add_apart(
         self, into: ComplexArray, observer: IntArray, each: ComplexArray, off: ComplexArray, failing: BoolArray
@@ -279,13 +285,15 @@ class Parts:
         np.add.at(into, observer, each)
         (self.shed_waves if into is self.creeping else self.specular_waves).append(each)
         np.add.at(self.doubt, observer, np.abs(off) ** 2)
-        sizes = np.sqrt(np.sum(np.abs(each) ** 2, axis=tuple(range(1, each.ndim))))
+        sizes = _sizes(each)
+        np.add.at(self.sizes, observer, sizes)
         np.add.at(self.failing_size, observer, np.where(failing, sizes, 0.0))
 
     def _add_whole(self, into: ComplexArray, first: ComplexArray, second: ComplexArray, *, sharp: bool = True) -> None:
         """Add an integral of both orders (m, ...), which errs as one; unless ``sharp`` by what the second adds."""
         wave = second if self.order == 2 else first
         into += wave
+        self.sizes += _sizes(wave)
         change = np.abs(second - first)
         self.doubt += np.asarray(beyond(change, wave, self.order, self.unsure) if sharp else 2 * change) ** 2
 
@@ -329,6 +337,11 @@ def beyond(change: FloatArray, wave: ComplexArray, order: int, unsure: float = 1
         return change
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.asarray(np.fmin(change, unsure * THIRD * change * (change / np.abs(wave))))
+
+
+def _sizes(waves: ComplexArray | FloatArray) -> FloatArray:
+    """Sizes (n,) of waves (n, ...), of all polarisations."""
+    return np.asarray(np.sqrt(np.sum(np.abs(waves) ** 2, axis=tuple(range(1, waves.ndim)))))
 
 
 def _weighted(share: FloatArray, wave: ComplexArray) -> ComplexArray:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import creeping as cr
+import scatterers as sc
 from studies.field_coverage import bodies
 from studies.reference.dipoles import frames
 
@@ -109,3 +110,11 @@ def test_a_hundred_thousand_observers(name, method, count, boundary, rng):
         far = cr.far_field(fan_of(name), r, wavenumber=20.0, boundary=boundary, method=method)
         finite = np.isfinite(far.total).reshape(len(r), -1).all(axis=1)
         assert np.all(finite | far.unresolved) and np.mean(finite) > 0.999
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard", "pec"])
+def test_a_body_within_a_wavelength_is_unresolved_by_rays(boundary):
+    fan = cr.launch(cr.DirectFlow(sc.Sphere(1.0)), cr.shadow_line(sc.Sphere(1.0), D), length=4.0, n_rays=64)
+    for ka, flagged in ((0.1, True), (0.3, True), (0.7, True), (1.0, True), (12.0, False)):
+        far = cr.far_field(fan, [-D], wavenumber=ka, boundary=boundary, method="rays")
+        assert far.unresolved.tolist() == [flagged]
