@@ -5,7 +5,7 @@ stands beside the body, as that of a plane wave does.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,8 @@ from creeping.shadow.line import ShadowLine
 
 INCIDENT = ("d", "S")
 """Names of the arrow of the wave."""
+NAMES_APART = 0.5
+"""Least distance of the names of two axes, in lengths of an axis."""
 NEAR_SOURCE, SIDEWAYS, STEEP = 2.5, 75.0, 55.0
 """Distance from all of the body, in body sizes, within which a source is in the picture; degrees by which the camera
 stands aside of its wave, so that the source and its shadow both show, and above or below a body that hides it."""
@@ -38,11 +40,14 @@ class Mark:
     ----------
     name : str
     foot, tip : (3,), L
+    shift : (3,) or float, L
+        Moves the name out of another's way.
     """
 
     name: str
     foot: FloatArray
     tip: FloatArray
+    shift: FloatArray | float = 0.0
 
     @property
     def text(self) -> dict[str, Any]:
@@ -57,7 +62,7 @@ class Mark:
         # a fixed distance in the picture, however foreshortened the arrow is
         if self.name in INCIDENT:
             return np.asarray(self.foot - 0.1 * float(np.linalg.norm(along)) / flat * along)
-        return np.asarray(self.tip + 0.22 * float(np.linalg.norm(along)) / flat * along)
+        return np.asarray(self.tip + 0.22 * float(np.linalg.norm(along)) / flat * along + self.shift)
 
     def outline(self, view: View) -> FloatArray:
         """Flat arrow (7, 3) that faces the camera: a thin shaft and a filled head."""
@@ -70,6 +75,20 @@ class Mark:
         neck = self.tip - head / length * along
         sides = [self.foot - thick * across, neck - thick * across, neck - 0.32 * head * across, self.tip]
         return np.stack([*sides, neck + 0.32 * head * across, neck + thick * across, self.foot + thick * across])
+
+
+def _apart(marks: list[Mark], view: View, least: float) -> list[Mark]:
+    """The same arrows with names that stand at least so far from each other in the picture."""
+    for first, second in ((0, 1), (0, 2), (1, 2)):
+        one, other = marks[first], marks[second]
+        gap = view.project(other.label(view) - one.label(view))
+        distance = float(np.linalg.norm(gap))
+        if distance < least:
+            way = gap / distance if distance > 0 else np.array([1.0, 0.0])
+            step = 0.5 * (least - distance) * (way[0] * view.right + way[1] * view.up)
+            marks[first] = replace(one, shift=one.shift - step)
+            marks[second] = replace(other, shift=other.shift + step)
+    return marks
 
 
 @dataclass(frozen=True)
@@ -136,7 +155,8 @@ class Drawing:
             low[0] - 0.10 * extent - max(0.0, float(flat[:, 0].max())),
             low[1] + 0.03 * extent - min(0.0, float(flat[:, 1].min())),
         )
-        return [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
+        marks = [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
+        return _apart(marks, self.view, NAMES_APART * length)
 
     @property
     def marks(self) -> list[Mark]:

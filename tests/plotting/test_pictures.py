@@ -11,6 +11,7 @@ import creeping as cr
 import scatterers as sc
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
+from creeping.plotting._drawing import compose
 from creeping.plotting._strokes import chosen_rays, line_pieces, refined, runs, status_pieces, strokes
 from creeping.plotting._view import View, shadow_view
 from creeping.plotting.display import GLProbe
@@ -173,3 +174,12 @@ def test_runs_need_two_points():
     found = list(runs(points, np.array([True, False, True, True, False, True])))
     assert len(found) == 1
     np.testing.assert_array_equal(found[0], points[2:4])
+
+
+@pytest.mark.parametrize("view", [View(0.1, 1.2), View(np.pi / 4, 0.6154), View(1.6, -0.05), View(0.0, 1e-9)])
+def test_names_of_axes_stand_apart(view):
+    marks = compose(cr.shadow_line(sc.Sphere(), (0, 0, 1)), view=view).triad
+    places = [view.project(mark.label(view)) for mark in marks]
+    length = np.linalg.norm(marks[0].tip - marks[0].foot)
+    for first, second in ((0, 1), (0, 2), (1, 2)):
+        assert np.linalg.norm(places[first] - places[second]) > 0.3 * length
