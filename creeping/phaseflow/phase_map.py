@@ -20,13 +20,15 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
 from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
-from creeping.geodesics.states import checked_states, unpack
+from creeping.geodesics.states import DETACHMENT, checked_states, unpack
 from creeping.geometry.arguments import folder_path, positive_number, real_number, whole_number
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model
 from creeping.phaseflow.grid import Grid, Leap
 from creeping.storage.folder import write_folder
 
+SHORT = 0.5
+"""Share of the longest time up to which parts below the horizon are traced for the attenuation, and leaps do the rest."""
 MOST_LEAPS = 1e5
 """Leaps of the horizon that a ray may take: some seconds for a thousand rays."""
 
@@ -227,8 +229,9 @@ class PhaseMap(Drawn):
 
     def _transported(self, states: FloatArray, times: FloatArray) -> FloatArray:
         """What `transport` gives of checked states and times."""
-        if states.shape[1] > 10 and not self.attenuates_at(times):
-            return with_attenuation(self.body, states, times, rtol=self._rtol, transport=self.transport)
+        attenuates = states.shape[1] > 10
+        if attenuates and not self._leaps_serve(times):
+            return with_attenuation(self.body, states, times, rtol=self._rtol)
         if len(times) and times.max() > MOST_LEAPS * self.horizon:
             raise InvalidInputError(
                 f"times up to {times.max():.3g} take {times.max() / self.horizon:.2g} leaps of {self.horizon:.3g}, "
@@ -238,7 +241,7 @@ class PhaseMap(Drawn):
         whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12).astype(np.int64)
         rest = np.maximum(times - whole * self.horizon, 0.0)
         rest[rest < 1e-12 * self.horizon] = 0.0
-        if states.shape[1] > 10:
+        if attenuates and self.attenuates_at(times):
             # multiples of the horizon they are, but for rounding
             whole, rest = np.round(times / self.horizon).astype(np.int64), np.zeros_like(times)
         stops, place = np.unique(whole, return_inverse=True) if len(times) > 1 else (whole, np.zeros(1, np.int64))
@@ -250,7 +253,7 @@ class PhaseMap(Drawn):
         for k in range(len(stops)):
             mine = np.flatnonzero((place == k) & (rest > 0))
             if len(mine):
-                out[:, mine] = self._remainder(at[:, k], rest[mine])
+                out[:, mine] = self._remainder(at[:, k], rest[mine], stops[k] * self.horizon)
         return out
 
     def attenuates_at(self, times: FloatArray) -> bool:
@@ -258,8 +261,22 @@ class PhaseMap(Drawn):
         leaps = times / self.horizon
         return self.leaps[-1].has_curvature and bool(np.all(np.abs(leaps - np.round(leaps)) < 1e-11 * (1 + leaps)))
 
-    def _remainder(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance by times below the horizon: down the tower, then by direct integration."""
+    def _leaps_serve(self, times: FloatArray) -> bool:
+        """Whether leaps carry the attenuation most of the way to the times (m,), L, and traces from there are short."""
+        if not self.leaps[-1].has_curvature or not len(times):
+            return False
+        whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12)
+        traced = sum(float(np.max(times[whole == k] - k * self.horizon)) for k in np.unique(whole))
+        return bool(traced <= SHORT * times.max())
+
+    def _remainder(self, states: FloatArray, times: FloatArray, begun: float) -> FloatArray:
+        """Advance by times below the horizon from a time ``begun``: down the tower, then by direct integration."""
+        if states.shape[1] > 10:
+            more = with_attenuation(self.body, states, times, rtol=self._rtol)
+            # a trace counts from its own start
+            later = np.isinf(states[:, None, DETACHMENT]) & np.isfinite(more[..., DETACHMENT])
+            more[..., DETACHMENT] += np.where(later, begun, 0.0)
+            return more
         if len(self.leaps) == 1:
             return trace_states(self.body, states, times, rtol=self._rtol, step=self.horizon / 4)
         out = np.empty((len(states), len(times), states.shape[1]))

@@ -241,3 +241,18 @@ def test_maps_in_space_carry_what_others_do(rng):
         flow = build_direct(body, model_of(body, "ambient"), plan, lambda _: None, rtol=1e-11)
         got = flow.transport(states, times)
         np.testing.assert_allclose(got[..., :11], exact[..., :11], atol=2e-4)
+
+
+@pytest.mark.parametrize("times", [[0.3, 1.17], [1.17, 2.95], np.linspace(0.06, 2.94, 49)])
+def test_attenuation_at_times_between_leaps(times, rng):
+    """Leaps and short traces from their ends, or one trace where times are many: either way as direct integration."""
+    body = sc.TwistedEllipsoid()
+    flow = cr.build_phase_map(body, horizon=0.25, grid=(32, 32, 40), degree=5, cache=False)
+    states = pack(*random_bundle_points(body, 300, rng=rng), lanes=12)
+    got, exact = (f.transport(states, np.asarray(times)) for f in (flow, cr.DirectFlow(body, rtol=1e-12)))
+    assert rms(got[..., :6], exact[..., :6]) < 20 * flow.error.rms
+    np.testing.assert_allclose(got[..., 10], exact[..., 10], atol=1e-3)
+    # some detach within a leap, some within what is left of one
+    ended = np.isfinite(exact[..., 11]) & np.isfinite(got[..., 11])
+    assert ended[:, -1].sum() > 30 and np.mean(np.isfinite(exact[..., 11]) == np.isfinite(got[..., 11])) > 0.99
+    assert np.median(np.abs(got[..., 11][ended] - exact[..., 11][ended])) < 1e-4
