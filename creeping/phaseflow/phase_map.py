@@ -28,7 +28,7 @@ from creeping.phaseflow.grid import Grid, Leap
 from creeping.storage.folder import write_folder
 
 SHORT = 0.5
-"""Share of the longest time up to which parts below the horizon are traced for the attenuation, and leaps do the rest."""
+"""Share of the longest time up to which traces from the ends of leaps carry the attenuation, and leaps the rest."""
 MOST_LEAPS = 1e5
 """Leaps of the horizon that a ray may take: some seconds for a thousand rays."""
 

@@ -117,7 +117,7 @@ def leap_seconds(degree: int, nbytes: float, *, carry_jacobi: bool = False, flat
     if flat:
         base, farther = (10.0, 4.0) if degree == 3 else (16.0, 5.0)
     leap = 1e-9 * (base + farther * float(np.log2(max(nbytes / 1e6, 1.0))))
-    # Jacobi matrix and curvatures are three times as much, but stand packed beside each other; the attenuation is summed
+    # Jacobi matrix and curvatures are three times as much, but packed beside each other; the attenuation is summed
     return (4 if flat else 2) * leap + 20e-9 if carry_jacobi else leap
 
 
