@@ -25,6 +25,8 @@ Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
 METHODS = ("rays", "auto", "currents")
 LARGEST_LENGTH = 1e300
+LONG_LEAP = 0.15
+"""Share of an automatic length up to which it is made one of whole leaps."""
 MOST_RAYS, MOST_STEPS, MOST_WAVENUMBERS = 65_536, 4096, 100_000
 
 
@@ -308,10 +310,13 @@ def with_lattice(request: SweepRequest, incidences: FloatArray) -> SweepRequest:
     return request if request.accuracy is None else replace(request, lattice=lattice_of(incidences))
 
 
-def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike) -> float:
+def sweep_length(
+    body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike, *, leap: float = 0.0
+) -> float:
     """Length of the rays of a sweep asked for as a number or as "auto": then for its lowest wavenumber, if it has any.
 
-    What is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes.
+    An automatic length is one of whole leaps of a map, each of ``leap``, for what is left of one would be traced. What
+    is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes.
     """
     if not (isinstance(length, str) and length == AUTO):
         number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= LARGEST_LENGTH
@@ -321,7 +326,8 @@ def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: Ar
     except InvalidInputError:
         known = np.zeros(0)
     known = known[np.isfinite(known) & (known > 0)]
-    return body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))
+    found = body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))
+    return leap * float(np.ceil(found / leap - 1e-9)) if 0 < leap < LONG_LEAP * found else found
 
 
 def _plain(value: Any) -> Any:

@@ -14,6 +14,7 @@ from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.geometry.arguments import flag, folder_path, shown, whole_number
 from creeping.geometry.directions import unit_directions
+from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
@@ -130,7 +131,7 @@ def sweep_directions(
     several: Any = list(boundary) if isinstance(boundary, (list, tuple)) else [boundary]
     request = sweep_request(
         quantity,
-        length=sweep_length(flow.body, length, wavenumbers),
+        length=sweep_length(flow.body, length, wavenumbers, leap=flow.horizon if isinstance(flow, PhaseMap) else 0.0),
         n_rays=n_rays,
         n_steps=n_steps,
         wavenumbers=wavenumbers,
