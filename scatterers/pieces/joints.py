@@ -28,6 +28,8 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 FEWEST = 40
 """Vertices of a part that is known well enough to be taken for a quadric: a quadric has 9 numbers."""
+DETERMINED = 12
+"""Vertices of a narrow part between others that are."""
 NOISE = 2.0
 """Distance within which a quadric holds vertices, in the largest of those that it was fitted to."""
 STEEP = 1e-3
@@ -108,7 +110,10 @@ def jointed(vertices: FloatArray, triangles: IntArray, normals: FloatArray, clea
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     ends = edges_of(triangles).ends
     sheets, held = _sheets(vertices, normals, ends, clean, size)
-    if not sheets or not held.any(axis=1).all():
+    if not sheets:
+        return None
+    sheets, held = _narrow(vertices, triangles, ends, held, sheets, size)
+    if not held.any(axis=1).all():
         return None
     found = _placed(vertices, ends, held, sheets)
     if found.open.any():
@@ -199,6 +204,25 @@ def _with_tips(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: li
             if held[beside, k].all() and sheet.off(vertices[vertex : vertex + 1])[0] < NEARLY * sheet.tolerance:
                 held[vertex, k] = True
     return held
+
+
+def _narrow(
+    vertices: FloatArray, triangles: IntArray, ends: IntArray, held: BoolArray, sheets: list[_Sheet], size: float
+) -> tuple[list[_Sheet], BoolArray]:
+    """Sheets with those through parts so narrow that no vertex of theirs is clean."""
+    left = ~held.any(axis=1)
+    if not left.any():
+        return sheets, held
+    label, normals = _parts(len(vertices), ends, left), angle_weighted_normals(vertices, triangles)
+    for part in np.unique(label[left]):
+        some = np.flatnonzero(left & (label == part))
+        patch = polynomial_patch(vertices[some], normals[some], size) if len(some) >= DETERMINED else None
+        if patch is not None:
+            sheet = _Sheet(patch, vertices[some], size)
+            on = sheet.off(vertices) <= sheet.tolerance
+            mine = on & (_parts(len(vertices), ends, on) == _parts(len(vertices), ends, on)[some[0]])
+            sheets, held = [*sheets, sheet], np.column_stack([held, mine])
+    return sheets, held
 
 
 def _between(
