@@ -247,7 +247,8 @@ def _examined(
 
 def _with_joints(quality: MeshQuality, mesh: TriangleMesh, jets: Jets) -> tuple[MeshQuality, Jointed | None]:
     """What jets make of the vertices, corrected where the body is planes and quadrics that join; and these."""
-    if quality.verdict == "noisy" or quality.jumps < FEWEST_RIMS:
+    # between long triangles jets tell of no jumps
+    if quality.verdict == "noisy" or (quality.jumps < FEWEST_RIMS and quality.verdict != "too coarse"):
         return quality, None
     clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
     joints = jointed(mesh.vertices, mesh.triangles, jets.normals, clean)

@@ -142,7 +142,7 @@ def _sheets(
             break
         at = np.flatnonzero(left)
         # what is farthest from all that is not
-        distance = cKDTree(vertices[~left]).query(vertices[at])[0]
+        distance = np.full(len(at), size) if left.all() else cKDTree(vertices[~left]).query(vertices[at])[0]
         seed = int(at[np.argmax(distance)])
         near = np.asarray(tree.query(vertices[seed], np.minimum(len(at), MOST))[1])
         near = near[np.linalg.norm(vertices[near] - vertices[seed], axis=1) <= distance.max()]
