@@ -258,9 +258,9 @@ def _with_joints(quality: MeshQuality, mesh: TriangleMesh, jets: Jets) -> tuple[
         quality,
         verdict="curvature jumps",
         jumps=joints.on_joints,
-        reasons=f"the curvature jumps at {joints.on_joints} of {len(joints.vertices)} vertices, on joints of planes and "
-        "quadrics, as where a cylinder meets a sphere; the body is taken in smooth pieces, and rays across their joints "
-        "are of low order: blend the faces with continuous curvature for a smooth one",
+        reasons=f"the curvature jumps at {joints.on_joints} of {len(joints.vertices)} vertices, on joints of planes "
+        "and quadrics, as where a cylinder meets a sphere; the body is taken in smooth pieces, and rays across their "
+        "joints are of low order: blend the faces with continuous curvature for a smooth one",
     ), joints
 
 

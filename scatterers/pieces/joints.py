@@ -43,7 +43,7 @@ TRIES = 20
 ROUNDS = 12
 """Times that a quadric is fitted again to all that it holds."""
 TIPS, NEARLY = 100, 100.0
-"""Vertices that may be tips, and their distance in that within which others are held: Q changes there with its square."""
+"""Vertices that may be tips, and their distance in that within which others are held: Q changes with its square."""
 SECANTS, FOUND = 6, 1e-6
 """Steps to the point of a joint on an edge, and what may be left of (n_i - n_j).t, over its change along the edge."""
 SNAP = 0.1
@@ -85,9 +85,7 @@ class _Sheet:
         """Distance (n,) of points (n, 3) from it, of second order: at the tip of a cone it has no slope."""
         value, gradient = self.spline.value_and_gradient(x)
         slope = np.linalg.norm(gradient, axis=1)
-        return np.asarray(
-            2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * self.bend * np.abs(value)) + 1e-300)
-        )
+        return np.asarray(2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * self.bend * np.abs(value)) + 1e-300))
 
     def normals(self, x: FloatArray) -> FloatArray:
         """Outward normals (n, 3) at points (n, 3); 0 where there is none."""
@@ -179,7 +177,7 @@ def _grown(
         if patch is None:
             break
         sheet = _Sheet(patch, vertices[core], size)
-        on = sheet.off(vertices) <= sheet.tolerance
+        on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
         parts = _parts(len(vertices), ends, on)
         mine = on & (parts == parts[seed])
         if not mine[seed] or mine.sum() <= held.sum():
@@ -210,7 +208,7 @@ def _narrow(
     vertices: FloatArray, triangles: IntArray, ends: IntArray, held: BoolArray, sheets: list[_Sheet], size: float
 ) -> tuple[list[_Sheet], BoolArray]:
     """Sheets with those through parts so narrow that no vertex of theirs is clean."""
-    left = ~held.any(axis=1)
+    left = np.asarray(~held.any(axis=1))
     if not left.any():
         return sheets, held
     label, normals = _parts(len(vertices), ends, left), angle_weighted_normals(vertices, triangles)
@@ -219,8 +217,9 @@ def _narrow(
         patch = polynomial_patch(vertices[some], normals[some], size) if len(some) >= DETERMINED else None
         if patch is not None:
             sheet = _Sheet(patch, vertices[some], size)
-            on = sheet.off(vertices) <= sheet.tolerance
-            mine = on & (_parts(len(vertices), ends, on) == _parts(len(vertices), ends, on)[some[0]])
+            on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
+            parts = _parts(len(vertices), ends, on)
+            mine = on & (parts == parts[some[0]])
             sheets, held = [*sheets, sheet], np.column_stack([held, mine])
     return sheets, held
 
@@ -258,8 +257,17 @@ def _parts(count: int, ends: IntArray, some: BoolArray) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Vertices next to joints moved onto them, which sheets hold each, where joints cut edges, and edges (e,) whose
-    ends neither a sheet nor a joint connects."""
+    """Vertices, those next to joints moved onto them, and where joints cut edges.
+
+    Attributes
+    ----------
+    points : (n, 3), L
+    held : (n, k) bool
+        Which sheets hold them.
+    cuts : Cuts
+    open : (e,) bool
+        Edges whose ends neither a sheet nor a joint connects.
+    """
 
     points: FloatArray
     held: BoolArray

@@ -17,15 +17,25 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Cuts:
-    """Edges (k,) to cut, in the order of `scatterers.triangles.topology.edges_of`, the points (k, 3) there, and which
-    of p sheets hold these (k, p)."""
+    """Where edges are cut.
+
+    Attributes
+    ----------
+    edge : (k,)
+        In the order of `scatterers.triangles.topology.edges_of`.
+    points : (k, 3), L
+    held : (k, p) bool
+        Which sheets hold the points.
+    """
 
     edge: IntArray
     points: FloatArray
     held: BoolArray
 
 
-def cut(vertices: FloatArray, triangles: IntArray, held: BoolArray, cuts: Cuts) -> tuple[FloatArray, IntArray, BoolArray]:
+def cut(
+    vertices: FloatArray, triangles: IntArray, held: BoolArray, cuts: Cuts
+) -> tuple[FloatArray, IntArray, BoolArray]:
     """Vertices, triangles, and which sheets hold each vertex, of the mesh with more vertices on its edges.
 
     Parameters
@@ -48,10 +58,11 @@ def cut(vertices: FloatArray, triangles: IntArray, held: BoolArray, cuts: Cuts) 
     between = new[edges.number].reshape(-1, 3)
     count = (between >= 0).sum(axis=1)
     parts = [triangles[count == 0]]
-    for number, sought in ((1, lambda on: on[:, 0]), (2, lambda on: on[:, 0] & on[:, 2]), (3, lambda on: on[:, 0])):
+    for number in (1, 2, 3):
         t, m = triangles[count == number].copy(), between[count == number].copy()
         for _ in range(2):
-            wrong = ~sought(m >= 0)
+            # turned until the first edge is cut, of two cuts the last as well
+            wrong = (m[:, 0] < 0) | ((m[:, 2] < 0) & (number == 2))
             t[wrong], m[wrong] = np.roll(t[wrong], -1, axis=1), np.roll(m[wrong], -1, axis=1)
         (a, b, c), (ab, bc, ca) = t.T, m.T
         split = {

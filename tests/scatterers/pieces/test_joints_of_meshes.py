@@ -51,8 +51,9 @@ def test_joints_are_those_of_the_exact_body(name):
     assert sorted(c.kind for c in body.creases) == sorted(c.kind for c in exact.creases)
     assert len(body.pieces) == len(exact.pieces)
     for kind in ("joint", "tip"):
-        mine, theirs = (np.concatenate([c.points for c in b.creases if c.kind == kind] or [np.zeros((0, 3))])
-                        for b in (body, exact))
+        mine, theirs = (
+            np.concatenate([c.points for c in b.creases if c.kind == kind] or [np.zeros((0, 3))]) for b in (body, exact)
+        )
         if len(mine):
             height = np.unique(theirs[:, 2].round(9))
             off = np.abs((mine @ turn)[:, 2:] - height).min(axis=1)
@@ -63,8 +64,11 @@ def test_joints_are_those_of_the_exact_body(name):
     points = points + rng.uniform(-1e-3, 1e-3, size=(1000, 1)) * normal(exact, points)
     near = np.linalg.norm(points - [0, 0, points[:, 2].max()], axis=1) > 0.05
     assert near.sum() > 500
-    np.testing.assert_allclose(body.level(points[near] @ turn.T) / slope(body, points[near] @ turn.T),
-                               exact.level(points[near]) / slope(exact, points[near]), atol=3e-6)
+    np.testing.assert_allclose(
+        body.level(points[near] @ turn.T) / slope(body, points[near] @ turn.T),
+        exact.level(points[near]) / slope(exact, points[near]),
+        atol=3e-6,
+    )
 
 
 def slope(body, points):
@@ -142,7 +146,8 @@ def test_a_cut_mesh_is_the_same_surface():
     edges = edges_of(triangles)
     some = np.flatnonzero(np.random.default_rng(0).random(len(edges.ends)) < 0.4)
     middles = points[edges.ends[some]].mean(axis=1)
-    x, t, _ = cut(points, triangles, np.zeros((len(points), 1), dtype=bool), Cuts(some, middles, np.zeros((len(some), 1), dtype=bool)))
+    cuts = Cuts(some, middles, np.zeros((len(some), 1), dtype=bool))
+    x, t, _ = cut(points, triangles, np.zeros((len(points), 1), dtype=bool), cuts)
     assert len(x) == len(points) + len(some) and np.all(edges_of(t).faces == 2)
 
     def volume(v, f):
