@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from scatterers.base.clouds import PieceCloud, PointCloud
 from scatterers.base.fitted_body import FittedBody, checked_options
+from scatterers.pieces.joints import Jointed, jointed
 from scatterers.pieces.regions import regions_of
 from scatterers.spline.cache import key_of
 from scatterers.spline.fitting import spacing_of
@@ -27,7 +28,7 @@ from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers.triangles.jet_points import centroids, signed_distance
 from scatterers.triangles.jets import Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.parts import MOST_SUBDIVIDED, subdivided
-from scatterers.triangles.quality import MeshQuality, assess
+from scatterers.triangles.quality import FEWEST_RIMS, MeshQuality, assess, jumps_at
 
 FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0
@@ -125,10 +126,14 @@ class Mesh(FittedBody):
     def _points(
         self, source: Any, units: str | None, strict: bool, choice: Choice, progress: Callable[[str], None]
     ) -> PointCloud | PieceCloud:
-        mesh, jets, quality = _examined(source, units, choice, progress)
+        mesh, jets, quality, joints = _examined(source, units, choice, progress)
         if quality.verdict not in ("smooth", "noisy"):
             if strict:
                 raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
+            if joints is not None:
+                regions = regions_of(joints.vertices, joints.triangles, sharp=joints.sharp, level=joints.level)
+                notes = {"repairs": list(mesh.repairs), "source": source_name(source)}
+                return PieceCloud(joints.vertices, joints.triangles, regions, None, quality, notes)
             regions = regions_of(mesh.vertices, mesh.triangles)
             # creases that end on smooth ground are folds of a coarse mesh, unless most sharp edges are in chains
             if regions.count > 1 or (regions.crease.any() and quality.verdict == "sharp"):
@@ -213,13 +218,13 @@ def examined_mesh(
     'sharp'
     """
     choice = Choice(part, cap, union, subdivide)
-    mesh, _, quality = _examined(source, units, choice, lambda _: None)
+    mesh, _, quality, _ = _examined(source, units, choice, lambda _: None)
     return mesh, quality
 
 
 def _examined(
     source: Any, units: str | None, choice: Choice, progress: Callable[[str], None]
-) -> tuple[TriangleMesh, Jets, MeshQuality]:
+) -> tuple[TriangleMesh, Jets, MeshQuality, Jointed | None]:
     progress("reading the mesh")
     mesh = read_mesh(source, units, choice, progress=progress)
     times = choice.subdivide
@@ -231,13 +236,32 @@ def _examined(
             found = TriangleMesh(*finer, (*mesh.repairs, *notes))
         progress(f"normals of {len(found.vertices)} vertices")
         jets = osculating_jets(found.vertices, found.triangles)
-        quality = assess(found, jets)
+        quality, joints = _with_joints(assess(found, jets), found, jets)
         enough = quality.verdict != "too coarse" or (count and quality.bad_share < FEW_BAD)
         if times != "auto" or enough or 4 * len(found.vertices) > MOST_SUBDIVIDED:
             break
     for line in found.repairs[len(mesh.repairs) :]:
         progress(line)
-    return found, jets, quality
+    return found, jets, quality, joints
+
+
+def _with_joints(quality: MeshQuality, mesh: TriangleMesh, jets: Jets) -> tuple[MeshQuality, Jointed | None]:
+    """What jets make of the vertices, corrected where the body is planes and quadrics that join; and these."""
+    # between long triangles jets tell of no jumps
+    if quality.verdict == "noisy" or (quality.jumps < FEWEST_RIMS and quality.verdict != "too coarse"):
+        return quality, None
+    clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
+    joints = jointed(mesh.vertices, mesh.triangles, jets.normals, clean)
+    if joints is None or joints.sharp.any():
+        return quality, joints
+    return replace(
+        quality,
+        verdict="curvature jumps",
+        jumps=joints.on_joints,
+        reasons=f"the curvature jumps at {joints.on_joints} of {len(joints.vertices)} vertices, on joints of planes "
+        "and quadrics, as where a cylinder meets a sphere; the body is taken in smooth pieces, and rays across their "
+        "joints are of low order: blend the faces with continuous curvature for a smooth one",
+    ), joints
 
 
 def _content(source: Any) -> bytes:

@@ -40,6 +40,9 @@ def points_of_charts(body: Surface) -> FloatArray:
     samples: FloatArray | None = getattr(body, "samples", None)
     if samples is not None:
         return samples
+    # charts of other bodies may take a minute, and direct integration asks for none
+    if not getattr(body, "quick_charts", True):
+        return kept(body, "points without charts", lambda: _on_a_grid(body))
     try:
         charts = body.atlas.charts
     except ValueError:

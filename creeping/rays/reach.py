@@ -93,7 +93,7 @@ def ray_length(
         return asked_length(body, _positive("length", length, ", nor 'auto'"))
     if speed_of(body) is not None:
         return weighted_length(body)
-    launch = line.launch_points(TRIALS)
+    launch = kept(line, "trial launch points", lambda: line.launch_points(TRIALS))
     return float(decayed_lengths(body, launch, wavenumber, decay)[0])
 
 
@@ -155,11 +155,16 @@ def decayed_lengths(
 ) -> FloatArray:
     """Lengths (n,), L, at which waves of n incidences have died away; LONGEST body sizes where no ray is launched."""
     most, there = LONGEST * size(body), launch.there
-    starts = pack(launch.points[there], launch.headings[there])
-    curvature = np.full(there.shape, np.nan)
-    curvature[there] = curvature_values(body, starts)
     times: FloatArray = np.linspace(0.0, most, SAMPLES + 1)
-    states = carried(DirectFlow(body, rtol=RTOL), launch, times, components=whole_lanes(body))
+
+    def traced() -> tuple[FloatArray, FloatArray]:
+        starts = pack(launch.points[there], launch.headings[there])
+        curvature = np.full(there.shape, np.nan)
+        curvature[there] = curvature_values(body, starts)
+        return curvature, carried(DirectFlow(body, rtol=RTOL), launch, times, components=whole_lanes(body))
+
+    # the same for all wavenumbers
+    curvature, states = kept(launch, "trial rays", traced)
     k = None if wavenumber is None else _positive("wavenumber", wavenumber)
     found = np.full(len(there), most)
     for row in np.flatnonzero(there.any(axis=1)):

@@ -35,6 +35,8 @@ MEET = 1e-7
 """Distance of the ends of two curves, in body sizes, up to which they meet."""
 MOST_PANELS = 1000
 """Of a curve: one that takes more, as along a generator that the wave goes along, is lost, and takes minutes."""
+DOUBLINGS = 5
+"""Of the distance from a tip at which a curve ends, while its panels cannot be made."""
 EXACT = 1e-12
 """Relative error of a length: panels are exact to rounding."""
 
@@ -68,7 +70,7 @@ def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
         gaps += missing
         for found in on_piece:
             try:
-                curve = _finished(body, pieces[number], number, direction, found, n_points)
+                curve, found = _as_far_as_known(body, pieces[number], number, direction, found, n_points)
             except SingularIncidenceError:
                 # it turns within rounding of a crossing somewhere: all of it is lost
                 gaps += float(np.sum(np.linalg.norm(np.diff(found.nodes, axis=0), axis=1)))
@@ -78,6 +80,34 @@ def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
                 gaps += sum(found.gaps)
     curves.sort(key=lambda curve: -curve.length)
     return _joined(body, curves), parts_on_edges(body, pieces, direction), gaps, level
+
+
+def _as_far_as_known(
+    body: Any, piece: Any, number: int, direction: FloatArray, found: PieceCurve, n_points: int
+) -> tuple[ShadowCurve, PieceCurve]:
+    """The curve in panels; where these fail next to a tip, as the slope of F fades into rounding, ended farther off."""
+    for _ in range(DOUBLINGS):
+        try:
+            return _finished(body, piece, number, direction, found, n_points), found
+        except SingularIncidenceError:
+            shorter = _ended_earlier(body, found)
+            if shorter is None:
+                raise
+            found = shorter
+    return _finished(body, piece, number, direction, found, n_points), found
+
+
+def _ended_earlier(body: Any, found: PieceCurve) -> PieceCurve | None:
+    """A curve that ends at tips without its nodes within twice its gaps; None if it does not, or hardly one is left."""
+    nodes, gaps = found.nodes, list(found.gaps)
+    for side, way in ((0, 1), (1, -1)):
+        if gaps[side] > 0:
+            away = np.linalg.norm(nodes[::way] - body.creases[found.creases[side]].points[0], axis=1)
+            first = int(np.argmax(away > 2 * gaps[side]))
+            nodes, gaps[side] = nodes[::way][first:][::way], float(away[first])
+    if gaps == list(found.gaps) or len(nodes) < 3:
+        return None
+    return found._replace(nodes=nodes, gaps=(gaps[0], gaps[1]))
 
 
 def _finished(

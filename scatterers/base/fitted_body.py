@@ -1,7 +1,6 @@
 """Bodies fitted to points and normals: two fits, their difference, and the checks before anything is traced."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
+Kept = tuple[Path, str, dict[str, FloatArray], dict[str, Any]]
 COARSENING = 1.35
 """Spacing of the second fit, in units of the first."""
 SMOOTHINGS = (1e-6, 1e-5, 1e-4, 1e-3)
@@ -106,6 +106,11 @@ class SplineBody(LevelBody):
         """Whether points (..., 3), L, lie where the body is not smooth enough, or not known well enough: (...)."""
         return super().non_smooth(points) if self._parts is None else self._parts.non_smooth(points)
 
+    @property
+    def quick_charts(self) -> bool:
+        """Whether charts take no time; else only maps ask for them."""
+        return self._map is not None
+
     def _covered(self) -> "CubeSphereAtlas | MongeAtlas":
         if self._parts is not None:
             raise ValueError("a body with edges has no charts; its rays go by direct integration")
@@ -163,16 +168,29 @@ class FittedBody(SplineBody):
         self._no_charts = str(text.get(NO_CHARTS, ""))
         self.coarse_fit = SplineBody(known[1], f"{key}, coarser", speed)
         self.coarse_fit._non_smooth, self.coarse_fit._reach = self._non_smooth, self._reach
-        if found is None and folder is not None:
-            if not self.star_shaped and not self.creases:
-                progress("charts")
-                # a body without them can still be looked at; who needs them is told
-                with suppress(ValueError):
-                    charts = cast("MongeAtlas", self.atlas).arrays()
-                    arrays |= {CHARTS + name: array for name, array in charts.items()}
-                text |= {NO_CHARTS: self._no_charts}
-            if trouble := _fit_cache.store(folder, key, arrays, text):
+        self._kept: Kept | None = None
+        if folder is not None:
+            self._kept = folder, key, arrays, text
+            if found is None and (trouble := _fit_cache.store(folder, key, arrays, text)):
                 progress(trouble)
+
+    def _covered(self) -> "CubeSphereAtlas | MongeAtlas":
+        """Make the atlas; the charts, or that there are none, are kept with the fit: to find out takes as long."""
+        known = bool(self._charts or self._no_charts)
+        try:
+            found = super()._covered()
+        except ValueError:
+            if self._no_charts and not known:
+                self._keep({})
+            raise
+        if not (self.star_shaped or known):
+            self._keep({CHARTS + name: array for name, array in cast("MongeAtlas", found).arrays().items()})
+        return found
+
+    def _keep(self, charts: dict[str, FloatArray]) -> None:
+        if self._kept is not None:
+            folder, key, arrays, text = self._kept
+            _fit_cache.store(folder, key, arrays | charts, text | {NO_CHARTS: self._no_charts})
 
     def _describe(self, arrays: dict[str, FloatArray], text: dict[str, Any]) -> None:
         """Take over what is known of the fit."""

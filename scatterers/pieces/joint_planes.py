@@ -14,6 +14,11 @@ IntArray = NDArray[np.int64]
 ALIKE = 0.5
 """Cosine between the normals of pieces that a chain of joints makes one surface: across a sharp nose they oppose."""
 
+STRAIGHT, KINK = 1e-3, 0.8
+"""Turn of a joint over three of its segments, radians, from which on it has a plane, and beyond which it is a kink;"""
+STEEP = 0.5
+"""cosine between that plane and the one at right angles to the body, below which it nearly touches the body."""
+
 
 def of_one_surface(
     splines: Sequence[TensorSpline],
@@ -46,9 +51,31 @@ def _unit(vectors: FloatArray) -> FloatArray:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
 
 
-class JointPlanes:
-    """Planes across the body through joints and seams, by which the two pieces of one smooth surface are told apart.
+def _osculating(curve: Crease, across: FloatArray) -> FloatArray:
+    """Normals (k, 3) of planes through the segments of a joint and its bend there, which it leaves last.
 
+    Where it is straight, has a kink, or its plane nearly touches the body, it is the plane ``across``.
+    """
+    along = np.diff(curve.points, axis=0)
+    if len(along) < 3:
+        return across
+    if curve.closed:
+        before, after = np.roll(along, 1, axis=0), np.roll(along, -1, axis=0)
+    else:
+        inner = np.clip(np.arange(len(along)), 1, len(along) - 2)
+        before, after = along[inner - 1], along[inner + 1]
+    bend = _unit(after) - _unit(before)
+    normal = np.cross(_unit(along), bend)
+    turn = np.linalg.norm(normal, axis=1)
+    normal = _unit(normal) * np.copysign(1.0, np.sum(normal * across, axis=1))[:, None]
+    sound = (turn > STRAIGHT) & (turn < KINK) & (np.sum(normal * across, axis=1) > STEEP)
+    return np.where(sound[:, None], normal, across)
+
+
+class JointPlanes:
+    """Planes through joints and seams, by which the two pieces of one smooth surface are told apart.
+
+    Of a seam the plane is at right angles to the body, of a joint that in which it bends.
     a.x > b is the side of the piece with the larger number: which way a crease runs says nothing of that, points of
     both pieces next to it do.
     """
@@ -73,6 +100,8 @@ class JointPlanes:
                 x, along = 0.5 * (curve.points[1:] + curve.points[:-1]), np.diff(curve.points, axis=0)
                 n = sum(_unit(splines[number].gradient(x)) for number in pair)
                 across = _unit(np.cross(n, along))
+                if curve.kind == "joint":
+                    across = _osculating(curve, across)
                 ways = [trees[number].data[trees[number].query(x)[1]] for number in (first, second)]
                 places.append(x)
                 planes.append(np.copysign(1.0, np.sum(across * (ways[1] - ways[0]))) * across)

@@ -129,9 +129,9 @@ def polynomial_through(
         value, slope = _monomials(x, powers)
         if len(x) * 3 < len(powers):
             continue
-        across = np.cross(slope, normals[:, None])
-        rows = np.concatenate([ON * value, *np.moveaxis(across, -1, 0)])
-        q = np.linalg.svd(rows, full_matrices=False)[2][-1]
+        q = _least(value, slope, normals)
+        # the normals of triangles tell which quadric it is; its own do not pull at it
+        q = _least(value, slope, np.einsum("npk,p->nk", slope, q))
         f, g = value @ q, np.einsum("npk,p->nk", slope, q)
         steep = np.linalg.norm(g, axis=1)
         lean = np.sum(g * normals, axis=1) / np.maximum(steep, 1e-300)
@@ -148,6 +148,14 @@ def polynomial_through(
         if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and few:
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
     return None
+
+
+def _least(value: FloatArray, slope: FloatArray, normals: FloatArray) -> FloatArray:
+    """q (p,) of unit length with least sum ON^2 (value.q)^2 + |n x slope.q|^2, normals (n, 3) made unit vectors."""
+    n = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    across = np.cross(slope, n[:, None])
+    rows = np.concatenate([ON * value, *np.moveaxis(across, -1, 0)])
+    return np.asarray(np.linalg.svd(rows, full_matrices=False)[2][-1])
 
 
 def tip_of(patch: Patch) -> FloatArray | None:

@@ -45,6 +45,8 @@ NOISE_RATIO, NOISE = 0.15, 5e-4
 RESIDUAL_PER_NOISE = 0.95, 0.81
 """Residuals of degree 4 and 6 on noise: sqrt(1 - terms/neighbours), a little more by the weights."""
 JUMP_DECAY, JUMP_RESIDUAL = 0.33, 1e-4
+ROUNDING = 1e-12
+"""Edges below which a residual is rounding of the vertices."""
 FEWEST_RIMS, JUMPS_ALONG = 6, 0.5
 """Vertices that make a rim; jumps, in roots of the number of vertices, that make a curve over the body."""
 
@@ -180,19 +182,14 @@ def assess(mesh: Mesh, jets: Jets) -> MeshQuality:
     edge = float(length.mean())
     ends, angles = _dihedrals(vertices, triangles)
     curvature = np.abs(jets.principal).max(axis=1)
-    doubt = np.abs(jets.principal4 - jets.principal).max(axis=1)
+    doubt = _doubt(jets)
     astray = np.linalg.norm(jets.normals - angle_weighted_normals(vertices, triangles), axis=1)
     badness = np.maximum(np.maximum(jets.tilt, edge * doubt / 3), np.where(astray > ASTRAY, astray, 0.0))
-    # below this a residual is rounding of the vertices
-    floor = 1e-12 * edge
-    second, fourth, sixth = np.maximum(jets.residuals, floor).T
+    second, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T
     ratio = sixth / second
     resolved = float(np.percentile(curvature, 99)) * edge
     noise = _noise(fourth, sixth, curvature * edge) / edge
-    jump = (sixth > JUMP_DECAY * fourth) & (sixth > max(JUMP_RESIDUAL * edge, 5 * float(np.median(sixth))))
-    strong = float(np.percentile(curvature, 90))
-    # noise of s e changes kappa_4 - kappa_6 by up to 8 s/e where the jet is well determined
-    jump |= doubt > (0.25 + 100 * resolved**4) * strong + 12 * float(np.median(sixth)) / edge**2
+    jump = jumps_at(jets, edge)
     quality: dict[str, Any] = {
         "vertices": len(vertices),
         "triangles": len(triangles),
@@ -215,6 +212,22 @@ def assess(mesh: Mesh, jets: Jets) -> MeshQuality:
     faults = {"rims": _rims(ends, angles, len(vertices)), "unseen": int(np.sum(length > 2 * far)) // 2}
     verdict, reasons = _verdict(quality, jets, **faults)
     return MeshQuality(**quality, verdict=verdict, reasons=reasons)
+
+
+def jumps_at(jets: Jets, edge: float) -> NDArray[np.bool_]:
+    """Vertices (n,) at which the curvature jumps, by jets on a mesh with this mean edge, L."""
+    curvature, doubt = np.abs(jets.principal).max(axis=1), _doubt(jets)
+    _, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T
+    resolved = float(np.percentile(curvature, 99)) * edge
+    jump = (sixth > JUMP_DECAY * fourth) & (sixth > max(JUMP_RESIDUAL * edge, 5 * float(np.median(sixth))))
+    strong = float(np.percentile(curvature, 90))
+    # noise of s e changes kappa_4 - kappa_6 by up to 8 s/e where the jet is well determined
+    jump |= doubt > (0.25 + 100 * resolved**4) * strong + 12 * float(np.median(sixth)) / edge**2
+    return np.asarray(jump)
+
+
+def _doubt(jets: Jets) -> FloatArray:
+    return np.asarray(np.abs(jets.principal4 - jets.principal).max(axis=1))
 
 
 def _verdict(quality: dict[str, Any], jets: Jets, *, rims: int, unseen: int) -> tuple[Verdict, str]:

@@ -1,0 +1,174 @@
+"""Meshes of capsules and cone-spheres are cut along their joints; smooth bodies, however meshed or noisy, are not."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import creeping as cr
+import scatterers as sc
+from creeping.geodesics.states import pack
+from creeping.geometry.surface import normal, size
+from scatterers.pieces.joints import jointed
+from scatterers.pieces.mesh_cuts import Cuts, cut
+from scatterers.triangles.jets import osculating_jets
+from scatterers.triangles.quality import assess, jumps_at
+from scatterers.triangles.topology import edges_of
+from studies._meshes import capsule, geodesic_sphere, on_body, slivers, torus_grid
+
+PILL, SHORT, CONE = sc.Capsule(0.8, 3.1), sc.Capsule(1.0, 2.2), sc.ConeSphere(1.0, 3.3)
+MESHES = {
+    # rings beside the joints, triangles of all shapes, a cylinder of long triangles, one of three rings
+    "even": (lambda: capsule(3000, 1.5, 0.8), PILL),
+    "slivers": (lambda: slivers(PILL, 20), PILL),
+    "long": (lambda: long_triangles(), PILL),
+    "short": (lambda: capsule(4000, 0.2, 1.0), SHORT),
+    "cone": (lambda: slivers(CONE, 24), CONE),
+}
+
+
+def long_triangles():
+    found = trimesh.creation.capsule(height=1.5, radius=0.8, count=[40, 40])
+    points = np.asarray(found.vertices)
+    return points - 0.5 * (points.min(axis=0) + points.max(axis=0)), np.asarray(found.faces)
+
+
+@cache
+def opened(name):
+    """Body of a mesh that is turned in space, the exact one, and the turn."""
+    (points, triangles), exact = MESHES[name][0](), MESHES[name][1]
+    turn = Rotation.random(random_state=7).as_matrix()
+    return sc.Mesh(SimpleNamespace(vertices=points @ turn.T, faces=triangles), cache=False), exact, turn
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_joints_are_those_of_the_exact_body(name):
+    body, exact, turn = opened(name)
+    assert body.quality.verdict == "curvature jumps" and "on joints of planes and quadrics" in body.quality.reasons
+    assert sorted(c.kind for c in body.creases) == sorted(c.kind for c in exact.creases)
+    assert len(body.pieces) == len(exact.pieces)
+    for kind in ("joint", "tip"):
+        mine, theirs = (
+            np.concatenate([c.points for c in b.creases if c.kind == kind] or [np.zeros((0, 3))]) for b in (body, exact)
+        )
+        if len(mine):
+            height = np.unique(theirs[:, 2].round(9))
+            off = np.abs((mine @ turn)[:, 2:] - height).min(axis=1)
+            np.testing.assert_allclose(off, 0, atol=2e-6)
+    # next to the body, on either side of the joints too
+    rng = np.random.default_rng(3)
+    points = exact.tiles(0.1)[0].reshape(-1, 3)[rng.integers(0, 3000, 1000)]
+    points = points + rng.uniform(-1e-3, 1e-3, size=(1000, 1)) * normal(exact, points)
+    near = np.linalg.norm(points - [0, 0, points[:, 2].max()], axis=1) > 0.05
+    assert near.sum() > 500
+    np.testing.assert_allclose(
+        body.level(points[near] @ turn.T) / slope(body, points[near] @ turn.T),
+        exact.level(points[near]) / slope(exact, points[near]),
+        atol=3e-6,
+    )
+
+
+def slope(body, points):
+    return np.linalg.norm(body.gradient(points), axis=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "direction"), [("even", (0.3, 0.5, 0.8)), ("slivers", (-0.6, 0.1, 0.4)), ("cone", (0.2, 0.9, -0.5))]
+)
+def test_shadow_line_and_rays_are_those_of_the_exact_body(name, direction):
+    body, exact, turn = opened(name)
+    d = np.array(direction) / np.linalg.norm(direction)
+    line, wanted = cr.shadow_line(body, turn @ d), cr.shadow_line(exact, d)
+    assert len(line.curves) == len(wanted.curves)
+    points = np.concatenate([curve.points for curve in line.curves]) @ turn
+    assert np.max(np.abs(exact.level(points) / slope(exact, points))) < 1e-7 * size(exact)
+    # n.d over the curvature there is the distance from the exact line
+    curvature = np.concatenate([curve.curvature for curve in line.curves])
+    assert np.max(np.abs(normal(exact, points) @ d) / np.abs(curvature)) < 1e-6
+    fan = cr.launch(cr.DirectFlow(body), line, length=2.5, n_rays=24, n_steps=16, max_gap=np.inf, measured=False)
+    assert len(fan.crossings.ray) >= 8
+    own, theirs = cr.DirectFlow(body), cr.DirectFlow(exact)
+    times = fan.travel_time
+    start, ahead = fan.points[:, 0], fan.directions[:, 0]
+    a = own.transport(pack(start, ahead, lanes=14), times)
+    b = theirs.transport(pack(start @ turn, ahead @ turn, lanes=14), times)
+    np.testing.assert_allclose(a[:, :, :3] @ turn, b[:, :, :3], atol=1e-5 * size(exact))
+    # M, M', m and m' of a ray, by which it spreads
+    np.testing.assert_allclose(a[:, :, 6:10], b[:, :, 6:10], atol=1e-3 * np.nanmax(np.abs(b[:, :, 6:10])))
+
+
+def bumpy():
+    return sc.Implicit("x**2+y**2+z**2-1+0.15*sin(3*x)*sin(3*y)*cos(2*z)")
+
+
+SMOOTH = {
+    "sphere": lambda n: geodesic_sphere(n),
+    "ellipsoid": lambda n: (geodesic_sphere(n)[0] * [3, 1, 1], geodesic_sphere(n)[1]),
+    "torus": lambda n: torus_grid(n),
+    "thin torus": lambda n: torus_grid(n, 0.25),
+    "twisted": lambda n: on_body("twisted", n)[1:],
+    "twisted, slivers": lambda n: slivers(sc.TwistedEllipsoid(), round(0.57 * np.sqrt(n))),
+    "bumpy": lambda n: slivers(bumpy(), round(0.57 * np.sqrt(n))),
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-7, 1e-5])
+@pytest.mark.parametrize("name", SMOOTH)
+def test_smooth_bodies_have_no_joints(name, noise):
+    not_split(name, noise, 2000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+@pytest.mark.parametrize("name", SMOOTH)
+def test_finely_meshed_smooth_bodies_have_no_joints(name, noise):
+    not_split(name, noise, 10_000)
+
+
+def not_split(name, noise, count):
+    """Whatever jets say of the curvature there."""
+    points, triangles = SMOOTH[name](count)
+    rng = np.random.default_rng(11)
+    points = points + noise * 0.5 * np.linalg.norm(np.ptp(points, axis=0)) * rng.normal(size=points.shape)
+    jets = osculating_jets(points, triangles)
+    quality = assess(SimpleNamespace(vertices=points, triangles=triangles), jets)
+    clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
+    assert jointed(points, triangles, jets.normals, clean) is None
+    # not even where half of the vertices are taken for a jump
+    assert jointed(points, triangles, jets.normals, clean & (points[:, 2] > 0.1)) is None
+
+
+def test_a_cut_mesh_is_the_same_surface():
+    points, triangles = geodesic_sphere(600)
+    edges = edges_of(triangles)
+    some = np.flatnonzero(np.random.default_rng(0).random(len(edges.ends)) < 0.4)
+    middles = points[edges.ends[some]].mean(axis=1)
+    cuts = Cuts(some, middles, np.zeros((len(some), 1), dtype=bool))
+    x, t, _ = cut(points, triangles, np.zeros((len(points), 1), dtype=bool), cuts)
+    assert len(x) == len(points) + len(some) and np.all(edges_of(t).faces == 2)
+
+    def volume(v, f):
+        a, b, c = np.moveaxis(v[f], 1, 0)
+        return np.sum(a * np.cross(b, c)) / 6
+
+    assert volume(x, t) == pytest.approx(volume(points, triangles), rel=1e-13)
+
+
+def test_lines_of_a_cone_come_to_its_tip_from_all_sides():
+    """Next to the tip the slope of a quadric fades into rounding; no curve is lost for that."""
+    body, exact, turn = opened("cone")
+    rng = np.random.default_rng(4)
+    for d in rng.normal(size=(6, 3)):
+        found, wanted = cr.shadow_line(body, turn @ d / np.linalg.norm(d)), cr.shadow_line(exact, d / np.linalg.norm(d))
+        assert len(found.curves) == len(wanted.curves)
+        lengths = [sum(curve.length for curve in line.curves) for line in (found, wanted)]
+        assert lengths[0] == pytest.approx(lengths[1], rel=1e-2)
+
+
+def test_strict_refuses_joints():
+    points, triangles = capsule(3000, 1.5, 0.8)
+    with pytest.raises(ValueError, match=r"\(curvature jumps\): .* on joints of planes and quadrics"):
+        sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), strict=True, cache=False)
