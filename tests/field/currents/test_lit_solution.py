@@ -9,7 +9,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.field.currents import lit_solution
 from creeping.field.currents.lit_solution import WINDOW, solved_on_lit_ground, with_bare_ground
-from creeping.field.currents.second_kind import NodeSums, twice_incident
+from creeping.field.currents.node_sums import NodeSums
+from creeping.field.currents.second_kind import twice_incident
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.quadrature import body_nodes
 from studies.field_coverage import bodies
