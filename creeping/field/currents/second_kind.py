@@ -29,8 +29,8 @@ from creeping.field.served import Served
 from creeping.field.shed_wave import smoothstep
 from creeping.geometry.surface import normal
 
-NEAR = 2.0
-"""Width a of the window, over 1/k."""
+NEAR, NEAR_VECTOR = 2.0, 0.8
+"""Width a of the window, over 1/k; of a conductor, whose sums need no more and notice how curvature varies in it."""
 LEAST = 0.05
 """Least c with which the wave of an impedance is parted."""
 OWN, EVERYWHERE, STILL = 1.5, 2.0, 0.25
@@ -97,7 +97,8 @@ def _everywhere(currents: SurfaceCurrents, unit: float) -> FloatArray:
 
 def stepped(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, values: ComplexArray) -> ComplexArray:
     """Field u, du/dn if soft, or J, at points of the body with normals (m, 3) by one step from ``values`` (m, ...)."""
-    window, wave = NEAR / currents.wavenumber, twice_incident(currents, points, normals)
+    wide = NEAR_VECTOR if currents.boundary.kind == "conductor" else NEAR
+    window, wave = wide / currents.wavenumber, twice_incident(currents, points, normals)
     if currents.boundary.kind != "impedance":
         return wave + sums_at(currents, points, normals, window).total(currents.values, values)
     rest, own = NodeSums(currents, points, normals, window).of(currents.values)

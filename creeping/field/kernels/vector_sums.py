@@ -23,6 +23,8 @@ TOUCHING = 1e-6
 """Distance, over 1/k, below which a node is the point itself."""
 PART = 256
 """Nodes whose gradients are held at a time."""
+TOGETHER = 16
+"""Points that are summed at while their nodes are at hand."""
 
 
 @njit(**options)
@@ -60,23 +62,26 @@ def vectors_from_nodes(x, normals, y, alike, currents, k, near, first, last, out
     its components first; ``alike`` (n,) matters up to the distance ``near``.
     """
     n, waves = y.shape[1], currents.shape[0]
-    g, total = np.empty((5, PART)), np.empty((waves, 6))
-    for j in range(first, last):
-        n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
+    g, total = np.empty((5, PART)), np.empty((TOGETHER, waves, 6))
+    for top in range(first, last, TOGETHER):
+        bottom = min(top + TOGETHER, last)
         total[:] = 0.0
         for start in range(0, n, PART):
             end = min(start + PART, n)
-            _gradients((x[0, j], x[1, j], x[2, j]), y, alike, start, end, k, near, g)
+            for j in range(top, bottom):
+                _gradients((x[0, j], x[1, j], x[2, j]), y, alike, start, end, k, near, g)
+                for q in range(waves):
+                    part = crossed_sum(g, currents[q], start, end)
+                    for c in range(6):
+                        total[j - top, q, c] += part[c]
+        for j in range(top, bottom):
+            n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
             for q in range(waves):
-                part = crossed_sum(g, currents[q], start, end)
-                for c in range(6):
-                    total[q, c] += part[c]
-        for q in range(waves):
-            for c in (0, 3):
-                h0, h1, h2 = total[q, c], total[q, c + 1], total[q, c + 2]
-                out[j, q, c] = 2.0 * (n1 * h2 - n2 * h1)
-                out[j, q, c + 1] = 2.0 * (n2 * h0 - n0 * h2)
-                out[j, q, c + 2] = 2.0 * (n0 * h1 - n1 * h0)
+                for c in (0, 3):
+                    h0, h1, h2 = total[j - top, q, c], total[j - top, q, c + 1], total[j - top, q, c + 2]
+                    out[j, q, c] = 2.0 * (n1 * h2 - n2 * h1)
+                    out[j, q, c + 1] = 2.0 * (n2 * h0 - n0 * h2)
+                    out[j, q, c + 2] = 2.0 * (n0 * h1 - n1 * h0)
 
 
 @njit(**entry_options)
