@@ -1,4 +1,4 @@
-"""Sums over the nodes of conductors: exact currents satisfy the equation of the magnetic field, and lit ground is found."""
+"""Sums over the nodes of conductors: exact currents satisfy the equation of the magnetic field, lit ground is found."""
 
 from dataclasses import replace
 
@@ -100,7 +100,7 @@ def test_kernels_are_their_sums_in_numpy(rng):
         sent = np.cross(g, (J[q, :3] + 1j * J[q, 3:])[:, None], axis=0).sum(axis=2)
         want = 2 * np.cross(normals, sent, axis=0)
         np.testing.assert_allclose(out[:, q, :3] + 1j * out[:, q, 3:], want.T, atol=TWIN * np.abs(want).max())
-    chi = np.where(alike & ((R <= near) | touching), weights * np.exp(-np.where(touching, 0, R / reach) ** 2), 0.0)
+    chi = np.where(alike & ((R <= near) | touching), weights * np.exp(-(np.where(touching, 0, R / reach) ** 2)), 0.0)
     np.testing.assert_allclose(patch[:, 0], chi.sum(axis=1), atol=TWIN)
     static = chi * ~touching / R**3
     T = np.einsum("amn,bn,mn->mab", away, sides, static)
