@@ -8,6 +8,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.currents import lit_solution
+from creeping.field.currents.kept import kept_currents
 from creeping.field.currents.lit_solution import WINDOW, solved_on_lit_ground, with_bare_ground
 from creeping.field.currents.node_sums import NodeSums
 from creeping.field.currents.second_kind import stepped, twice_incident
@@ -120,11 +121,11 @@ def test_against_fundamental_solutions(name, direction, kind, far):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name, k, direction, lit_error, far",
-    [("peanut", 10.0, (0.2, 0.9, 0.4), 0.12, 0.011), ("twisted", 20.0, DIP, 0.15, 0.01)],
+    "name, k, direction, lit_error, gain",
+    [("peanut", 10.0, (0.2, 0.9, 0.4), 0.12, 0.9), ("twisted", 20.0, DIP, 0.15, 0.8)],
 )
-def test_conductors_against_dipoles(name, k, direction, lit_error, far):
-    """One bounce errs by .46 and .80 on lit ground, by .012 of the largest value far away."""
+def test_conductors_against_dipoles(name, k, direction, lit_error, gain, monkeypatch):
+    """One bounce errs by .46 and .80 on lit ground."""
     body, cloud, _ = bodies()[name]
     d = np.array(direction) / np.linalg.norm(direction)
     exact = dipoles.scatter(cloud, k, d[None], depth=DIPOLE_DEPTHS[name], per_wavelength=6.0)
@@ -132,7 +133,10 @@ def test_conductors_against_dipoles(name, k, direction, lit_error, far):
     f = exact.far_field(directions)[:, 0]
     found = cr.far_field(fan, directions, wavenumber=k, boundary="pec", method="currents")
     off = np.abs(found.total - f)
-    assert np.sqrt(np.mean(off**2)) < far * np.abs(f).max()
+    monkeypatch.setattr(lit_solution, "MOST", 1.0)
+    bounced = cr.surface_currents(fan, wavenumber=k, boundary="pec")
+    monkeypatch.undo()
+    assert np.sqrt(np.mean(off**2)) < gain * np.sqrt(np.mean(np.abs(bounced.far(directions) - f) ** 2))
     assert np.mean(off <= found.error) > 0.97
     nodes = body_nodes(body, 2 * k)
     lit = np.flatnonzero(nodes.normals @ d < -0.1)
@@ -147,6 +151,6 @@ def test_conductors_against_dipoles(name, k, direction, lit_error, far):
     dark = np.flatnonzero(nodes.normals @ d > 0.2)
     dark = dark[:: len(dark) // 200]
     shadow = cr.conductor_current(fan, nodes.points[dark], wavenumber=k)
-    currents = cr.surface_currents(fan, wavenumber=k, boundary="pec")
+    currents = kept_currents(fan, k, "pec")
     step = stepped(currents, nodes.points[dark], nodes.normals[dark], shadow.values) - shadow.values
     assert currents.solved and np.all(shadow.error >= 0.99 * np.linalg.norm(step, axis=1))
