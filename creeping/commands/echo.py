@@ -179,7 +179,7 @@ def _cost(shape: Any, request: Any, azimuths: Any, elevations: Any, method: str)
 
     if method == "rays" or not request.monostatic:
         return ""
-    seconds = seconds_of_currents(shape, request.wavenumbers, azimuths, elevations)
+    seconds = seconds_of_currents(shape, request.wavenumbers, azimuths, elevations, boundary=request.boundary)
     if seconds < TOLD:
         return ""
     return f"; up to about {seconds / 60:.0f} min if currents of the body must serve all (--method rays: seconds)"

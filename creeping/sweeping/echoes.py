@@ -147,7 +147,13 @@ def bistatic(
 
 
 def seconds_of_currents(
-    body: Surface, wavenumbers: FloatArray, azimuths: FloatArray, elevations: FloatArray, *, observers: int = 1
+    body: Surface,
+    wavenumbers: FloatArray,
+    azimuths: FloatArray,
+    elevations: FloatArray,
+    *,
+    observers: int = 1,
+    boundary: BoundaryLike = "soft",
 ) -> float:
     """About what an echo costs where currents serve all of its incidences, by the first of them; 0 of unknown cost.
 
@@ -161,7 +167,7 @@ def seconds_of_currents(
     except SingularIncidenceError:
         return 0.0
     fan = launch(DirectFlow(body, rtol=1e-6), line, length=size(body), n_rays=8, measured=False)
-    return len(azimuths) * expected_seconds(fan, wavenumbers, observers)
+    return len(azimuths) * expected_seconds(fan, wavenumbers, observers, boundary)
 
 
 def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -4,7 +4,8 @@
     n.E = div J/(ik),   dH_n/dn = -div (J x n)
 
 J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
-the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
+the body (`creeping.field.currents.bounce`), or a step of the integral equation stands for both where that is solved
+(`creeping.field.conductor.equation`); where rays merge beams stand for them
 (`creeping.field.conductor.mode_beams`). Divergences on the surface are differences between points 0.02/k to either
 side. Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
 ground BEYOND |J_thrown| stands besides, for what comes to it later.
@@ -19,6 +20,7 @@ import numpy as np
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
+from creeping.field.conductor.equation import by_a_step
 from creeping.field.conductor.marched import current_marches, marched_current
 from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
 from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
@@ -84,7 +86,8 @@ def on_conductor(
     count = len(points)
     around, normals, apart = _crosses(fan, points, k)
     lit, lit_off, share = _lit_at(fan, around, normals, k, electric)
-    if currents is not None and not convex(fan):
+    solved = currents is not None and currents.solved
+    if currents is not None and not (solved or convex(fan)):
         at = np.flatnonzero(share > 0)
         thrown = share[at, None, None] * currents.thrown(around[at], normals[at])
         lit[at] += thrown
@@ -99,6 +102,8 @@ def on_conductor(
         # what is left out at a point is left out around it
         dropped = np.all(one.creeping == 0, axis=1) | ~np.all(np.isfinite(sums.values[:count]), axis=1)
         total[:, :, i] = lit[:, :, i] + np.where(np.tile(dropped, 5)[:, None], 0.0, sums.values)
+    if currents is not None and solved:
+        served, total = by_a_step(currents, served, total, (around, normals, share), left)
     magnetic = np.cross(total, normals[:, :, None], axis=1)
     charge, turned = (_divergence(v.reshape(5, count, *v.shape[1:]), apart) for v in (total, magnetic))
     return OnConductor(served, charge / (1j * k), -turned / k)

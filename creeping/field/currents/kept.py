@@ -33,8 +33,8 @@ MAKING = 2700.0
 """What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
 SECONDS = 3.3e-9
 """Of one node at one place."""
-SOLVING = 1.6e-8
-"""Of one pair of nodes between which the equation of lit ground is solved."""
+SOLVING, SOLVING_VECTORS = 1.6e-8, 5e-8
+"""Of one pair of nodes between which the equation of lit ground is solved; of a conductor, both polarisations."""
 LIT = 0.6
 """Share of a body's nodes that are lit or in the penumbra."""
 KEPT = 2
@@ -54,11 +54,12 @@ def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = F
     return nodes * (MAKING + (0 if by_transform else places)) < AFFORDABLE
 
 
-def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int) -> float:
+def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boundary: BoundaryLike = "soft") -> float:
     """About what currents of one incidence at wavenumbers (k,), 1/L, and their far field cost, where they are taken."""
     known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
     plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
-    return plain + SOLVING * sum(expected_pairs(fan, k) for k in known)
+    solving = SOLVING_VECTORS if boundary == "pec" else SOLVING
+    return plain + solving * sum(expected_pairs(fan, k) for k in known)
 
 
 def expected_pairs(fan: RayFan, wavenumber: float) -> int:

@@ -131,7 +131,7 @@ def _gradients(at, up, y, first, last, k, low, out):
 
 
 @njit(**options)
-def _crossed_sum(g, J, first, last):
+def crossed_sum(g, J, first, last):
     """Sum of g x J over nodes first..last, real and imaginary parts of its components."""
     a0, a1, a2, b0, b1, b2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(first, last):
@@ -169,7 +169,7 @@ def vectors_from_above(x, normals, of, y, nodes, block, currents, k, low, first,
                 start, end = some[a] * block, min((some[a] + 1) * block, n)
                 _gradients(at, (n0, n1, n2), y, start, end, k, low, g)
                 for q in range(waves):
-                    part = _crossed_sum(g, currents[q], start, end)
+                    part = crossed_sum(g, currents[q], start, end)
                     for c in range(6):
                         total[q, c] += part[c]
             for q in range(waves):

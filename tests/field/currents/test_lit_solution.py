@@ -8,12 +8,15 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.currents import lit_solution
+from creeping.field.currents.kept import kept_currents
 from creeping.field.currents.lit_solution import WINDOW, solved_on_lit_ground, with_bare_ground
-from creeping.field.currents.second_kind import NodeSums, twice_incident
+from creeping.field.currents.node_sums import NodeSums
+from creeping.field.currents.second_kind import stepped, twice_incident
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.quadrature import body_nodes
-from studies.field_coverage import bodies
-from studies.reference import fundamental, sphere
+from creeping.shadow.occlusion import occluded
+from studies.field_coverage import DIPOLE_DEPTHS, bodies
+from studies.reference import dipoles, fundamental, sphere
 
 K = 10.0
 DIP = (0.3, 0.5, 0.812)
@@ -114,3 +117,40 @@ def test_against_fundamental_solutions(name, direction, kind, far):
         u = np.asarray(exact.total(currents.points[lit]))[:, 0]
         wrong = np.abs(currents.values[lit] - u) ** 2
         assert np.sqrt(np.average(wrong, weights=currents.weights[lit])) < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, k, direction, lit_error, gain",
+    [("peanut", 10.0, (0.2, 0.9, 0.4), 0.12, 0.9), ("twisted", 20.0, DIP, 0.15, 0.8)],
+)
+def test_conductors_against_dipoles(name, k, direction, lit_error, gain, monkeypatch):
+    """One bounce errs by .46 and .80 on lit ground."""
+    body, cloud, _ = bodies()[name]
+    d = np.array(direction) / np.linalg.norm(direction)
+    exact = dipoles.scatter(cloud, k, d[None], depth=DIPOLE_DEPTHS[name], per_wavelength=6.0)
+    fan, directions = fan_on(body, d, k), fibonacci_directions(200)
+    f = exact.far_field(directions)[:, 0]
+    found = cr.far_field(fan, directions, wavenumber=k, boundary="pec", method="currents")
+    off = np.abs(found.total - f)
+    monkeypatch.setattr(lit_solution, "MOST", 1.0)
+    bounced = cr.surface_currents(fan, wavenumber=k, boundary="pec")
+    monkeypatch.undo()
+    assert np.sqrt(np.mean(off**2)) < gain * np.sqrt(np.mean(np.abs(bounced.far(directions) - f) ** 2))
+    assert np.mean(off <= found.error) > 0.97
+    nodes = body_nodes(body, 2 * k)
+    lit = np.flatnonzero(nodes.normals @ d < -0.1)
+    lit = lit[:: len(lit) // 200]
+    lit = lit[~occluded(body, nodes.points[lit], d)]
+    J = np.cross(nodes.normals[lit][:, :, None], exact.total(nodes.points[lit])[1][:, :, 0], axis=1)
+    current = cr.conductor_current(fan, nodes.points[lit], wavenumber=k)
+    wrong = np.linalg.norm(current.values - J, axis=1)
+    assert np.quantile(wrong, 0.95) < lit_error
+    assert np.mean(wrong <= current.error) > 0.97
+    # what a step would change on dark ground stands in its error
+    dark = np.flatnonzero(nodes.normals @ d > 0.2)
+    dark = dark[:: len(dark) // 200]
+    shadow = cr.conductor_current(fan, nodes.points[dark], wavenumber=k)
+    currents = kept_currents(fan, k, "pec")
+    step = stepped(currents, nodes.points[dark], nodes.normals[dark], shadow.values) - shadow.values
+    assert currents.solved and np.all(shadow.error >= 0.99 * np.linalg.norm(step, axis=1))

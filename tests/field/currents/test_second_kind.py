@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.currents import second_kind
+from creeping.field.currents import node_sums
 from creeping.field.currents.second_kind import stepped
 from creeping.geometry.quadrature import body_nodes
 from studies.reference import sphere
@@ -79,5 +79,5 @@ def test_what_stands_far_off_is_summed_as_what_is_beside(fan, monkeypatch):
     x = currents.points[::97]
     u = exact(x, "hard")
     found = stepped(currents, x, currents.normals[::97], u)
-    monkeypatch.setattr(second_kind, "NEIGHBOURS", 6.0)
+    monkeypatch.setattr(node_sums, "NEIGHBOURS", 6.0)
     np.testing.assert_allclose(stepped(currents, x, currents.normals[::97], u), found, atol=1e-7)
