@@ -310,9 +310,7 @@ def with_lattice(request: SweepRequest, incidences: FloatArray) -> SweepRequest:
     return request if request.accuracy is None else replace(request, lattice=lattice_of(incidences))
 
 
-def sweep_length(
-    body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike, *, leap: float = 0.0
-) -> float:
+def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike, *, leap: float = 0.0) -> float:
     """Length of the rays of a sweep asked for as a number or as "auto": then for its lowest wavenumber, if it has any.
 
     An automatic length is one of whole leaps of a map, each of ``leap``, for what is left of one would be traced. What
