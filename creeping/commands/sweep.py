@@ -111,7 +111,7 @@ def sweep(
 def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any) -> tuple[Any, Any]:
     """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
     from creeping.sweeping.plan import SweepPlan, task_size
-    from creeping.sweeping.request import with_lattice
+    from creeping.sweeping.request import in_patches, with_lattice
     from creeping.sweeping.results import require
     from creeping.sweeping.run import open_store
     from creeping.sweeping.storage.store import SweepStore
@@ -132,10 +132,11 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
         flow, chunk = store.flow(body), store.chunk
     else:
         flow, chunk = _flow(read, body, request, cache, progress), task_size(request, len(read.incidences), read.chunk)
+    request = with_lattice(request, read.incidences)
     plan = SweepPlan(
         flow,
-        with_lattice(request, read.incidences),
-        read.incidences,
+        request,
+        read.incidences[in_patches(request, read.incidences)],
         chunk,
         asked={"flow": read.flow, "tolerance": read.tolerance},
         text=read.text,

@@ -23,6 +23,8 @@ FINER = 2
 CROWDED = 3.0
 """Incidences that a cell of a level has, on average, for the level to pay."""
 MOST_LEVELS = 6
+BITS = 14
+"""Binary digits of the numbers of nodes on the sphere."""
 FLAT = 1e-9
 """Largest distance of the directions of a cut from its plane."""
 HIGHEST = 0.999
@@ -99,6 +101,21 @@ class Lattice:
             d[rows, axis] = np.where(nodes[:, 0] % 2, -1.0, 1.0)
             d[rows, (axis + 1) % 3], d[rows, (axis + 2) % 3] = np.tan(u).T
         return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
+
+    def order(self, directions: FloatArray) -> IntArray:
+        """Order of unit directions (n, 3) in which those of one cell follow each other, at every level: (n,).
+
+        A task has few cells then, and their nodes serve it alone. On a cut it is that of the directions, which
+        follow each other as they are.
+        """
+        if self.axes:
+            return np.arange(len(directions))
+        cells, _ = self.located(directions, self.levels - 1)
+        numbers, key = cells[:, 1:] + TURN * FINER**MOST_LEVELS, np.zeros(len(directions), dtype=np.int64)
+        for bit in range(BITS):
+            for axis in range(2):
+                key |= ((numbers[:, axis] >> bit) & 1) << (2 * bit + axis)
+        return np.lexsort((key, cells[:, 0]))
 
     def wrapped(self, nodes: IntArray, level: int) -> IntArray:
         """Nodes with those that are one numbered alike: a cut closes after a turn."""

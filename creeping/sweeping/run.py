@@ -6,10 +6,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from creeping._typing import Any, ArrayLike
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, IntArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.geometry.arguments import flag, folder_path, shown, whole_number
@@ -18,7 +21,7 @@ from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
-from creeping.sweeping.request import Quantity, sweep_length, sweep_request, with_lattice
+from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request, with_lattice
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.mending import mended
@@ -152,16 +155,19 @@ def sweep_directions(
         if going_on
         else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
-    plan = SweepPlan(flow, request, unit, chunk)
+    patches = in_patches(request, unit)
+    plan = SweepPlan(flow, request, unit[patches], chunk)
     if store is None:
-        return in_memory(plan, progress)
+        return in_memory(plan, progress, patches)
     opened = open_store(plan, store, resume=resume)
     fill(plan, opened, client=client, progress=progress)
-    return opened.dataset()
+    return opened.dataset().isel(incidence=np.argsort(patches))
 
 
-def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Dataset:
+def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray | None = None) -> xarray.Dataset:
     """Dataset of a plan, computed in this process and kept in memory.
+
+    The incidences of the plan may be those of the dataset in another ``order`` (n,).
 
     Raises
     ------
@@ -178,18 +184,21 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Datas
     arrays: Arrays = plan.request.empty(count, filled=False)
     errors: list[tuple[int, str]] = []
     guard = FirstTaskGuard()
+    order = np.arange(count) if order is None else order
     for task in range(plan.tasks):
         rows = plan.rows(task)
         if progress and isinstance(sweeper, Sweeper):
             sweeper.passed = _within(rows, count, started, progress)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():
-            values[rows] = found[name]
-        errors += [(rows.start + row, text) for row, text in failed.items()]
+            values[order[rows]] = found[name]
+        errors += [(int(order[rows.start + row]), text) for row, text in failed.items()]
         guard.add(rows.stop - rows.start, common_error(failed, rows.stop - rows.start))
         if progress:
             progress(rows.stop, count, time.perf_counter() - started)
-    return as_dataset(plan, arrays, errors, time.perf_counter() - started)
+    incidences = np.empty_like(plan.incidences)
+    incidences[order] = plan.incidences
+    return as_dataset(replace(plan, incidences=incidences), arrays, errors, time.perf_counter() - started)
 
 
 def _within(rows: slice, count: int, started: float, progress: Progress) -> Passed:

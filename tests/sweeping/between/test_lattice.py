@@ -126,3 +126,14 @@ def test_no_places_have_no_weights(dimensions):
     six, errors = weights(none)
     assert six.shape == (0, 6**dimensions) and all(one.shape == six.shape for one in errors)
     assert corner_weights(none).shape == (0, 2**dimensions)
+
+
+def test_incidences_of_a_cell_follow_each_other():
+    directions = cr.fibonacci_directions(20_000)
+    lattice = lattice_of(directions)
+    order = lattice.order(directions)
+    assert np.array_equal(np.sort(order), np.arange(20_000))
+    for level in range(lattice.levels):
+        cells = lattice.located(directions[order], level)[0]
+        changes = np.count_nonzero(np.any(np.diff(cells, axis=0), axis=1))
+        assert changes == len(np.unique(cells, axis=0)) - 1

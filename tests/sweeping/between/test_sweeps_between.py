@@ -7,6 +7,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.geodesics.states import pack
 from creeping.shadow.panels import onto_line
+from creeping.sweeping.lattice import lattice_of
 
 BODY = sc.Ellipsoid(1.2, 0.85, 0.7)
 FLOW = cr.DirectFlow(BODY, rtol=1e-9)
@@ -200,3 +201,19 @@ def test_rays_that_are_carried_start_on_the_line():
     assert np.abs(np.sum(start * d, axis=1) - found.launch_phase.values[row, ray]).max() < 1e-6
     assert np.abs(-back - d).max() < 1e-6
     assert np.abs(np.linalg.norm(onto_line(body, d, start, reach=0.1) - start, axis=1)).max() < 1e-6
+
+
+def test_a_patch_of_the_sphere_comes_back_in_its_own_order(tmp_path):
+    """In memory and in a folder, whose tasks are patches."""
+    directions = cr.fibonacci_directions(40_000)
+    directions = directions[directions @ np.array([0.6, 0.48, 0.64]) > 0.99]
+    asked = {"quantity": "rays", "n_rays": 16, "length": 1.0, "accuracy": 1e-3}
+    flow = cr.DirectFlow(sc.Ellipsoid(1.0, 0.8, 0.6), rtol=1e-8)
+    here = cr.sweep_directions(flow, directions, **asked)
+    kept = cr.sweep_directions(flow, directions, store=tmp_path / "store", **asked)
+    order = lattice_of(directions).order(directions)
+    assert not np.array_equal(order, np.arange(len(directions)))
+    for ds in (here, kept):
+        np.testing.assert_array_equal(ds.direction, directions)
+    np.testing.assert_array_equal(here.points, kept.points)
+    np.testing.assert_array_equal(here.interpolated, kept.interpolated)
