@@ -30,7 +30,7 @@ from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
 from creeping.explorer.text import legend, preview_text, refined_text, wave_note
 from creeping.explorer.titled import titled
 from creeping.explorer.units import wave_scale
-from creeping.field.currents.kept import expected_nodes, expected_pairs
+from creeping.field.currents.kept import expected_nodes
 from creeping.field.lit_ground import convex
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import size
@@ -289,8 +289,7 @@ class Explorer:
                 if speed_of(self.flow.body) is not None or not self._follows(frame):
                     continue
                 # currents of a body that faces itself take seconds
-                facing = not convex(frame.fan) or expected_pairs(frame.fan, request.wavenumber)
-                method = "rays" if facing else "auto"
+                method = "auto" if convex(frame.fan) else "rays"
                 cut = cut_svg(request, angles, far_cut(frame.fan, request, angles, method))
                 self.cut_seconds.append(time.perf_counter() - began)
                 with self._drawing:

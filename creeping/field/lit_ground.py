@@ -22,10 +22,12 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
+from creeping.field.currents.bounce import may_face_itself
 from creeping.field.currents.nodes import LitNodes
 from creeping.field.point_result import FieldStatus
 from creeping.field.ray_sums import RaySum
 from creeping.field.served import Served, Words
+from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
@@ -57,8 +59,13 @@ NO_VALUE = 1e30
 
 
 def convex(fan: RayFan) -> bool:
-    """Whether nothing on the rays or along the line says that the body may reflect onto itself."""
-    return fan.line.fractions["attached"] == 1.0 and bool(np.all(fan.status == RayStatus.OK))
+    """Whether nothing on the rays, along the line or anywhere on the body says that it may reflect onto itself.
+
+    On a torus along its axis all rays are OK, and light goes to and fro in its hole.
+    """
+    if fan.line.fractions["attached"] < 1.0 or not np.all(fan.status == RayStatus.OK):
+        return False
+    return is_creased(fan.body) or not may_face_itself(fan.body)
 
 
 def composed(

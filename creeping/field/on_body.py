@@ -181,7 +181,9 @@ def total_on(
         currents = currents or _currents_of(fan, k, kind)
         left = currents.extinction if currents else np.nan
         if currents and order == 2 and kind.kind in ("soft", "hard") and not (jointed or currents.solved):
-            lit = lit[0] + _thrown(currents, points, lit[2]), *lit[1:]
+            thrown = currents.thrown(points, normal(fan.body, points))
+            # as much may come later, to and fro, and to dark ground, whose rays do not know of it
+            lit = lit[0] + lit[2] * thrown, np.hypot(lit[1], np.abs(thrown)), lit[2]
     unit = k if kind.kind == "soft" else 1.0
     field = composed(fan, lit, rays, by, left, k, kind, unit)
     if currents and order == 2 and (jointed or currents.solved):
@@ -198,14 +200,6 @@ def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | Non
         return kept_currents(fan, k, boundary) if affordable(fan, INNER, k) else None
     except SurfaceError:
         return None
-
-
-def _thrown(currents: SurfaceCurrents, points: FloatArray, share: FloatArray) -> ComplexArray:
-    """What lit ground receives of other parts of the body, where it has a share (n,)."""
-    out = np.zeros(len(points), dtype=complex)
-    at = np.flatnonzero(share > 0)
-    out[at] = share[at] * currents.thrown(points[at], normal(currents.body, points[at]))
-    return out
 
 
 def _lit_at(

@@ -6,6 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field import on_body
+from creeping.field.lit_ground import convex
 from creeping.field.point_result import FieldStatus
 from studies.reference import clouds, fundamental, sphere
 
@@ -186,3 +187,32 @@ def test_rays_without_a_share_are_no_trouble_next_to_the_line():
         assert np.all(u.ok)
         exact = sphere.surface_field(20.0, 1.0, x @ d, "hard")
         assert np.all(np.abs(u - exact) <= u.error)
+
+
+def test_what_faces_itself_is_not_convex_though_all_rays_creep():
+    """Along its axis all of a torus' shadow line is attached and all rays are OK; light goes to and fro in its hole."""
+    for body, d, expected in (
+        (sc.Torus(), (0.1, 0.2, 0.97), False),
+        (sc.Ellipsoid(1.0, 0.8, 0.6), (0.1, 0.2, 0.97), True),
+    ):
+        fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), length=0.5, n_rays=32)
+        assert set(fan.status_counts) == {"OK"} and fan.line.fractions["attached"] == 1.0
+        assert convex(fan) is expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("k", "direction"), [(8.0, (0.1, 0.2, 0.97)), (10.0, (0.5, 0.2, 0.8))])
+def test_stated_errors_on_a_torus_know_of_its_hole(k, direction, rng):
+    """Of 500 points, against fundamental solutions; the second incidence was not seen while the error was made."""
+    body, d = sc.Torus(), np.array(direction) / np.linalg.norm(direction)
+    theta, psi = rng.uniform(0, 2 * np.pi, (2, 500))
+    n = np.stack([np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), np.sin(theta)], axis=1)
+    x = np.stack([np.cos(psi), np.sin(psi), 0 * psi], axis=1) + 0.5 * n
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), wavenumber=k)
+    field = cr.surface_field(fan, x, wavenumber=k, boundary="hard")
+    solution = fundamental.scatter(clouds.Torus(1.0, 0.5), k, d[None], boundary="hard", depth=0.15, per_wavelength=12.0)
+    assert solution.residual.max() < 1e-4
+    off, good = np.abs(np.asarray(field) - solution.total(x)[:, 0]), field.status == 0
+    for side, least in ((n @ d < 0, 0.9), (n @ d > 0, 0.75)):
+        assert np.mean((off <= field.error)[side & good]) > least
+    assert np.mean(good) > 0.4
