@@ -131,7 +131,7 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
                 f"a phase that turns once in {2 * np.pi / rate:.3g} L asks for more than {MOST_NODES} nodes; "
                 "take a lower wavenumber, or rays"
             )
-        nodes = found.nodes(body, cells, points)
+        nodes: BodyNodes = found.nodes(body, cells, points)
         if nodes.error <= CLOSED:
             return nodes
         found.cells = finer(cells) if cells < MOST_CELLS else 0
