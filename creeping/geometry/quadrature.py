@@ -6,16 +6,13 @@ which tiles the body without gaps or overlaps, whatever its genus; Gauss's produ
     dS = (Y_u x Y_v).n du dv/((1 + h kappa_1)(1 + h kappa_2)),
 
 2 M = kappa_1 + kappa_2 and K from H. The integral of n over a closed surface is 0; what the rule gives for it tells
-its error. For integrands as fast as e^{i a u} on a tile of -1 < u < 1 a rule of p points leaves
-
-    2^(2p) (p!)^4 a^(2p)/((2p + 1) (2p)!^3).
+its error. Which mesh and rule are taken: `creeping.geometry.tile_rules`.
 
 A body of smooth pieces is tiled by triangles, each mapped onto its own piece, with conical products of Gauss's rules.
 
 Sources: [G98], [DR84, sec. 2.7]; Derivations, B11.
 """
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,23 +21,15 @@ import numpy as np
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.geometry.creased import Tiles, is_creased, pieces_of, tiles_of
-from creeping.geometry.curvature import adjugate_form, principal_curvature_bound, second_form
+from creeping.geometry.curvature import adjugate_form, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, size
-from creeping.geometry.triangulation import quadrilaterals
+from creeping.geometry.tile_rules import CLOSED, FEWEST, KEPT, MOST, MOST_CELLS, Rules, finer, points_for
 from creeping.kernels.threads import in_slices
 
-CELLS, MOST_CELLS, MOST_NODES = 24, 120, 3_000_000
-"""Cells of the coarsest and the finest mesh, and the most nodes."""
-FEWEST, MOST = 3, 10
-"""Points of Gauss's rule along a side of a tile."""
-SMALL = 5e-3
-"""Error of a tile for the fastest integrand, as a share of its area; over the body most of it cancels."""
-CLOSED = 1e-6
-"""Integral of n, as a share of the area, beyond which a mesh is too coarse for the body."""
-KEPT = 4
-"""Rules kept with a body."""
+MOST_NODES = 3_000_000
+"""Most nodes."""
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 """Where xx, yy, zz, yz, xz, xy stand in a matrix."""
 STEPS = 12
@@ -132,7 +121,7 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     """
     if is_creased(body):
         return _on_pieces(body, rate)
-    found = kept(body, "quadratures", lambda: _Rules(body))
+    found = kept(body, "quadratures", lambda: Rules(body, _nodes))
     while found.cells:
         cells, points, tiles = found.rule(body, rate)
         if points > MOST or tiles * points**2 > MOST_NODES:
@@ -142,16 +131,10 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
                 f"a phase that turns once in {2 * np.pi / rate:.3g} L asks for more than {MOST_NODES} nodes; "
                 "take a lower wavenumber, or rays"
             )
-        # the last one used stands last
-        key = cells, points
-        nodes = found.rules[key] = (
-            found.rules.pop(key) if key in found.rules else _nodes(body, found.mesh(body, cells), points)
-        )
-        while len(found.rules) > KEPT:
-            found.rules.pop(next(iter(found.rules)))
+        nodes: BodyNodes = found.nodes(body, cells, points)
         if nodes.error <= CLOSED:
             return nodes
-        found.cells = _finer(cells) if cells < MOST_CELLS else 0
+        found.cells = finer(cells) if cells < MOST_CELLS else 0
     found.cells = 0
     raise SurfaceError(
         f"no mesh of up to {MOST_CELLS} cells or {MOST_NODES} nodes integrates over the body, which is too thin or too "
@@ -172,71 +155,11 @@ def node_count(body: Surface, rate: float) -> int:
     if is_creased(body):
         area = float(np.sum(tiles_of(body, LONGEST).areas))
         return int(area / _side(body, rate) ** 2 * SMALLER * ON_PIECES**2)
-    found = kept(body, "quadratures", lambda: _Rules(body))
+    found = kept(body, "quadratures", lambda: Rules(body, _nodes))
     if not found.cells:
         return MOST_NODES + 1
     _, points, tiles = found.rule(body, rate)
     return MOST_NODES + 1 if points > MOST else tiles * points**2
-
-
-class _Rules:
-    """Rules of a body, sizes of its meshes, and the last mesh.
-
-    ``cells`` is that of the coarsest mesh that is not known to be too coarse, 0 if there is none.
-    """
-
-    def __init__(self, body: Surface) -> None:
-        self.rules: dict[tuple[int, int], BodyNodes] = {}
-        self._sizes: dict[int, tuple[float, int]] = {}
-        self._mesh: tuple[int, tuple[FloatArray, IntArray]] | None = None
-        # tiles about as large as the least radius of curvature
-        vertices, tiles = self.mesh(body, CELLS)
-        wanted = CELLS * float(np.median(_sides(vertices, tiles))) * principal_curvature_bound(body, vertices)
-        self.cells = 0 if wanted > 2 * MOST_CELLS else max(CELLS, min(MOST_CELLS, round(0.3 * wanted)))
-
-    def rule(self, body: Surface, rate: float) -> tuple[int, int, int]:
-        """Cells of the mesh, points along a side of its tiles, and the number of these, for a rate, 1/L."""
-        cells = self.cells
-        edge, tiles = self.size(body, cells)
-        points = _points_for(0.5 * rate * edge)
-        while points > MOST and cells < MOST_CELLS:
-            cells = _finer(cells)
-            edge, tiles = self.size(body, cells)
-            points = _points_for(0.5 * rate * edge)
-        return cells, points, tiles
-
-    def mesh(self, body: Surface, cells: int) -> tuple[FloatArray, IntArray]:
-        """Vertices and quadrilaterals of a mesh."""
-        if self._mesh is None or self._mesh[0] != cells:
-            self._mesh = cells, quadrilaterals(body.level, body.gradient, body.bounds, cells=cells)
-        return self._mesh[1]
-
-    def size(self, body: Surface, cells: int) -> tuple[float, int]:
-        """Long side of the tiles of a mesh, L, nine of ten are shorter, and their number."""
-        if cells not in self._sizes:
-            vertices, tiles = self.mesh(body, cells)
-            longest = np.max(_sides(vertices, tiles), axis=1)
-            self._sizes[cells] = float(np.quantile(longest, 0.9)), len(tiles)
-        return self._sizes[cells]
-
-
-def _sides(vertices: FloatArray, tiles: IntArray) -> FloatArray:
-    """Lengths of the sides of quadrilaterals (m, 4), L."""
-    corners = vertices[tiles]
-    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1))
-
-
-def _finer(cells: int) -> int:
-    return min(MOST_CELLS, cells + cells // 2)
-
-
-def _points_for(half: float) -> int:
-    """Fewest points of Gauss's rule for e^{i half u} on -1 < u < 1."""
-    for p in range(FEWEST, MOST + 1):
-        log = 2 * p * math.log(2 * max(half, 1e-9)) + 4 * math.lgamma(p + 1) - 3 * math.lgamma(2 * p + 1)
-        if log - math.log(2 * p + 1) < math.log(SMALL):
-            return p
-    return MOST + 1
 
 
 def _nodes(body: Surface, mesh: tuple[FloatArray, IntArray], points: int) -> BodyNodes:
@@ -270,7 +193,7 @@ def _onto(body: Surface, points: FloatArray, areas: FloatArray) -> BodyNodes:
 
 def _side(body: Any, rate: float) -> float:
     """Sides, L, of the triangles of a body of pieces for a rate, 1/L."""
-    half = max(value for value in np.arange(0.05, 20.0, 0.05) if _points_for(value) <= ON_PIECES)
+    half = max(value for value in np.arange(0.05, 20.0, 0.05) if points_for(value) <= ON_PIECES)
     share = min(2 * float(half) / (rate * size(body)), LONGEST)
     # on a ladder: neighbouring rates have one rule
     return float(LADDER ** np.floor(np.log(share) / np.log(LADDER))) * size(body)

@@ -21,6 +21,8 @@ MAX_POINTS = 12_000_000
 OTHERS = (0.94, 0.88, 0.81)
 """Shares of the cells that are tried where more would be too many: a grid may meet a saddle just so that its triangles
 are not closed, and another does not."""
+ACROSS = 24
+"""Cells across each side of a box, at least."""
 LARGEST = 1e40
 """Extent of a body, and inverse of the least one, beyond which powers of lengths leave the range of numbers."""
 
@@ -138,11 +140,15 @@ def quadrilaterals(
     bounds: FloatArray,
     *,
     cells: int = 48,
+    fewest: int = ACROSS,
 ) -> tuple[FloatArray, IntArray]:
-    """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there."""
+    """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there.
+
+    There are ``fewest`` cells or more across each side of the box.
+    """
     box = checked_extent(bounds)
-    for count in _counts(box, cells):
-        axes = _grid_axes(box, count)
+    for count in _counts(box, cells, fewest):
+        axes = _grid_axes(box, count, fewest)
         values = _grid_values(level, axes)
         vertices, number = _cell_vertices(values, values < 0, axes)
         tiles = _around_edges(values < 0, number)
@@ -154,25 +160,25 @@ def quadrilaterals(
     return _onto_surface(level, gradient, vertices, reach), tiles
 
 
-def _counts(box: FloatArray, cells: int) -> Iterator[int]:
+def _counts(box: FloatArray, cells: int, fewest: int) -> Iterator[int]:
     """Cells to try: more by half while there may be, then a few less."""
     while True:
         yield cells
         finer = cells + cells // 2
-        if np.prod([len(axis) for axis in _grid_axes(box, finer)]) > MAX_POINTS:
+        if np.prod([len(axis) for axis in _grid_axes(box, finer, fewest)]) > MAX_POINTS:
             break
         cells = finer
     for share in OTHERS:
         yield int(share * cells)
 
 
-def _grid_axes(box: FloatArray, cells: int) -> list[FloatArray]:
-    """Grid coordinates per axis, two cells beyond the box: cubic cells, but at least 24 across each side.
+def _grid_axes(box: FloatArray, cells: int, fewest: int) -> list[FloatArray]:
+    """Grid coordinates per axis, two cells beyond the box: cubic cells, but at least ``fewest`` across each side.
 
     Cells much flatter than long would miss the topology of a ring, hence cubes.
     """
     side = box[1] - box[0]
-    count = np.clip(np.round(side / (np.prod(side) ** (1 / 3) / cells)), 24, 1000).astype(int)
+    count = np.clip(np.round(side / (np.prod(side) ** (1 / 3) / cells)), fewest, 1000).astype(int)
     spacing = side / count
     # an irrational shift keeps grid points off the symmetry planes, where F is often exactly 0
     low = box[0] - (2 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing

@@ -5,9 +5,12 @@ import pytest
 
 import scatterers as sc
 from creeping.errors import SurfaceError
+from creeping.geometry import quadrature, tile_rules
 from creeping.geometry.curvature import gaussian_curvature
 from creeping.geometry.depth import inner_points
 from creeping.geometry.quadrature import body_nodes, nearest_points, node_count
+from creeping.geometry.triangulation import quadrilaterals
+from studies.field_coverage import bodies
 
 BODIES = {
     "sphere": sc.Sphere(radius=2.0),
@@ -42,6 +45,33 @@ def test_waves_through_a_closed_surface(name, rate, rng):
     nodes = body_nodes(BODIES[name], rate)
     flux = np.sum(nodes.weights * (nodes.normals @ a) * np.exp(1j * (nodes.points @ q)))
     assert abs(flux) < 1e-4 * np.sum(nodes.weights)
+
+
+def fine_count(body, rate, monkeypatch):
+    """Nodes where no mesh is coarser than 24 cells."""
+    with monkeypatch.context() as patch:
+        patch.setattr(tile_rules, "COARSE", {})
+        return node_count(type(body)(), rate)
+
+
+@pytest.mark.parametrize("make, gain", [(sc.TwistedEllipsoid, 3.0), (sc.Sphere, 3.0), (sc.Torus, 3.0)])
+def test_slow_waves_take_few_nodes_and_fast_ones_no_more(make, gain, monkeypatch):
+    body = make()
+    assert gain * len(body_nodes(body, 16.0).points) < fine_count(body, 16.0, monkeypatch)
+    for rate in (24.0, 40.0, 80.0, 160.0):
+        assert node_count(body, rate) <= fine_count(body, rate, monkeypatch)
+    nodes = body_nodes(body, 20.0)
+    assert nodes.error < 1e-6 and 20.0 * nodes.spacing < 1.2 * tile_rules.NEAR
+
+
+def test_coarse_meshes_that_do_not_close_are_passed_over(monkeypatch):
+    """Of the peanut few points on large tiles miss the area by more than 1e-4; those that are taken do not."""
+    body = bodies()["peanut"][0]
+    rough = quadrature._nodes(body, quadrilaterals(body.level, body.gradient, body.bounds, cells=6, fewest=6), 3)
+    sharp = body_nodes(body, 160.0).weights.sum()
+    assert abs(rough.weights.sum() / sharp - 1) > 1e-4 and rough.error > tile_rules.CLOSED
+    taken = body_nodes(body, 16.0)
+    assert len(taken.points) < 16_000 and taken.weights.sum() == pytest.approx(sharp, rel=1e-5)
 
 
 def test_nodes_are_on_the_body_and_curvatures_are_its():
