@@ -46,8 +46,9 @@ MATTERS = 0.05
 """Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
 DARK = 0.5
 """Share of the field that ground without rays may have before a direction is unresolved."""
-VAGUE = 0.5
-"""Error over the sizes of all contributions from which a direction is unresolved."""
+VAGUE, LOW = 0.5, 1.3
+"""Error over the sizes of all contributions from which a direction is unresolved where m̄ is less, k ρ of 4: there it is
+the expansion that fails, not one of its waves."""
 HIDDEN = 0.01
 """Share of the shadow line from which hidden parts leave the forward lobe unresolved."""
 THIRD, UNSURE = 3.0, 1.5
@@ -164,7 +165,8 @@ class Parts:
         failing = np.maximum(self.failing_size, self.left_out)
         without = ~(self.dark <= DARK * largest)
         # contributions may cancel: a deep null is none the worse for it; of a conductor two come for every wave
-        without |= ~(_sizes(self.error()) <= VAGUE * self.sizes / np.sqrt(2 if self.vector else 1))
+        vague = ~(_sizes(self.error()) <= VAGUE * self.sizes / np.sqrt(2 if self.vector else 1))
+        without |= vague & (self.geometry.mean_root_radius * np.cbrt(self.wavenumber / 2) < LOW)
         return np.asarray((self.missing & (self.in_forward > 0)) | ~(failing <= MATTERS * largest) | without)
 
     def error(self) -> FloatArray:

@@ -35,9 +35,9 @@ class FarField(Drawn):
         Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
         fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
         forward lobe with no bisector contour (a concave region) or with a rim that the body hides in part; or whether
-        rays that end too early may lack so much there (`creeping.field.ray_ends`); or whether
-        the error is more than half of all contributions, as where k times the radii is 1. With currents, whether it is
-        more than a tenth of the largest |f|.
+        rays that end too early may lack so much there (`creeping.field.ray_ends`); or whether,
+        where k times the radii is below 4, the error is more than half of all contributions. With currents, whether
+        it is more than a tenth of the largest |f|.
     error : (m,) or (m, 2, 2), L
         Of |f|, meant to hold in 95 of 100 directions; NaN where it is not known.
     error_by : str
