@@ -40,7 +40,12 @@ def faces_itself(part: LitNodes) -> bool:
     """Whether lit ground is somewhere not convex, so that it may face other parts of the body."""
     total = part.along + part.across
     gauss = part.along * part.across - part.twist**2
-    return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(total**2, initial=0.0))
+    return _has_saddles(gauss, total**2)
+
+
+def _has_saddles(gauss: FloatArray, square: FloatArray) -> bool:
+    """Whether K is negative anywhere (n,), by the largest (kappa_1 + kappa_2)^2 (n,)."""
+    return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(square, initial=0.0))
 
 
 def may_face_itself(body: Surface) -> bool:
@@ -49,8 +54,7 @@ def may_face_itself(body: Surface) -> bool:
     def found() -> bool:
         points = points_of_charts(body)
         gauss = gaussian_curvature(body, points)
-        total = curvature_norms(body, points) ** 2 + 2 * gauss
-        return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(total, initial=0.0))
+        return _has_saddles(gauss, curvature_norms(body, points) ** 2 + 2 * gauss)
 
     return kept(body, "may face itself", found)
 
