@@ -28,7 +28,7 @@ from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers.triangles.jet_points import centroids, signed_distance
 from scatterers.triangles.jets import Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.parts import MOST_SUBDIVIDED, subdivided
-from scatterers.triangles.quality import FEWEST_RIMS, MeshQuality, assess, jumps_at
+from scatterers.triangles.quality import FEWEST_RIMS, MeshQuality, assess, jumps_at, noise_at_most
 
 FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0
@@ -40,6 +40,8 @@ GRID, ENOUGH, SMALL = 1e6, 2.0, 0.2
 at which nothing is lost."""
 NOISE = 2e-4
 """Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
+MOST_NOISE = 5e-3
+"""Noise in units of the mean edge up to which jets find joints."""
 MOST_SUBDIVISIONS = 3
 FEW_BAD = 0.05
 """Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
@@ -133,7 +135,7 @@ class Mesh(FittedBody):
             if joints is not None:
                 regions = regions_of(joints.vertices, joints.triangles, sharp=joints.sharp, level=joints.level)
                 notes = {"repairs": list(mesh.repairs), "source": source_name(source)}
-                return PieceCloud(joints.vertices, joints.triangles, regions, None, quality, notes)
+                return PieceCloud(joints.vertices, joints.triangles, regions, None, quality, notes, joints.noise)
             regions = regions_of(mesh.vertices, mesh.triangles)
             # creases that end on smooth ground are folds of a coarse mesh, unless most sharp edges are in chains
             if regions.count > 1 or (regions.crease.any() and quality.verdict == "sharp"):
@@ -247,11 +249,15 @@ def _examined(
 
 def _with_joints(quality: MeshQuality, mesh: TriangleMesh, jets: Jets) -> tuple[MeshQuality, Jointed | None]:
     """What jets make of the vertices, corrected where the body is planes and quadrics that join; and these."""
-    # between long triangles jets tell of no jumps
-    if quality.verdict == "noisy" or (quality.jumps < FEWEST_RIMS and quality.verdict != "too coarse"):
+    # between long triangles jets tell of no jumps, and noise drowns them
+    told = quality.jumps >= FEWEST_RIMS or quality.verdict == "too coarse"
+    if not told and quality.noise < NOISE:
         return quality, None
     clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
-    joints = jointed(mesh.vertices, mesh.triangles, jets.normals, clean)
+    joints = jointed(mesh.vertices, mesh.triangles, jets.normals, clean) if told else None
+    noise = noise_at_most(jets)
+    if joints is None and noise < MOST_NOISE * quality.edge_mean:
+        joints = jointed(mesh.vertices, mesh.triangles, jets.normals, clean, noise)
     if joints is None or joints.sharp.any():
         return quality, joints
     return replace(

@@ -82,6 +82,8 @@ class PieceCloud:
     quality : MeshQuality
     notes : dict
         As of a `PointCloud`.
+    noise : float
+        Of vertices on planes and quadrics, L.
     """
 
     vertices: FloatArray
@@ -90,3 +92,4 @@ class PieceCloud:
     normals: FloatArray | None
     quality: MeshQuality
     notes: dict[str, Any]
+    noise: float = 0.0

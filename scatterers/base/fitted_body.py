@@ -272,6 +272,9 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
     smoothing = SMOOTHINGS[0] if cloud.noise or coarse else SMOOTHING
     fine = fitted(cloud.spacing, smoothing, every)
     for more in SMOOTHINGS[1:] if cloud.noise else ():
+        # what is smoother is off by more
+        if fine.misfit > EXCESS * cloud.noise:
+            break
         smoother = fitted(cloud.spacing, more, every)
         if smoother.misfit > EXCESS * cloud.noise:
             break
@@ -312,7 +315,7 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
 
 def _fitted_pieces(cloud: PieceCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     """Arrays and text of the fits of all pieces."""
-    fitted = fitted_pieces(cloud.vertices, cloud.triangles, cloud.regions, progress, cloud.normals)
+    fitted = fitted_pieces(cloud.vertices, cloud.triangles, cloud.regions, progress, cloud.normals, cloud.noise)
     corners = cloud.vertices[cloud.triangles]
     arrays = {"rough": np.zeros((0, 3)), "badness": cloud.quality.badness}
     for name in FITS:

@@ -33,29 +33,31 @@ def accumulate(places, values, slopes, weights, shape, c, out):  # type: ignore[
 
 
 @njit(cache=True, nogil=True, **OPTIONS)
-def subtract_roughness(weight, shape, c, out):  # type: ignore[no-untyped-def]
-    """Subtract w D^T D c from out, D the fourth differences along each axis in turn, of coefficients as above."""
-    stride_y = shape[2]
-    stride_x = shape[1] * stride_y
-    for i in range(shape[0]):
-        for j in range(shape[1]):
+def subtract_roughness(weight, shape, ranges, bands, c, out):  # type: ignore[no-untyped-def]
+    """Subtract w D^T D c from out, D the fourth differences along each axis in turn, of coefficients as above.
+
+    Only in ``ranges`` (nx ny, 2) of k, one for each row of coefficients along the last axis. Bands of D^T D along the
+    three axes are (9, nx + ny + nz), from four below the diagonal to four above it; `spline.fitting.fourth_bands`.
+    """
+    nx, ny, nz = shape[0], shape[1], shape[2]
+    stride_y = nz
+    stride_x = ny * stride_y
+    for i in range(nx):
+        for j in range(ny):
+            first, last = ranges[i * ny + j, 0], ranges[i * ny + j, 1]
+            if last <= first:
+                continue
             row = i * stride_x + j * stride_y
-            for k in range(shape[2]):
-                at = row + k
-                if i + 4 < shape[0]:
-                    _fourth(weight, at, stride_x, c, out)
-                if j + 4 < shape[1]:
-                    _fourth(weight, at, stride_y, c, out)
-                if k + 4 < shape[2]:
-                    _fourth(weight, at, 1, c, out)
+            for s in range(-4, 5):
+                if 0 <= i + s < nx:
+                    _subtract(weight * bands[s + 4, i], row + s * stride_x, row, first, last, c, out)
+                if 0 <= j + s < ny:
+                    _subtract(weight * bands[s + 4, nx + j], row + s * stride_y, row, first, last, c, out)
+                for k in range(max(first, -s), min(last, nz - s)):
+                    out[row + k] -= weight * bands[s + 4, nx + ny + k] * c[row + k + s]
 
 
 @njit(cache=True, nogil=True, inline="always", **OPTIONS)
-def _fourth(weight, at, step, c, out):  # type: ignore[no-untyped-def]
-    far, near, middle = c[at] + c[at + 4 * step], c[at + step] + c[at + 3 * step], c[at + 2 * step]
-    rough = weight * (far - 4.0 * near + 6.0 * middle)
-    out[at] -= rough
-    out[at + step] += 4.0 * rough
-    out[at + 2 * step] -= 6.0 * rough
-    out[at + 3 * step] += 4.0 * rough
-    out[at + 4 * step] -= rough
+def _subtract(weight, source, row, first, last, c, out):  # type: ignore[no-untyped-def]
+    for k in range(first, last):
+        out[row + k] -= weight * c[source + k]

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.pieces.patch import EXACT, SLIGHT, TIP, Patch
+from scatterers.pieces.patch import SLIGHT, TIP, Patch
 from scatterers.pieces.regions import Regions
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +27,7 @@ def absorbed(
     triangles: IntArray,
     regions: Regions,
     quadric: Callable[[IntArray], Patch | None],
-    size: float,
+    close: float,
 ) -> Regions:
     """Regions without creases that lie within one quadric.
 
@@ -37,8 +37,8 @@ def absorbed(
     regions : Regions
     quadric : callable
         Plane or quadric through triangles with given numbers, None if there is none.
-    size : float
-        Of the body, L.
+    close : float
+        What a vertex on a quadric may be off it, L.
     """
     number, crease = regions.number.copy(), regions.crease.copy()
     sharp = np.flatnonzero(regions.crease & ~regions.level)
@@ -57,7 +57,7 @@ def absorbed(
         while small:
             mine = np.flatnonzero(np.isin(number, small))
             own = number[mine]
-            fits = _lies_on(patch, corners[mine], flat[mine], EXACT * size)
+            fits = _lies_on(patch, corners[mine], flat[mine], close)
             good = [j for j in small if np.all(fits[own == j])]
             number[np.isin(number, good)] = k
             pair = number[sides]

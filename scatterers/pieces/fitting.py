@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scatterers.pieces.absorbed import absorbed
 from scatterers.pieces.crease import Crease
 from scatterers.pieces.curved import curved, divided
-from scatterers.pieces.patch import COARSER, SPACING, TIP, Patch, polynomial_patch, spline_patch, tip_of
+from scatterers.pieces.patch import COARSER, SPACING, TIP, Closeness, Patch, polynomial_patch, spline_patch, tip_of
 from scatterers.pieces.regions import Regions
 from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
 from scatterers.pieces.trust import astray, doubtful, rough
@@ -128,6 +128,7 @@ def fitted_pieces(
     regions: Regions,
     progress: Callable[[str], None],
     normals: FloatArray | None = None,
+    noise: float = 0.0,
 ) -> FittedPieces:
     """Pieces of a closed mesh (n, 3), L, and (m, 3) with known regions.
 
@@ -135,23 +136,26 @@ def fitted_pieces(
     ----------
     normals : (m, 3, 3), optional
         Outward at the corners of the triangles, where they are known; those of the triangles if not.
+    noise : float
+        Of vertices on planes and quadrics, L.
     """
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    close = Closeness.of(size, noise)
     regions = absorbed(
         vertices,
         triangles,
         regions,
-        lambda members: polynomial_patch(*_known(vertices, triangles, members, normals)[1:], size),
-        size,
+        lambda members: polynomial_patch(*_known(vertices, triangles, members, normals)[1:], close),
+        close.most,
     )
-    piece = _parted(vertices, triangles, regions, normals, size)
+    piece = _parted(vertices, triangles, regions, normals, close)
     count = int(piece.max()) + 1
     patches, at_corners, doubted = [], np.empty((len(triangles), 3, 3)), [np.zeros((0, 3))]
     for number in range(count):
         progress(f"piece {number + 1} of {count}")
         own = np.flatnonzero(piece == number)
         members = _grown(piece, number, regions)
-        patch, corner_normals = _patch(vertices, triangles, members, own, normals, size)
+        patch, corner_normals = _patch(vertices, triangles, members, own, normals, close)
         patches.append(patch)
         at_corners[own] = corner_normals
         local, x, n = _known(vertices, triangles, members, normals)
@@ -218,7 +222,7 @@ def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[
 
 
 def _parted(
-    vertices: FloatArray, triangles: IntArray, regions: Regions, normals: FloatArray | None, size: float
+    vertices: FloatArray, triangles: IntArray, regions: Regions, normals: FloatArray | None, close: Closeness
 ) -> IntArray:
     """Piece of each triangle: its region, or a part of one that folds and is no quadric, which has both sides."""
     from scipy.spatial import cKDTree
@@ -241,7 +245,7 @@ def _parted(
             tree = cKDTree(np.einsum("kj,kjc->kc", place.mean(axis=1), corners[own][origin]))
             pairs = own[origin][tree.query_pairs(reach, output_type="ndarray")]
             folds = bool(np.any(np.sum(normal[pairs[:, 0]] * normal[pairs[:, 1]], axis=1) < 0))
-            folds = folds and polynomial_patch(*_known(vertices, triangles, own, normals)[1:], size) is None
+            folds = folds and polynomial_patch(*_known(vertices, triangles, own, normals)[1:], close) is None
         if not folds:
             piece[own] = count
             count += 1
@@ -320,13 +324,13 @@ def _patch(
     members: IntArray,
     own: IntArray,
     normals: FloatArray | None,
-    size: float,
+    close: Closeness,
 ) -> tuple[Patch, FloatArray]:
     """F of a piece from its triangles and those next to it, and the normals at the corners of its own."""
     local, x, n = _known(vertices, triangles, members, normals)
     corners = x[local]
     mine = np.isin(members, own)
-    polynomial = polynomial_patch(x, n, size)
+    polynomial = polynomial_patch(x, n, close)
     if polynomial is not None:
         return polynomial, _corner_normals(polynomial, corners[mine])
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)

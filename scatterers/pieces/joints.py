@@ -1,9 +1,8 @@
 """Joints in a mesh: curves where the curvature jumps while the normal does not, found between planes and quadrics.
 
-Where curvature jumps, jets of degree 4 and 6 disagree (`scatterers.triangles.quality`); what lies between is taken in
-connected parts, and each must lie on one plane or quadric Q_k = 0, which then holds all vertices joined to it that lie
-on it. Only if all vertices of the mesh are held is there a joint at all: a surface whose curvature merely varies is on
-no quadric. On either side of a joint of i and j, s across it,
+Planes and quadrics Q_k = 0 are found first (`scatterers.pieces.quadric_sheets`). Only if they hold all vertices of the
+mesh is there a joint at all: a surface whose curvature merely varies is on no quadric. On either side of a joint of i
+and j, s across it,
 
     Q_i - Q_j = (kappa_i - kappa_j) s^2/2,    n_i - n_j = (kappa_i - kappa_j) s t,
 
@@ -19,31 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.pieces.mesh_cuts import Cuts, cut
-from scatterers.pieces.patch import EXACT, Patch, polynomial_patch
-from scatterers.triangles.jets import angle_weighted_normals
-from scatterers.triangles.topology import components, edges_of
+from scatterers.pieces.patch import Closeness
+from scatterers.pieces.quadric_sheets import STEEP, Sheet, sheets_of, with_between, with_narrow
+from scatterers.triangles.topology import edges_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
-FEWEST = 40
-"""Vertices of a part that is known well enough to be taken for a quadric: a quadric has 9 numbers."""
-DETERMINED = 12
-"""Vertices of a narrow part between others that are."""
-NOISE = 2.0
-"""Distance within which a quadric holds vertices, in the largest of those that it was fitted to."""
-STEEP = 1e-3
-"""Slope of a quadric, relative to the median, below which it has no normal: the tip of a cone."""
 SMOOTH = 0.02
 """Angle between the normals of two quadrics, radians, up to which they may join there without an edge."""
-MOST = 2000
-"""Vertices that a quadric is fitted to at first."""
-TRIES = 20
-"""Places at which no quadric is found until it is believed that there is none."""
-ROUNDS = 12
-"""Times that a quadric is fitted again to all that it holds."""
-TIPS, NEARLY = 100, 100.0
-"""Vertices that may be tips, and their distance in that within which others are held: Q changes with its square."""
 SECANTS, FOUND = 6, 1e-6
 """Steps to the point of a joint on an edge, and what may be left of (n_i - n_j).t, over its change along the edge."""
 SNAP = 0.1
@@ -60,12 +43,15 @@ class Jointed:
     sharp, level : (e,) bool
         Edges, in the order of `scatterers.triangles.topology.edges_of`, at which pieces meet with different normals and
         with equal ones.
+    noise : float
+        That the vertices were taken to have, L.
     """
 
     vertices: FloatArray
     triangles: IntArray
     sharp: BoolArray
     level: BoolArray
+    noise: float = 0.0
 
     @property
     def on_joints(self) -> int:
@@ -73,29 +59,9 @@ class Jointed:
         return len(np.unique(edges_of(self.triangles).ends[self.level]))
 
 
-class _Sheet:
-    """A plane or quadric, how near to it a vertex is its own, and where it has a normal."""
-
-    def __init__(self, patch: Patch, points: FloatArray, size: float) -> None:
-        self.spline = patch.fine
-        self.bend = float(np.linalg.norm(self.spline.hessian(points[:1])[0]))
-        self.tolerance = max(EXACT * size, NOISE * float(np.max(self.off(points))))
-
-    def off(self, x: FloatArray) -> FloatArray:
-        """Distance (n,) of points (n, 3) from it, of second order: at the tip of a cone it has no slope."""
-        value, gradient = self.spline.value_and_gradient(x)
-        slope = np.linalg.norm(gradient, axis=1)
-        return np.asarray(2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * self.bend * np.abs(value)) + 1e-300))
-
-    def normals(self, x: FloatArray) -> FloatArray:
-        """Outward normals (n, 3) at points (n, 3); 0 where there is none."""
-        gradient = self.spline.gradient(x)
-        slope = np.linalg.norm(gradient, axis=1, keepdims=True)
-        # the slope is 1 in the median
-        return np.where(slope > STEEP, gradient / np.maximum(slope, 1e-300), 0.0)
-
-
-def jointed(vertices: FloatArray, triangles: IntArray, normals: FloatArray, clean: BoolArray) -> Jointed | None:
+def jointed(
+    vertices: FloatArray, triangles: IntArray, normals: FloatArray, clean: BoolArray, noise: float = 0.0
+) -> Jointed | None:
     """The mesh (n, 3), L, and (m, 3), cut along its joints; None if it has none, or is not all planes and quadrics.
 
     Parameters
@@ -104,155 +70,27 @@ def jointed(vertices: FloatArray, triangles: IntArray, normals: FloatArray, clea
         Of the jets at the vertices.
     clean : (n,) bool
         Vertices about which nothing speaks against a smooth surface.
+    noise : float
+        Of the vertices, L; 0 where they are exact to single precision.
     """
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    close = Closeness.of(size, noise)
     ends = edges_of(triangles).ends
-    sheets, held = _sheets(vertices, normals, ends, clean, size)
+    sheets, held = sheets_of(vertices, normals, ends, clean, size, noise)
     if not sheets:
         return None
-    sheets, held = _narrow(vertices, triangles, ends, held, sheets, size)
+    sheets, held = with_narrow(vertices, triangles, ends, held, sheets, close)
     if not held.any(axis=1).all():
         return None
     found = _placed(vertices, ends, held, sheets)
     if found.open.any():
         # of long triangles from joint to joint no vertex is clean
-        sheets, held = _between(vertices, triangles, held, sheets, found.open, size)
+        sheets, held = with_between(vertices, triangles, held, sheets, found.open, close)
         found = _placed(vertices, ends, held, sheets)
     if found.open.any() or len(sheets) < 2:
         return None
     corners, t, held = cut(found.points, triangles, found.held, found.cuts)
-    return _labelled(corners, t, held, sheets)
-
-
-def _sheets(
-    vertices: FloatArray, normals: FloatArray, ends: IntArray, clean: BoolArray, size: float
-) -> tuple[list[_Sheet], BoolArray]:
-    """Planes and quadrics, and which vertices each holds (n, k); none if a part of the mesh lies on none."""
-    from scipy.spatial import cKDTree
-
-    n = len(vertices)
-    sheets: list[_Sheet] = []
-    held = np.zeros((n, 0), dtype=bool)
-    tree, tries = cKDTree(vertices), 0
-    while True:
-        left = clean & ~held.any(axis=1)
-        if np.sum(left) < FEWEST:
-            break
-        at = np.flatnonzero(left)
-        # what is farthest from all that is not
-        distance = np.full(len(at), size) if left.all() else cKDTree(vertices[~left]).query(vertices[at])[0]
-        seed = int(at[np.argmax(distance)])
-        near = np.asarray(tree.query(vertices[seed], np.minimum(len(at), MOST))[1])
-        near = near[np.linalg.norm(vertices[near] - vertices[seed], axis=1) <= distance.max()]
-        if len(near) < FEWEST:
-            break
-        found = None
-        # jumps show in some of the vertices only
-        while found is None and len(near) >= FEWEST:
-            found = _grown(vertices, normals, ends, near, seed, size)
-            near = near[: len(near) // 2]
-        if found is None:
-            # it is next to a joint, or on no quadric
-            tries += 1
-            if tries == TRIES:
-                return [], held
-            clean = clean.copy()
-            clean[tree.query(vertices[seed], FEWEST)[1]] = False
-            continue
-        if found[1].all():
-            return [], held
-        sheets.append(found[0])
-        held = np.column_stack([held, found[1]])
-    return sheets, _with_tips(vertices, ends, held, sheets)
-
-
-def _grown(
-    vertices: FloatArray, normals: FloatArray, ends: IntArray, core: IntArray, seed: int, size: float
-) -> tuple[_Sheet, BoolArray] | None:
-    """The plane or quadric through vertices with these numbers, and all that it holds, joined to one of them (n,)."""
-    held = np.zeros(len(vertices), dtype=bool)
-    sheet = None
-    for _ in range(ROUNDS):
-        patch = polynomial_patch(vertices[core], normals[core], size)
-        if patch is None:
-            break
-        sheet = _Sheet(patch, vertices[core], size)
-        on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
-        parts = _parts(len(vertices), ends, on)
-        mine = on & (parts == parts[seed])
-        if not mine[seed] or mine.sum() <= held.sum():
-            break
-        held = mine
-        # not those at its border: there a jet sees the other side
-        border = np.unique(ends[held[ends].sum(axis=1) == 1])
-        inner = held.copy()
-        inner[border] = False
-        core = np.flatnonzero(inner)
-        if len(core) < FEWEST:
-            break
-    return None if sheet is None or held.sum() < FEWEST else (sheet, held)
-
-
-def _with_tips(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: list[_Sheet]) -> BoolArray:
-    """What sheets hold, with vertices that none holds among neighbours that one holds, nearly: tips of cones."""
-    for vertex in np.flatnonzero(~held.any(axis=1))[:TIPS].tolist():
-        beside = ends[(ends == vertex).any(axis=1)]
-        beside = beside[beside != vertex]
-        for k, sheet in enumerate(sheets):
-            if held[beside, k].all() and sheet.off(vertices[vertex : vertex + 1])[0] < NEARLY * sheet.tolerance:
-                held[vertex, k] = True
-    return held
-
-
-def _narrow(
-    vertices: FloatArray, triangles: IntArray, ends: IntArray, held: BoolArray, sheets: list[_Sheet], size: float
-) -> tuple[list[_Sheet], BoolArray]:
-    """Sheets with those through parts so narrow that no vertex of theirs is clean."""
-    left = np.asarray(~held.any(axis=1))
-    if not left.any():
-        return sheets, held
-    label, normals = _parts(len(vertices), ends, left), angle_weighted_normals(vertices, triangles)
-    for part in np.unique(label[left]):
-        some = np.flatnonzero(left & (label == part))
-        patch = polynomial_patch(vertices[some], normals[some], size) if len(some) >= DETERMINED else None
-        if patch is not None:
-            sheet = _Sheet(patch, vertices[some], size)
-            on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
-            parts = _parts(len(vertices), ends, on)
-            mine = on & (parts == parts[some[0]])
-            sheets, held = [*sheets, sheet], np.column_stack([held, mine])
-    return sheets, held
-
-
-def _between(
-    vertices: FloatArray, triangles: IntArray, held: BoolArray, sheets: list[_Sheet], open_: BoolArray, size: float
-) -> tuple[list[_Sheet], BoolArray]:
-    """Sheets with those through triangles at edges (e,) whose ends no sheet and no joint connects."""
-    edges = edges_of(triangles)
-    lost = np.flatnonzero(open_[edges.number].reshape(-1, 3).any(axis=1))
-    order = np.argsort(edges.number, kind="stable").reshape(-1, 2) // 3
-    place = np.full(len(triangles), -1)
-    place[lost] = np.arange(len(lost))
-    joined = place[order]
-    joined = joined[np.all(joined >= 0, axis=1)]
-    label = components(len(lost), joined[:, 0], joined[:, 1])[1]
-    more = []
-    for part in range(int(label.max()) + 1):
-        used, local = np.unique(triangles[lost[label == part]], return_inverse=True)
-        x = vertices[used]
-        patch = polynomial_patch(x, angle_weighted_normals(x, local.reshape(-1, 3)), size)
-        if patch is not None:
-            sheets = [*sheets, _Sheet(patch, x, size)]
-            mine = np.zeros(len(vertices), dtype=bool)
-            mine[used] = True
-            more.append(mine)
-    return sheets, np.column_stack([held, *more])
-
-
-def _parts(count: int, ends: IntArray, some: BoolArray) -> IntArray:
-    """Connected parts (n,) of some of the vertices; the others are parts of their own."""
-    kept = ends[some[ends].all(axis=1)]
-    return components(count, kept[:, 0], kept[:, 1])[1]
+    return _labelled(corners, t, held, sheets, noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +113,7 @@ class _Placed:
     open: BoolArray
 
 
-def _placed(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: list[_Sheet]) -> _Placed:
+def _placed(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: list[Sheet]) -> _Placed:
     points, held = vertices.copy(), held.copy()
     at: list[IntArray] = []
     places, keep = [], []
@@ -302,7 +140,7 @@ def _placed(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: list[
 
 
 def _across(
-    first: _Sheet, second: _Sheet, vertices: FloatArray, ends: IntArray, one: BoolArray, other: BoolArray
+    first: Sheet, second: Sheet, vertices: FloatArray, ends: IntArray, one: BoolArray, other: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray, FloatArray, FloatArray]:
     """Edges (k,) from what the first sheet holds to what the second holds, a to b, and where on them their joint is.
 
@@ -366,7 +204,9 @@ def _take_sides(
     held[vertex[both], np.where(ahead[both] > 0, pair[1], pair[0])] = False
 
 
-def _labelled(vertices: FloatArray, triangles: IntArray, held: BoolArray, sheets: list[_Sheet]) -> Jointed | None:
+def _labelled(
+    vertices: FloatArray, triangles: IntArray, held: BoolArray, sheets: list[Sheet], noise: float
+) -> Jointed | None:
     """Which sheet each triangle lies on, and where these meet."""
     corners = vertices[triangles]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -391,4 +231,4 @@ def _labelled(vertices: FloatArray, triangles: IntArray, held: BoolArray, sheets
     smooth = np.linalg.norm(normals[0] - normals[1], axis=1) < SMOOTH
     sharp, level = np.zeros(len(sides), dtype=bool), np.zeros(len(sides), dtype=bool)
     level[meet[smooth]], sharp[meet[~smooth]] = True, True
-    return Jointed(vertices, triangles, sharp, level) if level.any() else None
+    return Jointed(vertices, triangles, sharp, level, noise) if level.any() else None

@@ -13,6 +13,7 @@ Sources: Derivations, B13.
 
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 EXACT = 1e-6
 """Distance of points from a plane or quadric, in body sizes, within which they lie on it: single precision and some."""
+OUTLIER, EVENLY = 5.0, 1.4
+"""Largest and rms distance of noisy points from their quadric, in their noise: the rms tells what a quadric misses."""
 CLOSE = 2e-4
 LEAN = 0.35
 """Angle between the normals of triangles and a quadric through their corners, radians."""
@@ -101,9 +104,24 @@ def spline_patch(
     return Patch(fine.spline, coarse.spline, "spline", fine.misfit, fine.turn, spacing)
 
 
-def polynomial_patch(points: FloatArray, normals: FloatArray, size: float) -> Patch | None:
-    """Plane or quadric through points (n, 3), L, of a body of a size, L, if there is one."""
-    found = polynomial_through(points, normals, EXACT * size)
+class Closeness(NamedTuple):
+    """What points on a plane or quadric may be off it, all and rms, L."""
+
+    most: float
+    rms: float = np.inf
+
+    @classmethod
+    def of(cls, size: float, noise: float = 0.0) -> "Closeness":
+        """On a body of a size whose points have noise, both L."""
+        exact = cls(EXACT * size)
+        return cls(max(exact.most, OUTLIER * noise), max(exact.most, EVENLY * noise)) if noise else exact
+
+
+def polynomial_patch(points: FloatArray, normals: FloatArray, close: Closeness) -> Patch | None:
+    """Plane or quadric through points (n, 3), L, if there is one."""
+    found = polynomial_through(points, normals, close.most)
+    if found is not None and found[2] > close.rms:
+        return None
     return None if found is None else Patch(found[0], found[0], *found[1:], 0.0, 0.0)
 
 

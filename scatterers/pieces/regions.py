@@ -8,6 +8,7 @@ what is connected without crossing a crease.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class Regions:
         """How many."""
         return int(self.number.max()) + 1
 
-    @property
+    @cached_property
     def joined(self) -> IntArray:
         """Pairs of triangles (k, 2) that are neighbours across an edge that is no crease."""
         return np.asarray(self.turns.sides[~self.crease])

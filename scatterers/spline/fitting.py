@@ -26,6 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.spline_constants import OVERREAD
+from scatterers.spline.cardinal import Cardinal
+from scatterers.spline.roughness import fourth_bands, ranges
 from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated, weights
 
 FloatArray = NDArray[np.float64]
@@ -202,7 +204,7 @@ class _Equations:
         self.points, self.normals, self.spacing, self.smoothing = points, normals, spacing, smoothing
         self.low, self.normal_weight = low, normal_weight
         self.tree = cKDTree(points)
-        # in the order of the cells, so that neighbouring samples find their coefficients in the cache
+        # in the order of the cells: neighbouring samples find their coefficients in the cache
         self.fitted = slice(None) if trusted is None else trusted
         points, normals = points[self.fitted], normals[self.fitted]
         places = (points - low) / spacing
@@ -212,12 +214,11 @@ class _Equations:
         self.samples = [places, *(np.ascontiguousarray((places + k * self.sorted_normals)[some]) for k in (1, -1))]
         self.targets = [np.zeros(len(places)), *(self._offset_targets(k) for k in (1, -1))]
         self.unknown = self._seen()
-        one = np.array([1, 26, 66, 26, 1]) / 120
-        sampling = [sum(np.diag(np.full(n - abs(k), one[k + 2]), k) for k in range(-2, 3)) for n in self.shape]
-        self.cardinal = [np.linalg.inv(matrix) for matrix in sampling]
+        self.cardinal = Cardinal(self.shape)
+        self.bands, self.ranges = fourth_bands(self.shape), ranges(self.unknown)
         density = self._density()
         # 70 is the square sum of a fourth difference's weights
-        self.divisor = density + FLOOR * density.max() + 210 * smoothing
+        self.damping = 1 / (density + FLOOR * density.max() + 210 * smoothing)
 
     def _nearest(self, where: FloatArray) -> NDArray[np.int64]:
         """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
@@ -284,22 +285,17 @@ class _Equations:
             slopes = self.sorted_normals if targets and not k else flat
             accumulate(places, values if targets else np.zeros(len(places)), slopes, weight, shape, c, out)
         if rough:
-            subtract_roughness(self.smoothing, shape, c, out)
-        total = out[:-OVERREAD].reshape(self.shape)
-        total *= self.unknown
+            subtract_roughness(self.smoothing, shape, self.ranges, self.bands, c, out)
+        out[:-OVERREAD] *= self.unknown.ravel()
         out[-OVERREAD:] = 0.0
         return out
 
     def preconditioned(self, r: FloatArray) -> FloatArray:
         """S D^-1 S r on the unknown coefficients."""
-        z = self._cardinal(self._cardinal(r[:-OVERREAD].reshape(self.shape)) / self.divisor) * self.unknown
-        return np.concatenate([z.ravel(), np.zeros(OVERREAD)])
-
-    def _cardinal(self, values: FloatArray) -> FloatArray:
-        first, second, third = self.cardinal
-        # along each axis in the order of the memory: nothing is transposed
-        values = (first @ values.reshape(len(first), -1)).reshape(self.shape)
-        return np.asarray(np.matmul(second, values) @ third.T)
+        out = np.zeros_like(r)
+        z = self.damping * self.cardinal(r[:-OVERREAD].reshape(self.shape))
+        np.multiply(self.cardinal(z), self.unknown, out=out[:-OVERREAD].reshape(self.shape))
+        return out
 
     def _seen(self) -> NDArray[np.bool_]:
         """Coefficients that some sample sees."""

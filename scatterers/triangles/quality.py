@@ -274,6 +274,11 @@ def _noise(fourth: FloatArray, sixth: FloatArray, turn: FloatArray) -> float:
     return float(np.median(np.sqrt(np.maximum(sixth**2 - decay * fourth**2, 0) / (on6**2 - decay * on4**2))))
 
 
+def noise_at_most(jets: Jets) -> float:
+    """Noise of the vertices, L, if all that jets of degree 6 leave were noise."""
+    return float(np.median(jets.residuals[:, 2])) / RESIDUAL_PER_NOISE[1]
+
+
 def _rims(ends: IntArray, angles: FloatArray, count: int) -> int:
     """Vertices at which at least two sharp edges meet, or 0 if most sharp edges stand alone, as those of slivers do."""
     sharp = (angles > SHARP) & (angles > 3 * np.median(angles))

@@ -15,7 +15,7 @@ from creeping.geometry.surface import normal, size
 from scatterers.pieces.joints import jointed
 from scatterers.pieces.mesh_cuts import Cuts, cut
 from scatterers.triangles.jets import osculating_jets
-from scatterers.triangles.quality import assess, jumps_at
+from scatterers.triangles.quality import assess, jumps_at, noise_at_most
 from scatterers.triangles.topology import edges_of
 from studies._meshes import capsule, geodesic_sphere, on_body, slivers, torus_grid
 
@@ -100,6 +100,25 @@ def test_shadow_line_and_rays_are_those_of_the_exact_body(name, direction):
     np.testing.assert_allclose(a[:, :, 6:10], b[:, :, 6:10], atol=1e-3 * np.nanmax(np.abs(b[:, :, 6:10])))
 
 
+@pytest.mark.parametrize(
+    ("name", "amount"), [("even", 1e-6), ("even", 1e-5), ("slivers", 1e-5), ("short", 1e-5), ("cone", 1e-6)]
+)
+def test_joints_are_found_within_the_noise_of_the_vertices(name, amount):
+    (points, triangles), exact = MESHES[name][0](), MESHES[name][1]
+    noise = amount * 0.5 * np.linalg.norm(np.ptp(points, axis=0))
+    rng = np.random.default_rng(23)
+    body = sc.Mesh(
+        SimpleNamespace(vertices=points + noise * rng.normal(size=points.shape), faces=triangles), cache=False
+    )
+    assert body.quality.verdict == "curvature jumps" and len(body.pieces) == len(exact.pieces)
+    assert [c.kind for c in body.creases].count("joint") == [c.kind for c in exact.creases].count("joint")
+    # quadrics through many vertices are off by less than each of these
+    there = exact.tiles(0.1)[0].reshape(-1, 3)[rng.integers(0, 3000, 1000)]
+    there = there[np.linalg.norm(there - [0, 0, points[:, 2].max()], axis=1) > 0.05]
+    off = body.level(there) / slope(body, there)
+    assert np.sqrt(np.mean(off**2)) < noise
+
+
 def bumpy():
     return sc.Implicit("x**2+y**2+z**2-1+0.15*sin(3*x)*sin(3*y)*cos(2*z)")
 
@@ -137,6 +156,9 @@ def not_split(name, noise, count):
     quality = assess(SimpleNamespace(vertices=points, triangles=triangles), jets)
     clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
     assert jointed(points, triangles, jets.normals, clean) is None
+    # nor within all that jets leave, taken for noise
+    assert jointed(points, triangles, jets.normals, clean, noise_at_most(jets)) is None
+    assert jointed(points, triangles, jets.normals, clean & (points[:, 2] > 0.1), noise_at_most(jets)) is None
     # not even where half of the vertices are taken for a jump
     assert jointed(points, triangles, jets.normals, clean & (points[:, 2] > 0.1)) is None
 

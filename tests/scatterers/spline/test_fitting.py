@@ -9,7 +9,9 @@ import scatterers as sc
 from scatterers.kernels.normal_equations import accumulate, subtract_roughness
 from scatterers.kernels.spline_constants import OVERREAD
 from scatterers.spline import fitting as _fitting
+from scatterers.spline.cardinal import Cardinal
 from scatterers.spline.fitting import _Equations, accumulate_numpy, fit
+from scatterers.spline.roughness import fourth_bands, ranges
 from scatterers.spline.tensor import TensorSpline, coefficients, evaluated
 
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
@@ -89,7 +91,8 @@ def test_roughness_is_that_of_fourth_differences(rng):
     shape = (9, 5, 4)
     c = np.concatenate([rng.normal(size=np.prod(shape)), np.zeros(OVERREAD)])
     out = np.zeros_like(c)
-    subtract_roughness(0.3, np.array(shape), c, out)
+    whole = np.tile([0, shape[2]], (shape[0] * shape[1], 1))
+    subtract_roughness(0.3, np.array(shape), whole, fourth_bands(shape), c, out)
     expected = np.zeros(shape)
     for axis in (0, 1):
         fourth = np.diff(np.eye(shape[axis]), 4, axis=0)
@@ -97,6 +100,34 @@ def test_roughness_is_that_of_fourth_differences(rng):
         expected -= 0.3 * np.moveaxis(along, 0, axis)
     np.testing.assert_allclose(out[:-OVERREAD].reshape(shape), expected, atol=1e-13)
     assert not out[-OVERREAD:].any()
+    # only where it is wanted
+    some, found = whole.copy(), np.zeros_like(c)
+    some[:, 0], some[:, 1] = 1, 3
+    some[7] = 0
+    subtract_roughness(0.3, np.array(shape), some, fourth_bands(shape), c, found)
+    wanted = np.zeros(shape, dtype=bool)
+    wanted[:, :, 1:3] = True
+    wanted[1, 2] = False
+    np.testing.assert_allclose(found[:-OVERREAD].reshape(shape), np.where(wanted, expected, 0), atol=1e-13)
+
+
+@pytest.mark.parametrize("shape", [(7, 20, 9), (70, 6, 5), (6, 97, 5), (5, 6, 130)])
+def test_cardinal_coefficients_take_the_values(rng, shape):
+    values = rng.normal(size=shape)
+    c = Cardinal(shape)(values)
+    for axis, n in enumerate(shape):
+        bands = [1, 26, 66, 26, 1]
+        sampled = sum(np.diag(np.full(n - abs(k), bands[k + 2] / 120), k) for k in range(-2, 3))
+        c = np.moveaxis(np.tensordot(sampled, c, axes=(1, axis)), 0, axis)
+    # exact along short axes
+    np.testing.assert_allclose(c, values, atol=1e-12 if max(shape) < 64 else 1e-4)
+
+
+def test_ranges_hold_all_that_is_unknown(rng):
+    unknown = rng.random((4, 5, 6)) < 0.2
+    found = ranges(unknown)
+    for row, (first, last) in zip(unknown.reshape(-1, 6), found, strict=True):
+        assert row[first:last].sum() == row.sum() and (last == 0 or (row[first] and row[last - 1]))
 
 
 def test_rows_are_value_and_slopes_of_the_spline(system):

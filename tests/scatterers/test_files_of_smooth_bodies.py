@@ -1,0 +1,76 @@
+"""Coarse files of smooth bodies, where their folder lies beside the project: tori against the closed form, subdivided
+meshes against those that are subdivided further."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scatterers as sc
+
+FOLDER = Path(__file__).parents[3] / "shared" / "bodies"
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not FOLDER.is_dir(), reason="no folder of real bodies"),
+]
+TORI = {"oded_torus.obj": (1.0, 0.25), "occ_torus_default_resolution.stl": (20.0, 10.0)}
+
+
+def distances(body, points):
+    return body.level(points) / np.linalg.norm(body.gradient(points), axis=1)
+
+
+def moved(body):
+    """By how much vertices are told to have moved, rms and at most, m."""
+    line = next(line for line in body.repairs if "after Loop" in line)
+    return [float(found) for found in re.search(r"moved by (\S+) m rms, (\S+) at most", line).groups()]
+
+
+def torus_points(name):
+    """Points (n, 3), m, all over the torus of a file, unit tangents along and around, and the curvatures there."""
+    mesh, _ = sc.examined_mesh(FOLDER / name, "m")
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    axis = int(np.argmin(high - low))
+    radius, minor = TORI[name]
+    u, v = np.random.default_rng(4).uniform(0, 2 * np.pi, (2, 2000))
+    zero = np.zeros_like(u)
+    rho = radius + minor * np.cos(u)
+    found = [
+        np.stack([rho * np.cos(v), rho * np.sin(v), minor * np.sin(u)], axis=1),
+        np.stack([-np.sin(v), np.cos(v), zero], axis=1),
+        np.stack([-np.sin(u) * np.cos(v), -np.sin(u) * np.sin(v), np.cos(u)], axis=1),
+    ]
+    x, along, around = (np.roll(one, axis + 1, axis=1) for one in found)
+    return x + 0.5 * (low + high), np.stack([along, around]), np.stack([np.cos(u) / rho, zero + 1 / minor])
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+@pytest.mark.parametrize("name", TORI)
+def test_curvatures_of_a_torus_err_as_stated(name):
+    body = sc.Mesh(FOLDER / name, "m", cache=False)
+    x, tangents, wanted = torus_points(name)
+    bent = np.einsum("kni,nij,knj->kn", tangents, body.hessian(x), tangents)
+    error = rms(bent / np.linalg.norm(body.gradient(x), axis=1) - wanted)
+    assert error / rms(wanted) < body.fit.normal_curvature_error / body.fit.normal_curvature
+    assert rms(distances(body, x)) < 5e-4 * float(np.max(body.quality.size))
+
+
+@pytest.mark.parametrize("name", TORI)
+def test_a_subdivided_torus_is_off_by_what_vertices_are_told_to_have_moved(name):
+    body = sc.Mesh(FOLDER / name, "m", subdivide="auto", cache=False)
+    off = distances(body, torus_points(name)[0])
+    # what moves the vertices inward leaves less between them
+    assert rms(off) < 1.1 * moved(body)[0] and np.max(np.abs(off)) < 1.1 * moved(body)[1]
+
+
+@pytest.mark.parametrize("name", ["libigl_bumpy.off", "libigl_fertility.off"])
+def test_a_subdivided_mesh_is_near_one_that_is_subdivided_further(name):
+    """Both have the same limit; what a fit to the coarser is off is small beside what the subdivision has moved."""
+    body = sc.Mesh(FOLDER / name, "m", subdivide="auto", cache=False)
+    finer, _ = sc.examined_mesh(FOLDER / name, "m", subdivide=3)
+    assert len(finer.vertices) > 10 * body.quality.vertices
+    assert rms(distances(body, finer.vertices[::7])) < 0.25 * moved(body)[0]
