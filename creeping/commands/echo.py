@@ -38,7 +38,11 @@ Incidence = Annotated[
 TOLD = 90.0
 """Seconds from which it is said beforehand what a request may cost."""
 Method = Annotated[
-    str, Parameter(help="auto, rays or currents: auto takes currents where rays do not resolve a value and err more.")
+    str,
+    Parameter(
+        help="auto, rays, currents or equation: auto takes currents where rays do not resolve a value and err more; "
+        "equation solves the body's integral equation for every value, in seconds to minutes each."
+    ),
 ]
 Compare = Annotated[
     Path | None,

@@ -110,8 +110,9 @@ def sweep(
 
 def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any) -> tuple[Any, Any]:
     """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
+    from creeping.sweeping.between.worth import with_paying_lattice
     from creeping.sweeping.plan import SweepPlan, task_size
-    from creeping.sweeping.request import in_patches, with_lattice
+    from creeping.sweeping.request import in_patches
     from creeping.sweeping.results import require
     from creeping.sweeping.run import open_store
     from creeping.sweeping.storage.store import SweepStore
@@ -132,7 +133,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
         flow, chunk = store.flow(body), store.chunk
     else:
         flow, chunk = _flow(read, body, request, cache, progress), task_size(request, len(read.incidences), read.chunk)
-    request = with_lattice(request, read.incidences)
+    request = with_paying_lattice(flow, request, read.incidences)
     plan = SweepPlan(
         flow,
         request,

@@ -27,8 +27,8 @@ entry_options = _common | {"fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 # and compiled three times.
 options = entry_options | {"forceinline": True}
 # For kernels too large to be inlined whole: they keep to the letter of floating-point arithmetic, so that results are
-# the same however the compiler has cut the calls.
-strict_options = _common
+# the same however the compiler has cut the calls. Said even so: what a callee leaves open numba takes from its caller.
+strict_options = _common | {"fastmath": False}
 
 
 # numba would compile it for each pair of constants

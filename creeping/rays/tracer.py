@@ -14,11 +14,9 @@ R is the distance from a point source, inf of a plane wave.
 Sources: Derivations, R4, R12 and R19.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
@@ -31,7 +29,7 @@ from creeping.geometry.surface import Surface, size
 from creeping.rays.nonsmooth import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
 from creeping.rays.single_rays import SingleRays
-from creeping.shadow.panels import newton_step
+from creeping.shadow.moving import moved_onto_lines
 
 TURN = 0.12
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 1e-9."""
@@ -87,16 +85,16 @@ class RayTracer:
     def onto_line(self, points: FloatArray, directions: FloatArray, steps: int = 4) -> tuple[FloatArray, FloatArray]:
         """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""
         reach = 0.1 * size(self.body)
+        if not is_creased(self.body):
+            points, tangents, _ = moved_onto_lines(self.body, directions, points, reach=reach, steps=steps)
+            return points, tangents
         points, tangents = points.copy(), np.zeros_like(points)
-        # on a body with creases, each on the piece that it is next to
-        on = piece_ahead(self.body, points, directions) if is_creased(self.body) else np.zeros(len(points), dtype=int)
-        bodies: Sequence[Any] = pieces_of(self.body) if is_creased(self.body) else (self.body,)
+        # each on the piece that it is next to
+        on, bodies = piece_ahead(self.body, points, directions), pieces_of(self.body)
         for number in np.unique(on):
             mine = on == number
-            for _ in range(steps):
-                step, tangents[mine] = newton_step(bodies[number], directions[mine], points[mine])
-                long = np.linalg.norm(step, axis=1, keepdims=True)
-                points[mine] += step * np.minimum(1.0, reach / np.maximum(long, 1e-300))
+            moved = moved_onto_lines(bodies[number], directions[mine], points[mine], reach=reach, steps=steps)
+            points[mine], tangents[mine] = moved.points, moved.tangents
         return points, tangents
 
     def _states(

@@ -6,10 +6,11 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import SingularIncidenceError, SurfaceError
-from creeping.field.boundary import parse_boundary
+from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.far import far_field
+from creeping.field.far_result import FarField
 from creeping.geometry.surface import Surface
-from creeping.rays.fan import launch
+from creeping.rays.fan import RayFan, launch
 from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.many import ShadowLines, lines_together
@@ -51,12 +52,7 @@ def fill_creased(
         for problem, (name, which, suffix) in enumerate(request.problems):
             boundary = parse_boundary(name)
             for k, wavenumber in enumerate(request.wavenumbers):
-                asked: dict[str, Any] = {"boundary": boundary, "order": request.order, "method": request.method}
-                try:
-                    field = far_field(fan, observers, wavenumber=wavenumber, **asked)
-                except SurfaceError:
-                    # what no mesh of the body resolves is as rays have it, and says so
-                    field = far_field(fan, observers, wavenumber=wavenumber, **asked | {"method": "rays"})
+                field = _field(fan, observers, wavenumber, boundary, request)
                 for part, values in FieldArrays.of(field, 1).arrays.items():
                     if part + suffix in out:
                         out[part + suffix][(row, *which, k)] = values[0] if bistatic else values[0, 0]
@@ -65,3 +61,20 @@ def fill_creased(
                     for known, value in zip(VALID, numbers, strict=True):
                         out[known][row, k] = value
                 passed((row + (problem * len(request.wavenumbers) + k + 1) / each) / len(lines))
+
+
+def _field(
+    fan: RayFan, observers: FloatArray, wavenumber: float, boundary: BoundaryLike, request: SweepRequest
+) -> FarField:
+    """Far field of one incidence; by its equation a conductor has that of "auto" where rays do not resolve it."""
+    asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "order": request.order}
+    by_rays = request.method == "rays" or (request.method == "auto" and boundary == "pec")
+    if by_rays:
+        field = far_field(fan, observers, method="rays", **asked)
+        if request.method == "rays" or not len(FieldArrays.of(field, 1).unclear):
+            return field
+    try:
+        return far_field(fan, observers, method=request.method, **asked)
+    except SurfaceError:
+        # what no mesh of the body resolves is as rays have it, and says so
+        return field if by_rays else far_field(fan, observers, method="rays", **asked)

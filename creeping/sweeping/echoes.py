@@ -20,7 +20,7 @@ from creeping.field.echo import Echo
 from creeping.field.labelled import PARTS
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, whole_number
-from creeping.geometry.creased import is_creased
+from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.tuning.flow_choice import choose_flow
@@ -61,7 +61,7 @@ def backscatter(
     azimuth, elevation : float or (n,), degrees
         Where the radar is, as seen from the body; one may be a number.
     boundary : "pec", "soft", "hard" or ImpedanceBoundary
-    method : {"auto", "rays", "currents"}
+    method : {"auto", "rays", "currents", "equation"}
         As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more.
     n_rays : int
         Rays of an incidence.
@@ -159,7 +159,7 @@ def seconds_of_currents(
 
     ``azimuths``, ``elevations`` (n,), degrees, are the radar's; ``observers`` directions belong to each.
     """
-    if is_creased(body):
+    if is_creased(body) and (has_edges(body) or boundary != "pec"):
         return 0.0
     radar = directions_from_azimuth_elevation(np.radians(azimuths[0]), np.radians(elevations[0]))
     try:

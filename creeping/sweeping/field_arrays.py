@@ -28,8 +28,8 @@ class FieldArrays:
         """Arrays of a far field whose rows are the observers of one incidence after the other."""
         arrays = {name: getattr(field, name) for name in PARTS}
         arrays = {name: np.array(v).reshape(incidences, -1, *v.shape[1:]) for name, v in arrays.items()}
-        by_currents = np.reshape(field.method == "currents", arrays["unresolved"].shape)
-        return cls(arrays | {"by_currents": by_currents.copy()})
+        by_currents = np.isin(field.method, ("currents", "equation")).reshape(arrays["unresolved"].shape)
+        return cls(arrays | {"by_currents": by_currents})
 
     @property
     def unclear(self) -> IntArray:

@@ -46,12 +46,15 @@ class Lattice:
     levels : int
     crowding : float
         Incidences in a cell of the coarsest level, the mean of cells that have any.
+    first : int
+        Level with which to begin.
     """
 
     axes: tuple[tuple[float, float, float], ...]
     height: float
     levels: int
     crowding: float
+    first: int = 0
 
     @property
     def dimensions(self) -> int:
@@ -88,17 +91,18 @@ class Lattice:
         number = np.floor(place)
         return np.concatenate([face[:, None], number.astype(np.int64)], axis=1), place - number
 
-    def directions(self, nodes: IntArray, level: int) -> FloatArray:
-        """Unit directions of nodes (n, 1 + dimensions), the face and numbers: (n, 3)."""
+    def directions(self, nodes: IntArray | FloatArray, level: int) -> FloatArray:
+        """Unit directions of nodes (n, 1 + dimensions), the face and numbers, or of places between: (n, 3)."""
         u = nodes[:, 1:] * self.step(level)
         if self.axes:
             axis, first, second = np.array(self.axes)
             across = np.sqrt(1 - self.height**2)
             d = self.height * axis + across * (np.cos(u) * first + np.sin(u) * second)
         else:
-            rows, axis = np.arange(len(nodes)), nodes[:, 0] // 2
+            face = nodes[:, 0].astype(np.int64)
+            rows, axis = np.arange(len(nodes)), face // 2
             d = np.empty((len(nodes), 3))
-            d[rows, axis] = np.where(nodes[:, 0] % 2, -1.0, 1.0)
+            d[rows, axis] = np.where(face % 2, -1.0, 1.0)
             d[rows, (axis + 1) % 3], d[rows, (axis + 2) % 3] = np.tan(u).T
         return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
 

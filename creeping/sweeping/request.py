@@ -23,7 +23,7 @@ from creeping.sweeping.lattice import Lattice, lattice_of
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
-METHODS = ("rays", "auto", "currents")
+METHODS = ("rays", "auto", "currents", "equation")
 LARGEST_LENGTH = 1e300
 LONG_LEAP = 0.15
 """Share of an automatic length up to which it is made one of whole leaps."""
@@ -107,8 +107,9 @@ class SweepRequest:
         Unit directions of "bistatic".
     order : 2 or 1
         Of the creeping waves.
-    method : {"rays", "auto", "currents"}
-        Of the fields: isolated rays, currents of the whole body where rays do not resolve an incidence, or for all.
+    method : {"rays", "auto", "currents", "equation"}
+        Of the fields: isolated rays, currents of the whole body where rays do not resolve an incidence, or for all, or
+        the body's integral equation for all.
     accuracy : float, optional
         Error allowed to interpolation between incidences; without it each is computed.
     lattice : Lattice, optional
@@ -149,8 +150,8 @@ class SweepRequest:
             number = isinstance(self.accuracy, float) and 0 < self.accuracy < 1
             if not number:
                 yield f"accuracy = {self.accuracy!r} is not a number between 0 and 1"
-            elif self.method == "currents":
-                yield 'accuracy goes with rays; method "currents" computes every incidence'
+            elif self.method in ("currents", "equation"):
+                yield f'accuracy goes with rays; method "{self.method}" computes every incidence'
         if self.quantity == "rays":
             for name in ("wavenumbers", "boundaries", "observation"):
                 if getattr(self, name):

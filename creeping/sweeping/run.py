@@ -20,8 +20,9 @@ from creeping.geometry.directions import unit_directions
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
+from creeping.sweeping.between.worth import with_paying_lattice
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
-from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request, with_lattice
+from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.mending import mended
@@ -84,10 +85,11 @@ def sweep_directions(
         Points kept of each ray of "rays".
     order : 2 or 1
         Of the creeping waves.
-    method : {"rays", "auto", "currents"}
+    method : {"rays", "auto", "currents", "equation"}
         Of the fields. "auto" computes an incidence again by the currents of the whole body where isolated rays leave a
         direction unresolved, a tenth of a second or so for each boundary and wavenumber, "currents" every one that a
-        mesh of the body resolves: ``by_currents`` says which.
+        mesh of the body resolves: ``by_currents`` says which. "equation" solves the body's integral equation for every
+        one, in seconds to minutes each (`creeping.surface_currents` with ``solve=True``).
     accuracy : float, optional
         Interpolate between incidences, where they are dense and that is known to err by less than this share of the
         field's size, ten times it of the creeping part's own; 1e-3 is a good one. Each incidence that cannot be had so
@@ -147,7 +149,7 @@ def sweep_directions(
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:
         raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
-    request = with_lattice(request, unit)
+    request = with_paying_lattice(flow, request, unit)
     chunk = None if chunk is None else whole_number(chunk, "chunk")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (

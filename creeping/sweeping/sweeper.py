@@ -144,19 +144,22 @@ class Sweeper:
                 fans[number] = self._fan(directions[number])
             return fans[number]
 
-        made: list[Parts] = []
         geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, lines.attached[rows], forward)
-        for name, which, suffix in request.problems:
-            boundary = parse_boundary(name)
-            for k, wavenumber in enumerate(request.wavenumbers):
-                made.append(parts_of(geometry, wavenumber, boundary, request.order))
-                field = FieldArrays.of(made[-1].field(boundary), len(rows))
-                if request.method == "currents":
+        made: dict[tuple[int, int], Parts] = {}
+        # boundaries of one frequency follow each other: they share what is of the frequency alone
+        for k, wavenumber in enumerate(request.wavenumbers):
+            for which, (name, place, suffix) in enumerate(request.problems):
+                boundary = parse_boundary(name)
+                parts = made[which, k] = parts_of(geometry, wavenumber, boundary, request.order)
+                field = FieldArrays.of(parts.field(boundary), len(rows))
+                if request.method in ("currents", "equation"):
                     for number in range(len(rows)):
-                        asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "method": "currents"}
+                        asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary}
                         # what no mesh of the body resolves stays as rays have it, and says so
                         with suppress(SurfaceError):
-                            field.replace(number, far_field(fan_of(number), observers[number], **asked))
+                            field.replace(
+                                number, far_field(fan_of(number), observers[number], method=request.method, **asked)
+                            )
                 elif request.method == "auto":
                     for number in field.unclear:
                         other = _by_currents(fan_of(number), observers[number], wavenumber, boundary)
@@ -164,9 +167,9 @@ class Sweeper:
                             field.replace(number, other)
                 for part, values in field.arrays.items():
                     if part + suffix in out:
-                        out[part + suffix][(rows, *which, k)] = values if bistatic else values[:, 0]
+                        out[part + suffix][(rows, *place, k)] = values if bistatic else values[:, 0]
                 passed(len(made) / (len(request.problems) * len(request.wavenumbers)))
-        return rows, geometry, made
+        return rows, geometry, [made[key] for key in sorted(made)]
 
     def _fan(self, direction: FloatArray) -> RayFan:
         line, request = shadow_line(self.body, direction), self.request

@@ -14,7 +14,9 @@ from numba import njit
 
 from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
+from creeping.kernels.cube_root import cube_root
 from creeping.kernels.curvature import second_form
+from creeping.kernels.turns import turns
 from creeping.rays.quantities import GAUSS, GUARD, SHARPEST
 
 WIDTH = 2 * GUARD
@@ -55,20 +57,33 @@ def _applied(w, row, values, k):
 
 
 @njit(**options)
-def _add(kappa, rate, bend, transverse, weight, total):
-    """Add the five integrands, times a weight."""
-    positive = max(kappa, 0.0)
-    root = positive ** (1 / 3)
-    square = root * root
-    variation = 0.0
-    if positive > 0.0:
-        variation = -bend / positive**3 + 4 / 3 * rate * rate / positive**4
-        variation = min(max(variation, -SHARPEST), SHARPEST)
-    total[0] += weight * root
-    total[1] += weight * square
-    total[2] += weight * square * square
-    total[3] += weight * root * transverse
-    total[4] += weight * square * square * variation
+def _integrands(kappa, rate, bend, transverse, weight, count, total):
+    """Add the five integrands at count places, times a weight, to total (5, count or more)."""
+    for k in range(count):
+        positive = max(kappa[k], 0.0)
+        root = cube_root(positive)
+        square = root * root
+        curved = positive if positive > 0.0 else 1.0
+        inverse = 1.0 / curved
+        inverse3 = inverse * inverse * inverse
+        variation = -bend[k] * inverse3 + 4 / 3 * rate[k] * rate[k] * inverse3 * inverse
+        variation = min(max(variation, -SHARPEST), SHARPEST) if positive > 0.0 else 0.0
+        total[0, k] += weight * root
+        total[1, k] += weight * square
+        total[2, k] += weight * square * square
+        total[3, k] += weight * root * transverse[k]
+        total[4, k] += weight * square * square * variation
+
+
+@njit(**options)
+def _between(w, row, values, first, count, out):
+    """Products of a row of weights with the values around each of count steps from the first: (count or more,)."""
+    for k in range(count):
+        out[k] = 0.0
+    for j in range(WIDTH):
+        weight, shift = w[row, j], first + j - GUARD + 1
+        for k in range(count):
+            out[k] += weight * values[k + shift]
 
 
 @njit(**options)
@@ -96,7 +111,7 @@ def cross(level, level_par, matrix, states, step, owner, observers, times):
 
 
 @njit(**options)
-def _along(level, level_par, rule, scale, ray, step, known, kappa, across, normals, totals, angles, good, g, joints):
+def _along(level, level_par, rule, scale, ray, step, known, kappa, across, normals, totals, angles, good, work, joints):
     """Fill what is known along one ray, states (K, 8), at its steps from the launch point to number ``known``.
 
     kappa, across (K,) and normals (3, K) at all states; totals (K, 5), angles (K,) and good (K,) are integrals, the
@@ -105,6 +120,8 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
     """
     K = ray.shape[0]
     weights, gauss_weights = rule
+    g, at, parts = work
+    principal = at[0]
     x = np.empty((3, K))
     for k in range(K):
         for axis in range(3):
@@ -120,33 +137,45 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
         kappa[k] = second_form(px, py, pz, xx, yy, zz, yz, xz, xy) * inverse
         across[k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
         normals[0, k], normals[1, k], normals[2, k] = nx, ny, nz
-    totals[0, :] = 0.0
     good[0] = kappa[GUARD] > 0.0
     angles[0] = math.atan2(-scale * ray[GUARD, 7], ray[GUARD, 6])
+    for d in range(5):
+        for k in range(known):
+            parts[d, k] = 0.0
+    for k in range(known):
+        good[k + 1] = True
+    for q in range(GAUSS):
+        for d in range(3):
+            _between(weights[q], d, kappa, GUARD, known, at[d])
+        _between(weights[q], 0, across, GUARD, known, at[3])
+        _integrands(at[0], at[1], at[2], at[3], gauss_weights[q] * step, known, parts)
+        for k in range(known):
+            good[k + 1] &= joints or at[0, k] > 0.0
+    for d in range(5):
+        totals[0, d] = 0.0
     for k in range(known):
         i = k + GUARD
-        copy(totals[k], totals[k + 1])
-        positive = good[k]
         # where the creeping ray has ended, the integrals stay
-        for q in range(GAUSS if positive else 0):
-            curved = _applied(weights[q], 0, kappa, i)
-            positive &= joints or curved > 0.0
-            _add(
-                curved,
-                _applied(weights[q], 1, kappa, i),
-                _applied(weights[q], 2, kappa, i),
-                _applied(weights[q], 0, across, i),
-                gauss_weights[q] * step,
-                totals[k + 1],
-            )
-        good[k + 1] = positive and (not joints or kappa[i + 1] > -STRAIGHT / scale)
-        angles[k + 1] = _turned(angles[k], ray[i + 1, 6], ray[i + 1, 7], scale)
+        share = 1.0 if good[k] else 0.0
+        for d in range(5):
+            totals[k + 1, d] = totals[k, d] + share * parts[d, k]
+        good[k + 1] &= good[k] and (not joints or kappa[i + 1] > -STRAIGHT / scale)
+    # at has been used: its first row is free
+    for k in range(known):
+        principal[k] = 2 * math.pi * turns(-scale * ray[k + GUARD + 1, 7], ray[k + GUARD + 1, 6])
+    for k in range(known):
+        angles[k + 1] = _nearest(angles[k], principal[k])
 
 
 @njit(**options)
 def _turned(before, J, rate, scale):
-    """Angle phi of (J, -J') next to the one before, a whole number of turns from the principal one."""
-    angle = math.atan2(-scale * rate, J)
+    """Angle phi of (J, -J') next to the one before."""
+    return _nearest(before, math.atan2(-scale * rate, J))
+
+
+@njit(**options)
+def _nearest(before, angle):
+    """Angle that differs from a given one by whole turns, next to the one before."""
     return angle + 2 * math.pi * math.floor((before - angle) / (2 * math.pi) + 0.5)
 
 
@@ -190,10 +219,11 @@ def quantities_at(
         With observers, risen (n,) tells whether n.r > 0 somewhere before, two steps or more.
     """
     K = states.shape[1]
-    g, w, total = np.empty((10, K)), np.empty((3, WIDTH)), np.empty(5)
+    g, w = np.empty((10, K)), np.empty((3, WIDTH))
     kappa, across, normals = np.empty(K), np.empty(K), np.empty((3, K))
     totals, angles, good = np.empty((K, 5)), np.empty(K), np.empty(K, np.bool_)
     weights = np.empty((GAUSS, 3, WIDTH))
+    at, parts, one = np.empty((4, K)), np.empty((5, K)), np.empty((4, 1))
     for q in range(GAUSS):
         _weights(matrix, nodes[q], step, weights[q])
     row, n = 0, owner.shape[0]
@@ -206,7 +236,7 @@ def quantities_at(
         known = min(max(int(latest / step), 0), K - 2 * GUARD - 1) if whole else 0
         _along(
             level, level_par, (weights, gauss_weights), scale, ray, step, known, kappa, across, normals, totals,
-            angles, good, g, joints,
+            angles, good, (g, at, parts), joints,
         )  # fmt: skip
         _weights(matrix, 0.0, step, w)
         for d in range(3):
@@ -231,21 +261,17 @@ def quantities_at(
                 continue
             lanes[point, 8] = _turned(angles[last], lanes[point, 6], lanes[point, 7], scale)
             positive = good[last]
-            copy(totals[last], total)
+            for d in range(5):
+                parts[d, 0] = totals[last, d]
             for q in range(GAUSS if part > 0.0 and positive else 0):
                 _weights(matrix, part * nodes[q], step, w)
-                curved = _applied(w, 0, kappa, i)
-                positive &= joints or curved > 0.0
-                _add(
-                    curved,
-                    _applied(w, 1, kappa, i),
-                    _applied(w, 2, kappa, i),
-                    _applied(w, 0, across, i),
-                    gauss_weights[q] * part * step,
-                    total,
-                )
+                for d in range(3):
+                    one[d, 0] = _applied(w, d, kappa, i)
+                one[3, 0] = _applied(w, 0, across, i)
+                positive &= joints or one[0, 0] > 0.0
+                _integrands(one[0], one[1], one[2], one[3], gauss_weights[q] * part * step, 1, parts)
             for d in range(5):
-                lanes[point, 13 + d] = total[d]
+                lanes[point, 13 + d] = parts[d, 0]
             alive[point] = positive and lanes[point, 9] > (STRAIGHT / scale if joints else 0.0)
             if observers.shape[0]:
                 risen[point] = False

@@ -1,8 +1,11 @@
 """Fans at the nodes of a lattice, whose rays are told by their launch points.
 
 On a line that is one whole curve launch points are those next to the reference's, the line at the middle of a block of
-cells; else those that the line has by itself, if all of its arcs have ends.
+cells; else those that the line has by itself, if all of its arcs have ends. From the reference's wave to the node's the
+points go by way of WAYS - 1 waves between, each as near to the one before as the next.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,20 +14,40 @@ from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.many import ShadowLines, shadow_lines
-from creeping.shadow.panels import newton_step, onto_line
+from creeping.shadow.moving import moved_onto_lines
 from creeping.shadow.status import OK
-from creeping.sweeping.between.stencil import around
+from creeping.sweeping.between.rows import Rows
+from creeping.sweeping.between.stencil import around, corners, lines
 from creeping.sweeping.lattice import FINER, Lattice
-from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.sweeper import Arrays, fill_lines, fill_rays
+from creeping.sweeping.request import CURVED, LINE, SweepRequest
+from creeping.sweeping.sweeper import fill_lines, fill_rays
 
-SPAN = 16
-"""Cells of the coarsest level along a block: a radian."""
+SPANS = (16, 4, 1)
+"""Cells of the coarsest level along a block, the first a radian: the first whose reference serves, or the first."""
+WAYS, STEPS = 3, 6
+"""Waves on the way from the reference to a node, and Newton steps onto the line of each."""
 FAR, SETTLED = 1.0, 1e-10
 """Distance, in body sizes, that launch points may be moved from the reference, and of the next step where they are."""
-START, ARCLENGTH, PHASE, END, STEPS = slice(0, 3), 3, 4, 5, 6
-"""Lanes of a ray: x0, arclength, d.x0, time of detachment (0 if there is none), and for each output x, p, J, J', A."""
+START, ARCLENGTH, PHASE, END = "start", "arclength", "launch_phase", "detachment"
 POINTS = ("points", "directions", "spreading", "spreading_rate", "attenuation")
+NUMBERS = (START, ARCLENGTH, PHASE, END, *POINTS)
+"""What is interpolated of a ray: x0, s1, d.x0, the time of detachment, 0 if there is none, and x, p, J, J', A."""
+RELATIVE = ("spreading", "spreading_rate")
+"""Numbers whose errors are of 1 + their own size."""
+WHOLE, UNTOLD = -1, -2
+"""How rays are told on lines that are one whole curve, and where they are not."""
+KNOWN = ("ray_status", "curve_index", "has_end", *LINE, *CURVED)
+"""What is kept of a node beside."""
+
+
+class Judged(NamedTuple):
+    """Cells of a level: the nodes of their stencils (n, m), and the largest errors of their rays (n, rays).
+
+    An error is infinite where the ray is not of one status at all nodes, all of them where rays cannot be told.
+    """
+
+    stencils: IntArray
+    errors: FloatArray
 
 
 class Fans:
@@ -38,107 +61,145 @@ class Fans:
 
     Attributes
     ----------
-    results : dict
-        Arrays of results as of a sweep, the first axis the node.
-    lanes : (nodes, rays, lanes)
-    scales : (lanes,)
-        Factors that make errors of lanes numbers without unit, 0 of what is not judged.
-    relative : (lanes,) of bool
-        Lanes whose errors are of 1 + their own size: J and J'.
+    numbers : Rows
+        `NUMBERS` of nodes, (nodes, rays w) with w numbers of each ray.
+    known : Rows
+        `KNOWN` of nodes.
     """
 
     def __init__(self, flow: Flow, request: SweepRequest, lattice: Lattice) -> None:
         self._flow, self._request, self._lattice = flow, request, lattice
-        self._known: dict[tuple[int, ...], int] = {}
-        self.results: Arrays = request.empty(0)
-        lanes = STEPS + 9 * request.n_steps
-        self.lanes = np.zeros((0, request.n_rays, lanes))
-        # whether rays are told by their places on arcs, or next to a reference
-        self._open, self._whole = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-        self._arcs = np.zeros((0, request.n_rays))
+        self._places: dict[tuple[int, ...], int] = {}
+        # of a block the reference's launch points (rays, 3), if its line is one whole curve, and its wave
+        self._references: dict[tuple[int, ...], tuple[FloatArray, FloatArray] | None] = {}
+        one, rays, steps = request.empty(1), request.n_rays, request.n_steps
+        widths = dict.fromkeys(NUMBERS, 1) | dict.fromkeys(POINTS, steps) | {START: 3}
+        widths |= {"points": 3 * steps, "directions": 3 * steps}
+        self.numbers = Rows({name: np.empty((0, rays * width)) for name, width in widths.items()})
+        one["has_end"] = np.zeros((1, rays), dtype=bool)
+        self.known = Rows({name: one[name][:0] for name in KNOWN})
+        # how rays are told: WHOLE, UNTOLD, or the number of an order of arcs; and what must be alike of a ray
+        self._told, self._orders = Rows({"order": np.zeros(0, dtype=np.int64)}), dict[bytes, int]()
+        self._codes = Rows({"code": np.zeros((0, rays), dtype=np.int32)})
         length = size(flow.body)
-        step = [*[1 / length] * 3, 1, 1, 1, 1, length, length ** (-1 / 3)]
-        self.scales = np.array([*[1 / length] * 3, 0, 0, 1 / length, *np.tile(step, request.n_steps)])
-        judged = np.array([False] * 6 + [True, True, False])
-        self.relative = np.concatenate([np.zeros(STEPS, dtype=bool), np.tile(judged, request.n_steps)])
+        self._scales = {START: 1 / length, END: 1 / length, "points": 1 / length, "directions": 1.0, "spreading": 1.0}
+        self._scales |= {"spreading_rate": length, "attenuation": length ** (-1 / 3)}
+        self._lines, self._corners = lines(lattice.dimensions), corners(lattice.dimensions)
 
     def __len__(self) -> int:
-        return len(self._known)
+        return len(self._places)
 
-    def stencils(self, level: int, own: IntArray) -> list[IntArray | None]:
-        """Nodes of each cell, (n, 1 + dimensions) the face and its own number; None where rays cannot be told."""
+    @property
+    def nbytes(self) -> int:
+        """Memory that the fans take."""
+        return self.numbers.nbytes
+
+    def judged(self, level: int, own: IntArray) -> Judged:
+        """Cells of a level, (n, 1 + dimensions) the face and their own number."""
+        from creeping.sweeping.kernels.judging import cell_errors
+
+        stencils = self._stencils(level, own)
+        errors = np.zeros((len(own), self._request.n_rays))
+        orders = self._told["order"][stencils]
+        told = np.flatnonzero((orders[:, 0] != UNTOLD) & np.all(orders == orders[:, :1], axis=1))
+        some, found, codes = stencils[told], errors[told], self._codes["code"]
+        for name, scale in self._scales.items():
+            rule = *self._lines, self._corners, scale, name in RELATIVE
+            cell_errors(self.numbers[name], some, *rule, found)
+        for row, stencil in enumerate(some):
+            alike = codes[stencil]
+            found[row, np.any(alike != alike[0], axis=0)] = np.inf
+        errors[:] = np.inf
+        errors[told] = found
+        return Judged(stencils, errors)
+
+    def _stencils(self, level: int, own: IntArray) -> IntArray:
+        """Nodes (n, m) of the stencils of cells (n, 1 + dimensions)."""
         lattice, finer = self._lattice, FINER ** (self._lattice.levels - 1 - level)
         nodes = around(own)
         numbers = lattice.wrapped(nodes.reshape(-1, own.shape[1]), level)
-        block = np.repeat(own[:, 1:] // (SPAN * FINER**level), nodes.shape[1], axis=0)
-        keys = np.concatenate([block, numbers[:, :1], numbers[:, 1:] * finer], axis=1)
+        blocks = np.repeat(self._blocks(level, own), nodes.shape[1], axis=0)
+        keys = np.concatenate([blocks, numbers[:, 1:] * finer], axis=1)
         keys, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        new = [n for n, key in enumerate(map(tuple, keys.tolist())) if key not in self._known]
+        listed = list(map(tuple, keys.tolist()))
+        new = [n for n, key in enumerate(listed) if key not in self._places]
         if new:
-            count = len(self._known)
-            self._known |= {tuple(keys[n].tolist()): count + k for k, n in enumerate(new)}
-            self._compute(lattice.directions(numbers[first[new]], level), keys[new][:, : own.shape[1]])
-        fans = np.array([self._known[tuple(key)] for key in keys.tolist()], dtype=np.int64)
-        return [self._served(stencil) for stencil in fans[place.reshape(len(own), -1)]]
+            count = len(self._places)
+            self._places |= {listed[n]: count + k for k, n in enumerate(new)}
+            self._compute(lattice.directions(numbers[first[new]], level), blocks[first[new]])
+        fans = np.array([self._places[key] for key in listed], dtype=np.int64)
+        return np.asarray(fans[place.reshape(len(own), -1)])
 
-    def alike(self, stencil: IntArray) -> BoolArray:
-        """Whether a ray is of one status at all nodes, and detached at the same outputs (rays,)."""
-        status, ends = self.results["ray_status"][stencil], self.results["detachment"][stencil]
-        before = ends[..., None] > self._request.travel_times
-        return np.asarray(np.all(status == status[0], axis=0) & np.all(before == before[0], axis=(0, 2)))
-
-    def _served(self, stencil: IntArray) -> IntArray | None:
-        if self._whole[stencil].all():
-            return stencil
-        places = self.results["curve_index"][stencil], self._arcs[stencil], self.results["curves"][stencil]
-        same = all(np.array_equal(one, np.broadcast_to(one[0], one.shape), equal_nan=True) for one in places)
-        return stencil if same and self._open[stencil].all() else None
+    def _blocks(self, level: int, own: IntArray) -> IntArray:
+        """Blocks (n, 2 + dimensions) of cells: their span, face and number."""
+        found = np.zeros((len(own), 1 + own.shape[1]), dtype=np.int64)
+        left = np.arange(len(own))
+        for span in (*SPANS, SPANS[0]):
+            number = own[left, 1:] // (span * FINER**level)
+            found[left] = np.concatenate([np.full((len(left), 1), span), own[left, :1], number], axis=1)
+            left = left[np.array([one is None for one in self._referred(found[left])], dtype=bool)]
+        return found
 
     def _compute(self, directions: FloatArray, blocks: IntArray) -> None:
-        """Add nodes of unit directions (n, 3) in blocks (n, dimensions + face)."""
+        """Add nodes of unit directions (n, 3) in blocks (n, 2 + dimensions)."""
         body, request = self._flow.body, self._request
         lines = shadow_lines(body, directions, request.n_rays)
-        own, of = np.unique(blocks, axis=0, return_inverse=True)
-        middle = own[:, [own.shape[1] - 1, *range(own.shape[1] - 1)]]
-        middle[:, 1:] = middle[:, 1:] * SPAN + SPAN // 2
-        references = shadow_lines(body, self._lattice.directions(middle, 0), request.n_rays)
-        moved = np.flatnonzero(_is_whole(lines) & _is_whole(references)[of.reshape(-1)])
-        from_ = references.launch.points[of.reshape(-1)[moved]]
-        points, settled = self._moved(from_, directions[moved])
-        moved, points = moved[settled], points[settled]
-        lines.launch.points[moved] = points
-        lines.launch.arclength[moved] = _arclengths(points, lines.length[moved])
+        launch, whole = lines.launch, self._moved(lines, blocks)
         out = request.empty(len(directions))
         fill_lines(lines, out)
         fill_rays(self._flow, lines, request.travel_times, out)
-        whole, launch = np.zeros(len(directions), dtype=bool), lines.launch
-        whole[moved] = True
+        out["has_end"] = np.isfinite(out[END])
+        passed = np.sum(out[END][..., None] > request.travel_times, axis=-1)
+        self._codes.add({"code": out["ray_status"].astype(np.int32) * (request.n_steps + 1) + passed})
         has_ends = np.all(np.where(launch.there, launch.closed == 0, True), axis=1) & (lines.status == OK)
-        ends = np.where(np.isinf(out["detachment"]), 0.0, out["detachment"])
-        each = [launch.points, *(v[..., None] for v in (out["arclength"], out["launch_phase"], ends))]
-        steps = [v if v.ndim == 4 else v[..., None] for v in (out[name] for name in POINTS)]
-        each.append(np.concatenate(steps, axis=-1).reshape(*launch.there.shape, -1))
-        # what stands for no ray must not spoil the others
-        self.lanes = np.concatenate([self.lanes, np.nan_to_num(np.concatenate(each, axis=-1))])
-        self.results = {name: np.concatenate([values, out[name]]) for name, values in self.results.items()}
-        self._open, self._whole = np.concatenate([self._open, has_ends]), np.concatenate([self._whole, whole])
-        self._arcs = np.concatenate([self._arcs, np.where(launch.there, launch.arc_index, -1.0)])
+        arcs = np.where(launch.there, launch.arc_index, -1.0)
+        orders = np.full(len(directions), UNTOLD)
+        orders[whole] = WHOLE
+        for row in np.flatnonzero(has_ends & ~whole):
+            of = b"".join(np.ascontiguousarray(v[row]).tobytes() for v in (out["curves"], out["curve_index"], arcs))
+            orders[row] = self._orders.setdefault(of, len(self._orders))
+        self._told.add({"order": orders})
+        self.known.add({name: out[name] for name in KNOWN})
+        # what stands for no ray, or for no end, must not spoil the others
+        numbers = {START: launch.points} | {name: out[name] for name in NUMBERS if name != START}
+        numbers[END] = np.where(out["has_end"], out[END], 0.0)
+        self.numbers.add({name: np.nan_to_num(v.reshape(len(directions), -1)) for name, v in numbers.items()})
 
-    def _moved(self, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Launch points (n, rays, 3) moved onto the lines of directions (n, 3), and whether all of a line are there."""
-        body, length = self._flow.body, size(self._flow.body)
-        d = np.repeat(directions, points.shape[1], axis=0)
-        found = onto_line(body, d, points.reshape(-1, 3), reach=0.2 * length, iterations=6)
-        step, _ = newton_step(body, d, found)
-        found, far = found.reshape(points.shape), np.linalg.norm(found.reshape(points.shape) - points, axis=-1)
-        near = (np.linalg.norm(step, axis=1).reshape(far.shape) < SETTLED * length) & (far < FAR * length)
-        return found, np.all(near, axis=1)
+    def _moved(self, lines: ShadowLines, blocks: IntArray) -> BoolArray:
+        """Put launch points of lines next to those of the references of their blocks, and whether it was so (n,)."""
+        body, length, done = self._flow.body, size(self._flow.body), np.zeros(len(blocks), dtype=bool)
+        references = self._referred(blocks)
+        rows = np.flatnonzero(_is_whole(lines) & np.array([one is not None for one in references], dtype=bool))
+        pairs = [one for one in (references[row] for row in rows) if one is not None]
+        if not pairs:
+            return done
+        points, waves = (np.stack(kind) for kind in zip(*pairs, strict=True))
+        begun, rays = points.reshape(-1, 3), points.shape[1]
+        found, left = begun, np.zeros(len(begun))
+        for way in range(1, WAYS + 1):
+            between = waves + way / WAYS * (lines.directions[rows] - waves)
+            between /= np.linalg.norm(between, axis=1, keepdims=True)
+            between = np.repeat(between, rays, axis=0)
+            found, _, left = moved_onto_lines(body, between, found, reach=0.2 * length, steps=STEPS)
+        near = (left < SETTLED * length) & (np.linalg.norm(found - begun, axis=1) < FAR * length)
+        settled = np.all(near.reshape(-1, rays), axis=1)
+        rows, points = rows[settled], found.reshape(points.shape)[settled]
+        lines.launch.points[rows] = points
+        lines.launch.arclength[rows] = _arclengths(points, lines.length[rows])
+        done[rows] = True
+        return done
 
-
-def steps_of(lanes: FloatArray, n_steps: int) -> tuple[FloatArray, ...]:
-    """x, p, J, J' and A of lanes (..., lanes) at each output, as `POINTS` names them."""
-    path = lanes[..., STEPS:].reshape(*lanes.shape[:-1], n_steps, 9)
-    return path[..., :3], path[..., 3:6], path[..., 6], path[..., 7], path[..., 8]
+    def _referred(self, blocks: IntArray) -> list[tuple[FloatArray, FloatArray] | None]:
+        """References of blocks (n, 2 + dimensions)."""
+        keys = list(map(tuple, blocks.tolist()))
+        new = [key for key in dict.fromkeys(keys) if key not in self._references]
+        if new:
+            span, face, number = np.split(np.array(new), (1, 2), axis=1)
+            waves = self._lattice.directions(np.concatenate([face, number * span + span / 2], axis=1), 0)
+            lines = shadow_lines(self._flow.body, waves, self._request.n_rays)
+            for key, whole, points, wave in zip(new, _is_whole(lines), lines.launch.points, waves, strict=True):
+                self._references[key] = (points, wave) if whole else None
+        return [self._references[key] for key in keys]
 
 
 def _is_whole(lines: ShadowLines) -> BoolArray:

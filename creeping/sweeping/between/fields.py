@@ -25,7 +25,7 @@ from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
 from creeping.sweeping.between.levels import Between, by_cell
 from creeping.sweeping.between.nodes import Nodes
-from creeping.sweeping.between.stencil import combined, corner_weights, corners, weights
+from creeping.sweeping.between.stencil import corner_weights, corners, totals, weights
 from creeping.sweeping.field_arrays import FieldArrays
 from creeping.sweeping.request import LINE, SHARES, VALID, SweepRequest
 from creeping.sweeping.sweeper import Arrays, Sweeper
@@ -77,14 +77,14 @@ class FieldsBetween(Between):
         if len(self._nodes) > MOST_NODES:
             self._nodes = Nodes(self._plain, self._lattice)
 
-    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
+    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> FloatArray:
         nodes = self._nodes
         own, which, members, places = by_cell(self._lattice, level, incidences[rows])
         cells = nodes.cells(level, own)
         six, errors = weights(places)
         stencil = cells.stencil[which]
         lengths = nodes.results["line_length"][stencil].T
-        length, *off = (_totals(w.T * lengths) for w in (six, *errors))
+        length, *off = (totals(w.T * lengths) for w in (six, *errors))
         # of a line that is not there it is not known
         passed = np.max(np.abs(off), axis=0) <= self._accuracy * length
         shape = len(rows), self._many, 2, len(self._wavenumbers)
@@ -101,7 +101,7 @@ class FieldsBetween(Between):
             for problem in problems:
                 passed[FieldArrays(problem.arrays).unclear] = False
         self._write(nodes.results, inside, places, length, problems, rows, passed, out)
-        return np.asarray(rows[~passed])
+        return np.where(passed, 0.0, 1.0)
 
     def _write(
         self,
@@ -123,7 +123,7 @@ class FieldsBetween(Between):
         out["singular_distance"][some] = known["singular_distance"].min(axis=1)
         near = corner_weights(places[done])
         for name in SHARES:
-            out[name][some] = _totals(near.T * known[name].T)
+            out[name][some] = totals(near.T * known[name].T)
         for name, worst in zip(VALID, (np.min, np.max), strict=True):
             out[name][some] = worst(known[name], axis=1)
         out["interpolated"][some] = True
@@ -138,20 +138,16 @@ class FieldsBetween(Between):
         self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: list[FloatArray]
     ) -> tuple[Any, FloatArray, BoolArray]:
         """Fields (n, m, 2, columns) of reflected and of creeping sheets, their differences, and who passes (n,)."""
+        from creeping.sweeping.kernels.sheet_sums import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
+
         k, amplitudes = self._wavenumbers, np.zeros((0, 1)) if nodes.amplitudes is None else nodes.amplitudes
-        paths, sheets = nodes.path[chain].T, amplitudes[chain].swapaxes(0, 1)
-        between = combined(six, sheets)
-        waves, size = between * np.exp(1j * k * combined(six, paths)[..., None]), np.abs(between)
-        off = np.zeros_like(size)
-        for w in errors:
-            change = np.abs(combined(w, sheets)) + size * k * np.abs(combined(w, paths))[..., None]
-            np.maximum(off, change, out=off)
-        shape = len(six), self._many, 2, len(k)
-        fields, (differences, squares, sizes) = np.zeros(shape, dtype=complex), np.zeros((3, *shape))
-        # one after the other: sums are to be the same in whatever company
-        for sheet, label in enumerate(nodes.label[chain[:, 0]]):
-            for total, each in ((fields, waves), (differences, off), (squares, off**2), (sizes, size**2)):
-                total[:, label // 2, label % 2] += each[:, sheet]
+        sheets, label = amplitudes[chain], nodes.label[chain[:, 0]]
+        parts = np.stack([sheets.real, sheets.imag], axis=2)
+        out = np.zeros((len(six), 2 * self._many, SUMS, len(k)))
+        sheet_sums(parts, nodes.path[chain], label, six, np.stack(errors), k, out)
+        out = out.reshape(len(six), self._many, 2, SUMS, len(k))
+        fields = out[..., REAL, :] + 1j * out[..., IMAGINARY, :]
+        differences, squares, sizes = (out[..., which, :] for which in (ERROR, SQUARE, SIZE))
         differences = SAFE * differences + NOISE * np.sqrt(sizes)
         # of a conductor's components together
         squares, sizes = (np.add.reduceat(each, self._first, axis=-1) for each in (squares, sizes))
@@ -175,11 +171,3 @@ class FieldsBetween(Between):
             arrays["unresolved"] = unresolved.any(axis=1).reshape(n, self._many)
             arrays["by_currents"] = np.zeros((n, self._many), dtype=bool)
             yield Problem(which, suffix, difference, arrays)
-
-
-def _totals(values: FloatArray) -> FloatArray:
-    """Sums (n,) of rows (m, n), one after the other."""
-    out: FloatArray = values[0]
-    for row in values[1:]:
-        out = out + row
-    return out

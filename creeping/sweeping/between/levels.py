@@ -38,21 +38,25 @@ class Between(ABC):
         incidences = np.asarray(incidences, dtype=float)
         out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
         self._begin()
-        for level in range(self._lattice.levels):
+        for level in range(self._lattice.first, self._lattice.levels):
             if len(left):
-                left = self._level(level, incidences, left, out)
+                left = left[self._level(level, incidences, left, out) == 1]
         if len(left):
             for name, values in self._direct(incidences[left]).items():
                 out[name][left] = values
         return out
+
+    def left(self, level: int, incidences: FloatArray) -> FloatArray:
+        """Share of each of the incidences (n, 3) that a level leaves to be computed, 1 of what it does not give."""
+        return self._level(level, incidences, np.arange(len(incidences)), self.request.empty(len(incidences)))
 
     @abstractmethod
     def _begin(self) -> None:
         """Make room for nodes, where there are too many of earlier calls."""
 
     @abstractmethod
-    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
-        """Fill the results of those rows that the level gives; returns the others."""
+    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> FloatArray:
+        """Fill the results of those rows that the level gives; returns the shares that are computed, 1 of others."""
 
 
 def by_cell(

@@ -13,7 +13,7 @@ Sources: Derivations, F23.
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.geodesics.states import ATTENUATION, P, X, pack, whole_lanes
 from creeping.geometry.surface import size
 from creeping.kernels.threads import CHUNK
@@ -21,20 +21,18 @@ from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.fan import ray_arrays
 from creeping.rays.transport import Flow
 from creeping.shadow.attachment import LaunchPoints
-from creeping.shadow.panels import onto_line
-from creeping.shadow.status import ATTACHED, FOLLOWED, OK
-from creeping.sweeping.between.fans import ARCLENGTH, END, PHASE, POINTS, START, Fans, steps_of
+from creeping.shadow.moving import moved_onto_lines
+from creeping.shadow.status import ATTACHED, FOLLOWED, NO_RAY, OK
+from creeping.sweeping.between.fans import ARCLENGTH, END, PHASE, POINTS, START, Fans
 from creeping.sweeping.between.levels import Between, by_cell
-from creeping.sweeping.between.stencil import combined, corner_weights, corners, weights
+from creeping.sweeping.between.stencil import corner_weights, corners, totals, weights
 from creeping.sweeping.request import CURVED, LINE, SHARES, SweepRequest
 from creeping.sweeping.sweeper import Arrays
 
-TESTS = (0.2, 0.5, 0.8)
-"""Places in a cell at which its rays are judged."""
-MOST_BYTES = 30_000_000
-"""Lanes of fans that are kept from one call to the next."""
-SOME = 0.5
-"""Largest share of an incidence's rays that are carried by themselves."""
+MOST_BYTES = 120_000_000
+"""Fans that are kept from one call to the next."""
+SOME, FINER_PAYS = 0.6, 3.0
+"""Largest share of an incidence's rays that are carried by themselves, and that over incidences in a finer cell."""
 
 
 class RaysBetween(Between):
@@ -43,89 +41,85 @@ class RaysBetween(Between):
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         super().__init__(flow, request)
         self._fans = Fans(flow, request, self._lattice)
-        # a cell is judged by itself, whatever incidences it holds
-        tests = np.stack(np.meshgrid(*[TESTS] * self._lattice.dimensions, indexing="ij"), axis=-1)
-        self._tests = weights(tests.reshape(-1, self._lattice.dimensions))
 
     def _begin(self) -> None:
-        if self._fans.lanes.nbytes > MOST_BYTES:
+        if self._fans.nbytes > MOST_BYTES:
             self._fans = Fans(self.flow, self.request, self._lattice)
 
-    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> IntArray:
-        fans = self._fans
-        own, _, members, places = by_cell(self._lattice, level, incidences[rows])
-        six, near = weights(places)[0], corner_weights(places)
-        # finer cells have about half as many such rays, and cost a fan each
-        allowed = min(SOME, 2.0 / self._lattice.crowded(level))
-        passed, again = np.zeros(len(rows), dtype=bool), []
-        for stencil, mine in zip(fans.stencils(level, own), members, strict=True):
-            if stencil is None:
-                continue
-            error = self._error(fans, stencil)
-            there = fans.results["curve_index"][stencil[0]] >= 0
-            unsure = there & ~((error <= self._accuracy) & fans.alike(stencil))
-            if np.count_nonzero(unsure) > allowed * np.count_nonzero(there):
-                continue
-            passed[mine] = True
-            lanes = combined(six[mine], fans.lanes[stencil])
-            self._lines(fans, stencil, six[mine], near[mine], rows[mine], out)
-            self._rays(fans, stencil, lanes, np.where(there & ~unsure, error, 0.0), rows[mine], out)
-            ray = np.flatnonzero(unsure)
-            again.append(
-                (np.repeat(rows[mine], len(ray)), np.tile(ray, len(mine)), lanes[:, ray, START].reshape(-1, 3))
-            )
-        if again:
-            row, ray, starts = (np.concatenate(kind) for kind in zip(*again, strict=True))
-            self._carry(incidences, row, ray, starts, out)
-        return rows[~passed]
+    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> FloatArray:
+        fans, lattice = self._fans, self._lattice
+        own, _, members, places = by_cell(lattice, level, incidences[rows])
+        cells = fans.judged(level, own)
+        there = fans.known["curve_index"][cells.stencils[:, 0]] != NO_RAY
+        unsure = there & ~(cells.errors <= self._accuracy)
+        share = np.count_nonzero(unsure, axis=1) / np.maximum(np.count_nonzero(there, axis=1), 1)
+        # finer cells have about half as many such rays, and cost fans of their own
+        share[share > min(SOME, FINER_PAYS / lattice.crowded(level + 1))] = 1.0
+        good = np.flatnonzero(share < 1)
+        left = np.ones(len(rows))
+        if not len(good):
+            return left
+        # the incidences that have passed, those of one cell after those of another
+        some = np.concatenate([members[cell] for cell in good])
+        first = np.cumsum([0, *(len(members[cell]) for cell in good)])
+        of = np.repeat(good, np.diff(first))
+        left[some] = share[of]
+        target, six, stencils = rows[some], weights(places[some])[0], cells.stencils[good]
 
-    def _error(self, fans: Fans, stencil: IntArray) -> FloatArray:
-        """Largest error of the lanes of each ray anywhere in a cell (rays,)."""
-        six, errors = self._tests
-        lanes = fans.lanes[stencil].reshape(len(stencil), -1)
-        off = np.max([np.abs(w @ lanes) for w in errors], axis=0).reshape(len(six), *fans.lanes.shape[1:]) * fans.scales
-        found = (six @ lanes).reshape(off.shape)[..., fans.relative]
-        off[..., fans.relative] /= 1 + np.abs(found * fans.scales[fans.relative])
-        return np.asarray(off.max(axis=(0, 2)))
+        def sums(name: str, found: np.ndarray[Any, Any]) -> None:
+            from creeping.sweeping.kernels.judging import cell_sums
 
-    def _lines(
-        self, fans: Fans, stencil: IntArray, six: FloatArray, near: FloatArray, rows: IntArray, out: Arrays
-    ) -> None:
-        """Results of the lines."""
-        inside = stencil[corners(self._lattice.dimensions)]
-        known = {name: fans.results[name][inside] for name in (*LINE, *CURVED)}
-        out["incidence_status"][rows] = FOLLOWED if np.any(known["incidence_status"] == FOLLOWED) else OK
-        out["curves"][rows], out["line_length"][rows] = (
-            known["curves"][0],
-            combined(six, fans.results["line_length"][stencil]),
-        )
-        out["line_error"][rows] = known["line_error"].max()
-        out["singular_distance"][rows] = known["singular_distance"].min()
+            numbers = fans.numbers[name]
+            cell_sums(numbers, stencils, first, six, target, found.reshape(len(found), numbers.shape[1]))
+
+        for name in (ARCLENGTH, PHASE, *POINTS):
+            sums(name, out[name])
+        if np.any(fans.known["has_end"][stencils[:, 0]]):
+            sums(END, out[END])
+        out["interpolation_error"][target] = np.where(there & ~unsure, cells.errors, 0.0)[of]
+        self._rays(cells.stencils[of, 0], target, out)
+        self._lines(cells.stencils[of], six, corner_weights(places[some]), target, out)
+        row, ray = np.nonzero(unsure[of])
+        if len(row):
+            starts = np.empty((len(incidences), self.request.n_rays, 3))
+            sums(START, starts)
+            self._carry(incidences, target[row], ray, starts[target[row], ray], out)
+        return left
+
+    def _lines(self, stencils: IntArray, six: FloatArray, near: FloatArray, rows: IntArray, out: Arrays) -> None:
+        """Results of the lines of incidences by the nodes of their stencils (n, m)."""
+        inside = stencils[:, corners(self._lattice.dimensions)]
+        known = {name: self._fans.known[name][inside] for name in (*LINE, *CURVED)}
+        out["incidence_status"][rows] = np.where(np.any(known["incidence_status"] == FOLLOWED, axis=1), FOLLOWED, OK)
+        out["curves"][rows] = known["curves"][:, 0]
+        out["line_length"][rows] = totals(six.T * self._fans.known["line_length"][stencils].T)
+        out["line_error"][rows] = known["line_error"].max(axis=1)
+        out["singular_distance"][rows] = known["singular_distance"].min(axis=1)
         for name in SHARES:
-            out[name][rows] = combined(near, known[name])
+            out[name][rows] = totals(near.T * known[name].T)
         for name, worst in zip(CURVED, (np.min, np.max), strict=True):
-            out[name][rows] = worst(known[name])
+            out[name][rows] = worst(known[name], axis=1)
         out["interpolated"][rows] = True
 
-    def _rays(
-        self, fans: Fans, stencil: IntArray, lanes: FloatArray, error: FloatArray, rows: IntArray, out: Arrays
-    ) -> None:
-        """Results of interpolated rays."""
+    def _rays(self, nodes: IntArray, rows: IntArray, out: Arrays) -> None:
+        """What rays have of one node of their stencil (n,): codes, and whether they are there and end."""
+        known = self._fans.known
         for name in ("ray_status", "curve_index"):
-            out[name][rows] = fans.results[name][stencil[0]]
-        ends = fans.results["detachment"][stencil[0]]
-        out["detachment"][rows] = np.where(np.isinf(ends), ends, lanes[..., END])
-        out["arclength"][rows], out["launch_phase"][rows] = lanes[..., ARCLENGTH], lanes[..., PHASE]
-        for name, values in zip(POINTS, steps_of(lanes, self.request.n_steps), strict=True):
-            out[name][rows] = values
-        out["interpolation_error"][rows] = error
+            out[name][rows] = known[name][nodes]
+        on = ~known["has_end"][nodes]
+        if np.any(on):
+            row, ray = np.nonzero(on)
+            out[END][rows[row], ray] = np.inf
+        none = known["curve_index"][nodes] == NO_RAY
+        if np.any(none):
+            row, ray = np.nonzero(none)
+            for name in (ARCLENGTH, PHASE, END, *POINTS):
+                out[name][rows[row], ray] = np.nan
 
     def _carry(self, incidences: FloatArray, rows: IntArray, ray: IntArray, starts: FloatArray, out: Arrays) -> None:
         """Results of rays (n,) that are carried from their interpolated launch points (n, 3)."""
-        if not len(rows):
-            return
         body, times, directions = self.body, self.request.travel_times, incidences[rows]
-        points = onto_line(body, directions, starts, reach=0.1 * size(body), iterations=6)[:, None]
+        points = moved_onto_lines(body, directions, starts, reach=0.1 * size(body), steps=6).points[:, None]
         states = self._alone(pack(points, directions, lanes=whole_lanes(body)), rows)[:, None]
         none = np.full((len(rows), 1), np.nan)
         begun = np.full((len(rows), 1), float(ATTACHED))

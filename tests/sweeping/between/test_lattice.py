@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import creeping as cr
-from creeping.sweeping.between.stencil import NODES, combined, corner_weights, corners, offsets, weights
+from creeping.sweeping.between.stencil import NODES, corner_weights, corners, offsets, weights
 from creeping.sweeping.lattice import CROWDED, Lattice, lattice_of
+from tests.oracles.weighted import combined
 
 
 def circle(count, height=0.0, axis=(0.3, 0.5, 0.81), turn=2 * np.pi):

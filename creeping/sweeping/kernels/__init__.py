@@ -1,0 +1,1 @@
+"""Compiled sums over the nodes of a stencil."""
