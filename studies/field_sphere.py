@@ -76,7 +76,7 @@ def creeping_rays(fan: RayFan, k: float, boundary: Any, order: int) -> float:
     geometry = far_geometry(fan, observers(theta))
     kind = scalar_boundaries(boundary)[0]
     found = np.zeros(len(theta), dtype=complex)
-    np.add.at(found, geometry.shed.observer, isolated_rays(geometry, k, kind, order))
+    np.add.at(found, geometry.shed.observer, isolated_rays(geometry, k, kind)[order - 1])
     reference: Any = boundary if isinstance(boundary, str) else boundary.admittance
     return worst(found, poles(k, reference))
 
@@ -85,7 +85,7 @@ def back_axis(fan: RayFan, k: float, boundary: Any, order: int) -> float:
     """Fan integral at backscatter, where all rays merge, against the Regge poles."""
     geometry = far_geometry(fan, [[0.0, 0, -1]])
     nodes = geometry.fan_nodes(k, np.array([True]))
-    found = fan_half(nodes, geometry.directions, k, scalar_boundaries(boundary)[0], order).sum()
+    found = fan_half(nodes, geometry.directions, k, scalar_boundaries(boundary)[0])[order - 1].sum()
     return worst(np.array([found]), watson.far_field(k, 1.0, [np.pi], boundary))
 
 

@@ -11,17 +11,20 @@ from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 
 LEAST_WAVENUMBER, LARGEST_WAVENUMBER = 1e-100, 1e100
-METHODS = ("auto", "currents", "rays")
+METHODS = ("auto", "currents", "rays", "equation")
+PLAIN = ("auto", "equation")
+"""Methods of fields on the body, and of conductors."""
 UNRESOLVED = 0.1
 """Error, as a share of the largest |f|, from which a direction counts as unresolved."""
 
 
-def checked_method(method: str, order: int) -> None:
+def checked_method(method: str, order: int, methods: tuple[str, ...] = METHODS) -> None:
     """Refuse a method that is none, and currents of the first order."""
-    if not isinstance(method, str) or method not in METHODS:
-        raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, METHODS))}")
-    if method == "currents" and order != 2:
-        raise InvalidInputError(f"method 'currents' has no order {order}; give method='rays'")
+    if not isinstance(method, str) or method not in methods:
+        raise InvalidInputError(f"method = {method!r} is not one of {', '.join(map(repr, methods))}")
+    if method in ("currents", "equation") and order != 2:
+        other = "rays" if "rays" in methods else "auto"
+        raise InvalidInputError(f"method {method!r} has no order {order}; give method={other!r}")
 
 
 def observers_of(observation: ArrayLike) -> FloatArray:

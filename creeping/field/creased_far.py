@@ -139,8 +139,7 @@ class CreasedParts(Parts):
         g, shed = self.geometry, self.geometry.shed
         share = (1 - self.in_forward)[shed.observer]
         waves = []
-        for order in (1, 2):
-            wave = isolated_rays(g, self.wavenumber, kind, order)
+        for wave in isolated_rays(g, self.wavenumber, kind):
             waves.append(np.where(share > 0, share * np.where(share > 0, wave, 0.0), 0.0))
         merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
         merged |= strong_coupling(shed.rays, self.wavenumber, kind)

@@ -97,7 +97,8 @@ def measured_level(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> Le
 
 def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:
     try:
-        currents = surface_currents(fan, wavenumber=k0, boundary=boundary)
+        # what expansions lack there they lack at k as well
+        currents = surface_currents(fan, wavenumber=k0, boundary=boundary, solve=False)
     except SurfaceError:
         return None
     r = fibonacci_directions(DIRECTIONS)

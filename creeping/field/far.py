@@ -22,6 +22,7 @@ from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundari
 from creeping.field.creased_far import creased_far_field, tip_waves
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_solution import pairs_of
 from creeping.field.extrapolated import measured_level
 from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import field_of
@@ -54,10 +55,12 @@ def far_field(
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     order : 2 or 1
         Second-order creeping waves, or the leading order, which is by rays.
-    method : {"auto", "currents", "rays"}
+    method : {"auto", "currents", "rays", "equation"}
         The currents of the whole body, or isolated rays. "auto" takes currents unless they cost more than some ten
-        seconds or the order is 1. A body with edges, and a conductor with joints or tips, has isolated rays and
-        physical optics, whatever the method (`creeping.field.creased_far`): "rays+optics" in the result.
+        seconds or the order is 1; where they are known to fail the body's integral equation is solved
+        (`creeping.surface_currents`). "equation" solves it wherever it can, in minutes at high wavenumbers. A body
+        with edges, and a conductor with joints or tips whose equation is not solved, has isolated rays and physical
+        optics, whatever the method (`creeping.field.creased_far`): "rays+optics" in the result.
 
     Returns
     -------
@@ -67,7 +70,8 @@ def far_field(
     Raises
     ------
     InvalidInputError
-        On bad directions, wavenumber, boundary, order or method, and for a weighted body.
+        On bad directions, wavenumber, boundary, order or method, for a weighted body, and if the equation is asked
+        for and the body has edges, is rough or needs too many nodes.
     SurfaceError
         If currents are asked for and the wavenumber is too high for any mesh of the body.
 
@@ -88,20 +92,22 @@ def far_field(
     k = checked(wavenumber, order)
     checked_method(method, order)
     r = observers_of(observation)
-    creased = is_creased(fan.body)
-    # currents go across joints, by marching, not round edges
-    marches = not creased or (len(kinds) == 1 and order == 2 and not has_edges(fan.body))
+    creased, solve = is_creased(fan.body), True if method == "equation" else None
+    # currents go across joints, by marching, not round edges; those of a conductor only if they are solved
+    serve = not creased or (order == 2 and not has_edges(fan.body) and (len(kinds) == 1 or pairs_of(fan.body, k) > 0))
     # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
     # there are no modes of an admittance that varies
-    must = marches and (method == "currents" or (method == "auto" and kinds[0].varies and not creased))
-    if must or (marches and cheap):
+    must = serve and (method == "currents" or (method == "auto" and kinds[0].varies and not creased))
+    if must or (serve and cheap) or solve:
         try:
-            left_out = tip_waves(fan, k) if creased else 0.0
-            far = _by_currents(kept_currents(fan, k, boundary), r, boundary, left_out)
+            currents = kept_currents(fan, k, boundary, solve=solve)
+            # the equation knows of tips, expansions do not
+            left_out = tip_waves(fan, k) if creased and not currents.solved else 0.0
+            far = _by_currents(currents, r, boundary, left_out)
             return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
         except SurfaceError:
-            if must:
+            if must or solve:
                 raise
     if creased:
         far = creased_far_field(fan, r, k, boundary, order)
@@ -124,7 +130,7 @@ def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLik
         creeping=dark,
         reflected=lit,
         forward=np.zeros(lit.shape, dtype=complex),
-        method=np.full(len(r), "currents", dtype="<U16"),
+        method=np.full(len(r), "equation" if currents.solved else "currents", dtype="<U16"),
         unresolved=off.any(axis=tuple(range(1, off.ndim))),
         error=error,
         error_by="extinction",

@@ -175,6 +175,7 @@ class FarGeometry:
         self._forward = forward
         self._lobes: dict[tuple[int, bytes], tuple[HorizonRays, MidHorizon, IntArray]] = {}
         self._nodes: dict[bytes, HorizonRays] = {}
+        self._fold: tuple[float, FloatArray] | None = None
         self._search()
 
     @cached_property
@@ -296,8 +297,11 @@ class FarGeometry:
         return specular_points(self.body, self.direction, self.directions, prepared(self.body).coarsest)
 
     def fold(self, wavenumber: float) -> FloatArray:
-        """What specular points miss at a caustic of the reflected field (n m,), L."""
-        return fold_error(self.body, prepared(self.body).coarsest, self.direction, self.directions, wavenumber)
+        """What specular points miss at a caustic of the reflected field (n m,), L; that of the last k is kept."""
+        if self._fold is None or self._fold[0] != wavenumber:
+            where = self.body, prepared(self.body).coarsest, self.direction, self.directions
+            self._fold = wavenumber, fold_error(*where, wavenumber)
+        return self._fold[1]
 
     @cached_property
     def typical(self) -> float:
@@ -308,7 +312,7 @@ class FarGeometry:
         """Nodes of the fan integral for the wanted observers, at most APART/k apart on the shadow line."""
         spacing = np.nan_to_num(self.launch.spacing)
         widest = np.max(spacing, axis=1, initial=0.0)
-        # rays stand for themselves unless they are too far apart; powers of two, so that frequencies share them
+        # rays stand for themselves unless too far apart; powers of two, so that frequencies share them
         parts = 2 ** np.ceil(np.log2(np.maximum(wavenumber * widest / APART, 1.0)) - 1e-9).astype(np.int64)
         key = parts.tobytes() + wanted.tobytes()
         if key not in self._nodes:
@@ -319,17 +323,16 @@ class FarGeometry:
         row, ray = self._crossed[:, :2].astype(np.int64).T
         mine = np.flatnonzero(wanted[row] & (self._crossed[:, 3] > TAPERED))
         row, ray, time = row[mine], ray[mine], self._crossed[mine, 2]
-        which = self.incidence[row]
-        share = parts[which]
+        share = parts[self.incidence[row]]
         # node j of a crossing starts at fraction (j + 1/2)/parts of the piece of line that the ray stands for
-        row, ray, time, which = (np.repeat(v, share) for v in (row, ray, time, which))
+        row, ray, time, total = (np.repeat(v, share) for v in (row, ray, time, share))
         number = np.arange(len(row)) - np.repeat(np.cumsum(share) - share, share)
-        total = parts[which]
-        several = int(parts.max(initial=1))
-        code = (which * self.launch.spacing.shape[1] + ray) * several + number
+        which = self.incidence[row]
+        several, width = int(parts.max(initial=1)), self.launch.spacing.shape[1]
+        code = (which * width + ray) * several + number
         codes, owner = np.unique(code, return_inverse=True)
         one, part = np.divmod(codes, several)
-        at, start = np.divmod(one, self.launch.spacing.shape[1])
+        at, start = np.divmod(one, width)
         directions, spacing = self.launch.directions[at], self.launch.spacing[at, start]
         starts, tangents = self.tracer.onto_line(self.launch.points[at, start], directions, 1)
         offset = (part + 0.5) / parts[at] - 0.5

@@ -32,7 +32,8 @@ from creeping.field.reflected import (
     reflected_error,
     series_fails,
 )
-from creeping.field.shed_wave import shed_wave, smoothstep
+from creeping.field.shed_orders import shed_orders
+from creeping.field.shed_wave import smoothstep
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints
@@ -74,20 +75,21 @@ def parts_of(geometry: FarGeometry, k: float, boundary: BoundaryLike, order: int
     return parts
 
 
-def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
-    """Contribution of each ray shed towards an observer (n,), L; infinite where J' = 0."""
+def isolated_rays(geometry: FarGeometry, wavenumber: float, boundary: Boundary) -> tuple[ComplexArray, ComplexArray]:
+    """Contribution of each ray shed towards an observer (n,), L, in both orders; infinite where J' = 0."""
     rays = geometry.shed.rays
     m1, m2 = scales(rays, wavenumber)
     phase = wavenumber * rays.departing - 0.5 * np.pi * rays.far_caustics
-    wave = shed_wave(rays, wavenumber, boundary, order)
+    first, second = shed_orders(rays, wavenumber, boundary)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        if order == 2 and boundary in CROSSED:
+        if boundary in CROSSED:
             sign, other = CROSSED[boundary]
             held = held_coupling(gradient_coupling(rays, wavenumber))
-            wave = wave + sign * held * shed_wave(rays, wavenumber, other, order)
+            second = second + sign * held * shed_orders(rays, wavenumber, other)[1]
         amplitude = np.sqrt(2 * m1 * m2 / wavenumber / held_rate(rays, m2, passed_fold(geometry)))
-        wave = np.where(amplitude > 0, -amplitude * wave * np.exp(1j * phase), 0.0)
-    return np.asarray(np.where(rays.alive & geometry.leaves, wave, 0.0))
+        turned, there = -amplitude * np.exp(1j * phase), (amplitude > 0) & rays.alive & geometry.leaves
+        first, second = (np.where(there, turned * wave, 0.0) for wave in (first, second))
+    return first, second
 
 
 def passed_fold(geometry: FarGeometry) -> BoolArray:
@@ -184,7 +186,7 @@ class Parts:
         g, k = self.geometry, self.wavenumber
         w, shed = self.in_forward, g.shed
         share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
-        first, second = (_weighted(share, isolated_rays(g, k, kind, order)) for order in (1, 2))
+        first, second = (_weighted(share, wave) for wave in isolated_rays(g, k, kind))
         # the first zero of J' is the launch point itself, where the forward lobe serves
         merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
         merged |= strong_coupling(shed.rays, k, kind)
@@ -211,10 +213,8 @@ class Parts:
         nodes = g.fan_nodes(k, self.in_fan > 0)
         share = ((1 - self.in_forward) * self.in_fan)[nodes.observer]
         normals = nodes.rays.first_normal, g.normals_of(nodes.rays.points)
-        sums = []
-        for order in (1, 2):
-            wave = _weighted(share, fan_half(nodes, g.directions, k, kind, order))
-            sums.append(self._summed(number, nodes.observer, wave, *normals))
+        waves = fan_half(nodes, g.directions, k, kind)
+        sums = [self._summed(number, nodes.observer, _weighted(share, wave), *normals) for wave in waves]
         self._add_whole(self.creeping, *sums)
 
     def _add_reflected(self, number: int, kind: Boundary) -> None:

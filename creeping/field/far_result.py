@@ -30,7 +30,8 @@ class FarField(Drawn):
         Parts; where parts are blended each carries its weight. With currents they are what the creeping rays' currents
         radiate, what the lit side's do, and nothing.
     method : (m,) of str
-        What served: "currents", or for the creeping part "forward", "rays", "fan", or several joined by "+".
+        What served: "currents", "equation" where the body's integral equation gave them, or for the creeping part
+        "forward", "rays", "fan", or several joined by "+".
     unresolved : (m,) of bool
         Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
         fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a

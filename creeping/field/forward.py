@@ -17,6 +17,7 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.ray_scales import fock_parameter, scales
+from creeping.field.shed_orders import shed_orders
 from creeping.field.shed_wave import SECOND_ORDER, shared_pole, shed_wave, smoothstep
 from creeping.field.special.fock import pekeris_slope, pekeris_star
 from creeping.rays.observer_contour import HorizonRays, MidHorizon
@@ -50,23 +51,33 @@ def shadow_half(
 
 
 def fan_half(
-    nodes: HorizonRays, observers: FloatArray, wavenumber: float, boundary: Boundary, order: int
-) -> ComplexArray:
-    """Integrand of the fan integral times its weight (n,), L."""
-    r = observers[nodes.observer]
-    g = np.exp(-0.25j * np.pi) * shed_wave(nodes.rays, wavenumber, boundary, order, transverse_weight=0.5)
-    return _crossing_wave(nodes, r, wavenumber, g)
+    nodes: HorizonRays, observers: FloatArray, wavenumber: float, boundary: Boundary
+) -> tuple[ComplexArray, ComplexArray]:
+    """Integrand of the fan integral times its weight (n,), L, in both orders."""
+    first, second = shed_orders(nodes.rays, wavenumber, boundary, transverse_weight=0.5)
+    factor = np.exp(-0.25j * np.pi) * _crossing_factor(nodes, observers[nodes.observer], wavenumber)
+    # a ray that has ended counts for nothing, whatever its numbers
+    first, second = (np.where(factor != 0, factor * wave, 0.0) for wave in (first, second))
+    return first, second
 
 
 def _crossing_wave(nodes: HorizonRays, r: FloatArray, wavenumber: float, g: ComplexArray) -> ComplexArray:
+    """Integrand (n,), L, of waves g (n,)."""
+    factor = _crossing_factor(nodes, r, wavenumber)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(factor != 0, factor * g, 0.0))
+
+
+def _crossing_factor(nodes: HorizonRays, r: FloatArray, wavenumber: float) -> ComplexArray:
+    """What multiplies g(ξ) under the integral (n,), L; 0 where the integrand is."""
     rays = nodes.rays
     m1, m2 = scales(rays, wavenumber)
     phase = wavenumber * (rays.eikonal - np.sum(r * rays.points, axis=1)) - 0.5 * np.pi * rays.caustics
     taper = smoothstep(np.sum(rays.directions * r, axis=1), *TAPER) * rays.alive
     amplitude = np.sqrt(np.abs(rays.spreading) * np.where(np.isfinite(m1 * m2), m1 * m2, 0.0)) * taper
     with np.errstate(invalid="ignore"):
-        wave = -amplitude / np.sqrt(np.pi) * g * np.exp(1j * phase) * nodes.weight
-    return np.asarray(np.where(amplitude > 0, wave, 0.0))
+        factor = -amplitude / np.sqrt(np.pi) * nodes.weight * np.exp(1j * phase)
+    return np.asarray(np.where(amplitude > 0, factor, 0.0))
 
 
 def lit_half(

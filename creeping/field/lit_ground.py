@@ -117,13 +117,15 @@ def composed(
 
 def without_tips(field: Served) -> Served:
     """The field without values where curvature is infinite, as on a tip: 0, without a bound, UNRESOLVED."""
-    bad = ~(np.isfinite(field.values) & np.isfinite(field.error) & (np.abs(field.values) < NO_VALUE))
+    values = field.values.reshape(len(field.error), -1)
+    bad = ~(np.all(np.isfinite(values) & (np.abs(values) < NO_VALUE), axis=1) & np.isfinite(field.error))
     if not np.any(bad):
         return field
+    each = bad.reshape(-1, *(1,) * (field.values.ndim - 1))
     return replace(
         field,
-        wave=np.where(bad, 0.0, field.wave),
-        creeping=np.where(bad, 0.0, field.creeping),
+        wave=np.where(each, 0.0, field.wave),
+        creeping=np.where(each, 0.0, field.creeping),
         error=np.where(bad, np.inf, field.error),
         error_by=np.where(bad, "bound", field.error_by),
         status=np.where(bad, int(FieldStatus.UNRESOLVED), field.status),

@@ -24,6 +24,7 @@ from creeping.field.arguments import checked, checked_method, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough, total_at
+from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.near_layer import layer_field
@@ -71,11 +72,12 @@ def near_field(
     boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
         Second-order creeping waves, or the leading order, which is by rays.
-    method : {"auto", "currents", "rays"}
+    method : {"auto", "currents", "rays", "equation"}
         The currents of the whole body, or the sum over creeping rays, which on the lit side is not the total field
         (status LIT). "auto" takes, point by point, rays in the shadow where they err less, currents elsewhere, unless
         these cost more than some forty seconds or the order is 1 (bodies with joints have no rays off them: there
-        currents alone serve). Nearer to the body than a quarter of a wavelength "layer" stands for currents: what is
+        currents alone serve). "equation" is as "currents", found by the body's integral equation (`surface_currents`
+        with ``solve=True``). Nearer to the body than a quarter of a wavelength "layer" stands for currents: what is
         between them and the field on the body (`creeping.field.near_layer`). Where that has no foot, over bays or
         ground without rays, rays serve.
 
@@ -87,7 +89,8 @@ def near_field(
     Raises
     ------
     InvalidInputError
-        On points inside the body or not finite, a bad wavenumber, boundary, order or method, and for a weighted body.
+        On points inside the body or not finite, a bad wavenumber, boundary, order or method, for a weighted body or one
+        with edges, and if the equation is asked for of a body that is rough or needs too many nodes.
     SurfaceError
         If currents are asked for and the wavenumber is too high for any mesh of the body.
 
@@ -114,7 +117,9 @@ def near_field(
     dark = np.zeros(len(flat), dtype=bool)
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
     field = zero_field(len(flat), "boundary")
-    by_currents = method != "rays" and order == 2 and (method == "currents" or affordable(fan, len(off), k))
+    must = method in ("currents", "equation")
+    solved = kept_currents(fan, k, boundary, solve=True) if method == "equation" else None
+    by_currents = method != "rays" and order == 2 and (must or affordable(fan, len(off), k))
     # of rays on the lit side nothing is known that currents do not know better
     marched = march_alone(fan.body, kind)
     plain = marched | (by_currents & ~dark)
@@ -122,12 +127,11 @@ def near_field(
     field = field.put(without, _no_rays(~dark[without]))
     field = field.put(rays, _rays_off(fan, flat[rays], ~dark[rays], k, kind, order)) if len(rays) else field
     if len(at) and kind.kind != "soft":
-        parts = _rays_alone_on if method == "rays" else total_on
-        field = field.put(at, parts(fan, flat[at], k, kind, order))
-    asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (method == "currents")))
+        its = fan, flat[at], k, kind, order
+        field = field.put(at, _rays_alone_on(*its) if method == "rays" else total_on(*its, solved))
+    asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | must))
     if method != "rays" and order == 2 and len(asked):
-        must = method == "currents" or kind.varies
-        field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=must)
+        field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=must or kind.varies, solved=solved)
     left = without[field.method[without] == "none"]
     if len(left) and not marched:
         field = field.put(left, _rays_off(fan, flat[left], ~dark[left], k, kind, order))
@@ -232,20 +236,22 @@ def _with_currents(
     boundary: BoundaryLike,
     *,
     must: bool,
+    solved: SurfaceCurrents | None,
 ) -> Served:
     """The field with that of currents, or of the layer, at the points asked for where it must be or is better."""
     if not must and not affordable(fan, len(asked), k):
         return field
     try:
         far = far_enough(fan.body, k, points[asked])
-        currents = kept_currents(fan, k, boundary)
+        currents = solved or kept_currents(fan, k, boundary)
     except SurfaceError:
         if must:
             raise
         return field
     at, close = asked[far], asked[~far]
     incident, scattered, error = total_at(currents, points[at], dark[at])
-    field = field.put_better(at, measured_field(incident + scattered, error, "currents", "extinction"), must=must)
+    by = "equation" if currents.solved else "currents"
+    field = field.put_better(at, measured_field(incident + scattered, error, by, "extinction"), must=must)
     if len(close):
         rows, layer = layer_field(fan, currents, points[close], scalar_boundary(boundary))
         field = field.put_better(close[rows], layer, must=must)

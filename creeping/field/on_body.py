@@ -3,7 +3,9 @@
     u = (1 - W) e^{ikd.x} u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
 
 with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
-w_i of rays that come from afar. `creeping.field.lit_ground` says how far it is off.
+w_i of rays that come from afar. `creeping.field.lit_ground` says how far it is off. On a body that may reflect onto
+itself or hides part of its line, or if it is asked for, the integral equation's solution stands for both, where it is
+affordable (`creeping.field.currents.whole_solution`).
 
 Sources: [F46], [LK59]; Derivations, F9, F16 and F20.
 """
@@ -11,18 +13,21 @@ Sources: [F46], [LK59]; Derivations, F9, F16 and F20.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
-from creeping.errors import SurfaceError
-from creeping.field.arguments import checked, checked_plain
+from creeping.errors import InvalidInputError, SurfaceError
+from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
-from creeping.field.currents.second_kind import by_the_equation
+from creeping.field.currents.second_kind import with_a_step
 from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_solution import ON_BODY, lit_ground, resolved_at, solved_at
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error, without_tips
 from creeping.field.marched_sum import marched_sum, marches
@@ -31,7 +36,7 @@ from creeping.field.own_waves import own_waves
 from creeping.field.point_result import FieldStatus, SurfaceField, judged
 from creeping.field.ray_scales import fock_parameter
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
-from creeping.field.served import Served, Words
+from creeping.field.served import Served, Words, measured_field
 from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
@@ -53,6 +58,7 @@ def surface_field(
     wavenumber: float,
     boundary: BoundaryLike = "soft",
     order: int = 2,
+    method: str = "auto",
 ) -> SurfaceField:
     """Field on the body: u, or du/dn (1/L) of the soft boundary, with its error; it acts as an array.
 
@@ -64,6 +70,9 @@ def surface_field(
     wavenumber : float, 1/L
     boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
+    method : {"auto", "equation"}
+        At points, whether rays and the lit side's expansion serve where they can, or the solution of the body's
+        integral equation everywhere (`surface_currents` with ``solve=True``).
 
     Returns
     -------
@@ -78,7 +87,10 @@ def surface_field(
     Raises
     ------
     InvalidInputError
-        On bad points, wavenumber, boundary or order, for a weighted body, and at points for the fan of a point source.
+        On bad points, wavenumber, boundary, order or method, for a weighted body, and at points for the fan of a point
+        source.
+    SurfaceError
+        If the equation is asked for and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------
@@ -99,12 +111,17 @@ def surface_field(
     checked_plain(fan.body)
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
+    checked_method(method, order, PLAIN)
     if points is None:
+        if method == "equation":
+            raise InvalidInputError("method 'equation' is of the field at points, not of each ray's own; give points")
         return own_waves(fan, k, boundary, kind, order)
     checked_plain(fan.body, edgeless="the field at points of the body")
     y = as_points(points)
     shape = y.shape[:-1]
-    total = total_on(fan, on_body(fan.body, y).reshape(-1, 3), k, kind, order)
+    on = on_body(fan.body, y).reshape(-1, 3)
+    solved = kept_currents(fan, k, boundary, solve=True) if method == "equation" else None
+    total = total_on(fan, on, k, kind, order, solved)
     status = judged(total.status, total.values, total.error, total.error_by, k if kind.kind == "soft" else 1.0)
     return SurfaceField(
         points=y.copy(),
@@ -174,21 +191,37 @@ def total_on(
 
     ``currents`` are those of the wavenumber and boundary, if they are at hand.
     """
+    jointed, unit = is_creased(fan.body), k if kind.kind == "soft" else 1.0
+    # an admittance that steps is smeared by expansions, of which their currents tell
+    alone = not jointed and convex(fan) and not kind.varies
+    if not currents and not alone:
+        currents = _currents_of(fan, k, kind)
+    if currents and currents.solved and order == 2:
+        return _solved_on(currents, points, unit)
+    currents = None if alone else currents
     lit = _lit_at(fan, points, k, kind, order)
     rays, by = rays_on(fan, points, k, kind, order, 1 - lit[2])
-    left, jointed = 0.0, is_creased(fan.body)
-    if jointed or not convex(fan):
-        currents = currents or _currents_of(fan, k, kind)
-        left = currents.extinction if currents else np.nan
-        if currents and order == 2 and kind.kind in ("soft", "hard") and not (jointed or currents.solved):
-            thrown = currents.thrown(points, normal(fan.body, points))
-            # as much may come later, to and fro, and to dark ground, whose rays do not know of it
-            lit = lit[0] + lit[2] * thrown, np.hypot(lit[1], np.abs(thrown)), lit[2]
-    unit = k if kind.kind == "soft" else 1.0
+    left = currents.extinction if currents else 0.0 if alone else np.nan
+    if currents and order == 2 and kind.kind in ("soft", "hard") and not jointed:
+        thrown = currents.thrown(points, normal(fan.body, points))
+        # as much may come later, to and fro, and to dark ground, whose rays do not know of it
+        lit = lit[0] + lit[2] * thrown, np.hypot(lit[1], np.abs(thrown)), lit[2]
     field = composed(fan, lit, rays, by, left, k, kind, unit)
-    if currents and order == 2 and (jointed or currents.solved):
-        field = by_the_equation(field, currents, points, lit[2], unit)
+    if currents and order == 2 and jointed:
+        field = with_a_step(field, currents, points, lit[2], unit)
     return without_tips(field) if jointed else field
+
+
+def _solved_on(currents: SurfaceCurrents, points: FloatArray, unit: float) -> Served:
+    """Total field of solved currents at points of the body (n, 3); ``unit`` is the size of the incident wave's."""
+    normals = normal(currents.body, points)
+    values = solved_at(currents, points, normals)
+    error = np.full(len(points), ON_BODY * unit * currents.extinction)
+    field = measured_field(values, error, "equation", "extinction")
+    lit = lit_ground(currents.body, points, normals, currents.direction)
+    field = replace(field, wave=np.where(lit, values, 0.0), creeping=np.where(lit, 0.0, values))
+    sharp = ~resolved_at(currents, points, normals)
+    return without_tips(replace(field, error=np.where(sharp, np.inf, field.error))) if np.any(sharp) else field
 
 
 def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:

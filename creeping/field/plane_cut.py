@@ -14,7 +14,7 @@ import numpy as np
 
 from creeping._typing import ArrayLike, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import checked, checked_plain
+from creeping.field.arguments import PLAIN, checked, checked_plain
 from creeping.field.boundary import BoundaryLike
 from creeping.field.conductor.near import VECTOR, conductor_field
 from creeping.field.conductor.result import ConductorField
@@ -69,7 +69,7 @@ def field_cut(
         Spacing of points. By default an eighth of a wavelength; coarser, down to a fifth, where currents would cost
         more than `near_field` takes them for, and coarser than that where there would be more than 60 000 points.
     order, method
-        As of `near_field`; 2 and "auto" of a conductor.
+        As of `near_field`; of a conductor 2, and "auto" or "equation".
     polarisation : "theta", "phi" or (3,) complex, optional
         Of the wave that falls on a conductor, by default "theta".
 
@@ -114,7 +114,7 @@ def field_cut(
     field: NearField | ConductorField
     if conductor:
         wave = "theta" if polarisation is None else polarisation
-        field = conductor_field(fan, grid.points, wavenumber=k, polarisation=wave)
+        field = conductor_field(fan, grid.points, wavenumber=k, polarisation=wave, method=method)
     else:
         field = near_field(fan, grid.points, wavenumber=k, boundary=boundary, order=order, method=method)
     parts = {name: getattr(grid, name) for name in ("point", "axes", "across", "up", "outside")}
@@ -187,8 +187,8 @@ def _checked(fan: RayFan, wavenumber: float, boundary: BoundaryLike, order: int,
     checked_plain(fan.body, edgeless="the near field")
     conductor = isinstance(boundary, str) and boundary == "pec"
     k = checked(wavenumber, order)
-    if conductor and (order, method) != (2, "auto"):
-        raise InvalidInputError("a conductor's field has order 2 and method 'auto'; leave them out")
+    if conductor and (order != 2 or method not in PLAIN):
+        raise InvalidInputError("a conductor's field has order 2 and method 'auto' or 'equation'")
     return k, conductor
 
 

@@ -196,9 +196,9 @@ class NearField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; ``method`` is "currents", "layer" between them and the body, "rays", or, where an
-        admittance varies and neither serves, "none"; on the body "lit", "rays", "march" and both with "lit+", or
-        "boundary", where u = 0.
+        As of every field at points; ``method`` is "currents", "equation" where the body's integral equation gave them,
+        "layer" between them and the body, "rays", or, where an admittance varies and neither serves, "none"; on the
+        body "lit", "rays", "march" and both with "lit+", "equation", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
         Parts, whose sum the values are: where currents or lit ground served, the incident wave and the rest; where rays
         did, the sum over them, which in the shadow is the whole field.
@@ -229,9 +229,11 @@ class SurfaceField(PointField):
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
         As of every field at points; ``method`` is "lit", "rays" (creeping modes), "march" (waves
-        marched along rays, and beams where these merge) or, in the penumbra, "lit+rays" or "lit+march".
+        marched along rays, and beams where these merge) or, in the penumbra, "lit+rays" or "lit+march";
+        "equation" where the body's integral equation is solved.
     lit, creeping : (...) complex
-        Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
+        Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays; of the equation what
+        it is on lit and on dark ground.
 
     Examples
     --------

@@ -135,12 +135,13 @@ def is_convex(body: Any) -> bool:
         corners = np.unique(tiles_of(body, SAMPLE).corners.reshape(-1, 3), axis=0)
         hull = ConvexHull(corners)
         block = max(1, 4_000_000 // len(hull.equations))
-        # distances of all points inward from their nearest plane
-        depth = [
-            -np.max(corners[k : k + block] @ hull.equations[:, :3].T + hull.equations[:, 3], axis=1)
-            for k in range(0, len(corners), block)
-        ]
-        return bool(np.max(np.concatenate(depth)) < CONVEX * size(body))
+        parts = -(-len(corners) // block)
+        # distances of points inward from their nearest plane, until one is within
+        return all(
+            -np.min(np.max(corners[k::parts] @ hull.equations[:, :3].T + hull.equations[:, 3], axis=1))
+            < CONVEX * size(body)
+            for k in range(parts)
+        )
 
     return kept(body, "is convex", asked)
 

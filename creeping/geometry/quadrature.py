@@ -20,30 +20,22 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import Tiles, is_creased, pieces_of, tiles_of
+from creeping.geometry.creased import Tiles, is_creased, pieces_of
 from creeping.geometry.curvature import adjugate_form, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
+from creeping.geometry.graded_tiles import graded
 from creeping.geometry.kept import kept
+from creeping.geometry.piece_rules import MOST_NODES, PieceRules
 from creeping.geometry.surface import Surface, size
-from creeping.geometry.tile_rules import CLOSED, FEWEST, KEPT, MOST, MOST_CELLS, Rules, finer, points_for
+from creeping.geometry.tile_rules import CLOSED, FEWEST, MOST, MOST_CELLS, Rules, finer
 from creeping.kernels.threads import in_slices
 
-MOST_NODES = 3_000_000
-"""Most nodes."""
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 """Where xx, yy, zz, yz, xz, xy stand in a matrix."""
 STEPS = 12
 """Newton steps to the nearest point."""
-ON_PIECES = 6
-"""Points of Gauss's rules on triangles,"""
-LONGEST = 0.2
-"""and their longest sides, in body sizes."""
-SMALLER = 3.7
-"""Triangles of bodies over the square of their longest sides."""
-OPEN = 1e-3
-"""Integral of n, as a share of the area, beyond which pieces do not make a closed body."""
-LADDER = 1.1
-"""Ratio of the sides that are taken."""
+BESIDE = 8
+"""Nodes next to a point that tell how far they are apart."""
 STRETCH = (0.1, 10.0)
 """Bounds of (1 + h kappa_1)(1 + h kappa_2); at a tip, where curvatures are infinite, a triangle counts as flat."""
 
@@ -60,6 +52,8 @@ class BodyNodes:
         xx, yy, zz, yz, xz, xy of H/|grad F|: t.Ht/|grad F| is the normal curvature along t.
     error : float
         Integral of n as a share of the area.
+    each : int
+        Nodes that follow each other on one triangle of a body of pieces, whose triangles differ in size; else 0.
     """
 
     points: FloatArray
@@ -67,6 +61,7 @@ class BodyNodes:
     weights: FloatArray
     hessians: FloatArray
     error: float
+    each: int = 0
 
     def part(self, at: IntArray) -> "BodyNodes":
         """Some of the nodes, by their numbers."""
@@ -88,12 +83,23 @@ class BodyNodes:
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of points (m, 3) from the body as nodes tell it, L: the nearest less their spacing."""
-        return np.asarray(np.sqrt(np.maximum(self._tree.query(points)[0] ** 2 - (0.5 * self.spacing) ** 2, 0.0)))
+        return np.asarray(np.sqrt(np.maximum(self.nearest(points) ** 2 - (0.5 * self.spacing_at(points)) ** 2, 0.0)))
+
+    def nearest(self, points: FloatArray) -> FloatArray:
+        """Distance of points (m, 3) from the nearest node, L: (m,)."""
+        return np.asarray(self._tree.query(points)[0])
 
     @property
     def spacing(self) -> float:
         """Distance between neighbouring nodes, L, of those that are furthest apart."""
         return float(np.sqrt(np.max(self.weights)))
+
+    def spacing_at(self, points: FloatArray) -> FloatArray:
+        """`spacing` of the nodes next to points (m, 3), L: (m,)."""
+        if not self.each:
+            return np.full(len(points), self.spacing)
+        apart = np.repeat(np.sqrt(np.max(self.weights.reshape(-1, self.each), axis=1)), self.each)
+        return np.asarray(np.max(apart[self._tree.query(points, BESIDE)[1]], axis=1))
 
     @cached_property
     def _tree(self) -> Any:
@@ -153,8 +159,7 @@ def node_count(body: Surface, rate: float) -> int:
     True
     """
     if is_creased(body):
-        area = float(np.sum(tiles_of(body, LONGEST).areas))
-        return int(area / _side(body, rate) ** 2 * SMALLER * ON_PIECES**2)
+        return _piece_rules(body).rule(body, rate)[2]
     found = kept(body, "quadratures", lambda: Rules(body, _nodes))
     if not found.cells:
         return MOST_NODES + 1
@@ -191,35 +196,27 @@ def _onto(body: Surface, points: FloatArray, areas: FloatArray) -> BodyNodes:
     return BodyNodes(x, n, weights, hessians, error)
 
 
-def _side(body: Any, rate: float) -> float:
-    """Sides, L, of the triangles of a body of pieces for a rate, 1/L."""
-    half = max(value for value in np.arange(0.05, 20.0, 0.05) if points_for(value) <= ON_PIECES)
-    share = min(2 * float(half) / (rate * size(body)), LONGEST)
-    # on a ladder: neighbouring rates have one rule
-    return float(LADDER ** np.floor(np.log(share) / np.log(LADDER))) * size(body)
+def _piece_rules(body: Any) -> PieceRules:
+    found: PieceRules = kept(body, "piece quadratures", lambda: PieceRules(body, _piece_nodes))
+    return found
 
 
 def _on_pieces(body: Any, rate: float) -> BodyNodes:
     """Nodes of a body of smooth pieces."""
-    if node_count(body, rate) > MOST_NODES:
+    rules = _piece_rules(body)
+    rung, points, count = rules.rule(body, rate)
+    if count > MOST_NODES:
         raise SurfaceError(
-            f"a phase that turns once in {2 * np.pi / rate:.3g} L asks for more than {MOST_NODES} nodes; "
-            "take a lower wavenumber, or rays"
+            f"a phase that turns once in {2 * np.pi / rate:.3g} L asks for more than {MOST_NODES} nodes, or the "
+            "body's pieces do not close; take a lower wavenumber, or rays"
         )
-    side = _side(body, rate)
-    found: dict[float, BodyNodes] = kept(body, "piece quadratures", dict)
-    # the last one used stands last
-    nodes = found[side] = found.pop(side) if side in found else _piece_nodes(body, side)
-    while len(found) > KEPT:
-        found.pop(next(iter(found)))
-    if not nodes.error <= OPEN:
-        raise SurfaceError(f"the pieces of the body do not close: {nodes.error:.2g} of its area faces nothing")
+    nodes: BodyNodes = rules.nodes(body, rung, points)
     return nodes
 
 
-def _piece_nodes(body: Any, side: float) -> BodyNodes:
-    tiles = Tiles(*body.tiles(side))
-    u, w = np.polynomial.legendre.leggauss(ON_PIECES)
+def _piece_nodes(body: Any, side: float, points: int) -> BodyNodes:
+    tiles = graded(body, Tiles(*body.tiles(side)))
+    u, w = np.polynomial.legendre.leggauss(points)
     u, w = 0.5 * (1 + u), 0.5 * w
     # barycentric places of the conical product
     first, second = (part.ravel() for part in np.meshgrid(u, u, indexing="ij"))
@@ -241,7 +238,7 @@ def _piece_nodes(body: Any, side: float) -> BodyNodes:
             lanes[2][mine[~sound]] = flat[~sound]
     x, n, weights, hessians = lanes
     whole = float(np.sum(weights))
-    return BodyNodes(x, n, weights, hessians, float(np.linalg.norm(weights @ n)) / whole)
+    return BodyNodes(x, n, weights, hessians, float(np.linalg.norm(weights @ n)) / whole, points**2)
 
 
 def nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNodes:

@@ -23,6 +23,7 @@ from scipy.fft import dct
 from scipy.special import jv
 
 from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
+from studies.reference.clouds import Cloud
 from studies.reference.fundamental import least_squares
 
 BLOCK = 1_500_000
@@ -39,6 +40,8 @@ DENSER = 2.2
 """Points at which the condition is imposed, over rings."""
 DIGITS = 30.0
 """-ln of the error of the sum over the azimuth."""
+STRIPS = 2000
+"""Of a body, whose areas are added."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,32 @@ def cone_sphere_profile(radius: float, length: float) -> Profile:
         return np.where((s < side)[..., None], cone, a * n), n
 
     return Profile(at, side + a * (0.5 * np.pi + half), (side,), (0.0,), a)
+
+
+@dataclass(frozen=True)
+class Revolved:
+    """Points spread evenly over the body of revolution of a profile, about z (`studies.reference.clouds.Spread`)."""
+
+    profile: Profile
+    mirrors: tuple[int, ...] = (0, 1)
+
+    def area(self) -> float:
+        """Area of the whole body, L²."""
+        s = (np.arange(STRIPS) + 0.5) * self.profile.length / STRIPS
+        return float(2 * np.pi * np.mean(self.profile.at(s)[0][:, 0]) * self.profile.length)
+
+    def spread(self, spacing: float) -> Cloud:
+        """Points a spacing h apart, L, on the sides x_i > 0 of both mirrors."""
+        bands = max(1, round(self.profile.length / spacing))
+        sides = self.profile.at((np.arange(bands) + 0.5) * self.profile.length / bands)
+        points, normals = [], []
+        for (rho, z), (outward, up) in zip(*sides, strict=True):
+            count = max(1, round(0.5 * np.pi * rho / spacing))
+            psi = (np.arange(count) + 0.5) * 0.5 * np.pi / count
+            around = np.stack([np.cos(psi), np.sin(psi), 0 * psi], axis=-1)
+            points.append(rho * around + np.array([0.0, 0.0, z]))
+            normals.append(outward * around + np.array([0.0, 0.0, up]))
+        return Cloud(np.concatenate(points), np.concatenate(normals))
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,29 @@ def test_field_on_the_body_is_that_of_the_exact_sphere(fan):
     assert set(found.method) <= {"lit", "march", "lit+march"}
 
 
+def test_a_step_of_the_admittance():
+    """Expansions smear it, and the equation of the body stands for them: u has a kink there, and its slope a jump."""
+    zones, k, r = coated_sphere.Zones((0.2, 0.9 - 0.3j), (0.15,)), 8.0, spread(250)
+    boundary = cr.ImpedanceBoundary(lambda x: np.where(x[:, 2] < 0.15, 0.2, 0.9 - 0.3j))
+    ball = sc.Sphere()
+    fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, direction=D), length=3.3, n_rays=48)
+    exact = coated_sphere.far_field(k, 1.0, D, zones, r)
+    far = cr.far_field(fan, r, wavenumber=k, boundary=boundary)
+    assert set(far.method) == {"equation"}
+    assert np.max(np.abs(far.total - exact)) < 0.003 * np.max(np.abs(exact))
+    assert np.mean(np.abs(far.total - exact) <= far.error) > 0.85
+    u = cr.surface_field(fan, r, wavenumber=k, boundary=boundary)
+    off = np.abs(u.values - coated_sphere.surface_field(k, 1.0, D, zones, r))
+    assert set(u.method) == {"equation"} and np.all(u.ok)
+    assert np.quantile(off, 0.95) < 0.025 and np.max(off) < 0.08 and np.mean(off <= u.error) > 0.85
+
+
+def test_zones_of_one_admittance_are_its_series():
+    points = spread(60)
+    found = coated_sphere.surface_field(8.0, 1.0, D, coated_sphere.Zones((0.7, 0.7), (0.3,)), points)
+    assert np.allclose(found, sphere.surface_field(8.0, 1.0, points @ D, 0.7), atol=1e-12)
+
+
 @pytest.mark.slow
 def test_far_and_near_fields_are_those_of_the_exact_sphere(fan):
     boundary = cr.ImpedanceBoundary(coated)

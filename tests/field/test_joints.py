@@ -6,6 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError
+from creeping.field.currents import whole_solution
 from studies import joints
 
 PILL = sc.Capsule(1.0, 4.0)
@@ -77,20 +78,39 @@ def test_the_unit_of_length_is_no_matter():
     np.testing.assert_allclose(large.error, small.error, rtol=1e-8)
 
 
-def test_what_has_no_march_is_refused():
+def test_what_has_no_march_is_refused_where_the_equation_is_too_large(monkeypatch):
+    monkeypatch.setattr(whole_solution, "MOST", 1e7)
     fan = fan_of(PILL, (0.9, 0.0, 0.4))
     for ask in (
-        lambda: cr.surface_currents(fan, wavenumber=12.0, boundary="pec"),
-        lambda: cr.conductor_field(fan, [(3.0, 0, 0)], wavenumber=12.0),
+        lambda: cr.surface_currents(fan, wavenumber=24.0, boundary="pec"),
+        lambda: cr.conductor_field(fan, [(3.0, 0, 0)], wavenumber=24.0),
     ):
-        with pytest.raises(InvalidInputError, match="creases"):
+        with pytest.raises(InvalidInputError, match="not solved at wavenumber 24"):
             ask()
-    far = cr.far_field(fan, [(0, 0, 1)], wavenumber=12.0, boundary="pec")
+    far = cr.far_field(fan, [(0, 0, 1)], wavenumber=24.0, boundary="pec")
     assert far.method.tolist() == ["rays+optics"]
 
 
-def test_along_the_axis_the_line_is_a_joint():
-    """No tubes of rays there: rays and optics far away, and elsewhere words or a status, no foreign error."""
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
+def test_along_the_axis_the_equation_starts_from_nothing(boundary):
+    """The line is a joint: there are no tubes of rays, and no expansion's currents."""
+    profile, fan = joints.CASES["capsule 4"][1], fan_of(PILL, (0, 0, 1))
+    exact, r = joints.scatter_by_rings(profile, 8.0, [0.0], boundary), np.random.default_rng(5).normal(size=(60, 3))
+    r /= np.linalg.norm(r, axis=1, keepdims=True)
+    f = exact.far_field(r)[:, 0]
+    far = cr.far_field(fan, r, wavenumber=8.0, boundary=boundary)
+    assert set(far.method) == {"equation"} and np.abs(far.total - f).max() < 2e-3 * np.abs(f).max()
+    assert np.mean(np.abs(far.total - f) <= far.error) > 0.95
+    x, n = joints.spread(profile, np.random.default_rng(6), 100)
+    u = cr.surface_field(fan, x, wavenumber=8.0, boundary=boundary)
+    true = (exact.normal_derivative(x, n) if boundary == "soft" else exact.total(x))[:, 0]
+    unit = 8.0 if boundary == "soft" else 1.0
+    assert np.all(u.ok) and np.quantile(np.abs(u.values - true), 0.95) < 0.01 * unit
+
+
+def test_along_the_axis_where_the_equation_is_too_large(monkeypatch):
+    """Rays and optics far away, and elsewhere words or a status, no foreign error."""
+    monkeypatch.setattr(whole_solution, "MOST", 1e6)
     fan = fan_of(PILL, (0, 0, 1))
     far = cr.far_field(fan, [(0, 0, 1.0)], wavenumber=12.0, boundary="hard")
     assert far.method.tolist() == ["rays+optics"] and np.all(np.isfinite(far.total))

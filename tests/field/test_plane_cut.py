@@ -101,7 +101,7 @@ def test_conductor_satisfies_its_boundary_condition_in_size(fan):
         ({"point": (0, 0)}, "three finite coordinates"),
         ({"extent": (0.4, 0.4)}, "inside the body; give a larger extent"),
         ({"polarisation": "theta"}, "of a conductor's field"),
-        ({"boundary": "pec", "method": "rays"}, "leave them out"),
+        ({"boundary": "pec", "method": "rays"}, "or .equation."),
     ],
 )
 def test_bad_input_is_refused(fan, change, match):

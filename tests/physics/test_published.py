@@ -137,7 +137,10 @@ def test_low_frequencies_are_covered_or_unknown(shape, kind):
         assert abs(off) < 2.5 and (share < 1.5 or waist(f) > 5)
     for f in (12.0, 14.0, 18.0):
         off, share, unresolved = back(shape, kind, f)
-        assert waist(f) < THIN and np.isnan(share) and unresolved and abs(off) < 3
+        if shape == "sphere":
+            assert share < 1 and not unresolved and abs(off) < 0.25
+        else:
+            assert waist(f) < THIN and np.isnan(share) and unresolved and abs(off) < 3
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.field.arguments import checked, checked_plain
+from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain
 from creeping.field.conductor.layer import layer_fields, lowest_height
 from creeping.field.conductor.on_body import OnConductor, on_conductor
 from creeping.field.conductor.result import ConductorCurrent, ConductorField, Fields
@@ -28,13 +28,14 @@ from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.lit_ground import LEFT, UNKNOWN, convex
-from creeping.field.near import ON_BODY, checked_height, rays_alone
+from creeping.field.near import MISSING, ON_BODY, checked_height, rays_alone
 from creeping.field.point_result import FieldStatus, judged
 from creeping.field.polarisation import incident_mix, spherical_frame
 from creeping.field.served import Served, measured_field, zero_field
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
+from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import normal
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
@@ -52,6 +53,7 @@ def conductor_field(
     *,
     wavenumber: float,
     polarisation: str | ArrayLike | None = None,
+    method: str = "auto",
 ) -> ConductorField:
     """Total E and H at points off a perfect conductor or on it, with their error.
 
@@ -64,6 +66,9 @@ def conductor_field(
     wavenumber : float, 1/L
     polarisation : "theta", "phi" or (3,) complex, optional
         E0 of the incident wave, across its direction and of any length; both theta and phi if it is not given.
+    method : {"auto", "equation"}
+        Whether rays and the expansions' currents serve where they can, or the solution of the body's integral equation
+        everywhere (`surface_currents` with ``solve=True``). A body with joints has no others.
 
     Returns
     -------
@@ -73,8 +78,10 @@ def conductor_field(
     Raises
     ------
     InvalidInputError
-        On points inside the body or not finite, a bad wavenumber or polarisation, and for a weighted body or one with
-        edges.
+        On points inside the body or not finite, a bad wavenumber, polarisation or method, for a weighted body
+        or one with edges, and for one with joints, or if the equation is asked for, where it cannot be solved.
+    SurfaceError
+        If the equation must be solved and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------
@@ -88,7 +95,7 @@ def conductor_field(
     >>> field.method.tolist(), np.abs(field.H[0]).round(1).tolist(), np.abs(field.E[0]).round(1).tolist()
     (['lit', 'currents'], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0])
     """
-    k, mix = _checked(fan, wavenumber, polarisation)
+    k, mix = _checked(fan, wavenumber, polarisation, method)
     electric = np.asarray(spherical_frame(fan.line.direction).T @ mix, dtype=complex)
     y = as_points(points)
     flat = y.reshape(-1, 3)
@@ -97,12 +104,15 @@ def conductor_field(
     dark = np.zeros(len(flat), dtype=bool)
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
     fields = [_no_field(len(flat)) for _ in electric.T]
-    left, currents = _left_inside(fan, k, mix)
+    left, currents, alone = _left_inside(fan, k, mix, method)
     if len(at):
         found = on_conductor(fan, flat[at], k, electric, left, currents)
         n = normal(fan.body, flat[at])
         fields = [one.put(at, _on_body(found, i, n)) for i, one in enumerate(fields)]
-    if len(off):
+    if len(off) and alone:
+        fields = [one.put(off, _unknown(len(off))) for one in fields]
+        fields = _with_currents(fields, fan, flat, off, dark, left, currents, must=True)
+    elif len(off):
         sums = shed_sums(fan, flat[off], k, electric)
         rays = [
             _from_elsewhere(rays_alone(its, ~dark[off]), float(its_left))
@@ -112,7 +122,7 @@ def conductor_field(
         fine = np.all([(one.status == FieldStatus.OK) & (one.error <= FINE) for one in fields], axis=0)
         asked = np.flatnonzero(~on & ~fine)
         if len(asked):
-            fields = _with_currents(fields, fan, flat, asked, dark, k, mix, left)
+            fields = _with_currents(fields, fan, flat, asked, dark, left, _for(fan, k, mix, len(asked)))
     return _result(fields, fan, y, k, electric, single=polarisation is not None)
 
 
@@ -122,6 +132,7 @@ def conductor_current(
     *,
     wavenumber: float,
     polarisation: str | ArrayLike | None = None,
+    method: str = "auto",
 ) -> ConductorCurrent:
     """Current J = n x H and charge n.E at points of a perfect conductor, with their error; it acts as the array of J.
 
@@ -133,6 +144,8 @@ def conductor_current(
     wavenumber : float, 1/L
     polarisation : "theta", "phi" or (3,) complex, optional
         E0 of the incident wave, across its direction and of any length; both theta and phi if it is not given.
+    method : {"auto", "equation"}
+        As of `conductor_field`.
 
     Returns
     -------
@@ -142,8 +155,10 @@ def conductor_current(
     Raises
     ------
     InvalidInputError
-        On points off the body or not finite, a bad wavenumber or polarisation, and for a weighted body or one with
-        edges.
+        On points off the body or not finite, a bad wavenumber, polarisation or method, for a weighted body or one with
+        edges, and for one with joints, or if the equation is asked for, where it cannot be solved.
+    SurfaceError
+        If the equation must be solved and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------
@@ -157,10 +172,11 @@ def conductor_current(
     >>> np.linalg.norm(J, axis=1).round(1).tolist(), np.abs(J.charge).round(1).tolist()   # E across n, and along it
     ([0.3, 1.4], [0.0, 1.5])
     """
-    k, mix = _checked(fan, wavenumber, polarisation)
+    k, mix = _checked(fan, wavenumber, polarisation, method)
     electric = np.asarray(spherical_frame(fan.line.direction).T @ mix, dtype=complex)
     y = as_points(points)
-    found = on_conductor(fan, on_body(fan.body, y).reshape(-1, 3), k, electric, *_left_inside(fan, k, mix))
+    left, currents, _ = _left_inside(fan, k, mix, method)
+    found = on_conductor(fan, on_body(fan.body, y).reshape(-1, 3), k, electric, left, currents)
     shape, single = y.shape[:-1], polarisation is not None
     fields = found.current
     values, lit, creeping = (
@@ -177,10 +193,13 @@ def conductor_current(
     )
 
 
-def _checked(fan: RayFan, wavenumber: float, polarisation: str | ArrayLike | None) -> tuple[float, ComplexArray]:
+def _checked(
+    fan: RayFan, wavenumber: float, polarisation: str | ArrayLike | None, method: str
+) -> tuple[float, ComplexArray]:
     """The wavenumber and the polarisations' components along theta and phi (2, p), if they and the body will do."""
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, smooth="the near field")
+    checked_plain(fan.body, edgeless="the near field")
+    checked_method(method, 2, PLAIN)
     return checked(wavenumber, 2), incident_mix(polarisation, fan.line.direction)
 
 
@@ -189,21 +208,34 @@ def _places(count: int, mix: ComplexArray) -> int:
     return int(np.ceil(VECTOR * mix.shape[1] * count))
 
 
-def _left_inside(fan: RayFan, k: float, mix: ComplexArray) -> tuple[FloatArray, ConductorCurrents | None]:
-    """What currents leave inside of each incident wave (p,), and they: 0 on a convex body, NaN where none are known."""
+def _left_inside(
+    fan: RayFan, k: float, mix: ComplexArray, method: str
+) -> tuple[FloatArray, ConductorCurrents | None, bool]:
+    """What currents leave inside of each incident wave (p,), and they: 0 on a convex body, NaN where none are known.
+
+    And whether nothing but they will do.
+    """
+    alone = method == "equation" or is_creased(fan.body)
+    if alone:
+        currents = _currents(fan, k, mix, solve=True if method == "equation" else None)
+        return np.max(currents.left_of_each, axis=0), currents, alone
     if convex(fan):
-        return np.zeros(mix.shape[1]), None
-    unknown = np.full(mix.shape[1], np.nan), None
+        return np.zeros(mix.shape[1]), None, alone
+    found = _for(fan, k, mix, INNER)
+    return np.full(mix.shape[1], np.nan) if found is None else np.max(found.left_of_each, axis=0), found, alone
+
+
+def _for(fan: RayFan, k: float, mix: ComplexArray, count: int) -> ConductorCurrents | None:
+    """Currents of the whole body for fields at so many points, None if they cost too much or there is no mesh."""
     try:
-        currents = _currents(fan, k, mix) if affordable(fan, _places(INNER, mix), k) else None
+        return _currents(fan, k, mix) if affordable(fan, _places(count, mix), k) else None
     except SurfaceError:
-        return unknown
-    return unknown if currents is None else (np.max(currents.left_of_each, axis=0), currents)
+        return None
 
 
-def _currents(fan: RayFan, k: float, mix: ComplexArray) -> ConductorCurrents:
+def _currents(fan: RayFan, k: float, mix: ComplexArray, *, solve: bool | None = None) -> ConductorCurrents:
     """Currents of the whole body for these polarisations."""
-    found = kept_currents(fan, k, "pec")
+    found = kept_currents(fan, k, "pec", solve=solve)
     assert isinstance(found, ConductorCurrents)
     return found.polarised(mix)
 
@@ -213,6 +245,13 @@ def _no_field(count: int) -> Served:
     none = zero_field(count, "rays")
     nothing = np.zeros((count, 6), dtype=complex)
     return Served(nothing, nothing, none.error, none.error_by, none.status, none.method)
+
+
+def _unknown(count: int) -> Served:
+    """E and H (n, 6) of which a bound alone is known."""
+    nothing, words = np.zeros((count, 6), dtype=complex), np.full(count, "none")
+    status = np.full(count, int(FieldStatus.UNRESOLVED), dtype=np.int64)
+    return Served(nothing, nothing, np.full(count, MISSING), np.full(count, "bound"), status, words)
 
 
 def _on_body(found: OnConductor, i: int, n: FloatArray) -> Served:
@@ -246,27 +285,25 @@ def _with_currents(
     points: FloatArray,
     asked: IntArray,
     dark: BoolArray,
-    k: float,
-    mix: ComplexArray,
     left: FloatArray,
+    currents: ConductorCurrents | None,
+    *,
+    must: bool = False,
 ) -> list[Served]:
-    """Fields with those of currents, or of the layer, at the points asked for where they are better."""
-    if not affordable(fan, _places(len(asked), mix), k):
+    """Fields with those of currents, or of the layer, at the points asked for where they must be or are better."""
+    if currents is None:
         return fields
-    try:
-        far = far_enough(fan.body, k, points[asked], lowest_height(fan, k))
-        currents = _currents(fan, k, mix)
-    except SurfaceError:
-        return fields
+    k, by = currents.wavenumber, "equation" if currents.solved else "currents"
+    far = far_enough(fan.body, k, points[asked], lowest_height(fan, k))
     at, close = asked[far], asked[~far]
     if len(at):
         incident, scattered, error = total_fields(currents, points[at], dark[at])
         total = incident + scattered
-        new = [measured_field(total[..., i], error[:, i], "currents", "extinction") for i in range(len(fields))]
-        fields = [one.put_better(at, its, must=False) for one, its in zip(fields, new, strict=True)]
+        new = [measured_field(total[..., i], error[:, i], by, "extinction") for i in range(len(fields))]
+        fields = [one.put_better(at, its, must=must) for one, its in zip(fields, new, strict=True)]
     if len(close):
         rows, layer = layer_fields(fan, currents, points[close], left)
-        fields = [one.put_better(close[rows], its, must=False) for one, its in zip(fields, layer, strict=True)]
+        fields = [one.put_better(close[rows], its, must=must) for one, its in zip(fields, layer, strict=True)]
     return fields
 
 

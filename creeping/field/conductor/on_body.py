@@ -4,9 +4,9 @@
     n.E = div J/(ik),   dH_n/dn = -div (J x n)
 
 J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
-the body (`creeping.field.currents.bounce`), or a step of the integral equation stands for both where that is solved
-(`creeping.field.conductor.equation`); where rays merge beams stand for them
-(`creeping.field.conductor.mode_beams`). Divergences on the surface are differences between points 0.02/k to either
+the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
+(`creeping.field.conductor.mode_beams`). Where the integral equation is solved its solution stands for all of it
+(`creeping.field.currents.whole_solution`). Divergences on the surface are differences between points 0.02/k to either
 side. Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
 ground BEYOND |J_thrown| stands besides, for what comes to it later.
 
@@ -20,17 +20,17 @@ import numpy as np
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
-from creeping.field.conductor.equation import by_a_step
 from creeping.field.conductor.marched import current_marches, marched_current
 from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
 from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
 from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
+from creeping.field.currents.whole_solution import ON_BODY, lit_ground, resolved_at, solved_at
 from creeping.field.far_geometry import fan_strips
-from creeping.field.lit_ground import composed, convex, lit_error
+from creeping.field.lit_ground import composed, convex, lit_error, without_tips
 from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus
 from creeping.field.ray_scales import fock_parameter
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
-from creeping.field.served import Served, Words
+from creeping.field.served import Served, Words, measured_field
 from creeping.field.strip_waves import without_tubes
 from creeping.field.surface import surface_waves
 from creeping.geometry.quadrature import nodes_at
@@ -83,11 +83,49 @@ def on_conductor(
 
     ``left`` (p,) is what ``currents`` of the whole body leave inside of each incident wave, 0 on a body that is convex.
     """
-    count = len(points)
     around, normals, apart = _crosses(fan, points, k)
+    if currents is not None and currents.solved:
+        served, total = _solved_on(currents, points, around, normals, left)
+    else:
+        served, total = _by_expansions(fan, (around, normals), k, electric, left, currents)
+    magnetic = np.cross(total, normals[:, :, None], axis=1)
+    charge, turned = (_divergence(v.reshape(5, len(points), *v.shape[1:]), apart) for v in (total, magnetic))
+    return OnConductor(served, charge / (1j * k), -turned / k)
+
+
+def _solved_on(
+    currents: ConductorCurrents, points: FloatArray, around: FloatArray, normals: FloatArray, left: FloatArray
+) -> tuple[list[Served], ComplexArray]:
+    """J of solved currents at points (n,) for each polarisation, and at them and around them (5n, 3, p)."""
+    total = solved_at(currents, around, normals)
+    count = len(points)
+    lit = lit_ground(currents.body, points, normals[:count], currents.direction)
+    smooth = resolved_at(currents, points, normals[:count])
+    served = []
+    for i, share in enumerate(left):
+        J = total[:count, :, i]
+        one = measured_field(J, np.full(count, ON_BODY * float(share)), "equation", "extinction")
+        one = replace(one, wave=np.where(lit[:, None], J, 0.0), creeping=np.where(lit[:, None], 0.0, J))
+        served.append(without_tips(replace(one, error=np.where(smooth, one.error, np.inf))))
+    return served, total
+
+
+def _by_expansions(
+    fan: RayFan,
+    places: tuple[FloatArray, FloatArray],
+    k: float,
+    electric: ComplexArray,
+    left: FloatArray,
+    currents: ConductorCurrents | None,
+) -> tuple[list[Served], ComplexArray]:
+    """J of expansions at points (n,) for each polarisation, and at them and around them (5n, 3, p).
+
+    ``places`` are the points and those around them (5n, 3), L, and their normals.
+    """
+    around, normals = places
+    count = len(around) // 5
     lit, lit_off, share = _lit_at(fan, around, normals, k, electric)
-    solved = currents is not None and currents.solved
-    if currents is not None and not (solved or convex(fan)):
+    if currents is not None and not convex(fan):
         at = np.flatnonzero(share > 0)
         thrown = share[at, None, None] * currents.thrown(around[at], normals[at])
         lit[at] += thrown
@@ -102,11 +140,7 @@ def on_conductor(
         # what is left out at a point is left out around it
         dropped = np.all(one.creeping == 0, axis=1) | ~np.all(np.isfinite(sums.values[:count]), axis=1)
         total[:, :, i] = lit[:, :, i] + np.where(np.tile(dropped, 5)[:, None], 0.0, sums.values)
-    if currents is not None and solved:
-        served, total = by_a_step(currents, served, total, (around, normals, share), left)
-    magnetic = np.cross(total, normals[:, :, None], axis=1)
-    charge, turned = (_divergence(v.reshape(5, count, *v.shape[1:]), apart) for v in (total, magnetic))
-    return OnConductor(served, charge / (1j * k), -turned / k)
+    return served, total
 
 
 def _crosses(fan: RayFan, points: FloatArray, k: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -40,8 +40,9 @@ class ConductorField(PointData):
     Attributes
     ----------
     points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; the error holds for E and for H. ``method`` is "currents", "layer" between them and
-        the body, or "rays"; on the body that of `ConductorCurrent`.
+        As of every field at points; the error holds for E and for H. ``method`` is "currents", "equation" where
+        the body's integral equation gave them, "layer" between them and the body, or "rays"; on the body that of
+        `ConductorCurrent`.
     incident, scattered, creeping : Fields
         Parts, whose sum the field is: where currents or lit ground served, the incident wave and the rest; where rays
         did, the sum over them, which in the shadow is the whole field.

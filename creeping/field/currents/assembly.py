@@ -6,25 +6,31 @@ Sources: Derivations, F16 to F18.
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
-from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
+from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.currents.bounce import faces_itself
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
-from creeping.field.currents.lit_solution import solvable, solved_on_lit_ground
-from creeping.field.currents.nodes import lit_nodes, ray_nodes
+from creeping.field.currents.nodes import LitNodes, lit_nodes, ray_nodes
 from creeping.field.currents.waves import lit_waves, ray_waves
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_solution import ASKED, MOST, pairs_of, solved_on_whole_body, why_not
 from creeping.geometry.arguments import one_of
+from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
 
 CUT = 1e-3
 """Share of the shadow line without rays from which lit ground is not that of a convex body."""
+POOR = 0.02
+"""What currents leave of the incident wave inside from which the equation of any body is solved."""
 
 
-def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> SurfaceCurrents:
-    """Currents of the whole body of a fan.
+def surface_currents(
+    fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft", solve: bool | None = None
+) -> SurfaceCurrents:
+    """Currents of the whole body of a fan, by expansions, or its integral equation solved from these.
 
     Parameters
     ----------
@@ -32,6 +38,12 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         Its flow and its line are used; rays are as long and as dense as the wavenumber asks for.
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
+    solve : bool, optional
+        Whether the equation is solved. By default it is where expansions are known to fail, on a body that may reflect
+        onto itself, hides part of its shadow line or has an admittance that steps, or where they leave more than 2 % of
+        the incident wave inside or cannot be judged, or where there are none, as on a conductor with joints, and it
+        costs less than about half a minute (a minute and a half of a conductor). True is for as much as ten minutes,
+        half an hour of a conductor.
 
     Returns
     -------
@@ -40,7 +52,8 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
     Raises
     ------
     InvalidInputError
-        On a bad wavenumber or boundary, and for a weighted body.
+        On a bad wavenumber or boundary, for a weighted body or one with edges, for a conductor with joints where the
+        equation is not solved, and if ``solve`` is asked of a body that is rough or needs too many nodes.
     SurfaceError
         If the wavenumber is too high for any mesh of the body.
 
@@ -57,12 +70,44 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
     kinds = scalar_boundaries(boundary)
-    checked_plain(
-        fan.body, smooth="the current of a conductor" if len(kinds) == 2 else "", edgeless="the method of currents"
-    )
+    checked_plain(fan.body, edgeless="" if solve else "the method of currents")
     k = checked(wavenumber, 2)
+    refused = why_not(fan.body, k)
+    most = ASKED if solve else MOST
+    possible = not refused if solve else solve is None and pairs_of(fan.body, k) > 0
+    if solve and refused:
+        raise InvalidInputError(
+            f"the integral equation is not solved at wavenumber {k:g}: {refused}; without solve=True "
+            'or method="equation" expansions or rays serve'
+        )
+    if len(kinds) == 2 and is_creased(fan.body):
+        if not possible:
+            remedy = f"{refused}; far_field has rays" if refused else 'give solve=True or method="equation"'
+            raise InvalidInputError(
+                "a conductor with joints has no current but that of its integral equation, not solved at wavenumber "
+                f"{k:g}: {remedy}"
+            )
+        return solved_on_whole_body(_no_currents(fan, k, CONDUCTOR), most)
+    lit = lit_nodes(fan.body, fan.line, k)
+    try:
+        currents, facing = _expanded(fan, lit, k, kinds), faces_itself(lit)
+    except SurfaceError:
+        # along the axis of a capsule rays start on a joint
+        if not possible:
+            raise
+        return solved_on_whole_body(_no_currents(fan, k, CONDUCTOR if len(kinds) == 2 else kinds[0]), most)
+    poor = facing or currents.unserved > CUT or currents.stepped > 0
+    if possible and (solve or poor or not currents.extinction <= POOR):
+        return solved_on_whole_body(currents, most)
+    if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
+        currents.values[currents.lit] += currents.thrown(lit.points, lit.normals)
+    return currents
+
+
+def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...]) -> SurfaceCurrents:
+    """Currents by the expansion at nodes of the lit side and on creeping rays."""
     # a conductor's rays are as long as its wave that decays less
-    lit, shadow = lit_nodes(fan.body, fan.line, k), ray_nodes(fan, k, kinds[-1])
+    shadow = ray_nodes(fan, k, kinds[-1])
     make: type[SurfaceCurrents]
     if len(kinds) == 2:
         make, kind = ConductorCurrents, CONDUCTOR
@@ -74,7 +119,7 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         bright, first = lit_waves(lit, fan.line.direction, size(fan.body), k, kind)
         dark, second = ray_waves(shadow, k, kind)
         values, change = np.concatenate([bright, dark]), np.concatenate([bright - first, second])
-    currents = make(
+    return make(
         body=fan.body,
         direction=fan.line.direction,
         points=np.concatenate([lit.points, shadow.rays.points]),
@@ -90,12 +135,29 @@ def surface_currents(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike =
         wavenumber=k,
         boundary=kind,
     )
-    facing = faces_itself(lit)
-    if (facing or currents.unserved > CUT) and solvable(currents):
-        return solved_on_lit_ground(currents)
-    if facing and kind.kind in ("soft", "hard", "conductor"):
-        values[currents.lit] += currents.thrown(lit.points, lit.normals)
-    return currents
+
+
+def _no_currents(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents:
+    """Currents of which nothing is known: at no node."""
+    vector = kind.kind == "conductor"
+    make = ConductorCurrents if vector else SurfaceCurrents
+    nowhere, nothing = np.zeros((0, 3)), np.zeros((0, 3, 2) if vector else 0, dtype=complex)
+    return make(
+        body=fan.body,
+        direction=fan.line.direction,
+        points=nowhere,
+        normals=nowhere,
+        weights=np.zeros(0),
+        travel=nowhere,
+        values=nothing,
+        change=nothing,
+        lit=np.zeros(0, dtype=bool),
+        rim=_rim(fan.line, k),
+        rim_length=fan.line.length,
+        unserved=1.0 - float(fan.line.fractions["attached"]),
+        wavenumber=k,
+        boundary=kind,
+    )
 
 
 def _rim(line: ShadowLine, wavenumber: float) -> FloatArray:

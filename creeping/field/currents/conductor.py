@@ -80,7 +80,7 @@ class ConductorCurrents(SurfaceCurrents):
         x = self.inner_points
         wave = np.exp(1j * self.wavenumber * (x @ self.direction))
         electric = self._electric(self.values, x) + np.multiply.outer(wave, self.incident_electric)
-        return np.stack([self._rms(electric), self._left])
+        return np.stack([self._at_least(self._rms(electric)), self._left])
 
     def changed_electric(self, points: FloatArray) -> FloatArray:
         """As `changed`, of E and components added (m, p)."""

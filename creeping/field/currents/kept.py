@@ -10,14 +10,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.field.boundary import BoundaryLike
 from creeping.field.currents.assembly import CUT, surface_currents
 from creeping.field.currents.bounce import may_face_itself
-from creeping.field.currents.lit_solution import MOST
 from creeping.field.currents.nodes import RAYS, STEPS
 from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_solution import pairs_of
 from creeping.geometry.creased import is_creased
 from creeping.geometry.quadrature import node_count
 from creeping.rays.fan import RayFan
@@ -33,13 +33,13 @@ MAKING = 2700.0
 """What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
 SECONDS = 3.3e-9
 """Of one node at one place."""
-SOLVING, SOLVING_VECTORS = 1.6e-8, 5e-8
-"""Of one pair of nodes between which the equation of lit ground is solved; of a conductor, both polarisations."""
+SOLVING, SOLVING_VECTORS = 3.5e-8, 1e-7
+"""Of one pair of nodes between which the body's equation is solved; of a conductor, both polarisations."""
 LIT = 0.6
 """Share of a body's nodes that are lit or in the penumbra."""
 KEPT = 2
 """Currents kept with a fan, of so many wavenumbers and boundaries."""
-_CURRENTS: "WeakKeyDictionary[RayFan, dict[tuple[float, BoundaryLike], SurfaceCurrents]]" = WeakKeyDictionary()
+_CURRENTS: "WeakKeyDictionary[RayFan, dict[Any, SurfaceCurrents]]" = WeakKeyDictionary()
 
 
 def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = False) -> bool:
@@ -59,16 +59,13 @@ def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boun
     known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
     plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
     solving = SOLVING_VECTORS if boundary == "pec" else SOLVING
-    return plain + solving * sum(expected_pairs(fan, k) for k in known)
+    return plain + solving * sum(expected_pairs(fan, k, boundary) for k in known)
 
 
-def expected_pairs(fan: RayFan, wavenumber: float) -> int:
-    """About between how many pairs of nodes the equation of lit ground is solved for a fan, 0 if it is not."""
-    open_line = 1.0 - fan.line.fractions["attached"] > CUT
-    if is_creased(fan.body) or not (open_line or may_face_itself(fan.body)):
-        return 0
-    pairs = int(LIT * node_count(fan.body, 2 * wavenumber)) * expected_nodes(fan, wavenumber)
-    return pairs if pairs <= MOST else 0
+def expected_pairs(fan: RayFan, wavenumber: float, boundary: BoundaryLike = "soft") -> int:
+    """Between how many pairs of nodes the body's equation is solved for a fan, 0 if it is not, as far as is known."""
+    solved = 1.0 - fan.line.fractions["attached"] > CUT or (boundary == "pec" and is_creased(fan.body))
+    return pairs_of(fan.body, wavenumber) if solved or may_face_itself(fan.body) else 0
 
 
 def expected_nodes(fan: RayFan, wavenumber: float) -> int:
@@ -79,7 +76,9 @@ def expected_nodes(fan: RayFan, wavenumber: float) -> int:
     return int(LIT * node_count(fan.body, 2 * wavenumber) + rays)
 
 
-def kept_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents:
+def kept_currents(
+    fan: RayFan, wavenumber: float, boundary: BoundaryLike, *, solve: bool | None = None
+) -> SurfaceCurrents:
     """Currents of the whole body, made once for each of the last wavenumbers and boundaries.
 
     Raises
@@ -88,9 +87,9 @@ def kept_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> Sur
         As `surface_currents`.
     """
     kept = _CURRENTS.setdefault(fan, {})
-    key = (wavenumber, boundary)
+    key = (wavenumber, boundary, solve)
     if key not in kept:
         while len(kept) >= KEPT:
             kept.pop(next(iter(kept)))
-        kept[key] = surface_currents(fan, wavenumber=wavenumber, boundary=boundary)
+        kept[key] = surface_currents(fan, wavenumber=wavenumber, boundary=boundary, solve=solve)
     return kept[key]

@@ -20,7 +20,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.geometry.quadrature import SYMMETRIC, nodes_at
+from creeping.geometry.quadrature import SYMMETRIC
 from creeping.kernels.threads import in_threads
 
 NEIGHBOURS = 4.5
@@ -36,16 +36,26 @@ TOUCHING = 1e-6
 
 
 class Sums(Protocol):
-    """The sums over nodes at points (m,) of the body."""
+    """The sums over nodes at points (m,) of the body or inside it."""
 
     def total(self, values: ComplexArray, mine: ComplexArray) -> ComplexArray:
         """What the points, whose own current is ``mine`` (m, ...), receive of values (n, ...) at the nodes."""
 
+    def closed(self, values: ComplexArray, wave: ComplexArray) -> ComplexArray:
+        """The points' own current (m, ...) that is ``wave`` (m, ...) and what they receive of values at the nodes."""
 
-def sums_at(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: float) -> Sums:
+
+def sums_at(
+    currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float | None
+) -> Sums:
     """The sums over the nodes of currents, of any boundary; parameters as of `NodeSums`."""
     of = currents, points, normals, window
     return VectorSums(*of) if currents.boundary.kind == "conductor" else NodeSums(*of)
+
+
+def _each(window: FloatArray | float, points: FloatArray) -> FloatArray:
+    """A window for each of the points (m,)."""
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(window, dtype=float), (len(points),)))
 
 
 class NodeSums:
@@ -56,12 +66,15 @@ class NodeSums:
     currents : SurfaceCurrents
         Whose nodes, not values, are taken.
     points, normals : (m, 3), L and 1
-    window : float, L
-        The width a.
+    window : (m,) or float or None, L
+        The width a; None where the points are so far inside the body that nothing stands next to them.
     """
 
-    def __init__(self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: float) -> None:
-        self.k, kind, self.window = currents.wavenumber, currents.boundary, window
+    def __init__(
+        self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float | None
+    ) -> None:
+        self.k, kind = currents.wavenumber, currents.boundary
+        self.window = None if window is None else _each(window, points)
         self.soft = kind.kind == "soft"
         self._eta, ours = (
             np.zeros(len(x)) if self.soft else np.broadcast_to(kind.at(x).admittance, (len(x),))
@@ -77,14 +90,16 @@ class NodeSums:
         """What the points receive of values (n,) at the nodes, but for a share of their own; and that share: (m,)."""
         from creeping.field.kernels.second_kind import from_nodes
 
-        k, a, soft = self.k, self.window, self.soft
+        k, soft = self.k, self.soft
+        far = np.zeros(len(self._eta))
+        a, near = (1 / k + far, far) if self.window is None else (self.window, NEIGHBOURS * self.window)
         both = [
             np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (self._single * values, self._double * values)
         ]
         out = np.empty((len(self._eta), 6))
 
         def work(part: slice) -> None:
-            given = (*self._points, *self._nodes, *both, k, a, NEIGHBOURS * a, soft)
+            given = (*self._points, *self._nodes, *both, k, a, near, soft)
             from_nodes(*given, part.start, part.stop, out)
 
         in_threads(work, len(out), least=16, multiple=1, seconds=EACH * len(values))
@@ -100,6 +115,11 @@ class NodeSums:
         rest, own = self.of(values)
         return np.asarray(rest + own * mine)
 
+    def closed(self, values: ComplexArray, wave: ComplexArray) -> ComplexArray:
+        """The points' own current (m,) that is ``wave`` (m,) and what they receive of values (n,) at the nodes."""
+        rest, own = self.of(values)
+        return np.asarray((wave + rest) / (1 - own))
+
 
 class VectorSums:
     """As `NodeSums`, of a conductor: currents (n, 3, p) of p incident waves.
@@ -110,36 +130,49 @@ class VectorSums:
         What multiplies the current of the points themselves.
     """
 
-    def __init__(self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: float) -> None:
-        self.k, self._near = currents.wavenumber, NEIGHBOURS * window
+    def __init__(
+        self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float | None
+    ) -> None:
+        windows = _each(0.0 if window is None else window, points)
+        self.k, self._near = currents.wavenumber, NEIGHBOURS * windows
         self._points = [np.ascontiguousarray(part.T) for part in (points, normals)]
         self._nodes = np.ascontiguousarray(currents.points.T)
         self._alike = currents.even
         self._strength = (currents.weights / (4 * np.pi))[:, None, None]
-        area, static = self._patches(currents, window)
-        shape = nodes_at(currents.body, points, normals).hessians[:, SYMMETRIC]
+        self.own = np.zeros((len(points), 3, 3))
+        if window is None:
+            return
+        shape, static = self._patches(currents, windows)
         across = np.eye(3) - normals[:, :, None] * normals[:, None]
         shape = across @ shape @ across
         mean = 0.5 * np.trace(shape, axis1=1, axis2=2)[:, None, None]
-        put_back = (area / (8 * np.sqrt(np.pi) * window))[:, None, None] * (mean * across - shape)
+        put_back = (mean * across - shape) / (8 * np.sqrt(np.pi) * windows[:, None, None])
         self.own = 2 * (put_back + across @ static @ across / (4 * np.pi))
 
-    def _patches(self, currents: SurfaceCurrents, window: float) -> tuple[FloatArray, FloatArray]:
-        """Sums of chi w (m,), and T (m, 3, 3) of `creeping.field.kernels.vector_sums`."""
+    def _patches(self, currents: SurfaceCurrents, window: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Sums S and T (m, 3, 3) of `creeping.field.kernels.vector_sums`."""
         from creeping.field.kernels.vector_sums import patches
 
         sides = np.ascontiguousarray(currents.normals.T)
-        out = np.empty((self._points[0].shape[1], 10))
+        out = np.empty((self._points[0].shape[1], 15))
 
         def work(part: slice) -> None:
-            given = (*self._points, self._nodes, sides, currents.weights, self._alike)
+            given = (*self._points, self._nodes, sides, currents.weights, currents.shapes, self._alike)
             patches(*given, window, TOUCHING / self.k, self._near, part.start, part.stop, out)
 
         in_threads(work, len(out), least=16, multiple=1, seconds=PATCH * len(sides.T))
-        return out[:, 0], out[:, 1:].reshape(-1, 3, 3)
+        return out[:, SYMMETRIC], out[:, 6:].reshape(-1, 3, 3)
 
     def total(self, values: ComplexArray, mine: ComplexArray) -> ComplexArray:
         """What the points, whose own current is ``mine`` (m, 3, p), receive of values (n, 3, p) at the nodes."""
+        return np.asarray(self._rest(values) + self.own @ mine)
+
+    def closed(self, values: ComplexArray, wave: ComplexArray) -> ComplexArray:
+        """The points' own current that is ``wave`` (m, 3, p) and what they receive of values (n, 3, p) at the nodes."""
+        return np.asarray(np.linalg.solve(np.eye(3) - self.own, wave + self._rest(values)))
+
+    def _rest(self, values: ComplexArray) -> ComplexArray:
+        """What the points receive of values (n, 3, p) at the nodes, but for a share of their own: (m, 3, p)."""
         from creeping.field.kernels.vector_sums import vectors_from_nodes
 
         turned = np.moveaxis(values * self._strength, 0, 2)
@@ -151,4 +184,4 @@ class VectorSums:
             vectors_from_nodes(*given, part.start, part.stop, out)
 
         in_threads(work, len(out), least=16, multiple=1, seconds=EACH * VECTOR * len(values))
-        return np.asarray(np.moveaxis(out[..., :3] + 1j * out[..., 3:], 1, 2) + self.own @ mine)
+        return np.asarray(np.moveaxis(out[..., :3] + 1j * out[..., 3:], 1, 2))

@@ -21,7 +21,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping._typing import ComplexArray, FloatArray
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.node_sums import NodeSums, sums_at
 from creeping.field.currents.whole_body import SurfaceCurrents
@@ -40,58 +40,36 @@ SAMPLE, CLEAR, QUARTER = 128, 0.3, 0.25
 """Nodes, of c above this, by which that is judged, and the quantile."""
 WHOLE = 0.5
 """Share of lit ground from which on the step is taken whole: behind the line its error grows."""
-_EVERYWHERE: "WeakKeyDictionary[SurfaceCurrents, FloatArray]" = WeakKeyDictionary()
+_EVERYWHERE: "WeakKeyDictionary[SurfaceCurrents, float]" = WeakKeyDictionary()
 
 
-def by_the_equation(
-    field: Served, currents: SurfaceCurrents, points: FloatArray, share: FloatArray, unit: float
-) -> Served:
-    """The field on a body, at points (n, 3), L, of which ``share`` (n,) is lit ground, by the equation.
+def with_a_step(field: Served, currents: SurfaceCurrents, points: FloatArray, share: FloatArray, unit: float) -> Served:
+    """The field on a body with joints, at points (n, 3), L, of which ``share`` (n,) is lit ground, by the equation.
 
-    A step is taken as far as it changes more than it errs by itself, as a share of the incident wave's ``unit``. Where
-    lit ground is solved, what a step would change on dark ground is what that is off by.
+    A step is taken as far as it changes more than it errs by itself, as a share of the incident wave's ``unit``.
     """
-    at = np.flatnonzero(((share > 0) | currents.solved) & np.isfinite(field.values))
+    at = np.flatnonzero((share > 0) & np.isfinite(field.values))
     if not len(at):
         return field
     values = field.values[at]
     change = stepped(currents, points[at], normal(currents.body, points[at]), values) - values
-    own = float(unit * step_error(currents, currents.extinction, unit))
-    return with_step(field, at, change, share[at], own, solved=currents.solved)[0]
-
-
-def with_step(
-    field: Served, at: IntArray, change: ComplexArray, share: FloatArray, own: float, *, solved: bool
-) -> tuple[Served, FloatArray]:
-    """The field with what a step changes (m, ...) at the points ``at``, and how much of that was taken (m,).
-
-    ``share`` (m,) of them is lit ground, ``own`` what a step errs by.
-    """
-    size = np.linalg.norm(change.reshape(len(at), -1), axis=1)
-    reach = smoothstep(share, 0.0, WHOLE)
+    own = unit * np.hypot(OWN * currents.extinction, EVERYWHERE * _everywhere(currents, unit))
+    size, reach = np.abs(change), smoothstep(share[at], 0.0, WHOLE)
     taken = reach * size**2 / np.maximum(size**2 + own**2, 1e-300)
     wave, error = field.wave.copy(), field.error.copy()
-    wave[at] += taken.reshape(-1, *(1,) * (change.ndim - 1)) * change
-    kept = (1 if solved else reach) - taken * (1 - STILL)
-    error[at] = np.hypot(error[at], kept * size)
-    return replace(field, wave=wave, error=error), taken
+    wave[at] += taken * change
+    error[at] = np.hypot(error[at], (reach - taken * (1 - STILL)) * size)
+    return replace(field, wave=wave, error=error)
 
 
-def step_error(currents: SurfaceCurrents, left: float | FloatArray, unit: float = 1.0) -> FloatArray:
-    """What a step errs by, as a share of each incident wave, () or (p,), of which currents leave ``left`` inside."""
-    return np.hypot(OWN * left, EVERYWHERE * _everywhere(currents, unit))
-
-
-def _everywhere(currents: SurfaceCurrents, unit: float) -> FloatArray:
-    """What a step changes far from joints too, over each incident wave: where currents elsewhere are wrong."""
+def _everywhere(currents: SurfaceCurrents, unit: float) -> float:
+    """What a step changes far from joints too, over the wave's ``unit``: where currents elsewhere are wrong."""
     if currents not in _EVERYWHERE:
         clear = np.flatnonzero(currents.lit & (currents.normals @ currents.direction < -CLEAR))
         some = clear[:: max(1, len(clear) // SAMPLE)]
         points, normals, values = currents.points[some], currents.normals[some], currents.values[some]
         change = np.abs(stepped(currents, points, normals, values) - values)
-        size = np.linalg.norm(change, axis=1) if change.ndim > 1 else change
-        none = np.zeros(size.shape[1:])
-        _EVERYWHERE[currents] = np.asarray(np.quantile(size, QUARTER, axis=0) / unit) if len(some) else none
+        _EVERYWHERE[currents] = float(np.quantile(change, QUARTER) / unit) if len(some) else 0.0
     return _EVERYWHERE[currents]
 
 

@@ -38,20 +38,24 @@ from creeping.field.boundary import Boundary
 from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.depth import inner_points
-from creeping.geometry.quadrature import nodes_at
+from creeping.geometry.depth import TRIED, inner_points
+from creeping.geometry.quadrature import BodyNodes, body_nodes, nodes_at
 from creeping.geometry.surface import Surface
 
 DEPTH = 0.25
 """Least depth, in wavelengths, of the points inside at which currents are judged: nearer the sums over nodes err."""
 SHALLOW = 0.12
 """Least depth where the body is too thin for that."""
+APART = 2.5
+"""The same over the spacing of nodes next to it, where solved currents have some all over the body."""
 RIM = 0.3
 """Share of the error, in the square, that stands next to the shadow line."""
 AHEAD = 1.0
 """What of epsilon the field itself is off by, where it is large."""
-ALONE = 1.4
-"""Factor of the error where lit ground is solved: what is left is of dark ground alone, whose waves go together."""
+SUMS = 5e-4
+"""What the sums over nodes of the equation err by, of which points deep inside may know less."""
+BESIDE, STEP, LARGEST = 6, 0.05, 2.0
+"""Nodes next to one, the change of admittance to these from which it steps, and |u| of a wave that comes back."""
 POINTS = 100
 """Points inside at which they are judged."""
 
@@ -76,7 +80,7 @@ class SurfaceCurrents:
     change : as values
         What of it is of second order.
     lit : (n,) of bool
-        Whether the lit side's expansion served, else creeping rays.
+        Whether the lit side's expansion served, else creeping rays; of solved currents, whether ground is lit.
     rim : (l, 3), L
         Points of the shadow line, evenly spread.
     rim_length : float, L
@@ -85,9 +89,8 @@ class SurfaceCurrents:
     wavenumber : float, 1/L
     boundary : Boundary
     solved : bool
-        Whether lit and bare nodes satisfy the integral equation (`creeping.field.currents.lit_solution`).
-    bare : (n,) of bool, optional
-        Dark ground to which no ray comes.
+        Whether nodes are all over the body and their values satisfy its integral equation
+        (`creeping.field.currents.whole_solution`); ``change`` is what a step would add then.
 
     Examples
     --------
@@ -116,28 +119,27 @@ class SurfaceCurrents:
     wavenumber: float
     boundary: Boundary
     solved: bool = False
-    bare: BoolArray | None = None
     _factors: ClassVar[tuple[float, float]] = (2.5, 2.0)
     """Factors of the error: of what all directions share, and of what the second order says of each."""
 
     def __repr__(self) -> str:
+        dark = "in the dark" if self.solved else "on rays"
         return (
-            f"SurfaceCurrents({int(self.lit.sum())} lit nodes, {int((~self.lit).sum())} on rays, "
-            f"k = {self.wavenumber:g}, {self.boundary.kind})\n"
+            f"SurfaceCurrents({int(self.lit.sum())} lit nodes, {int((~self.lit).sum())} {dark}, "
+            f"k = {self.wavenumber:g}, {self.boundary.kind}{', solved' if self.solved else ''})\n"
             f"  {100 * self.unserved:.3g} % of the shadow line launch no ray"
         )
 
     def part(self, which: BoolArray) -> SurfaceCurrents:
         """Currents of some of the nodes (n,) alone."""
         names = ["points", "normals", "weights", "travel", "values", "change", "lit"]
-        names += ["bare"] if self.bare is not None else []
         found: SurfaceCurrents = replace(self, **{name: getattr(self, name)[which] for name in names})
         return found
 
     @property
     def even(self) -> BoolArray:
         """Nodes whose current is one function of place (n,); to a place on rays several may come."""
-        return self.lit if self.bare is None else self.lit | self.bare
+        return np.ones(len(self.lit), dtype=bool) if self.solved else self.lit
 
     def far(self, directions: ArrayLike) -> ComplexArray:
         """Far-field amplitude f, L, in directions (m, 3): (m,)."""
@@ -196,12 +198,18 @@ class SurfaceCurrents:
     def inner_points(self) -> FloatArray:
         """Points inside the body at which the currents are judged (m, 3), L; none where it is nowhere thick enough."""
         wavelength = 2 * np.pi / self.wavenumber
-        points = inner_points(self.body, DEPTH * wavelength, POINTS)
-        return points if len(points) else inner_points(self.body, SHALLOW * wavelength, POINTS)
+        found = (inner_points(self.body, depth * wavelength, POINTS) for depth in (DEPTH, SHALLOW))
+        points = next((points for points in found if len(points)), np.zeros((0, 3)))
+        if self.solved and not len(points):
+            nodes, x = body_nodes(self.body, 2 * self.wavenumber), inner_points(self.body, 0.0, TRIED)
+            points = x[nodes.nearest(x) > APART * nodes.spacing_at(x)][:POINTS]
+        return points
 
     @cached_property
     def extinction(self) -> float:
         """Rms of what is left of the incident wave inside, as a share of it; NaN if the body is nowhere thick enough.
+
+        Of solved currents at least 5e-4.
 
         It is the error of the far field, rms over all directions, as a share of the field's rms, within a factor of
         about 2. Of a conductor it is the mean of both polarisations, in the square.
@@ -223,8 +231,7 @@ class SurfaceCurrents:
         share = self._amplitude / np.sqrt(1 + np.ndim(self._amplitude))
         along = self._together(r).reshape(-1, *(1,) * (change.ndim - 1))
         own = AHEAD * np.abs(self.far(r))
-        left = self._left * (ALONE if self.solved else 1.0)
-        return np.asarray(left * np.hypot(np.hypot(level * share * along, own), shape * change))
+        return np.asarray(self._left * np.hypot(np.hypot(level * share * along, own), shape * change))
 
     def changed(self, points: ArrayLike) -> FloatArray:
         """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
@@ -257,12 +264,41 @@ class SurfaceCurrents:
     @cached_property
     def mean_curvature(self) -> FloatArray:
         """(kappa_1 + kappa_2)/2 of the body at the nodes (n,), 1/L."""
-        return 0.5 * nodes_at(self.body, self.points, self.normals).total_curvature
+        return 0.5 * self._body_nodes.total_curvature
+
+    @property
+    def shapes(self) -> FloatArray:
+        """Shape operator of the body at the nodes on tangents (6, n), 1/L: xx, yy, zz, yz, xz, xy."""
+        return np.ascontiguousarray(self._body_nodes.hessians.T)
+
+    @cached_property
+    def _body_nodes(self) -> BodyNodes:
+        return nodes_at(self.body, self.points, self.normals)
 
     @cached_property
     def _left(self) -> FloatArray:
         """What is left inside of each incident wave, rms, as a share of it: () or (2,)."""
-        return self._rms(self._remainder(self.inner_points, self._field(self.values, self.inner_points)))
+        return self._at_least(
+            self._rms(self._remainder(self.inner_points, self._field(self.values, self.inner_points)))
+        )
+
+    def _at_least(self, left: FloatArray) -> FloatArray:
+        """What is left inside, of solved currents no less than what sums over nodes err by at the surface.
+
+        With what it cannot tell: between nodes an admittance that steps may be another one, exactly solved.
+        """
+        left = np.maximum(left, SUMS) if self.solved else left
+        return np.hypot(left, self.stepped / (self._factors[0] * self._amplitude))
+
+    @cached_property
+    def stepped(self) -> float:
+        """What steps of an admittance between nodes may change f by, L: k/(4 pi) delta eta u^2 dS of all, by chance."""
+        if not self.boundary.varies:
+            return 0.0
+        eta = np.broadcast_to(self.boundary.at(self.points).admittance, (len(self.points),))
+        step = np.max(np.abs(eta[self._nodes.query(self.points, BESIDE)[1]] - eta[:, None]), axis=1)
+        off = np.where(step > STEP, step, 0.0) * self.weights * np.abs(self.values)
+        return float(self.wavenumber / (4 * np.pi) * np.sqrt(np.sum(off**2) / 12) * LARGEST)
 
     def _remainder(self, points: FloatArray, scattered: ComplexArray) -> ComplexArray:
         """Incident and scattered field at points (m, 3), L: (m, ...)."""

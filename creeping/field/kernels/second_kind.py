@@ -26,12 +26,12 @@ def from_nodes(x, normals, y, sides, weights, bends, alike, single, double, k, r
     """Fill rows first..last of out (m, 6): u, and the sums of chi w, chi w kappa and what a and b of x itself multiply.
 
     Points x and their normals (3, m), nodes y and theirs ``sides`` (3, n), single and double (2, n) the weights a and
-    b, real before imaginary parts. chi counts up to the distance ``near``, with w and kappa (n,) of the nodes that are
-    ``alike`` (n,) the points in phase.
+    b, real before imaginary parts. chi, of width ``reach`` (m,), counts up to the distances ``near`` (m,), with w and
+    kappa (n,) of the nodes that are ``alike`` (n,) the points in phase.
     """
-    per, wide, touching = k / (2 * math.pi), 1.0 / reach**2, (TOUCHING / k) ** 2
-    close = near * near
+    per, touching = k / (2 * math.pi), (TOUCHING / k) ** 2
     for j in range(first, last):
+        wide, close = 1.0 / reach[j] ** 2, near[j] ** 2
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
         p, q = 0.0, 0.0
@@ -74,14 +74,3 @@ def from_nodes(x, normals, y, sides, weights, bends, alike, single, double, k, r
             still += chi * inverse
             tilted += chi * inverse * inverse * lean
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = p, q, area, bent, still, tilted
-
-
-@njit(**entry_options)
-def area_within(x, y, weights, reach, first, last, out):
-    """Fill rows first..last of out (m,): the weights (n,) of nodes y (3, n) within ``reach`` of points x, added up."""
-    for j in range(first, last):
-        total = 0.0
-        for i in range(y.shape[1]):
-            dx, dy, dz = x[0, j] - y[0, i], x[1, j] - y[1, i], x[2, j] - y[2, i]
-            total += weights[i] if dx * dx + dy * dy + dz * dz <= reach * reach else 0.0
-        out[j] = total

@@ -1,11 +1,12 @@
 """Compiled sums over currents J at nodes y of a conductor of what they send to points x of its surface.
 
     J(x) = 2 sum_y h n_x x (g x J_y),   g = (y - x)/R (1/R - ik) e^{ikR}/R,   R = |y - x|
-    patch  A = sum_y chi w,  T = sum_y chi w [(y - x) n_y + n_x.(y - x) 1]/R^3,   chi = e^{-(R/a)^2}
+    patch  S = sum_y chi w K_y,  T = sum_y chi w [(y - x) n_y + n_x.(y - x) 1]/R^3,   chi = e^{-(R/a)^2}
 
 h is 1, or 1 - e^{-(kR)^2} for nodes that do not share the phase of x; a node that is x itself gives nothing. -T J_x is
 the static part of what nodes next to x send there if the current is J_x all around, since n_x.J_y = -n_y.J_x to first
-order: g (n_x.J_y) - J_y (n_x.g).
+order: g (n_x.J_y) - J_y (n_x.g). K_y is the shape operator, which may
+jump beside x.
 
 Source: Derivations, F32.
 """
@@ -59,7 +60,7 @@ def vectors_from_nodes(x, normals, y, alike, currents, k, near, first, last, out
     """Fill rows first..last of out (m, p, 6), real and imaginary part of J of p waves, at points x (3, m).
 
     ``normals`` (3, m) are those of the points, ``currents`` (p, 6, n) J dS/4 pi at the nodes y (3, n), real parts of
-    its components first; ``alike`` (n,) matters up to the distance ``near``.
+    its components first; ``alike`` (n,) matters up to the distances ``near`` (m,).
     """
     n, waves = y.shape[1], currents.shape[0]
     g, total = np.empty((5, PART)), np.empty((TOGETHER, waves, 6))
@@ -69,7 +70,7 @@ def vectors_from_nodes(x, normals, y, alike, currents, k, near, first, last, out
         for start in range(0, n, PART):
             end = min(start + PART, n)
             for j in range(top, bottom):
-                _gradients((x[0, j], x[1, j], x[2, j]), y, alike, start, end, k, near, g)
+                _gradients((x[0, j], x[1, j], x[2, j]), y, alike, start, end, k, near[j], g)
                 for q in range(waves):
                     part = crossed_sum(g, currents[q], start, end)
                     for c in range(6):
@@ -85,13 +86,15 @@ def vectors_from_nodes(x, normals, y, alike, currents, k, near, first, last, out
 
 
 @njit(**entry_options)
-def patches(x, normals, y, sides, weights, alike, reach, least, near, first, last, out):
-    """Fill rows first..last of out (m, 10): A, then T row by row, of nodes y (3, n) that are alike, normals ``sides``.
+def patches(x, normals, y, sides, weights, shapes, alike, reach, least, near, first, last, out):
+    """Fill rows first..last of out (m, 15): S and T row by row, of nodes y (3, n) that are alike, normals ``sides``.
 
-    Nodes nearer than ``least`` are x itself; chi of width ``reach`` counts up to the distance ``near``.
+    S is xx, yy, zz, yz, xz, xy, as ``shapes`` (6, n) of the nodes. Those nearer than ``least`` are x itself; chi of
+    width ``reach`` (m,) counts up to the distances ``near`` (m,).
     """
-    close, wide, touching = near * near, 1.0 / reach**2, least * least
+    touching = least * least
     for j in range(first, last):
+        wide, close = 1.0 / reach[j] ** 2, near[j] ** 2
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         out[j] = 0.0
         for i in range(y.shape[1]):
@@ -100,14 +103,15 @@ def patches(x, normals, y, sides, weights, alike, reach, least, near, first, las
             if square > close or not alike[i]:
                 continue
             chi = math.exp(-square * wide) * weights[i]
-            out[j, 0] += chi
+            for c in range(6):
+                out[j, c] += chi * shapes[c, i]
             if square <= touching:
                 continue
             chi /= square * math.sqrt(square)
             lean = chi * (normals[0, j] * dx + normals[1, j] * dy + normals[2, j] * dz)
             for b in range(3):
                 side = chi * sides[b, i]
-                out[j, 1 + b] += dx * side
-                out[j, 4 + b] += dy * side
-                out[j, 7 + b] += dz * side
-                out[j, 1 + 4 * b] += lean
+                out[j, 6 + b] += dx * side
+                out[j, 9 + b] += dy * side
+                out[j, 12 + b] += dz * side
+                out[j, 6 + 4 * b] += lean

@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError
-from creeping.field.currents import lit_solution
+from creeping.field.currents import whole_solution
 from creeping.field.polarisation import spherical_frame
 from creeping.geometry.quadrature import body_nodes
 
@@ -119,7 +119,7 @@ def test_units():
 
 def test_where_rays_end_the_status_says_so(monkeypatch):
     # which is no matter of lit ground
-    monkeypatch.setattr(lit_solution, "MOST", 1.0)
+    monkeypatch.setattr(whole_solution, "MOST", 1.0)
     body = sc.TwistedEllipsoid()
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, direction=OBLIQUE), length=4.0, n_rays=48)
     nodes = body_nodes(body, 10.0)
