@@ -27,8 +27,7 @@ C2, C3, C4, C5, C6, C7, C8, C9, C10, C11, C12, C13 = (1 / math.factorial(n) for 
 _PER_TURN = 0.5 / math.pi
 
 
-# to the letter: sums that may be reordered would put the two
-# parts of ln 2 together
+# to the letter: sums that may be reordered would put the two parts of ln 2 together
 @njit(**strict_options, forceinline=True)
 def exponential(x):
     """e^x, to 4e-16 of itself."""

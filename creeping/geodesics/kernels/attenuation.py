@@ -31,8 +31,8 @@ def curvatures(level, level_par, speed, speed_par, weighted, states, out):
         level(x, geometry[0], geometry[1:4], geometry[4:], level_par)
         for i in range(count):
             px, py, pz = states[start + i, 3], states[start + i, 4], states[start + i, 5]
-            bent = px * px * geometry[4, i] + py * py * geometry[5, i] + pz * pz * geometry[6, i]
-            bent += 2 * (py * pz * geometry[7, i] + px * pz * geometry[8, i] + px * py * geometry[9, i])
+            xx, yy, zz, yz = geometry[4, i], geometry[5, i], geometry[6, i], geometry[7, i]
+            bent = second_form(px, py, pz, xx, yy, zz, yz, geometry[8, i], geometry[9, i])
             out[start + i] = bent / math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
         if weighted:
             speed(x, geometry[0], geometry[1:4], geometry[4:], speed_par)
