@@ -5,7 +5,7 @@ Sources: Derivations, F16 to F18.
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
@@ -108,20 +108,20 @@ def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...])
     """Currents by the expansion at nodes of the lit side and on creeping rays."""
     # a conductor's rays are as long as its wave that decays less
     shadow = ray_nodes(fan, k, kinds[-1])
-    make: type[SurfaceCurrents]
     if len(kinds) == 2:
-        make, kind = ConductorCurrents, CONDUCTOR
+        kind = CONDUCTOR
         shadow = shadow[shadow.rays.alive]
         values, first = (conductor_waves(lit, shadow, fan.line.direction, k, order) for order in (2, 1))
         change = values - first
     else:
-        make, kind = SurfaceCurrents, kinds[0]
+        kind = kinds[0]
         bright, first = lit_waves(lit, fan.line.direction, size(fan.body), k, kind)
         dark, second = ray_waves(shadow, k, kind)
         values, change = np.concatenate([bright, dark]), np.concatenate([bright - first, second])
-    return make(
-        body=fan.body,
-        direction=fan.line.direction,
+    return _currents(
+        fan,
+        k,
+        kind,
         points=np.concatenate([lit.points, shadow.rays.points]),
         normals=np.concatenate([lit.normals, shadow.normals]),
         weights=np.concatenate([lit.weights, shadow.weights]),
@@ -129,22 +129,17 @@ def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...])
         values=values,
         change=change,
         lit=np.arange(len(values)) < len(lit.points),
-        rim=_rim(fan.line, k),
-        rim_length=fan.line.length,
-        unserved=1.0 - float(fan.line.fractions["attached"]),
-        wavenumber=k,
-        boundary=kind,
     )
 
 
 def _no_currents(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents:
     """Currents of which nothing is known: at no node."""
-    vector = kind.kind == "conductor"
-    make = ConductorCurrents if vector else SurfaceCurrents
-    nowhere, nothing = np.zeros((0, 3)), np.zeros((0, 3, 2) if vector else 0, dtype=complex)
-    return make(
-        body=fan.body,
-        direction=fan.line.direction,
+    nowhere = np.zeros((0, 3))
+    nothing = np.zeros((0, 3, 2) if kind.kind == "conductor" else 0, dtype=complex)
+    return _currents(
+        fan,
+        k,
+        kind,
         points=nowhere,
         normals=nowhere,
         weights=np.zeros(0),
@@ -152,11 +147,21 @@ def _no_currents(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents:
         values=nothing,
         change=nothing,
         lit=np.zeros(0, dtype=bool),
+    )
+
+
+def _currents(fan: RayFan, k: float, kind: Boundary, **at_nodes: Any) -> SurfaceCurrents:
+    """Currents of the wave of a fan, with what is given of them at nodes."""
+    make = ConductorCurrents if kind.kind == "conductor" else SurfaceCurrents
+    return make(
+        body=fan.body,
+        direction=fan.line.direction,
         rim=_rim(fan.line, k),
         rim_length=fan.line.length,
         unserved=1.0 - float(fan.line.fractions["attached"]),
         wavenumber=k,
         boundary=kind,
+        **at_nodes,
     )
 
 
