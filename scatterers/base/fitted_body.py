@@ -285,7 +285,11 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
 
 
 def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) -> FitReport:
-    """Curvatures of both fits at the points, those of non-smooth places left out."""
+    """Curvatures of both fits at the points, those of non-smooth places left out.
+
+    What both grids have in common their difference does not show: the normals that the finer one does not reach do, as
+    an angle over a cell, unless it is the points' noise that it does not follow.
+    """
     points, normals = cloud.points, cloud.normals
     if len(cloud.non_smooth):
         points, normals = points[cloud.smooth], normals[cloud.smooth]
@@ -296,6 +300,10 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
     def rms(values: FloatArray) -> float:
         return float(np.sqrt(np.mean(values**2)))
 
+    scattered = bool(cloud.noise) or bool(np.isfinite(cloud.uncertain))
+    shared = 0.0 if scattered else fine.turn / fine.spacing
+    # K = k1 k2, both off by as much, kappa taken along two directions at right angles
+    shared_gauss = np.sqrt(2) * rms(kappa) * shared
     return FitReport(
         points=len(cloud.points),
         spacing=fine.spacing,
@@ -305,9 +313,9 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
         turn=fine.turn,
         slope=(float(slope.min()), float(slope.max())),
         normal_curvature=rms(kappa),
-        normal_curvature_error=rms(kappa - other_kappa),
+        normal_curvature_error=float(np.hypot(rms(kappa - other_kappa), shared)),
         gaussian_curvature=rms(gauss),
-        gaussian_curvature_error=rms(gauss - other_gauss),
+        gaussian_curvature_error=float(np.hypot(rms(gauss - other_gauss), shared_gauss)),
         noise=cloud.noise,
         smoothing=smoothing,
     )

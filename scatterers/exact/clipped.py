@@ -27,6 +27,8 @@ SHALLOW = 1e-3
 """Angle between normals, radians, below which both levels together do not tell the place."""
 EDGE, JUMP = 1e-5, 1e-6
 """Angle of the normals, radians, that makes an edge, and change of the curvatures, relative, that makes a joint."""
+TOUCHING = 1e-12
+"""Singular values of gradients, relative, below which pieces touch there: rounding of F would be divided by them."""
 THIN = 0.5
 """Points of a crease closer than this, in the triangulation's spacing, are left out."""
 
@@ -166,7 +168,7 @@ def _on_all(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> Flo
         for _ in range(NEWTON):
             value = np.stack([pieces[k].level(x) for k in numbers], axis=-1)
             slope = np.stack([pieces[k].gradient(x) for k in numbers], axis=-2)
-            x = x - (np.linalg.pinv(np.nan_to_num(slope)) @ np.nan_to_num(value)[..., None])[..., 0]
+            x = x - (np.linalg.pinv(np.nan_to_num(slope), rcond=TOUCHING) @ np.nan_to_num(value)[..., None])[..., 0]
         points[mine] = x
     return points
 
@@ -200,7 +202,9 @@ def creases(pieces: Sequence[Level], clipped: Clipped, spacing: float) -> list[C
             turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
             angle = float(np.nanmax(turn))
             kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
-            if kind == "joint" and not _bent(pieces[a], pieces[b], points):
+            # where pieces that touch end on a third one, their end is not known as well as the rest
+            within = points[1:-1] if len(points) > 2 else points
+            if kind == "joint" and not _bent(pieces[a], pieces[b], within):
                 kind = "seam"
             found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
     return found

@@ -25,8 +25,9 @@ class FitReport:
     normal_curvature, gaussian_curvature : float
         Rms of kappa_n over points and directions, 1/L, and of K, 1/L^2.
     normal_curvature_error, gaussian_curvature_error : float
-        Rms difference between the two fits; that of the finer one is about a third of it where the grids resolve the
-        body, since curvatures converge with order 4.
+        Rms difference between the two fits and, of points without noise, ``turn`` over the spacing, which is in both:
+        the square root of the sum of their squares. The error of the finer fit is about a third of it where the grids
+        resolve the body, since curvatures converge with order 4.
     noise : float
         Rms distance of the points from a smooth body, estimated before the fit, L.
     smoothing : float
