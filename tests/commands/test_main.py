@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -302,9 +301,6 @@ def test_help_does_not_import_the_heavy_libraries():
         "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'pyvista', 'trimesh', 'sympy'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
-    started = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ}, check=False)
     assert done.returncode == 0, done.stderr
     assert "run" in done.stdout
-    # generous: the figure of 0.3 s is the benchmark's to hold
-    assert time.perf_counter() - started < 5

@@ -2,11 +2,12 @@
 
 import json
 import shutil
-import time
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+
+from tests.patience import HANGS, until
 
 # three.js tells a listener of this name about every scene it makes; it is what its developer tools use
 LISTEN = """
@@ -62,15 +63,17 @@ class Browser:
     def open(self, address):
         self.driver.get(address)
 
-    def segments(self, count, seconds=60.0):
+    def segments(self, count):
         """Ends of the lines with so many segments (count, 2, 3), once the page has them."""
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            held = self.driver.execute_script(SEGMENTS, count)
-            if held is not None:
-                return np.array(held, dtype=float).reshape(-1, 2, 3)
-            time.sleep(0.2)
-        raise AssertionError(f"no lines of {count} segments after {seconds} s: {self.errors()}")
+        held = []
+
+        def there():
+            found = self.driver.execute_script(SEGMENTS, count)
+            held[:] = [] if found is None else [np.array(found, dtype=float).reshape(-1, 2, 3)]
+            return bool(held)
+
+        until(there, lambda: f"no lines of {count} segments: {self.errors()}", pause=0.2)
+        return held[0]
 
     def errors(self):
         """Lines of the console that are errors."""
@@ -99,6 +102,6 @@ def browser(tmp_path):
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     made = selenium.Chrome(options=options, service=selenium.ChromeService(driver))
-    made.set_script_timeout(60)
+    made.set_script_timeout(HANGS)
     yield Browser(made)
     made.quit()

@@ -1,6 +1,5 @@
 """The page in a real browser: it loads, a slider moves the rays, nothing leaves the machine."""
 
-import time
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -10,6 +9,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.explorer.preview import preview_of
 from creeping.explorer.request import ViewRequest
+from tests.patience import HANGS, until
 
 pytest.importorskip("viser")
 BODY = sc.TwistedEllipsoid()
@@ -44,11 +44,8 @@ def rays_of(page, **values):
     return np.stack([fan.points[:, :-1], fan.points[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
-def refined_view(page, seconds=60.0):
-    until = time.monotonic() + seconds
-    while not page.found.content:
-        assert time.monotonic() < until, page.status.content
-        time.sleep(0.1)
+def refined_view(page):
+    until(lambda: page.found.content, lambda: page.status.content)
 
 
 def test_rays_on_the_page_are_those_of_the_engine(page, browser):
@@ -63,15 +60,14 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
 
     slider = browser.driver.find_elements(By.CSS_SELECTOR, "[role=slider]")[0]
     slider.send_keys(Keys.ARROW_RIGHT * 5)
-    until = time.monotonic() + 30
-    while page.request.theta == REQUEST.theta:
-        assert time.monotonic() < until
-        time.sleep(0.1)
-    time.sleep(1.0)
+    until(lambda: page.request.theta != REQUEST.theta)
+
+    def turned():
+        held, theta = browser.segments(len(first)), page.request.theta
+        return np.max(np.abs(held - first)) > 1e-3 and np.max(np.abs(held - rays_of(page, theta=theta))) < 1e-6
+
+    until(turned, lambda: page.status.content)
     assert 50.0 < page.request.theta < 50.6
-    held = browser.segments(len(first))
-    np.testing.assert_allclose(held, rays_of(page, theta=page.request.theta), rtol=0, atol=1e-6)
-    assert np.max(np.abs(held - first)) > 1e-3
     assert browser.errors() == []
     assert browser.requests_outside(urlsplit(page.address).netloc) == []
 
@@ -85,10 +81,7 @@ def test_the_plane_and_the_cut_follow_the_hand(page, monkeypatch):
     # the hand does not rest
     monkeypatch.setattr(module, "REST", 1000.0)
     page.ask(theta=70.0)
-    until = time.monotonic() + 60
-    while page.plane.content == plane or page.cut.content == cut:
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    until(lambda: page.plane.content != plane and page.cut.content != cut)
     assert page.found.content == "" and page.cut.content.startswith("<svg")
     page._requests.close()
 
@@ -152,10 +145,7 @@ def test_what_cannot_be_shown_is_told_and_the_page_lives_on(page):
     assert "length" in page.status.content and page.request == REQUEST
     refined_view(page)
     page.ask(theta=80.0)
-    until = time.monotonic() + 30
-    while "theta 80.0" not in page.status.content:
-        assert time.monotonic() < until, page.status.content
-        time.sleep(0.05)
+    until(lambda: "theta 80.0" in page.status.content, lambda: page.status.content)
 
 
 def test_a_singular_incidence_is_named():
@@ -163,10 +153,7 @@ def test_a_singular_incidence_is_named():
 
     made = Explorer(cr.DirectFlow(sc.Torus()), REQUEST.changed(theta=90.0, phi=0.0), port=8140)
     try:
-        until = time.monotonic() + 60
-        while "crosses itself" not in made.status.content:
-            assert time.monotonic() < until, made.status.content
-            time.sleep(0.05)
+        until(lambda: "crosses itself" in made.status.content, lambda: made.status.content)
     finally:
         made.close()
 
@@ -215,14 +202,14 @@ def test_others_are_turned_away_before_the_upgrade(guarded, options):
 @pytest.mark.parametrize("origin", ["http://127.0.0.1:8123", "http://localhost:8123", None])
 def test_the_page_itself_is_let_in(guarded, origin):
     with opened(guarded, origin=origin) as socket:
-        assert len(socket.recv(timeout=5)) > 0
+        assert len(socket.recv(timeout=HANGS)) > 0
 
 
 def test_two_hosts_are_none(guarded):
     import socket as sockets
 
     port = guarded.server.get_port()
-    with sockets.create_connection(("127.0.0.1", port), timeout=5) as raw:
+    with sockets.create_connection(("127.0.0.1", port), timeout=HANGS) as raw:
         raw.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nHost: a.example\r\n\r\n".encode())
         assert b" 403 " in raw.recv(200)
 
@@ -257,7 +244,7 @@ def test_only_so_many_pages_are_let_in(page):
 
     with ExitStack() as open_pages:
         for _ in range(CLIENTS):
-            open_pages.enter_context(opened(page)).recv(timeout=5)
+            open_pages.enter_context(opened(page)).recv(timeout=HANGS)
         with pytest.raises(InvalidStatus):
             opened(page)
 
@@ -283,19 +270,14 @@ def test_a_refined_view_is_not_drawn_over_a_newer_frame(page, monkeypatch):
         began.append(found.request.theta)
         if found.request.theta == 60.0:
             page.ask(theta=70.0)
-            until = time.monotonic() + 30
-            while "theta 70.0" not in page.status.content and time.monotonic() < until:
-                time.sleep(0.01)
+            until(lambda: "theta 70.0" in page.status.content, lambda: page.status.content, pause=0.01)
         return real(found)
 
     monkeypatch.setattr(module, "refined_text", late)
     drawn = []
     monkeypatch.setattr(page.scene, "refine", lambda found, paint: drawn.append(found.request.theta))
     page.ask(theta=60.0)
-    until = time.monotonic() + 90
-    while 70.0 not in drawn:
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    until(lambda: 70.0 in drawn)
     assert began[0] == 60.0 and 60.0 not in drawn
 
 

@@ -1,7 +1,5 @@
 """The wave that runs on the page: its phase is that of the field, only colours move, and what has none is told."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -16,6 +14,7 @@ from creeping.explorer.wave import MOST_SEGMENTS, SAMPLES, strengths, wave_colou
 from creeping.geometry.triangulation import triangulate
 from creeping.plotting.body_fronts import at_phase
 from studies.reference import sphere
+from tests.patience import until
 
 REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
 SPAN = (-50.0, 5.0)
@@ -118,17 +117,10 @@ def page():
     made.close()
 
 
-def until(condition, page, seconds=60.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, page.status.content
-        time.sleep(0.05)
-
-
 def test_playing_computes_no_field(page, monkeypatch):
     from creeping.explorer import page as module
 
-    until(lambda: page.found.content, page)
+    until(lambda: page.found.content, lambda: page.status.content)
 
     def fail(*_, **__):
         raise AssertionError("a field was computed for a picture of the same wave")
@@ -137,24 +129,24 @@ def test_playing_computes_no_field(page, monkeypatch):
         monkeypatch.setattr(module, name, fail)
     level, body = page.scene._lines["rays"].colors.copy(), page.scene.painted.glb_data
     page.player.show.value = "wave"
-    until(lambda: "crest" in page.bar.content, page)
+    until(lambda: "crest" in page.bar.content, lambda: page.status.content)
     rays = page.scene._lines["rays"]
     assert len(rays.points) == len(page._drawn[0].wave.segments)
     points, first, still = rays.points, rays.colors.copy(), page.scene.painted.glb_data
     assert still != body and page.player.slider.value == 0
     page.player.play.value = True
-    until(lambda: page.player.slider.value >= 90 and page.scene.painted.glb_data != still, page)
+    until(lambda: page.player.slider.value >= 90 and page.scene.painted.glb_data != still, lambda: page.status.content)
     assert rays.points is points and np.any(rays.colors != first)
     page.player.play.value = False
     # back to what was: the same colours
     page.player.show.value = "level"
-    until(lambda: "rays and body" in page.bar.content, page)
+    until(lambda: "rays and body" in page.bar.content, lambda: page.status.content)
     assert np.array_equal(page.scene._lines["rays"].colors, level) and page.scene.painted.glb_data == body
     assert "failed" not in page.status.content
 
 
 def test_a_hand_on_the_phase_turns_the_wave(page):
-    until(lambda: page.found.content, page)
+    until(lambda: page.found.content, lambda: page.status.content)
 
     class Event:
         client, target = object(), page.player.slider
@@ -164,23 +156,23 @@ def test_a_hand_on_the_phase_turns_the_wave(page):
     page.player._slid(Event)
     assert "crest" not in page.bar.content
     page.player.show.value = "wave"
-    until(lambda: "crest" in page.bar.content, page)
+    until(lambda: "crest" in page.bar.content, lambda: page.status.content)
     turned = rays.colors.copy()
     page.player.slider.value = 0
     page.player._slid(Event)
     assert np.any(rays.colors != turned)
     page.ask(boundary="pec")
-    until(lambda: "vector" in page.status.content, page)
+    until(lambda: "vector" in page.status.content, lambda: page.status.content)
     assert "crest" not in page.bar.content and len(rays.points) == len(page._drawn[0].ray_segments)
 
 
 def test_the_browser_has_the_colours_of_the_phase(page, browser):
     browser.open(page.address)
-    until(lambda: page.found.content, page)
+    until(lambda: page.found.content, lambda: page.status.content)
     page.player.show.value = "wave"
     held = browser.segments(len(page._drawn[0].wave.segments))
     np.testing.assert_allclose(held, page._drawn[0].wave.segments, rtol=0, atol=1e-6)
     page.player.play.value = True
-    until(lambda: page.player.slider.value >= 60, page)
+    until(lambda: page.player.slider.value >= 60, lambda: page.status.content)
     page.player.play.value = False
     assert browser.errors() == []

@@ -5,7 +5,6 @@ import logging
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from numba import njit
 
 from creeping.commands import compile_ahead
 from creeping.kernels import first_use
+from tests.patience import HANGS, until
 
 ROOT = Path(__file__).parents[2]
 
@@ -89,18 +89,20 @@ def main(*given):
     threading.Thread(target=_end_with_parent, daemon=True).start()
     pathlib.Path({str(tmp_path / "part")!r}).write_text(str(os.getpid()))
     os.replace({str(tmp_path / "part")!r}, {str(tmp_path / "pid")!r})
-    time.sleep(60)
+    time.sleep({2 * HANGS})
 """)
     paths = {"PYTHONPATH": os.pathsep.join((str(ROOT), str(tmp_path)))}
-    subprocess.run([sys.executable, "-c", code], env=os.environ | paths, timeout=60, check=False)
+    subprocess.run([sys.executable, "-c", code], env=os.environ | paths, timeout=HANGS, check=False)
     pid = int((tmp_path / "pid").read_text())
-    for _ in range(200):
+
+    def gone():
         try:
             os.kill(pid, 0)
         except ProcessLookupError:
-            return
-        time.sleep(0.05)
-    pytest.fail("it goes on")
+            return True
+        return False
+
+    until(gone, lambda: "it goes on")
 
 
 def test_what_is_compiled_ahead_is_noted_once(monkeypatch, tmp_path):

@@ -12,6 +12,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import fingerprint
 from creeping.storage.folder import MANIFEST
+from tests.patience import HANGS
 
 BODY = sc.Ellipsoid(1.0, 0.8, 0.6)
 OPTIONS = {"horizon": 0.25, "grid": (10, 12), "degree": 3}
@@ -164,7 +165,7 @@ def test_second_process_waits_and_opens_the_same_map(tmp_path):
         f"cr.build_phase_map(sc.Ellipsoid(1.0, 0.8, 0.6), cache={str(tmp_path)!r}, **options)"
     )
     both = [subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    said = [process.communicate(timeout=120)[0] for process in both]
+    said = [process.communicate(timeout=HANGS)[0] for process in both]
     assert [process.returncode for process in both] == [0, 0]
     assert sorted("tracing" in text for text in said) == [False, True]
     assert len([p for p in tmp_path.iterdir() if p.is_dir()]) == 1

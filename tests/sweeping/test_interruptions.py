@@ -17,6 +17,7 @@ import pytest
 from creeping.commands import sweep as _sweep_command
 from creeping.sweeping.run import fill, open_store
 from creeping.sweeping.storage.store import SweepStore
+from tests.patience import HANGS, until
 
 ROOT = Path(__file__).parents[2]
 STUDY = """
@@ -50,12 +51,13 @@ def started(*arguments, **environment):
 
 def wait_for_tasks(folder, number, process):
     """Wait until so many tasks are marked."""
-    for _ in range(1200):
-        if len(list(folder.glob("task_status/c/*"))) >= number:
-            return
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.02)
-    raise AssertionError(f"{number} tasks were not done in time")
+
+    def marked():
+        done = len(list(folder.glob("task_status/c/*"))) >= number
+        assert done or process.poll() is None, process.communicate()
+        return done
+
+    until(marked, lambda: f"{number} tasks were not done", pause=0.02)
 
 
 @pytest.mark.parametrize(("workers", "after", "seconds"), [(0, 3, 0.004), (0, 7, 0.011), (2, 5, 0.02)])
@@ -108,7 +110,7 @@ def test_one_interrupt_ends_the_command_with_4_and_tells_how_to_go_on(tmp_path):
     process = started(*command, str(tmp_path / "a study.toml"))
     wait_for_tasks(folder, 4, process)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=HANGS)
     assert process.returncode == 4, (out, err)
     assert "interrupt again to stop at once" in err and "Traceback" not in err
     (again,) = re.findall("not complete; to go on: (.*)", out)
@@ -117,7 +119,7 @@ def test_one_interrupt_ends_the_command_with_4_and_tells_how_to_go_on(tmp_path):
     assert 4 <= len(done) < 100
     times = {name: (folder / "points/c" / name / "0/0/0").stat().st_mtime_ns for name in done}
     process = started(*command, *shlex.split(again)[2:])
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=HANGS)
     assert process.returncode == 0, (out, err)
     assert f"{200 - 2 * len(done)} of them now" in out and "200 incidences, rays: 200 ok" in out
     assert times == {name: (folder / "points/c" / name / "0/0/0").stat().st_mtime_ns for name in done}
@@ -129,7 +131,7 @@ def test_interrupts_are_counted():
     with _sweep_command._stopping(meter) as asked:
         assert not asked.is_set()
         os.kill(os.getpid(), signal.SIGINT)
-        assert asked.wait(1)
+        assert asked.wait(HANGS)
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(1)
