@@ -26,6 +26,7 @@ from .field.far_result import FarField as FarField
 from .field.frequency import wavenumber as wavenumber
 from .field.impulse import ImpulseResponse as ImpulseResponse
 from .field.impulse import impulse_response as impulse_response
+from .field.monopoles import monopole_coupling as monopole_coupling
 from .field.near import near_field as near_field
 from .field.on_body import surface_field as surface_field
 from .field.plane_cut import field_cut as field_cut

@@ -43,7 +43,7 @@ class CouplingPaths:
         xi = (k/2)^(1/3) int kappa_n^(2/3) ds.
     caustics : (m,)
         Zeros of J2 passed.
-    wave : (m,) complex, 1/L, or 1/L^2 between slots
+    wave : (m,) complex, 1/L, or 1/L^2 on a conductor
         What each contributes; infinite on its caustic.
 
     Examples
@@ -72,13 +72,14 @@ class CouplingPaths:
 class Coupling(ArrayResult, Drawn):
     """Fields between ports on a body, at port j of a unit source at port i; acts as their matrix.
 
-    Of `coupling` u of e^{ikr}/(4 pi r); of `slot_coupling` H along slot j of a dipole along slot i.
+    Of `coupling` u of e^{ikr}/(4 pi r); of `slot_coupling` H along slot j of a dipole along slot i; of
+    `monopole_coupling` E along the normal.
 
     Attributes
     ----------
     body : Surface
     ports, normals : (n, 3), L and 1
-    values : (n, n) complex, 1/L, or 1/L^2 between slots
+    values : (n, n) complex, 1/L, or 1/L^2 on a conductor
         Symmetric; infinite on the diagonal, where source and receiver are one.
     error : (n, n)
         Of the values, meant to hold for 95 of 100 whose status is OK; at others a bound.
@@ -94,7 +95,7 @@ class Coupling(ArrayResult, Drawn):
     length_unit : str
         "m" where the body knows it, else "L".
     axes : (n, 3) or None
-        Unit tangents along the slots; None of `coupling`.
+        Unit tangents along the slots; None of `coupling` and `monopole_coupling`.
 
     Examples
     --------
@@ -175,8 +176,10 @@ class Coupling(ArrayResult, Drawn):
     @property
     def _kind(self) -> tuple[str, str]:
         """Unit of the values, and what they are."""
-        if self.axes is None:
+        if self.boundary != "pec":
             return power(self.length_unit, -1), "u of a unit source e^{ikr}/(4 pi r)"
+        if self.axes is None:
+            return power(self.length_unit, -2), "E of a unit electric dipole, times the admittance of free space"
         return power(self.length_unit, -2), "H of a unit magnetic dipole, times the impedance of free space"
 
     def to_xarray(self) -> xarray.Dataset:

@@ -102,7 +102,7 @@ def checked_wave(body: Surface, wavenumber: float, boundary: BoundaryLike, order
     if scalar_boundaries(boundary)[0].kind != "hard" or boundary == "pec":
         raise InvalidInputError(
             f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard', or use "
-            "slot_coupling for slots in a conductor"
+            "slot_coupling or monopole_coupling for slots in and monopoles on a conductor"
         )
     return k
 

@@ -57,16 +57,29 @@ class PortSources:
 def point_sources(rays: PortRays, k: float, order: int) -> PortSources:
     """Waves of point sources, 1/L."""
     terms = path_terms(rays, k)
-    waves = port_waves(rays, terms, k, order)
+    return scalar_sources(rays, terms, k, order, lambda of: port_waves(rays, terms, k, of), PortBeams, 1.0)
+
+
+def scalar_sources(
+    rays: PortRays,
+    terms: PathTerms,
+    k: float,
+    order: int,
+    waves_of: Callable[[int], ComplexArray],
+    kind: type[PortBeams],
+    scale: float,
+) -> PortSources:
+    """Waves (m,) of an order and beams of a kind; their error is a point source's, of order 1 with all that 2 adds."""
+    waves = waves_of(order)
     strength = np.abs(waves)
-    own = strength * path_error(rays, terms, k)
-    if order == 1:
-        with np.errstate(invalid="ignore"):
-            own = own + np.abs(port_waves(rays, terms, k, 2) - waves)
+    with np.errstate(invalid="ignore"):
+        own = strength * path_error(rays, terms, k)
+        if order == 1:
+            own = own + np.abs(waves_of(2) - waves)
     own = np.where(np.isfinite(strength), own, 0.0)
 
     def beams(number: int) -> Sums:
-        made = PortBeams(rays.body, rays.ports[number], rays.normals[number], rays.length, k, order)
+        made = kind(rays.body, rays.ports[number], rays.normals[number], rays.length, k, order)
 
         def sums(targets: IntArray, beyond: float) -> tuple[ComplexArray, ComplexArray, FloatArray]:
             found, again = (values[:, 0] for values in made.sums(rays.ports[targets], beyond))
@@ -74,7 +87,7 @@ def point_sources(rays: PortRays, k: float, order: int) -> PortSources:
 
         return sums
 
-    return PortSources(terms.square, waves, strength, own, 1.0, False, beams)
+    return PortSources(terms.square, waves, strength, own, scale, False, beams)
 
 
 def path_error(rays: PortRays, terms: PathTerms, k: float) -> FloatArray:

@@ -93,6 +93,14 @@ class PathTerms:
     def _late(self, some: IntArray, count: int) -> ComplexArray:
         """What second order adds, by so many modes."""
         tau = hard_modes(count).tau
+        plain = np.exp(1j * self.xi[some, None] * tau) / tau
+        decayed, bracket = self.modes_of_second_order(some, count)
+        total = np.sum(decayed * bracket - plain, axis=-1)
+        return np.asarray(np.exp(0.25j * np.pi) * np.sqrt(np.pi * self.xi[some]) * total)
+
+    def modes_of_second_order(self, some: IntArray, count: int) -> tuple[ComplexArray, ComplexArray]:
+        """So many modes e^{iξτ + ...}/τ, and their brackets: (m, count), (m, count)."""
+        tau = hard_modes(count).tau
         xi, E, H, L, P = (values[some, None] for values in (self.xi, self.E, self.H, self.L, self.P))
         leading = 1j * xi * tau
         small = 1 / self.square[some, None]
@@ -100,8 +108,7 @@ class PathTerms:
         third = xi * small**2 * (0.01 + h / 10 - tau**3 / 1400 - h**2 / (2 * tau**3))
         exponent = limited(1j * (E * tau**2 - H / tau + third), 0.5 * np.abs(leading))
         bracket = limited(L * tau + H / xi / tau**2 + 1j * P / xi, 2.0)
-        terms = np.exp(leading) / tau * (np.exp(exponent) * (1 + bracket) - 1)
-        return np.asarray(np.exp(0.25j * np.pi) * np.sqrt(np.pi * self.xi[some]) * np.sum(terms, axis=-1))
+        return np.exp(leading + exponent) / tau, 1 + bracket
 
 
 def path_terms(rays: PortRays, wavenumber: float) -> PathTerms:

@@ -171,15 +171,23 @@ class SlotTerms:
 
 def slot_waves(rays: PortRays, wavenumber: float, order: int) -> SlotWaves:
     """Of all geodesics (m,)."""
-    k, s = wavenumber, rays.arclength
-    terms = SlotTerms(k, s, rays.curvature, rays.torsion, rays.bend, rays.integrals)
+    terms = SlotTerms(wavenumber, rays.arclength, rays.curvature, rays.torsion, rays.bend, rays.integrals)
+    w, cot = geodesic_waves(rays, terms, wavenumber, order)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        w = terms.hard.factor * np.exp(1j * (k * s - 0.5 * np.pi * rays.caustics)) / np.sqrt(np.abs(rays.spreading))
-        cot = np.mean(rays.rates, axis=1) / rays.spreading
         components = terms.carried(order) + terms.near_field(rays.spreading, cot, order)
-        if order == 2:
-            w = w * (1 + limited(-0.125j / k * (cot - 1 / s), LIMIT))
-        components, missing = (of * size[:, None, None] for of, size in ((components, w), (terms.missing(), np.abs(w))))
+        components = components * w[:, None, None]
+        missing = terms.missing() * np.abs(w)[:, None, None]
     normals = np.stack([rays.normals[rays.first], rays.normals[rays.second]], axis=1)
     ends = np.stack([np.cross(normals, rays.directions), rays.directions], axis=2)
     return SlotWaves(components, ends, missing)
+
+
+def geodesic_waves(rays: PortRays, terms: SlotTerms, k: float, order: int) -> tuple[ComplexArray, FloatArray]:
+    """W, 1/L, infinite on caustics, and J2'/J2, 1/L: (m,), (m,)."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        phase = np.exp(1j * (k * rays.arclength - 0.5 * np.pi * rays.caustics))
+        w = terms.hard.factor * phase / np.sqrt(np.abs(rays.spreading))
+        cot = np.mean(rays.rates, axis=1) / rays.spreading
+        if order == 2:
+            w = w * (1 + limited(-0.125j / k * (cot - 1 / rays.arclength), LIMIT))
+    return w, cot

@@ -48,7 +48,7 @@ def write_touchstone(
     Raises
     ------
     InvalidInputError
-        If couplings are of slots, of different ports or not in order.
+        If couplings are of slots or monopoles, of different ports or not in order.
     CreepingError
         If the file cannot be written.
     """
@@ -58,11 +58,11 @@ def write_touchstone(
         raise InvalidInputError(
             "couplings has none in it, or more than results of creeping.coupling; give a list of them"
         )
-    slots = [n for n, one in enumerate(given) if one.axes is not None]
-    if slots:
+    electric = [n for n, one in enumerate(given) if one.boundary == "pec"]
+    if electric:
         raise InvalidInputError(
-            f"{len(slots)} of {len(given)} couplings are of slots (first: number {slots[0]}), which are no ratios of "
-            "pressures; write those of creeping.coupling"
+            f"{len(electric)} of {len(given)} couplings are of a conductor (first: number {electric[0]}), which are no "
+            "ratios of pressures; write those of creeping.coupling"
         )
     ports = given[0].ports
     strangers = [n for n, one in enumerate(given) if one.ports.shape != ports.shape or np.any(one.ports != ports)]

@@ -14,6 +14,7 @@ On other bodies by electric dipoles inside (`studies.reference.dipoles`), with m
 their ports, and their images: the field is H(0) + H₁ h + H₂ h² + ....
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,7 @@ from studies.reference.dipoles import _matrix, _tangential, _tangents
 from studies.reference.fundamental import least_squares
 from studies.reference.ports import AROUND, CENTRE, FIT_RINGS, RINGS, _around
 
+Field = Callable[[FloatArray, FloatArray, FloatArray, float], ComplexArray]
 TERMS = 6_000
 """Partial waves: with twice as many nothing changes by 1e-9 at 5 degrees and ka = 100."""
 
@@ -44,7 +46,7 @@ def sphere_slots(
     for n in range(1, terms):
         ratio = 1 / ((2 * n - 1) / x - ratio)
         soft = ratio - n / x
-        weight = (2 * n + 1) / (4 * np.pi) * _fade(n / terms)
+        weight = (2 * n + 1) / (4 * np.pi) * fade(n / terms)
         slope = -n * (before - c * value) / sine
         for row, factor in enumerate((soft, 1 / soft)):
             slopes[row] += weight * factor / (n * (n + 1)) * slope
@@ -63,7 +65,7 @@ def plane_slots(wavenumber: float, distances: ArrayLike) -> tuple[ComplexArray, 
     return wave * (1 + inverse + inverse**2), -2 * wave * inverse * (1 + inverse)
 
 
-def _fade(share: float) -> float:
+def fade(share: float) -> float:
     """1 up to a third, 0 at 1, smooth to all orders."""
     u = min(max(1.5 * share - 0.5, 0.0), 1.0)
     if u in (0.0, 1.0):
@@ -104,14 +106,54 @@ def coupled_slots(
 ) -> CoupledSlots:
     """Fields of slots in a conductor; parameters as of `studies.reference.ports.coupled`."""
     positive(wavenumber=wavenumber, depth=depth)
-    k, X = wavenumber, np.asarray(sources, dtype=float)
-    x, ports, h = body.map(np.asarray(points, dtype=float)), body.map(X), np.asarray(heights, dtype=float)
-    normals = body.gradient(ports)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    tangents = np.stack(_tangents(normals), axis=1)
+    x, ports = (body.map(np.asarray(given, dtype=float)) for given in (points, sources))
+    tangents = np.stack(_tangents(outward(body, ports)), axis=1)
+    field = from_above(
+        body,
+        wavenumber,
+        np.asarray(sources, dtype=float),
+        x,
+        tangents,
+        (_electric, field_of_moments, _magnetic_of_electric),
+        depth=depth,
+        heights=heights,
+        per_wavelength=per_wavelength,
+    )
+    values, fewer = on_body(field, heights)
+    spread = np.max(np.linalg.norm(values - fewer, axis=3), axis=2)
+    return CoupledSlots(ports, x, tangents, values, spread)
+
+
+def outward(body: Body, points: FloatArray) -> FloatArray:
+    """Unit normals (n, 3) at points of a body."""
+    normals = body.gradient(points)
+    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def from_above(
+    body: Body,
+    k: float,
+    X: FloatArray,
+    x: FloatArray,
+    moments: FloatArray,
+    fields: tuple[Field, Field, Field],
+    *,
+    depth: float,
+    heights: tuple[float, ...],
+    per_wavelength: float,
+) -> ComplexArray:
+    """Fields (n, 3, heights, s, a) at points x (n, 3) of moments (s, a, 3) at heights above ports, on a conductor.
+
+    ``fields`` are E of a moment and what is asked for of a moment and of an electric dipole inside.
+    """
+    seen_of, field_of, dipole_field = fields
+    ports, h, each = body.map(X), np.asarray(heights, dtype=float), moments.shape[1]
+    normals = outward(body, ports)
     # each with its image in the tangent plane, which leaves little for the dipoles inside
-    pair = [np.concatenate([np.repeat(ports + side * height * normals, 2, axis=0) for height in h]) for side in (1, -1)]
-    moments = np.tile(tangents.reshape(-1, 3), (len(h), 1))
+    pair = [
+        np.concatenate([np.repeat(ports + side * height * normals, each, axis=0) for height in h]) for side in (1, -1)
+    ]
+    moments = np.tile(moments.reshape(-1, 3), (len(h), 1))
     # each port in the fundamental domain, where its mirror images are one
     local = np.abs(X) if len(body.mirrors) == 3 else X
     spacing = 2 * np.pi / k / per_wavelength
@@ -119,8 +161,7 @@ def coupled_slots(
     fit = _joined([fit, *(_around(body, one, h[0] * FIT_RINGS, 2 * AROUND) for one in local)])
     near = [_around(body, one, h[0] * RINGS, AROUND) for one in local]
     own = body.map(local)
-    up = body.gradient(own)
-    below = [Cloud(own, up / np.linalg.norm(up, axis=1, keepdims=True))] * len(CENTRE)
+    below = [Cloud(own, outward(body, own))] * len(CENTRE)
     deep = np.repeat(np.minimum(np.maximum(0.7 * h[0], 0.6 * h[0] * RINGS), depth), AROUND)
     depths = [np.full(len(under), depth), *[deep] * len(near), *(np.full(len(own), h[0] * c) for c in CENTRE)]
     inside = _joined([under, *near, *below])
@@ -129,7 +170,7 @@ def coupled_slots(
     group, axes = images(body.mirrors), list(body.mirrors)
     odd = (group[:, axes] < 0).astype(int)
     characters = np.where(odd @ odd.T % 2, -1.0, 1.0)
-    seen = [sum(g[:, None] * _electric(fit.points * g, z, moments, k) for z in pair) for g in group]
+    seen = [sum(g[:, None] * seen_of(fit.points * g, z, moments, k) for z in pair) for g in group]
     waves = np.stack([_tangential(fit, np.asarray(field)) for field in seen])
     blocks = [_matrix(fit, y * g, p * g, k) for g in group]
     classes = []
@@ -137,17 +178,20 @@ def coupled_slots(
         matrix = sum(sign * block for sign, block in zip(signs, blocks, strict=True))
         right = -np.tensordot(signs, waves, axes=1) / len(group)
         classes.append(least_squares(np.asarray(matrix), np.asarray(right)))
-    field = np.asarray(sum(_magnetic(x, z, moments, k) for z in pair))
+    field = np.asarray(sum(field_of(x, z, moments, k) for z in pair))
     for g, signs in zip(group, characters.T, strict=True):
-        field += _magnetic_of_electric(x, y * g, p * g, k) @ np.tensordot(signs, np.stack(classes), axes=1)
-    # (n, 3, heights, ports, slots)
-    field = field.reshape(len(x), 3, len(h), -1, 2)
+        field += dipole_field(x, y * g, p * g, k) @ np.tensordot(signs, np.stack(classes), axes=1)
+    return np.asarray(field.reshape(len(x), 3, len(h), -1, each))
+
+
+def on_body(field: ComplexArray, heights: tuple[float, ...]) -> tuple[ComplexArray, ComplexArray]:
+    """Values (n, s, a, 3) at height 0 of fields (n, 3, heights, s, a), from all heights and all but the largest."""
+    h = np.asarray(heights, dtype=float)
     values, fewer = (
         np.einsum("h,nchsa->nsac", np.linalg.inv(h[:m, None] ** np.arange(m, dtype=float))[0], field[:, :, :m])
         for m in (len(h), len(h) - 1)
     )
-    spread = np.max(np.linalg.norm(values - fewer, axis=3), axis=2)
-    return CoupledSlots(ports, x, tangents, values, spread)
+    return values, fewer
 
 
 def _joined(clouds: list[Cloud]) -> Cloud:
@@ -168,8 +212,8 @@ def _electric(x: FloatArray, z: FloatArray, p: FloatArray, k: float) -> ComplexA
     return np.moveaxis(-(g * (1j * k - 1 / r))[:, :, None] * np.cross(s, p), 2, 1)
 
 
-def _magnetic(x: FloatArray, z: FloatArray, p: FloatArray, k: float) -> ComplexArray:
-    """H of the same, ik (1 + ∇∇/k²) e^{ikr}/(4πr): (n, 3, s)."""
+def field_of_moments(x: FloatArray, z: FloatArray, p: FloatArray, k: float) -> ComplexArray:
+    """H of magnetic, E of electric moments, ik (1 + ∇∇/k²) e^{ikr}/(4πr): (n, 3, s)."""
     r, s = _away(x, z)
     g, near = 1j * k * np.exp(1j * k * r) / (4 * np.pi * r), 1 / (k * r) ** 2 - 1j / (k * r)
     along = g * (3 * near - 1) * np.sum(s * p, axis=2)

@@ -222,5 +222,5 @@ def test_labelled(tmp_path):
     assert found.to_dataframe().loc[(0, 2), "error"] == found.error[0, 2]
     assert np.allclose(found.paths(0, 1).wave.sum(), found[0, 1])
     assert "3 ports, k = 30, pec" in repr(found)
-    with pytest.raises(InvalidInputError, match="1 of 1 couplings are of slots"):
+    with pytest.raises(InvalidInputError, match="1 of 1 couplings are of a conductor"):
         write_touchstone(tmp_path / "slots.s3p", [found], reference_distance=0.5)
