@@ -1,6 +1,8 @@
-"""Bodies and phase maps shared by the tests; no test touches the user's cache."""
+"""Bodies and phase maps shared by the tests; no test touches the user's cache; how long a run may go on."""
 
 import os
+import time
+from itertools import groupby
 
 # the processes of pytest-xdist share the cores; threads for small matrices would only take them from each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -22,6 +24,25 @@ from results_to_show import (  # noqa: F401
 
 import creeping as cr
 import scatterers as sc
+
+
+def pytest_addoption(parser):
+    about = "start no test later than this, in seconds since 1970; those left are skipped, and told"
+    parser.addoption("--until", type=float, default=float("inf"), help=about)
+    about = "begin with the file of this number, from the first again after the last"
+    parser.addoption("--turn", type=int, default=0, help=about)
+
+
+def pytest_collection_modifyitems(config, items):
+    files = [list(of) for _, of in groupby(items, key=lambda item: item.path)]
+    turn = config.getoption("--turn") % max(len(files), 1)
+    items[:] = [item for of in files[turn:] + files[:turn] for item in of]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    if time.time() > item.config.getoption("--until"):
+        pytest.skip("no time was left for it")
 
 
 @pytest.fixture(autouse=True, scope="session")
