@@ -185,7 +185,7 @@ def test_matlab_of_a_plane(ball_fan, tmp_path, boundary):
 def test_stk_holds_a_grid(tmp_path):
     azimuth, elevation = (v.ravel() for v in np.meshgrid([0.0, 120.0, 240.0], [-30.0, 60.0]))
     asked = {"wavenumbers": 100.0, "azimuth": azimuth, "elevation": elevation, "cache": False, "n_rays": 32}
-    echo = echo_from(cr.backscatter(sc.Ellipsoid(0.3, 0.2, 0.1), **asked), "rcs", ("HH", "VV"), "azimuth")
+    echo = echo_from(cr.backscatter(sc.Ellipsoid(0.3, 0.25, 0.2), **asked), "rcs", ("HH", "VV"), "azimuth")
     write_stk(tmp_path / "body.rcs", echo, "VV")
     lines = (tmp_path / "body.rcs").read_text().splitlines()
     assert lines[0] == "stk.v.9.0" and lines[5] == "NumPoints 6" and lines[-1] == "END rcs"

@@ -115,6 +115,7 @@ def test_what_would_take_too_long_has_one_bounce(monkeypatch):
     np.testing.assert_allclose(solved.weights.sum(), body_nodes(fan.body, 16.0).weights.sum())
 
 
+@pytest.mark.slow
 def test_a_thin_body_has_its_second_surface_inside():
     k, disc = 6.0, sc.Ellipsoid(1, 1, 0.3)
     nodes = body_nodes(disc, 2 * k)
