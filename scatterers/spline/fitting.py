@@ -214,11 +214,10 @@ class _Equations:
         self.samples = [places, *(np.ascontiguousarray((places + k * self.sorted_normals)[some]) for k in (1, -1))]
         self.targets = [np.zeros(len(places)), *(self._offset_targets(k) for k in (1, -1))]
         self.unknown = self._seen()
-        self.cardinal = Cardinal(self.shape)
         self.bands, self.ranges = fourth_bands(self.shape), ranges(self.unknown)
         density = self._density()
         # 70 is the square sum of a fourth difference's weights
-        self.damping = 1 / (density + FLOOR * density.max() + 210 * smoothing)
+        self.cardinal = Cardinal(1 / (density + FLOOR * density.max() + 210 * smoothing))
 
     def _nearest(self, where: FloatArray) -> NDArray[np.int64]:
         """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
@@ -292,9 +291,9 @@ class _Equations:
 
     def preconditioned(self, r: FloatArray) -> FloatArray:
         """S D^-1 S r on the unknown coefficients."""
-        out = np.zeros_like(r)
-        z = self.damping * self.cardinal(r[:-OVERREAD].reshape(self.shape))
-        np.multiply(self.cardinal(z), self.unknown, out=out[:-OVERREAD].reshape(self.shape))
+        out = np.empty_like(r)
+        out[-OVERREAD:] = 0.0
+        self.cardinal(r[:-OVERREAD].reshape(self.shape), self.unknown, out[:-OVERREAD].reshape(self.shape))
         return out
 
     def _seen(self) -> NDArray[np.bool_]:
