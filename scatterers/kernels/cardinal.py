@@ -1,9 +1,9 @@
 """Compiled S D S of a grid, S from values at nodes to coefficients of B-splines; see `scatterers.spline.cardinal`.
 
 B = L diag(d) L^T along each axis, L with ones on its diagonal and two bands below it: S takes a sweep down and one up,
-x_i - l_i x_(i-1) - m_i x_(i-2), then x_i/d_i - l_(i+1) x_(i+1) - m_(i+2) x_(i+2). The axes commute, so S D S takes three
-passes over the grid, of slabs that stay in the cache: the last two axes; the first one, D, the first one; the last two.
-In between the last two axes are exchanged, so that every sweep takes whole rows at a time.
+x_i - l_i x_(i-1) - m_i x_(i-2), then x_i/d_i - l_(i+1) x_(i+1) - m_(i+2) x_(i+2). The axes commute, so S D S takes
+three passes over the grid, of slabs that stay in the cache: the last two axes; the first one, D, the first one; the
+last two. In between the last two axes are exchanged, so that every sweep takes whole rows at a time.
 Factors are (3, n): l, m and 1/d. Importing this module imports numba.
 
 Sources: Derivations, B6.

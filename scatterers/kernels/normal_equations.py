@@ -79,7 +79,7 @@ def _subtract(weight, bands, i, n, stride, start, c, out):  # type: ignore[no-un
 
 @njit(nogil=True, **OPTIONS)
 def _subtract_around(weight, bands, stride, start, c, out):  # type: ignore[no-untyped-def]
-    """The same away from the ends of an axis, where bands are symmetric; few rows at a time are told apart in memory."""
+    """The same away from the ends of an axis, where bands are symmetric; of few rows at a time, as vectors ask for."""
     n = len(out)
     w0, w1, w2, w3, w4 = (weight * bands[4], weight * bands[5], weight * bands[6], weight * bands[7], weight * bands[8])
     middle = c[start : start + n]
