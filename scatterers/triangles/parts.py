@@ -173,9 +173,7 @@ def united(
     return found
 
 
-def subdivided(
-    vertices: FloatArray, triangles: IntArray, times: int, note: Note
-) -> tuple[FloatArray, IntArray, float]:
+def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note) -> tuple[FloatArray, IntArray, float]:
     """Loop's subdivision, so many times, and how far it moves the vertices, rms, which is told as well."""
     import trimesh
 
