@@ -175,6 +175,7 @@ class Mesh(FittedBody):
             mean_curvature=None if noisy else mean,
             quality=quality,
             uncertain=UNCERTAIN if coarse else np.inf,
+            moved=mesh.moved,
             notes={"repairs": list(mesh.repairs), "source": source_name(source)},
         )
 
@@ -234,8 +235,8 @@ def _examined(
     for count in range(0 if times in (None, "auto") else int(times or 0), MOST_SUBDIVISIONS + 1):
         if count:
             notes: list[str] = []
-            finer = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
-            found = TriangleMesh(*finer, (*mesh.repairs, *notes))
+            vertices, triangles, moved = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
+            found = TriangleMesh(vertices, triangles, (*mesh.repairs, *notes), moved)
         progress(f"normals of {len(found.vertices)} vertices")
         jets = osculating_jets(found.vertices, found.triangles)
         quality, joints = _with_joints(assess(found, jets), found, jets)

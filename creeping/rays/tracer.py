@@ -196,6 +196,10 @@ class RayTracer:
                 states, ends_of[mine] = self._states(
                     directions[mine], starts[mine], opened[mine], float(np.max(latest[mine])) + 2 * step, step, before
                 )
+                if whole and hasattr(self.body, "non_smooth"):
+                    ahead = states[:, GUARD:, X]
+                    rough = non_smooth_from(self.body, ahead, step * np.arange(ahead.shape[1], dtype=float))
+                    ends_of[mine] = np.minimum(ends_of[mine], rough)
                 seen = np.zeros((0, 3)) if observers is None else observers[rows]
                 if cross:
                     to_crossing(*evaluator, self._rule[0], states, step, which, seen, now)
@@ -216,8 +220,6 @@ class RayTracer:
         first[:, 1] = np.abs(np.sum(np.cross(first[:, 6:9], directions) * tangents, axis=1))
         if whole and n:
             alive &= times < ends_of[owner]
-        if whole and n and hasattr(self.body, "non_smooth"):
-            alive &= times < self._ends(directions, starts, times)
         return SingleRays(directions, starts, tangents, RayPoints(lanes, first, times, alive, scale), risen)
 
     def _traced(self, states: FloatArray, times: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
@@ -226,12 +228,6 @@ class RayTracer:
             found = trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=(GUARD + 2) * step)
             return found.states, found.end
         return trace_states(self.body, states, times, rtol=0.0, step=step), np.full(len(states), np.inf)
-
-    def _ends(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
-        """Times (n,) at which rays come to what is not smooth enough, inf if not by theirs."""
-        forward = self.step * np.arange(int(np.ceil(np.max(times) / self.step)) + 1, dtype=float)
-        states, _ = self._traced(pack(starts, directions), forward, self.step)
-        return non_smooth_from(self.body, states[..., X], forward)
 
     def towards(
         self, directions: FloatArray, observers: FloatArray, near: FloatArray, times: FloatArray, cell: FloatArray

@@ -42,6 +42,8 @@ class PointCloud:
         Plain values that are kept beside the fit: ``repairs``, and what else a kind of body has to tell.
     uncertain : float
         Difference of the curvatures of two fits, relative to their rms, beyond which the body is refused.
+    moved : float
+        Rms distance by which a subdivision has moved the vertices of the source, L.
     """
 
     points: FloatArray
@@ -55,6 +57,7 @@ class PointCloud:
     quality: MeshQuality
     notes: dict[str, Any]
     uncertain: float = np.inf
+    moved: float = 0.0
 
     @property
     def reach(self) -> float:

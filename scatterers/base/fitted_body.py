@@ -213,14 +213,13 @@ class FittedBody(SplineBody):
                 _require_one_body(Samples(one.spline.at_nodes(), one.spline.origin, one.spline.spacing))
         except ValueError as error:
             raise ValueError(f"{error}{_finer(cloud)}") from None
-        report = compared(cloud, fine, coarse, smoothing)
+        report, doubt = compared(cloud, fine, coarse, smoothing)
         if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
             raise ValueError(
                 f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
                 f"of 1; it is too thin or too curved for the distance of its points: refine the mesh there"
                 + _finer(cloud)
             )
-        doubt = report.normal_curvature_error / report.normal_curvature
         if doubt > cloud.uncertain:
             raise ValueError(
                 f"the mesh is too coarse: its curvatures are uncertain by {100 * doubt:.0f} %; "
@@ -284,11 +283,14 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
     return fine, fitted(COARSENING * cloud.spacing, smoothing, fewer if cloud.noise else every), smoothing
 
 
-def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) -> FitReport:
-    """Curvatures of both fits at the points, those of non-smooth places left out.
+def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) -> tuple[FitReport, float]:
+    """Curvatures of both fits at the points, non-smooth places left out, and how far these are uncertain to their rms.
 
     What both grids have in common their difference does not show: the normals that the finer one does not reach do, as
-    an angle over a cell, unless it is the points' noise that it does not follow.
+    an angle over a cell, unless it is the points' noise that it does not follow. Where a subdivision has moved the
+    vertices by m the body is taken for a surface parallel to its own, as curved regions move most: kappa changes by
+    m kappa^2, K by 2 H K m; and m changes over a radius of curvature, which turns normals by m kappa. None of that
+    is uncertain in the fit.
     """
     points, normals = cloud.points, cloud.normals
     if len(cloud.non_smooth):
@@ -304,21 +306,25 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
     shared = 0.0 if scattered else fine.turn / fine.spacing
     # K = k1 k2, both off by as much, kappa taken along two directions at right angles
     shared_gauss = np.sqrt(2) * rms(kappa) * shared
-    return FitReport(
+    error = float(np.hypot(rms(kappa - other_kappa), shared))
+    gauss_error = float(np.hypot(rms(gauss - other_gauss), shared_gauss))
+    m, twice_mean = cloud.moved, np.sum(kappa.reshape(2, -1), axis=0)
+    report = FitReport(
         points=len(cloud.points),
         spacing=fine.spacing,
         coarser_spacing=coarse.spacing,
         nodes=tuple(n - 4 for n in fine.spline.coefficients.shape),
-        misfit=fine.misfit,
-        turn=fine.turn,
+        misfit=float(np.hypot(fine.misfit, m)),
+        turn=float(np.hypot(fine.turn, m * rms(kappa))),
         slope=(float(slope.min()), float(slope.max())),
         normal_curvature=rms(kappa),
-        normal_curvature_error=float(np.hypot(rms(kappa - other_kappa), shared)),
+        normal_curvature_error=float(np.hypot(error, m * rms(kappa**2))),
         gaussian_curvature=rms(gauss),
-        gaussian_curvature_error=float(np.hypot(rms(gauss - other_gauss), shared_gauss)),
+        gaussian_curvature_error=float(np.hypot(gauss_error, m * rms(twice_mean * gauss))),
         noise=cloud.noise,
         smoothing=smoothing,
     )
+    return report, error / report.normal_curvature
 
 
 def _fitted_pieces(cloud: PieceCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:

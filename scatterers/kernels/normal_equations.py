@@ -37,27 +37,57 @@ def subtract_roughness(weight, shape, ranges, bands, c, out):  # type: ignore[no
     """Subtract w D^T D c from out, D the fourth differences along each axis in turn, of coefficients as above.
 
     Only in ``ranges`` (nx ny, 2) of k, one for each row of coefficients along the last axis. Bands of D^T D along the
-    three axes are (9, nx + ny + nz), from four below the diagonal to four above it; `spline.fitting.fourth_bands`.
+    three axes are (9, nx + ny + nz), from four below the diagonal to four above it; `spline.roughness.fourth_bands`.
     """
     nx, ny, nz = shape[0], shape[1], shape[2]
     stride_y = nz
     stride_x = ny * stride_y
+    along_z = bands[:, nx + ny :]
     for i in range(nx):
         for j in range(ny):
             first, last = ranges[i * ny + j, 0], ranges[i * ny + j, 1]
             if last <= first:
                 continue
-            row = i * stride_x + j * stride_y
-            for s in range(-4, 5):
-                if 0 <= i + s < nx:
-                    _subtract(weight * bands[s + 4, i], row + s * stride_x, row, first, last, c, out)
-                if 0 <= j + s < ny:
-                    _subtract(weight * bands[s + 4, nx + j], row + s * stride_y, row, first, last, c, out)
-                for k in range(max(first, -s), min(last, nz - s)):
-                    out[row + k] -= weight * bands[s + 4, nx + ny + k] * c[row + k + s]
+            start = i * stride_x + j * stride_y + first
+            into = out[start : start + last - first]
+            _subtract(weight, bands[:, i], i, nx, stride_x, start, c, into)
+            _subtract(weight, bands[:, nx + j], j, ny, stride_y, start, c, into)
+            # bands are those of the middle but for four rows at the ends
+            low, high = min(max(first, 4), last), max(min(last, nz - 4), first)
+            for k in range(first, last):
+                if low <= k < high:
+                    continue
+                for s in range(max(-4, -k), min(5, nz - k)):
+                    into[k - first] -= weight * along_z[s + 4, k] * c[start + k - first + s]
+            if high > low:
+                at, middle = start + low - first, along_z[:, low]
+                _subtract_around(weight, middle, 1, at, c, into[low - first : high - first])
 
 
-@njit(cache=True, nogil=True, inline="always", **OPTIONS)
-def _subtract(weight, source, row, first, last, c, out):  # type: ignore[no-untyped-def]
-    for k in range(first, last):
-        out[row + k] -= weight * c[source + k]
+@njit(nogil=True, **OPTIONS)
+def _subtract(weight, bands, i, n, stride, start, c, out):  # type: ignore[no-untyped-def]
+    """Subtract the sum of w bands[s + 4] c of the rows s = -4 .. 4 further along an axis of n, where they are."""
+    if 4 <= i < n - 4:
+        _subtract_around(weight, bands, stride, start, c, out)
+        return
+    for s in range(max(-4, -i), min(5, n - i)):
+        b = weight * bands[s + 4]
+        x = c[start + s * stride : start + s * stride + len(out)]
+        for k in range(len(out)):
+            out[k] -= b * x[k]
+
+
+@njit(nogil=True, **OPTIONS)
+def _subtract_around(weight, bands, stride, start, c, out):  # type: ignore[no-untyped-def]
+    """The same away from the ends of an axis, where bands are symmetric; of few rows at a time, as vectors ask for."""
+    n = len(out)
+    w0, w1, w2, w3, w4 = (weight * bands[4], weight * bands[5], weight * bands[6], weight * bands[7], weight * bands[8])
+    middle = c[start : start + n]
+    a, b = c[start - stride : start - stride + n], c[start + stride : start + stride + n]
+    d, e = c[start - 2 * stride : start - 2 * stride + n], c[start + 2 * stride : start + 2 * stride + n]
+    for k in range(n):
+        out[k] = out[k] - w0 * middle[k] - w1 * (a[k] + b[k]) - w2 * (d[k] + e[k])
+    a, b = c[start - 3 * stride : start - 3 * stride + n], c[start + 3 * stride : start + 3 * stride + n]
+    d, e = c[start - 4 * stride : start - 4 * stride + n], c[start + 4 * stride : start + 4 * stride + n]
+    for k in range(n):
+        out[k] = out[k] - w3 * (a[k] + b[k]) - w4 * (d[k] + e[k])

@@ -1,13 +1,13 @@
 """Which pieces make one smooth surface near a point, and the planes through their joints that part them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.pieces.crease import Crease
-from scatterers.spline.tensor import TensorSpline
+from scatterers.spline.tensor import TensorSpline, evaluated
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -22,28 +22,42 @@ STEEP = 0.5
 
 def of_one_surface(
     splines: Sequence[TensorSpline],
-    point: FloatArray,
-    among: Mapping[tuple[int, int], int],
-    joined: list[tuple[int, int]],
-) -> dict[tuple[int, int], int]:
-    """0 for pairs of pieces that joints near a point join, and for alike ones that a chain of joints does."""
-    found = dict.fromkeys(joined, 0)
-    if len(joined) < 2:
-        return found
-    groups: list[set[int]] = []
-    for pair in joined:
-        near = [group for group in groups if not group.isdisjoint(pair)]
-        groups = [group for group in groups if group not in near] + [set(pair).union(*near)]
-    normals: dict[int, FloatArray] = {}
-    for i, j in among:
-        if (i, j) in found or not any(i in group and j in group for group in groups):
+    points: FloatArray,
+    signs: Mapping[int, Mapping[tuple[int, int], int]],
+    joined: Mapping[int, Collection[tuple[int, int]]],
+) -> dict[int, dict[tuple[int, int], int]]:
+    """0 for pairs of pieces that joints near a point join, and for alike ones that a chain of joints does.
+
+    Points (n, 3), L; pairs of pieces by the numbers of the points that they are near to, and those that are joined.
+    """
+    found = {where: dict.fromkeys(pairs, 0) for where, pairs in joined.items()}
+    chained = []
+    for where, pairs in joined.items():
+        if len(pairs) < 2:
             continue
-        for number in (i, j):
-            if number not in normals:
-                gradient = splines[number].gradient(point[None])[0]
-                normals[number] = gradient / np.linalg.norm(gradient)
-        if float(normals[i] @ normals[j]) > ALIKE:
-            found[i, j] = 0
+        groups: list[set[int]] = []
+        for pair in pairs:
+            near = [group for group in groups if not group.isdisjoint(pair)]
+            groups = [group for group in groups if group not in near] + [set(pair).union(*near)]
+        for i, j in signs[where]:
+            if (i, j) not in found[where] and any(i in group and j in group for group in groups):
+                chained.append((where, i, j))
+    if not chained:
+        return found
+    at, first, second = np.array(chained).T
+    alike = np.sum(_normals(splines, points[at], first) * _normals(splines, points[at], second), axis=1) > ALIKE
+    for where, i, j in np.array(chained)[alike].tolist():
+        found[where][i, j] = 0
+    return found
+
+
+def _normals(splines: Sequence[TensorSpline], points: FloatArray, piece: IntArray) -> FloatArray:
+    """Unit normals (n, 3) of the pieces (n,) at points (n, 3)."""
+    found = np.empty_like(points)
+    for number in np.unique(piece):
+        mine = piece == number
+        gradient = evaluated(splines[number].compiled, points[mine])[1]
+        found[mine] = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     return found
 
 
@@ -109,14 +123,23 @@ class JointPlanes:
             self._of[first, second] = cKDTree(x), x, np.concatenate(planes)
 
     def near(
-        self, point: FloatArray, pairs: list[tuple[int, int]], reach: float
-    ) -> dict[tuple[int, int], tuple[float, ...]]:
-        """a (3) and b of the plane a.x = b nearest to a point, for each pair that has one."""
-        found = {}
-        for pair in pairs:
-            if pair in self._of:
-                tree, x, across = self._of[pair]
-                distance, k = tree.query(point)
-                if distance < reach:
-                    found[pair] = (*across[k].tolist(), float(across[k] @ x[k]))
+        self, points: FloatArray, pairs: Mapping[int, Collection[tuple[int, int]]], reach: float
+    ) -> dict[int, dict[tuple[int, int], tuple[float, ...]]]:
+        """a (3) and b of the plane a.x = b nearest to points (n, 3), for each pair near a point that has one.
+
+        Pairs by the numbers of the points that they are near to, and so the planes.
+        """
+        found: dict[int, dict[tuple[int, int], tuple[float, ...]]] = {where: {} for where in pairs}
+        rows: dict[tuple[int, int], list[int]] = {}
+        for where, some in pairs.items():
+            for pair in some:
+                if pair in self._of:
+                    rows.setdefault(pair, []).append(where)
+        for pair, at in rows.items():
+            tree, x, across = self._of[pair]
+            distance, nearest = tree.query(points[at])
+            planes = np.column_stack([across, np.sum(across * x, axis=1)])[nearest]
+            for where, plane, off in zip(at, planes.tolist(), distance.tolist(), strict=True):
+                if off < reach:
+                    found[where][pair] = tuple(plane)
         return found

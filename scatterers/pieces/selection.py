@@ -161,10 +161,11 @@ def piece_space(
     programs: list[Program] = [(int(number),) for number in nearest]
     known: dict[tuple[Any, ...], Program] = {}
     planes = JointPlanes(splines, creases, points, owner)
+    beside = planes.near(middles, signs, 3 * side)
+    smooth = of_one_surface(splines, middles, signs, beside)
     for where, among in signs.items():
-        beside = planes.near(middles[where], list(among), 3 * side)
-        among |= of_one_surface(splines, middles[where], among, list(beside))
-        key = int(nearest[where]), tuple(sorted(among.items())), tuple(sorted(beside.items()))
+        together = tuple(sorted((among | smooth[where]).items()))
+        key = int(nearest[where]), together, tuple(sorted(beside[where].items()))
         if key not in known:
             known[key] = _program(*key)
         programs[where] = known[key]

@@ -138,17 +138,20 @@ def fit(
     r = equations.residual(c, targets=True, rough=not keep_start)
     z = equations.preconditioned(r)
     p, rz = z.copy(), float(np.vdot(r, z))
+    q, part = np.empty_like(r), np.empty_like(r)
     before, change, done = watch.curvatures(c), np.inf, 0
     best, kept = watch.off(before), c.copy()
     changes = [np.inf, np.inf]
     while done < iterations and rz > 0:
-        q = equations.residual(p, targets=False)
+        # without new arrays: memory that is fresh at every step takes as long as the sums
+        equations.residual(p, targets=False, out=q)
         step = -rz / float(np.vdot(p, q))
-        c += step * p
-        r += step * q
-        z = equations.preconditioned(r)
+        c += np.multiply(p, step, out=part)
+        r += np.multiply(q, step, out=part)
+        equations.preconditioned(r, out=z)
         last, rz = rz, float(np.vdot(r, z))
-        p = z + (rz / last) * p
+        p *= rz / last
+        p += z
         done += 1
         if done % CHECKED:
             continue
@@ -212,13 +215,13 @@ class _Equations:
         places, self.sorted_normals = places[order], np.ascontiguousarray(normals[order])
         some = slice(None, None, OFFSET_STRIDE)
         self.samples = [places, *(np.ascontiguousarray((places + k * self.sorted_normals)[some]) for k in (1, -1))]
-        self.targets = [np.zeros(len(places)), *(self._offset_targets(k) for k in (1, -1))]
+        self.nothing, self.flat = np.zeros(len(places)), np.zeros_like(places)
+        self.targets = [self.nothing, *(self._offset_targets(k) for k in (1, -1))]
         self.unknown = self._seen()
-        self.cardinal = Cardinal(self.shape)
         self.bands, self.ranges = fourth_bands(self.shape), ranges(self.unknown)
         density = self._density()
         # 70 is the square sum of a fourth difference's weights
-        self.damping = 1 / (density + FLOOR * density.max() + 210 * smoothing)
+        self.cardinal = Cardinal(1 / (density + FLOOR * density.max() + 210 * smoothing))
 
     def _nearest(self, where: FloatArray) -> NDArray[np.int64]:
         """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
@@ -273,28 +276,30 @@ class _Equations:
             c = convolve1d(c, QUASI, axis=axis, mode="nearest")
         return np.concatenate([c.ravel(), np.zeros(OVERREAD)])
 
-    def residual(self, c: FloatArray, *, targets: bool, rough: bool = True) -> FloatArray:
+    def residual(
+        self, c: FloatArray, *, targets: bool, rough: bool = True, out: FloatArray | None = None
+    ) -> FloatArray:
         """A^T W (b - A c) less the smoothing's gradient if rough, b = 0 unless targets; zero where c is not unknown."""
         from scatterers.kernels.normal_equations import accumulate, subtract_roughness
 
-        out = np.zeros_like(c)
+        out = np.empty_like(c) if out is None else out
+        out.fill(0.0)
         shape = np.array(self.shape, dtype=np.int64)
-        flat = np.zeros_like(self.sorted_normals)
         for k, (places, values) in enumerate(zip(self.samples, self.targets, strict=True)):
             weight = np.array([OFFSET_WEIGHT, 0.0] if k else [1.0, self.normal_weight])
-            slopes = self.sorted_normals if targets and not k else flat
-            accumulate(places, values if targets else np.zeros(len(places)), slopes, weight, shape, c, out)
+            slopes = self.sorted_normals if targets and not k else self.flat
+            accumulate(places, values if targets else self.nothing[: len(places)], slopes, weight, shape, c, out)
         if rough:
             subtract_roughness(self.smoothing, shape, self.ranges, self.bands, c, out)
         out[:-OVERREAD] *= self.unknown.ravel()
         out[-OVERREAD:] = 0.0
         return out
 
-    def preconditioned(self, r: FloatArray) -> FloatArray:
+    def preconditioned(self, r: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """S D^-1 S r on the unknown coefficients."""
-        out = np.zeros_like(r)
-        z = self.damping * self.cardinal(r[:-OVERREAD].reshape(self.shape))
-        np.multiply(self.cardinal(z), self.unknown, out=out[:-OVERREAD].reshape(self.shape))
+        out = np.empty_like(r) if out is None else out
+        out[-OVERREAD:] = 0.0
+        self.cardinal(r[:-OVERREAD].reshape(self.shape), self.unknown, out[:-OVERREAD].reshape(self.shape))
         return out
 
     def _seen(self) -> NDArray[np.bool_]:

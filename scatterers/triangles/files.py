@@ -53,11 +53,14 @@ class TriangleMesh:
         Vertex numbers, counter-clockwise seen from outside.
     repairs : tuple of str
         What was changed, one sentence each.
+    moved : float
+        Rms distance by which a subdivision has moved the vertices, m.
     """
 
     vertices: FloatArray
     triangles: IntArray
     repairs: tuple[str, ...] = ()
+    moved: float = 0.0
 
     def __repr__(self) -> str:
         size = " x ".join(f"{v:.4g}" for v in np.ptp(self.vertices, axis=0))

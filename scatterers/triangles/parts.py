@@ -173,8 +173,8 @@ def united(
     return found
 
 
-def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note) -> tuple[FloatArray, IntArray]:
-    """Loop's subdivision, so many times; how far it moves the vertices is told."""
+def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note) -> tuple[FloatArray, IntArray, float]:
+    """Loop's subdivision, so many times, and how far it moves the vertices, rms, which is told as well."""
     import trimesh
 
     fine, corners = trimesh.remesh.subdivide_loop(vertices, triangles, iterations=times)
@@ -186,7 +186,7 @@ def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note
         f"subdivided {times} time{'s' * (times != 1)} after Loop: {len(vertices)} vertices became {len(fine)}, "
         f"moved by {rms:.2g} m rms, {most:.2g} at most (mean edge {edge:.2g} m)"
     )
-    return np.asarray(fine, dtype=float), np.asarray(corners, dtype=np.int64)
+    return np.asarray(fine, dtype=float), np.asarray(corners, dtype=np.int64), rms
 
 
 def areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:

@@ -8,7 +8,10 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field import on_body
+from creeping.geodesics.integrator import trace_states
 from creeping.geometry.surface import normal, project, size
+from creeping.rays import tracer
+from creeping.rays.fan_points import ray_points
 from creeping.rays.nonsmooth import NON_SMOOTH_SPACING
 from creeping.rays.uncertain_body import body_uncertainty
 
@@ -69,6 +72,26 @@ def test_other_rays_and_all_geometry_are_unchanged():
     for name in ("points", "directions", "spreading", "curvature", "attenuation", "eikonal"):
         np.testing.assert_array_equal(getattr(non_smooth, name), getattr(plain, name))
     assert f"{int((~others).sum())} NON_SMOOTH" in repr(non_smooth)
+
+
+def test_points_of_a_ray_end_where_it_does_and_are_traced_once(monkeypatch):
+    fan, asked = fan_of(NON_SMOOTH), []
+
+    def counted(body, states, times, **options):
+        asked.append(len(states) * len(times))
+        return trace_states(body, states, times, **options)
+
+    monkeypatch.setattr(tracer, "trace_states", counted)
+    times, rays = ray_points(fan)
+    # some steps more before and after, and no ray for each of its points
+    assert sum(asked) < 1.5 * rays.alive.size
+    ends = np.where(fan.status == cr.RayStatus.NON_SMOOTH, fan.detachment, np.inf)
+    met = np.isfinite(ends)
+    step = NON_SMOOTH_SPACING * size(EXACT)
+    assert np.all(np.abs(times[np.sum(rays.alive[met], axis=1)] - ends[met]) < times[1] + 2 * step)
+    plain = ray_points(fan_of(PLAIN))[1]
+    np.testing.assert_array_equal(rays.alive[~met], plain.alive[~met])
+    np.testing.assert_array_equal(rays.lanes, plain.lanes)
 
 
 def test_rays_launched_on_non_smooth_regions_end_at_once():

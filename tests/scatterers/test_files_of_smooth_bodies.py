@@ -49,14 +49,21 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+@pytest.mark.parametrize("subdivide", [None, 1])
 @pytest.mark.parametrize("name", TORI)
-def test_curvatures_of_a_torus_err_as_stated(name):
-    body = sc.Mesh(FOLDER / name, "m", cache=False)
+def test_a_torus_errs_as_stated(name, subdivide):
+    body = sc.Mesh(FOLDER / name, "m", subdivide=subdivide, cache=False)
     x, tangents, wanted = torus_points(name)
-    bent = np.einsum("kni,nij,knj->kn", tangents, body.hessian(x), tangents)
-    error = rms(bent / np.linalg.norm(body.gradient(x), axis=1) - wanted)
-    assert error / rms(wanted) < body.fit.normal_curvature_error / body.fit.normal_curvature
-    assert rms(distances(body, x)) < 5e-4 * float(np.max(body.quality.size))
+    slope = np.linalg.norm(body.gradient(x), axis=1)
+    error = rms(np.einsum("kni,nij,knj->kn", tangents, body.hessian(x), tangents) / slope - wanted)
+    # what a subdivision bends is estimated, not measured
+    share = 1.1 if subdivide else 1.0
+    assert error / rms(wanted) < share * body.fit.normal_curvature_error / body.fit.normal_curvature
+    # points lie between vertices, where the fit is free
+    assert rms(distances(body, x)) < 1.3 * body.fit.misfit
+    turned = np.cross(*tangents) * np.sign(np.sum(np.cross(*tangents) * body.gradient(x), axis=1, keepdims=True))
+    assert rms(np.linalg.norm(body.gradient(x) / slope[:, None] - turned, axis=1)) < body.fit.turn
+    assert subdivide or rms(distances(body, x)) < 5e-4 * float(np.max(body.quality.size))
 
 
 @pytest.mark.parametrize("name", TORI)

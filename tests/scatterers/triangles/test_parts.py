@@ -139,6 +139,11 @@ def test_a_coarse_ball_opens_when_subdivided():
     # as large as Loop's surface, and as round
     radius = 1 - body.level(directions)
     assert 0.8 < radius.min() and radius.max() < 1 and np.ptp(radius) < 0.05
+    # and its distance from the ball is stated, with what that makes of curvatures, to first order
+    fit = body.fit
+    assert 1 - radius.mean() < 1.1 * fit.misfit
+    assert abs(fit.normal_curvature - 1) < 1.1 * fit.normal_curvature_error
+    assert abs(fit.gaussian_curvature - 1) < 1.1 * fit.gaussian_curvature_error
 
 
 @pytest.mark.parametrize(
