@@ -26,11 +26,12 @@ MARGIN = 1.0
 """How far outside a cell a place may be: its rays are parted by that much or the search gives them up soon."""
 GAP, SPREAD = 0.2, 3.0
 """Fans are refined to gaps of 0.1; J tells how far rays of coarser ones part where no tip parts them."""
-AHEAD = 0.0
-"""p.r of a place, of unit vectors between the corners, above which rays leave towards r and not away from it."""
+AHEAD = 0.8
+"""p.r of a place, of unit vectors between the corners, above which rays leave towards r and not past it."""
 
-REACH = 0.6
-"""Distance of r from the nearest p of a cell, in the largest one of two of them: 1/√3 at most within a triangle."""
+REACH, FARTHEST = 0.6, 0.4
+"""Distance of r from the nearest p of a cell, in the largest one of two of them: 1/√3 at most within a triangle. And
+the one from which on a search would lead nowhere."""
 
 
 def likely_found(
@@ -116,7 +117,10 @@ def likely_cells(
         corners, J = x.reshape(n, 2, 2, 3), states[rays, np.minimum(sample // parts, states.shape[1] - 1)[:, None], M11]
         one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing[:, None])
         # where nothing can be told, a cell is likely
-        return np.asarray(((near & towards & (apart <= REACH * wide)) | ~np.isfinite(u1 + v1)) & ~np.any(one, axis=1))
+        return np.asarray(
+            ((near & towards & (apart <= np.minimum(REACH * wide, FARTHEST))) | ~np.isfinite(u1 + v1))
+            & ~np.any(one, axis=1)
+        )
 
 
 def parted(body: Any, x: FloatArray, other: FloatArray, spreading: FloatArray, spacing: FloatArray) -> BoolArray:

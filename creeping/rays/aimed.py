@@ -2,10 +2,10 @@
 
 They are found by Newton's method on p(σ, s) = r, with p and b = n x p at the end,
 
-    b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ ds - τ J dσ⊥,   τ = b.Hp/|grad F|,
+    b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ (ds + d.T dσ) - τ J dσ⊥,   τ = b.Hp/|grad F|,
 
-first on rays of long steps, then, on a body with creases, on exact ones: where the ground is sharp, long steps end
-beside what they seek.
+dσ along the line, whose tangent T need not be across d, and dσ⊥ = b0.T dσ. Rays of longer steps than those of what is
+found tell enough, but where the ground of a body with creases is sharp, the last steps look at exact ones.
 
 Sources: Derivations, R12.
 """
@@ -29,15 +29,15 @@ FAR, FAR_ON_PIECES = 3.0, 1.5
 """Cells by which a search may move before it is given up: most of those on bodies with creases go nowhere,"""
 SLOW = 0.95
 """and are given up where a round does not bring the residual down to this share,"""
-HOPE = 0.25
-"""for good if it has never been less than this: others may have met the error of long steps next to a tip."""
-LONG, LONG_ON_PIECES = (2, 1), (6, 1)
-"""Steps of both searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
-creases sharp places next to tips and edges make steps short all over it."""
+STEP = 2.0
+"""First step of Newton's method, in cells, from which on a search there is given up at once: nothing is a cell away."""
+LONG, LONG_ON_PIECES = (2, 1), (1,)
+"""Steps of the searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
+creases sharp places next to tips and edges make the steps short all over it, and long ones lead astray there."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
-EXACT = 3
-"""Rounds on exact rays."""
+EXACT, HOPE = 3, 0.25
+"""Rounds on exact rays there, and residuals up to which they are taken."""
 
 
 def rays_towards(
@@ -76,9 +76,7 @@ def rays_towards(
         rays, found = search.result()
         parts.append((rays, missing[found], search.moved[found]))
         # those that the search gave up, or ended too early
-        again = ~search.hopeless
-        again[found] = False
-        missing = missing[again]
+        missing = np.delete(missing, found)
     result = SingleRays.joined([part[0] for part in parts])
     found, moved = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     order = np.argsort(found)
@@ -92,8 +90,6 @@ class _Search:
     ----------
     moved : (n,)
         How far along the line each has come, in cells.
-    hopeless : (n,)
-        Searches on a body with creases that are not worth another with shorter steps.
     """
 
     def __init__(
@@ -116,7 +112,7 @@ class _Search:
         self.far = FAR_ON_PIECES if self.creased else FAR
         slow, before = np.zeros(n, dtype=bool), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
-        for _ in range(ROUNDS):
+        for number in range(ROUNDS):
             rows = directions[active], self.starts[active], self.tangents[active], self.times[active]
             now = tracer.at(*rows, long=long).rays
             self.lanes[active], self.first[active] = now.lanes, now.starts
@@ -128,11 +124,12 @@ class _Search:
             last = active[(residual > CLOSE) & self._within(active) & ~slow[active]]
             if not len(last):
                 break
-            self._step(last)
+            step = self._step(last)
+            if self.creased and number == 0:
+                last = last[step <= STEP]
             active = last[~self.wanted[last]]
             if not len(active):
                 break
-        self.hopeless = (slow | ~self._within()) & (before > HOPE) & self.creased
 
     def result(self) -> tuple[SingleRays, IntArray]:
         """Exact rays that have been found, and their rows."""
@@ -164,8 +161,8 @@ class _Search:
         rows = self.directions[some], self.starts[some], self.tangents[some], self.times[some]
         return self.tracer.at(*rows, observers=self.observers[some])
 
-    def _step(self, some: IntArray) -> None:
-        """Move some starts along their lines and times along their rays, by no more than a cell."""
+    def _step(self, some: IntArray) -> FloatArray:
+        """Move some starts along their lines and times along their rays, by no more than a cell; steps wanted (n,)."""
         x, p, J, rate, kappa = (self.lanes[some, part] for part in (slice(0, 3), slice(3, 6), 6, 7, 9))
         gap = self.observers[some] - p / np.linalg.norm(p, axis=1, keepdims=True)
         gradient = self.tracer.body.gradient(x)
@@ -175,15 +172,20 @@ class _Search:
         torsion = np.einsum("ni,nij,nj->n", b, self.tracer.body.hessian(x), p) / g
         directions, cell = self.directions[some], self.cell[some]
         facing = np.sum(np.cross(self.first[some, 6:9], directions) * self.tangents[some], axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             along_line = np.nan_to_num(np.sum(b * gap, axis=1) / rate / facing)
+            wanted = np.abs(along_line) / cell[:, 0]
             along_line = np.clip(along_line, -cell[:, 0], cell[:, 0])
             later = -(np.sum(n * gap, axis=1) + torsion * J * along_line * facing) / kappa
-        later = np.clip(np.nan_to_num(later), -cell[:, 1], cell[:, 1])
+            # a start farther along d is as good as a later end
+            later = np.nan_to_num(later - along_line * np.sum(directions * self.tangents[some], axis=1))
+            wanted = np.fmax(wanted, np.abs(later) / cell[:, 1])
+        later = np.clip(later, -cell[:, 1], cell[:, 1])
         self.moved[some] += along_line / cell[:, 0]
         self.times[some] = np.clip(self.times[some] + later, 0.0, self.tracer.length)
         guess = self.starts[some] + along_line[:, None] * self.tangents[some]
         self.starts[some], self.tangents[some] = self.tracer.onto_line(guess, directions, 2)
+        return np.asarray(wanted)
 
 
 def _apart(rays: RayPoints, observers: FloatArray) -> FloatArray:
