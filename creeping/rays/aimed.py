@@ -2,7 +2,7 @@
 
 They are found by Newton's method on p(σ, s) = r, with p and b = n x p at the end,
 
-    b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ (ds + d.T dσ) - τ J dσ⊥,   τ = b.Hp/|grad F|,
+    b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ (dt + d.T dσ) - τ J dσ⊥,   τ = b.Hp/|grad F|,
 
 dσ along the line, whose tangent T need not be across d, and dσ⊥ = b0.T dσ. Rays of longer steps than those of what is
 found tell enough, but where the ground of a body with creases is sharp, the last steps look at exact ones.
