@@ -21,13 +21,14 @@ from creeping.geometry.creased import is_creased
 from creeping.geometry.distinct import first_of_equals
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import normal, size
+from creeping.rays.aimed import rays_towards, same_within
 from creeping.rays.fan import RayFan
 from creeping.rays.observer_contour import HorizonRays, MidHorizon, forward_nodes
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays, free_ways
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
-from creeping.rays.tracer import TURN, RayTracer, same_within
+from creeping.rays.tracer import TURN, RayTracer
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine
@@ -194,7 +195,7 @@ class FarGeometry:
         lanes = WITH_END if is_creased(self.body) else WITH_JACOBI
         states = carried(self.flow, launch, times, components=lanes)
         # a ray that has come to an edge or tip stays there: what the search sees beyond is nothing
-        self._end = states[:, :, -1, END] if lanes == WITH_END else None
+        ends = states[:, :, -1, END : END + 2].copy() if lanes == WITH_END else None
         states = np.ascontiguousarray(states[..., :WITH_JACOBI])
         self._chi, self._roots = np.zeros((n, many)), np.ones(n)
         back = np.ascontiguousarray((self.angle > np.pi / 2).reshape(n, many))
@@ -230,9 +231,10 @@ class FarGeometry:
             pieces.append((found[:a], places[:a], crossed[:b]))
         self._found, self._places, self._crossed = (np.concatenate(kind) for kind in zip(*pieces, strict=True))
         self._fine = times[:-1, None] + np.diff(times)[:, None] * (np.arange(PARTS) / PARTS)
-        if self._end is not None:
+        if ends is not None:
             of = self.incidence[self._found[:, 0]], self._found, self.directions, self._places
-            self._likely = likely_found(self.body, states, launch.spacing, PARTS, float(times[1]), *of)
+            likely = likely_found(self.body, states, ends, launch.spacing, PARTS, float(times[1]), *of)
+            self._found, self._places = self._found[likely], self._places[likely]
 
     @property
     def mean_root_radius(self) -> FloatArray:
@@ -253,12 +255,8 @@ class FarGeometry:
         fine = np.append(self._fine.ravel(), self.tracer.length)
         long = fine[sample + 1] - fine[sample]
         begin = fine[sample] + along * long
-        if self._end is not None:
-            some = self._likely & (begin <= np.fmax(self._end[which, ray], self._end[which, after]) + long)
-            row, ray, which, across = row[some], ray[some], which[some], across[some]
-            near, begin, long = near[some], begin[some], long[some]
         cell = np.stack([launch.spacing[which, ray], long], axis=1)
-        one, found, moved = self.tracer.towards(self.direction[row], self.directions[row], near, begin, cell)
+        one, found, moved = rays_towards(self.tracer, self.direction[row], self.directions[row], near, begin, cell)
         row, ray, cell, across, which = row[found], ray[found], cell[found], across[found, 0], which[found]
         arc = launch.arc_index
         same = arc[which] == arc[which, ray][:, None]

@@ -8,7 +8,9 @@ either side of a tip, nothing is bilinear: neighbours are parted where they are
 
     |x_2 - x_1| > max(GAP size, SPREAD |J| spacing)
 
-apart, and what would come to such a cell counts as lost.
+apart, and what would come to such a cell counts as lost, as does what would come between a ray that has ended at a tip
+and a neighbour that goes on. Elsewhere r is no farther from the nearest p of the corners than REACH times what they are
+from each other.
 
 Sources: Derivations, R12.
 """
@@ -17,19 +19,25 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geodesics.states import M11, P, X
+from creeping.geometry.creased import tips_of
 from creeping.geometry.surface import size
 
 MARGIN = 1.0
 """How far outside a cell a place may be: its rays are parted by that much or the search gives them up soon."""
 GAP, SPREAD = 0.2, 3.0
 """Fans are refined to gaps of 0.1; J tells how far rays of coarser ones part where no tip parts them."""
-AHEAD = 0.0
-"""p.r of a place, of unit vectors between the corners, above which rays leave towards r and not away from it."""
+AHEAD = 0.8
+"""p.r of a place, of unit vectors between the corners, above which rays leave towards r and not past it."""
+
+REACH, FARTHEST = 0.6, 0.4
+"""Distance of r from the nearest p of a cell, in the largest one of two of them: 1/√3 at most within a triangle. And
+the one from which on a search would lead nowhere."""
 
 
 def likely_found(
     body: Any,
     states: FloatArray,
+    ends: FloatArray,
     spacing: FloatArray,
     parts: int,
     step: float,
@@ -38,14 +46,22 @@ def likely_found(
     directions: FloatArray,
     places: FloatArray,
 ) -> BoolArray:
-    """`likely_cells` of several incidences: states (n, rays, K, lanes), cells (m, 4) as the search numbers them."""
-    likely = np.ones(len(found), dtype=bool)
-    for number in np.unique(incidence):
-        mine = np.flatnonzero(incidence == number)
+    """`likely_cells` of several incidences: states (n, rays, K, lanes), cells (m, 4) as the search numbers them.
+
+    ``ends`` (n, rays, 2) has the time at which each ray ends, and the number of the crease, as lanes have them.
+    """
+    rays, long = found[:, 1:3], step / parts
+    begin, end = (found[:, 3] + places[:, 1]) * long, ends[incidence[:, None], rays, 0]
+    at_tip = np.isin(ends[incidence[:, None], rays, 1], tips_of(body)[0])
+    # an edge ends rays one after the other, a tip one of them alone
+    until = np.fmin(np.max(end, axis=1), np.min(np.where(at_tip, end, np.inf), axis=1))
+    likely = begin <= until + long
+    for number in np.unique(incidence[likely]):
+        mine = np.flatnonzero(likely & (incidence == number))
         row, ray, after, sample = found[mine].T
         rays, seen = np.stack([ray, after], axis=1), (directions[row], places[mine], spacing[number, ray])
         likely[mine] = likely_cells(body, states[number], rays, sample, parts, step, *seen)
-    return likely
+    return np.asarray(likely)
 
 
 def likely_cells(
@@ -93,12 +109,18 @@ def likely_cells(
         (f0, fu, fv), (h0, hu, hv) = _bilinear(f, u, v), _bilinear(h, u, v)
         determinant = fu * hv - fv * hu
         u1, v1 = u - (f0 * hv - fv * h0) / determinant, v - (fu * h0 - f0 * hu) / determinant
+        corners_of = p.reshape(n, 4, 3)
+        apart = np.linalg.norm(corners_of - observers[:, None], axis=2).min(axis=1)
+        wide = np.linalg.norm(corners_of[:, :, None] - corners_of[:, None], axis=3).max(axis=(1, 2))
         near = (np.abs(u1 - 0.5) <= 0.5 + MARGIN) & (np.abs(v1 - 0.5) <= 0.5 + MARGIN)
         towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > AHEAD
         corners, J = x.reshape(n, 2, 2, 3), states[rays, np.minimum(sample // parts, states.shape[1] - 1)[:, None], M11]
         one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing[:, None])
         # where nothing can be told, a cell is likely
-        return np.asarray(((near & towards) | ~np.isfinite(u1 + v1)) & ~np.any(one, axis=1))
+        return np.asarray(
+            ((near & towards & (apart <= np.minimum(REACH * wide, FARTHEST))) | ~np.isfinite(u1 + v1))
+            & ~np.any(one, axis=1)
+        )
 
 
 def parted(body: Any, x: FloatArray, other: FloatArray, spreading: FloatArray, spacing: FloatArray) -> BoolArray:

@@ -1,0 +1,206 @@
+"""Creeping rays that leave towards given directions r, sought next to given points of a shadow line.
+
+They are found by Newton's method on p(σ, s) = r, with p and b = n x p at the end,
+
+    b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ (dt + d.T dσ) - τ J dσ⊥,   τ = b.Hp/|grad F|,
+
+dσ along the line, whose tangent T need not be across d, and dσ⊥ = b0.T dσ. Rays of longer steps than those of what is
+found tell enough, but where the ground of a body with creases is sharp, the last steps look at exact ones.
+
+Sources: Derivations, R12.
+"""
+
+import numpy as np
+
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geometry.creased import is_creased
+from creeping.rays.quantities import LANES, START_LANES, RayPoints
+from creeping.rays.single_rays import SingleRays
+from creeping.rays.tracer import RayTracer
+
+CLOSE = 1e-6
+"""Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
+ACCEPTED = 1e-4
+"""Residual of what was found, on exact rays: its phase errs by half the square of it, in radii of curvature."""
+ALIKE = (1e-2, 1e-1)
+"""Distances, in cells, between which lies the one below which two rays that searches found are one."""
+ROUNDS = 10
+FAR, FAR_ON_PIECES = 3.0, 1.5
+"""Cells by which a search may move before it is given up: most of those on bodies with creases go nowhere,"""
+SLOW = 0.95
+"""and are given up where a round does not bring the residual down to this share,"""
+STEP = 2.0
+"""First step of Newton's method, in cells, from which on a search there is given up at once: nothing is a cell away."""
+LONG, LONG_ON_PIECES = (2, 1), (1,)
+"""Steps of the searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
+creases sharp places next to tips and edges make the steps short all over it, and long ones lead astray there."""
+NEARLY = 2e-4
+"""Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
+EXACT, HOPE = 3, 0.25
+"""Rounds on exact rays there, and residuals up to which they are taken."""
+
+
+def rays_towards(
+    tracer: RayTracer,
+    directions: FloatArray,
+    observers: FloatArray,
+    near: FloatArray,
+    times: FloatArray,
+    cell: FloatArray,
+) -> tuple[SingleRays, IntArray, FloatArray]:
+    """Rays with p = r next to given points and times.
+
+    Parameters
+    ----------
+    tracer : RayTracer
+    directions, observers, near : (n, 3)
+        d, r, and points next to the shadow line.
+    times : (n,)
+    cell : (n, 2), L
+        Distances of neighbouring rays and samples: a search that leaves its neighbourhood is given up.
+
+    Returns
+    -------
+    SingleRays (m,)
+        Those that were found.
+    found, moved : (m,)
+        Their rows, and how far along the line they start from where the search began, in cells.
+    """
+    missing, parts = np.arange(len(times)), []
+    levels = LONG_ON_PIECES if is_creased(tracer.body) else LONG
+    for number, long in enumerate(levels):
+        if number and not len(missing):
+            break
+        rows = directions[missing], observers[missing], near[missing], times[missing], cell[missing]
+        search = _Search(tracer, *rows, long, NEARLY if long == levels[0] else 0.0)
+        rays, found = search.result()
+        parts.append((rays, missing[found], search.moved[found]))
+        # those that the search gave up, or ended too early
+        missing = np.delete(missing, found)
+    result = SingleRays.joined([part[0] for part in parts])
+    found, moved = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    order = np.argsort(found)
+    return result[order], found[order], moved[order]
+
+
+class _Search:
+    """What `rays_towards` finds with steps of so many, without another look after one from a residual of ``nearly``.
+
+    Attributes
+    ----------
+    moved : (n,)
+        How far along the line each has come, in cells.
+    """
+
+    def __init__(
+        self,
+        tracer: RayTracer,
+        directions: FloatArray,
+        observers: FloatArray,
+        near: FloatArray,
+        times: FloatArray,
+        cell: FloatArray,
+        long: int,
+        nearly: float,
+    ) -> None:
+        n = len(times)
+        self.tracer, self.directions, self.observers, self.cell = tracer, directions, observers, cell
+        self.starts, self.tangents = tracer.onto_line(near, directions)
+        self.times, self.begin, self.moved = times.copy(), times, np.zeros(n)
+        self.lanes, self.first = np.empty((n, LANES)), np.empty((n, START_LANES))
+        self.creased = is_creased(tracer.body)
+        self.far = FAR_ON_PIECES if self.creased else FAR
+        slow, before = np.zeros(n, dtype=bool), np.full(n, np.inf)
+        active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
+        for number in range(ROUNDS):
+            rows = directions[active], self.starts[active], self.tangents[active], self.times[active]
+            now = tracer.at(*rows, long=long).rays
+            self.lanes[active], self.first[active] = now.lanes, now.starts
+            residual = _apart(now, observers[active])
+            self.wanted[active] = residual <= max(CLOSE, nearly)
+            if self.creased:
+                slow[active] = ~(residual <= SLOW * before[active])
+                before[active] = np.fmin(residual, before[active])
+            last = active[(residual > CLOSE) & self._within(active) & ~slow[active]]
+            if not len(last):
+                break
+            step = self._step(last)
+            if self.creased and number == 0:
+                last = last[step <= STEP]
+            active = last[~self.wanted[last]]
+            if not len(active):
+                break
+
+    def result(self) -> tuple[SingleRays, IntArray]:
+        """Exact rays that have been found, and their rows."""
+        kept = np.flatnonzero(self.wanted & self._within())
+        found = self._exact(kept)
+        off = _apart(found.rays, self.observers[kept])
+        for _ in range(EXACT if self.creased else 0):
+            beside = np.flatnonzero((off >= ACCEPTED) & (off < HOPE))
+            if not len(beside):
+                break
+            some, place = kept[beside], np.arange(len(kept))
+            self.lanes[some], self.first[some] = found.rays.lanes[beside], found.rays.starts[beside]
+            self._step(some)
+            better = self._exact(some)
+            place[beside] = len(kept) + np.arange(len(beside))
+            found = SingleRays.joined([found, better])[place]
+            now = _apart(better.rays, self.observers[some])
+            # those that come no nearer are given up
+            off[beside] = np.where(now < SLOW * off[beside], now, np.inf)
+        good = (off < ACCEPTED) & self._within(kept)
+        return found[good], kept[good]
+
+    def _within(self, some: IntArray | slice = slice(None)) -> BoolArray:
+        """Which of some searches are in their neighbourhoods."""
+        late = np.abs(self.times[some] - self.begin[some])
+        return np.asarray((np.abs(self.moved[some]) <= self.far) & (late <= self.far * self.cell[some, 1]))
+
+    def _exact(self, some: IntArray) -> SingleRays:
+        rows = self.directions[some], self.starts[some], self.tangents[some], self.times[some]
+        return self.tracer.at(*rows, observers=self.observers[some])
+
+    def _step(self, some: IntArray) -> FloatArray:
+        """Move some starts along their lines and times along their rays, by no more than a cell; steps wanted (n,)."""
+        x, p, J, rate, kappa = (self.lanes[some, part] for part in (slice(0, 3), slice(3, 6), 6, 7, 9))
+        gap = self.observers[some] - p / np.linalg.norm(p, axis=1, keepdims=True)
+        gradient = self.tracer.body.gradient(x)
+        g = np.linalg.norm(gradient, axis=1)
+        n = gradient / g[:, None]
+        b = np.cross(n, p)
+        torsion = np.einsum("ni,nij,nj->n", b, self.tracer.body.hessian(x), p) / g
+        directions, cell = self.directions[some], self.cell[some]
+        facing = np.sum(np.cross(self.first[some, 6:9], directions) * self.tangents[some], axis=1)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            along_line = np.nan_to_num(np.sum(b * gap, axis=1) / rate / facing)
+            wanted = np.abs(along_line) / cell[:, 0]
+            along_line = np.clip(along_line, -cell[:, 0], cell[:, 0])
+            later = -(np.sum(n * gap, axis=1) + torsion * J * along_line * facing) / kappa
+            # a start farther along d is as good as a later end
+            later = np.nan_to_num(later - along_line * np.sum(directions * self.tangents[some], axis=1))
+            wanted = np.fmax(wanted, np.abs(later) / cell[:, 1])
+        later = np.clip(later, -cell[:, 1], cell[:, 1])
+        self.moved[some] += along_line / cell[:, 0]
+        self.times[some] = np.clip(self.times[some] + later, 0.0, self.tracer.length)
+        guess = self.starts[some] + along_line[:, None] * self.tangents[some]
+        self.starts[some], self.tangents[some] = self.tracer.onto_line(guess, directions, 2)
+        return np.asarray(wanted)
+
+
+def _apart(rays: RayPoints, observers: FloatArray) -> FloatArray:
+    """|r - p| (n,)."""
+    p = rays.directions / np.linalg.norm(rays.directions, axis=1, keepdims=True)
+    return np.asarray(np.linalg.norm(observers - p, axis=1))
+
+
+def same_within(rays: RayPoints, cell: FloatArray) -> FloatArray:
+    """Distance of launch points, L, and difference of times below which two rays found (n,) are one: (n, 2).
+
+    ``cell`` (n, 2) is that of the fan in which each was sought. What is left of r - p, up to ACCEPTED, is a step of J'
+    across the rays and of κₙ along them: far on flat ground.
+    """
+    turn = np.stack([np.abs(rays.spreading_rate), np.abs(rays.curvature[1])], axis=1)
+    with np.errstate(divide="ignore"):
+        left = 2 * ACCEPTED / turn
+    return np.asarray(np.clip(left, ALIKE[0] * cell, ALIKE[1] * cell))

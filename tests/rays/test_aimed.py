@@ -1,0 +1,47 @@
+"""Rays sought towards directions on bodies of pieces: all that there are, wherever the rays of the fan lie."""
+
+import numpy as np
+import pytest
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.far_geometry import far_geometry
+
+OGIVE = sc.Ogive(1.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def dense():
+    """Shed rays of an ogive, of a dense fan, and the directions: to one side of the plane of symmetry, then images."""
+    r = cr.fibonacci_directions(24)[::2]
+    directions = np.concatenate([r, r * [1.0, -1.0, 1.0]])
+    return shed(OGIVE, directions, 1000), directions
+
+
+def shed(body, directions, n_rays):
+    flow, line = cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (-0.6, 0.0, -0.8))
+    length = 1.2 * np.ptp(body.bounds[:, 2])
+    return far_geometry(cr.launch(flow, line, length=length, n_rays=n_rays, measured=False), directions).shed
+
+
+def without(found, others, observer, mirror):
+    """Number of rays that are not among others, of the observers (n,), as images."""
+    close = 1e-3 * np.ptp(OGIVE.bounds[:, 2])
+    same = (observer[:, None] == others.observer) & (np.abs(found.rays.time[:, None] - others.rays.time) < close)
+    same &= np.linalg.norm(found.rays.points[:, None] - others.rays.points * mirror, axis=2) < close
+    return int(np.sum(~same.any(axis=1)))
+
+
+def test_rays_have_mirror_images(dense):
+    """Cells of the fan are no images of each other: a search that loses rays loses some of one side alone."""
+    found, directions = dense
+    half = len(directions) // 2
+    assert len(found.observer) > 40
+    assert without(found, found, (found.observer + half) % (2 * half), [1, -1, 1]) <= 2
+
+
+def test_coarse_fan_finds_what_a_dense_one_does(dense):
+    found, directions = dense
+    coarse = shed(OGIVE, directions, 256)
+    assert without(found, coarse, found.observer, [1, 1, 1]) <= 2
+    assert without(coarse, found, coarse.observer, [1, 1, 1]) <= 2
