@@ -10,7 +10,8 @@ either side of a tip, nothing is bilinear: neighbours are parted where they are
 
 apart, and what would come to such a cell counts as lost, as does what would come between a ray that has ended at a tip
 and a neighbour that goes on. Elsewhere r is no farther from the nearest p of the corners than REACH times what they are
-from each other.
+from each other. Where the place tells nothing, next to a tip and where both heights are as good as parallel, a cell is
+likely if r is nearer than FARTHEST to a corner's p, and where r is nearer than BESIDE in any case.
 
 Sources: Derivations, R12.
 """
@@ -32,6 +33,12 @@ AHEAD = 0.8
 REACH, FARTHEST = 0.6, 0.4
 """Distance of r from the nearest p of a cell, in the largest one of two of them: 1/√3 at most within a triangle. And
 the one from which on a search would lead nowhere."""
+BESIDE, WILD = 0.1, 8.0
+"""Distance of r from the nearest p below which a cell is tried wherever its bilinear functions vanish: next to a tip
+they bend. And the distance of that place, in cells, beyond which it tells nothing: they are parallel."""
+TIP = 0.03
+"""Distance from a tip, in body sizes, within which places tell nothing either, however dense the fan: rays turn there
+faster than samples of them tell."""
 
 
 def likely_found(
@@ -112,15 +119,23 @@ def likely_cells(
         corners_of = p.reshape(n, 4, 3)
         apart = np.linalg.norm(corners_of - observers[:, None], axis=2).min(axis=1)
         wide = np.linalg.norm(corners_of[:, :, None] - corners_of[:, None], axis=3).max(axis=(1, 2))
-        near = (np.abs(u1 - 0.5) <= 0.5 + MARGIN) & (np.abs(v1 - 0.5) <= 0.5 + MARGIN)
+        off = np.maximum(np.abs(u1 - 0.5), np.abs(v1 - 0.5))
+        bent = (off > WILD) | (_from_tips(body, x).reshape(n, 4).min(axis=1) < TIP * size(body))
+        near = (off <= 0.5 + MARGIN) | bent | (apart <= BESIDE)
+        reach = np.where(bent, FARTHEST, np.minimum(REACH * wide, FARTHEST))
         towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > AHEAD
         corners, J = x.reshape(n, 2, 2, 3), states[rays, np.minimum(sample // parts, states.shape[1] - 1)[:, None], M11]
         one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing[:, None])
         # where nothing can be told, a cell is likely
-        return np.asarray(
-            ((near & towards & (apart <= np.minimum(REACH * wide, FARTHEST))) | ~np.isfinite(u1 + v1))
-            & ~np.any(one, axis=1)
-        )
+        return np.asarray(((near & towards & (apart <= reach)) | ~np.isfinite(u1 + v1)) & ~np.any(one, axis=1))
+
+
+def _from_tips(body: Any, x: FloatArray) -> FloatArray:
+    """Distances of points (n, 3) from the nearest tip, L."""
+    tips = tips_of(body)[1]
+    if not len(tips):
+        return np.full(len(x), np.inf)
+    return np.asarray(np.min(np.linalg.norm(x[:, None] - tips, axis=2), axis=1))
 
 
 def parted(body: Any, x: FloatArray, other: FloatArray, spreading: FloatArray, spacing: FloatArray) -> BoolArray:

@@ -14,6 +14,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.creased import is_creased
+from creeping.geometry.surface import size
 from creeping.rays.quantities import LANES, START_LANES, RayPoints
 from creeping.rays.single_rays import SingleRays
 from creeping.rays.tracer import RayTracer
@@ -29,8 +30,9 @@ FAR, FAR_ON_PIECES = 3.0, 1.5
 """Cells by which a search may move before it is given up: most of those on bodies with creases go nowhere,"""
 SLOW = 0.95
 """and are given up where a round does not bring the residual down to this share,"""
-STEP = 2.0
-"""First step of Newton's method, in cells, from which on a search there is given up at once: nothing is a cell away."""
+STEP, LEAST_CELL = 2.0, 0.008
+"""First step of Newton's method, in cells, from which on a search there is given up at once: nothing is a cell away.
+Cells of dense fans count as cells of so many body sizes: what is near does not hang on the number of rays."""
 LONG, LONG_ON_PIECES = (2, 1), (1,)
 """Steps of the searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
 creases sharp places next to tips and edges make the steps short all over it, and long ones lead astray there."""
@@ -109,6 +111,7 @@ class _Search:
         self.times, self.begin, self.moved = times.copy(), times, np.zeros(n)
         self.lanes, self.first = np.empty((n, LANES)), np.empty((n, START_LANES))
         self.creased = is_creased(tracer.body)
+        self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.creased else cell
         self.far = FAR_ON_PIECES if self.creased else FAR
         slow, before = np.zeros(n, dtype=bool), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
@@ -154,8 +157,8 @@ class _Search:
 
     def _within(self, some: IntArray | slice = slice(None)) -> BoolArray:
         """Which of some searches are in their neighbourhoods."""
-        late = np.abs(self.times[some] - self.begin[some])
-        return np.asarray((np.abs(self.moved[some]) <= self.far) & (late <= self.far * self.cell[some, 1]))
+        along, late = np.abs(self.moved[some] * self.cell[some, 0]), np.abs(self.times[some] - self.begin[some])
+        return np.asarray((along <= self.far * self.wide[some, 0]) & (late <= self.far * self.wide[some, 1]))
 
     def _exact(self, some: IntArray) -> SingleRays:
         rows = self.directions[some], self.starts[some], self.tangents[some], self.times[some]
@@ -174,12 +177,12 @@ class _Search:
         facing = np.sum(np.cross(self.first[some, 6:9], directions) * self.tangents[some], axis=1)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             along_line = np.nan_to_num(np.sum(b * gap, axis=1) / rate / facing)
-            wanted = np.abs(along_line) / cell[:, 0]
+            wanted = np.abs(along_line) / self.wide[some, 0]
             along_line = np.clip(along_line, -cell[:, 0], cell[:, 0])
             later = -(np.sum(n * gap, axis=1) + torsion * J * along_line * facing) / kappa
             # a start farther along d is as good as a later end
             later = np.nan_to_num(later - along_line * np.sum(directions * self.tangents[some], axis=1))
-            wanted = np.fmax(wanted, np.abs(later) / cell[:, 1])
+            wanted = np.fmax(wanted, np.abs(later) / self.wide[some, 1])
         later = np.clip(later, -cell[:, 1], cell[:, 1])
         self.moved[some] += along_line / cell[:, 0]
         self.times[some] = np.clip(self.times[some] + later, 0.0, self.tracer.length)

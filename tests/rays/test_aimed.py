@@ -18,8 +18,8 @@ def dense():
     return shed(OGIVE, directions, 1000), directions
 
 
-def shed(body, directions, n_rays):
-    flow, line = cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (-0.6, 0.0, -0.8))
+def shed(body, directions, n_rays, incidence=(-0.6, 0.0, -0.8)):
+    flow, line = cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, incidence)
     length = 1.2 * np.ptp(body.bounds[:, 2])
     return far_geometry(cr.launch(flow, line, length=length, n_rays=n_rays, measured=False), directions).shed
 
@@ -45,3 +45,16 @@ def test_coarse_fan_finds_what_a_dense_one_does(dense):
     coarse = shed(OGIVE, directions, 256)
     assert without(found, coarse, found.observer, [1, 1, 1]) <= 2
     assert without(coarse, found, coarse.observer, [1, 1, 1]) <= 2
+
+
+@pytest.mark.parametrize("n_rays", [256, 700])
+@pytest.mark.parametrize("angle", [0.0, 0.5, 1.5])
+def test_what_passes_by_a_tip_is_found_however_rays_lie(n_rays, angle):
+    """The body turned about its axis, with incidence and direction, is the same, and cells of its fan are others."""
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    directions = cr.fibonacci_directions(40)[34:38]
+    found = shed(OGIVE, directions @ turn.T, n_rays, turn @ [0.1, 0.2, -0.97])
+    beside = found.observer == 2
+    assert np.bincount(found.observer, minlength=4).tolist() == [1, 2, 1, 1]
+    from_tip = np.linalg.norm(found.rays.points[beside] - [0, 0, -5.0], axis=1)
+    assert np.all(from_tip < 0.02 * np.ptp(OGIVE.bounds[:, 2]))
