@@ -6,9 +6,9 @@ HANGS = 600.0
 """Seconds after which what has not happened never will, on the slowest machine with all kernels to compile."""
 
 
-def until(condition, said=lambda: "", pause=0.05, most=HANGS):
+def until(condition, said=lambda: "", pause=0.05):
     """Wait for a condition; ``said()`` tells what stood there instead."""
-    end = time.monotonic() + most
+    end = time.monotonic() + HANGS
     while not condition():
         assert time.monotonic() < end, said()
         time.sleep(pause)

@@ -29,7 +29,6 @@ GAP, SPREAD = 0.2, 3.0
 """Fans are refined to gaps of 0.1; J tells how far rays of coarser ones part where no tip parts them."""
 AHEAD = 0.8
 """p.r of a place, of unit vectors between the corners, above which rays leave towards r and not past it."""
-
 REACH, FARTHEST = 0.6, 0.4
 """Distance of r from the nearest p of a cell, in the largest one of two of them: 1/√3 at most within a triangle. And
 the one from which on a search would lead nowhere."""

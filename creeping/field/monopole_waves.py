@@ -20,10 +20,9 @@ Sources: [PW81] for leading order; Derivations, F33.
 import numpy as np
 
 from creeping._typing import ComplexArray, IntArray
-from creeping.field.port_waves import DEEP, FEW
-from creeping.field.shed_wave import SECOND_ORDER, smoothstep
+from creeping.field.port_waves import second_order
 from creeping.field.slot_waves import SlotTerms, geodesic_waves
-from creeping.field.special.airy import MODES, hard_modes
+from creeping.field.special.airy import hard_modes
 from creeping.field.special.coupling_function import coupling_function
 from creeping.rays.port_rays import PortRays
 
@@ -33,26 +32,17 @@ class MonopoleTerms(SlotTerms):
 
     def upright(self, order: int) -> ComplexArray:
         """E_n without w (m,), 1/L."""
-        V = coupling_function(self.xi)
+        V, V1 = coupling_function(self.xi), coupling_function(self.xi, 1)
         if order == 1:
-            charge = coupling_function(self.xi, 1) / self.square - self.near**2 * V
+            charge = V1 / self.square - self.near**2 * V
         else:
-            charge = self._charge(V)
+            charge = second_order(self.xi, V, self._early_charge, self._late_charge)
         # a slot has T0s T0r at V_1; the mean of squares is more than that by half the square of the difference
-        charge = charge + 0.5 * (self.T0[:, 0] - self.T0[:, 1]) ** 2 * coupling_function(self.xi, 1) / self.square
+        charge = charge + 0.5 * (self.T0[:, 0] - self.T0[:, 1]) ** 2 * V1 / self.square
         return np.asarray(self.carried(order)[:, 0, 0] + 1j * self.k * charge)
 
-    def _charge(self, V: ComplexArray) -> ComplexArray:
-        """What the bracket adds to V (m,), to second order."""
-        weight = smoothstep(self.xi, *SECOND_ORDER)
-        early, late = np.flatnonzero(weight < 1), np.flatnonzero(weight > 0)
-        change = np.zeros_like(V)
-        change[early] = (1 - weight[early]) * self._early_charge(early, V[early])
-        for some, count in ((late[self.xi[late] <= DEEP], MODES), (late[self.xi[late] > DEEP], FEW)):
-            change[some] += weight[some] * self._late_charge(some, count)
-        return change
-
     def _early_charge(self, some: IntArray, V: ComplexArray) -> ComplexArray:
+        """What the bracket adds to V, under the integral."""
         hard = self.hard
         xi, M, near, E, H, L, P = (of[some] for of in (self.xi, self.square, self.near, hard.E, hard.H, hard.L, hard.P))
         V1, V2, V3 = (coupling_function(xi, power) for power in (1, 2, 3))
@@ -62,6 +52,7 @@ class MonopoleTerms(SlotTerms):
         return np.asarray(turned / M + a * V2 / M**2 + r * V)
 
     def _late_charge(self, some: IntArray, count: int) -> ComplexArray:
+        """What it adds, by so many modes."""
         xi, root, E = self.xi[some], np.sqrt(np.pi * self.xi[some]), self.hard.E[some]
         tau, small = hard_modes(count).tau, 1 / self.square[some, None]
         a = 0.25 * small**2 + (E / xi)[:, None] * small

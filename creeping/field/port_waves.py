@@ -21,6 +21,8 @@ mean of both ends, the next term of the transport along the body.
 Sources: [PW81] for leading order; Derivations, F25.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
@@ -34,6 +36,25 @@ LIMIT = 0.5
 """Bound of what second order adds at small ξ, and along the body, as a share of the wave."""
 DEEP, FEW = 2.5, 4
 """ξ beyond which so few modes do, to 1e-6."""
+
+
+def second_order(
+    xi: FloatArray,
+    plain: ComplexArray,
+    early: Callable[[IntArray, ComplexArray], ComplexArray],
+    late: Callable[[IntArray, int], ComplexArray],
+) -> ComplexArray:
+    """What second order adds (m,) to ``plain``: early under the integral at small ξ, late by so many modes beyond.
+
+    ``early(rows, plain)`` and ``late(rows, count)`` are asked for the rows that each serves, and blended.
+    """
+    weight = smoothstep(xi, *SECOND_ORDER)
+    before, beyond = np.flatnonzero(weight < 1), np.flatnonzero(weight > 0)
+    change = np.zeros_like(plain)
+    change[before] = (1 - weight[before]) * early(before, plain[before])
+    for some, count in ((beyond[xi[beyond] <= DEEP], MODES), (beyond[xi[beyond] > DEEP], FEW)):
+        change[some] += weight[some] * late(some, count)
+    return change
 
 
 class PathTerms:
@@ -76,19 +97,13 @@ class PathTerms:
         plain = coupling_function(self.xi)
         if order == 1:
             return np.asarray(self.factor * plain)
-        weight = smoothstep(self.xi, *SECOND_ORDER)
-        early, late = np.flatnonzero(weight < 1), np.flatnonzero(weight > 0)
-        change = np.zeros_like(plain)
-        change[early] = (1 - weight[early]) * limited(self._early(early, plain[early]), LIMIT * np.abs(plain[early]))
-        for some, count in ((late[self.xi[late] <= DEEP], MODES), (late[self.xi[late] > DEEP], FEW)):
-            change[some] += weight[some] * self._late(some, count)
-        return np.asarray(self.factor * (plain + change))
+        return np.asarray(self.factor * (plain + second_order(self.xi, plain, self._early, self._late)))
 
     def _early(self, some: IntArray, plain: ComplexArray) -> ComplexArray:
         """What second order adds, under the integral."""
         xi, E, H, L, P = (values[some] for values in (self.xi, self.E, self.H, self.L, self.P))
         total = 1j * E * coupling_function(xi, 2) + L * coupling_function(xi, 1) + 1j * P / xi * plain
-        return np.asarray(total - H / xi * coupling_function(xi, squared=True))
+        return limited(total - H / xi * coupling_function(xi, squared=True), LIMIT * np.abs(plain))
 
     def _late(self, some: IntArray, count: int) -> ComplexArray:
         """What second order adds, by so many modes."""

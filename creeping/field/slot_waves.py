@@ -26,9 +26,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
-from creeping.field.port_waves import DEEP, FEW, LIMIT, PathTerms
-from creeping.field.shed_wave import SECOND_ORDER, limited, smoothstep
-from creeping.field.special.airy import MODES, soft_modes
+from creeping.field.port_waves import LIMIT, PathTerms, second_order
+from creeping.field.shed_wave import limited
+from creeping.field.special.airy import soft_modes
 from creeping.field.special.coupling_function import coupling_function, soft_coupling_function
 from creeping.rays.port_rays import PortRays
 
@@ -106,18 +106,12 @@ class SlotTerms:
         plain = soft_coupling_function(self.xi)
         if order == 1:
             return plain
-        weight = smoothstep(self.xi, *SECOND_ORDER)
-        early, late = np.flatnonzero(weight < 1), np.flatnonzero(weight > 0)
-        change = np.zeros_like(plain)
-        change[early] = (1 - weight[early]) * limited(self._early(early, plain[early]), LIMIT * np.abs(plain[early]))
-        for some, count in ((late[self.xi[late] <= DEEP], MODES), (late[self.xi[late] > DEEP], FEW)):
-            change[some] += weight[some] * self._late(some, count)
-        return np.asarray(plain + change)
+        return np.asarray(plain + second_order(self.xi, plain, self._early, self._late))
 
     def _early(self, some: IntArray, plain: ComplexArray) -> ComplexArray:
         xi, E, L, P = (values[some] for values in (self.xi, self.E, self.L, self.P))
         first, second = (soft_coupling_function(xi, power) for power in (1, 2))
-        return np.asarray(1j * E * second + L * first + 1j * P / xi * plain)
+        return limited(1j * E * second + L * first + 1j * P / xi * plain, LIMIT * np.abs(plain))
 
     def _late(self, some: IntArray, count: int) -> ComplexArray:
         tau = soft_modes(count).tau
