@@ -27,12 +27,13 @@ ALIKE = (1e-2, 1e-1)
 """Distances, in cells, between which lies the one below which two rays that searches found are one."""
 ROUNDS = 10
 FAR, FAR_ON_PIECES = 3.0, 1.5
-"""Cells by which a search may move before it is given up: most of those on bodies with creases go nowhere,"""
-SLOW = 0.95
-"""and are given up where a round does not bring the residual down to this share,"""
-STEP, LEAST_CELL = 2.0, 0.008
-"""First step of Newton's method, in cells, from which on a search there is given up at once: nothing is a cell away.
-Cells of dense fans count as cells of so many body sizes: what is near does not hang on the number of rays."""
+"""Cells by which a search may move before it is given up, as most of those on bodies with creases are."""
+SLOW, IDLE, IDLE_ON_PIECES = 0.95, 3, 1
+"""And rounds in a row that do not bring the residual down to this share: where fans fold finely most go nowhere."""
+STEP, STEP_ON_PIECES, LEAST_CELL = 8.0, 2.0, 0.008
+"""First step of Newton's method, in cells, from which on a search is given up at once: nothing is a cell away. On
+bodies with creases cells of dense fans count as cells of so many body sizes: what is near does not hang on the number
+of rays."""
 LONG, LONG_ON_PIECES = (2, 1), (1,)
 """Steps of the searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
 creases sharp places next to tips and edges make the steps short all over it, and long ones lead astray there."""
@@ -77,8 +78,10 @@ def rays_towards(
         search = _Search(tracer, *rows, long, NEARLY if long == levels[0] else 0.0)
         rays, found = search.result()
         parts.append((rays, missing[found], search.moved[found]))
-        # those that the search gave up, or ended too early
-        missing = np.delete(missing, found)
+        # those that the search ended too early, or that steps so long led astray
+        open_still = search.unsure
+        open_still[found] = False
+        missing = missing[open_still]
     result = SingleRays.joined([part[0] for part in parts])
     found, moved = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     order = np.argsort(found)
@@ -92,6 +95,8 @@ class _Search:
     ----------
     moved : (n,)
         How far along the line each has come, in cells.
+    unsure : (n,)
+        Which have not been given up: their search ended next to a ray, or never did.
     """
 
     def __init__(
@@ -112,8 +117,9 @@ class _Search:
         self.lanes, self.first = np.empty((n, LANES)), np.empty((n, START_LANES))
         self.creased = is_creased(tracer.body)
         self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.creased else cell
-        self.far = FAR_ON_PIECES if self.creased else FAR
-        slow, before = np.zeros(n, dtype=bool), np.full(n, np.inf)
+        limits = (FAR_ON_PIECES, IDLE_ON_PIECES, STEP_ON_PIECES) if self.creased else (FAR, IDLE, STEP)
+        self.far, patience, longest = limits
+        idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
             rows = directions[active], self.starts[active], self.tangents[active], self.times[active]
@@ -121,18 +127,18 @@ class _Search:
             self.lanes[active], self.first[active] = now.lanes, now.starts
             residual = _apart(now, observers[active])
             self.wanted[active] = residual <= max(CLOSE, nearly)
-            if self.creased:
-                slow[active] = ~(residual <= SLOW * before[active])
-                before[active] = np.fmin(residual, before[active])
-            last = active[(residual > CLOSE) & self._within(active) & ~slow[active]]
+            idle[active] = np.where(residual <= SLOW * best[active], 0, idle[active] + 1)
+            best[active] = np.fmin(residual, best[active])
+            last = active[(residual > CLOSE) & self._within(active) & (idle[active] < patience)]
             if not len(last):
                 break
             step = self._step(last)
-            if self.creased and number == 0:
-                last = last[step <= STEP]
-            active = last[~self.wanted[last]]
+            if number == 0:
+                idle[last[step > longest]] = patience
+            active = last[~self.wanted[last] & (idle[last] < patience)]
             if not len(active):
                 break
+        self.unsure = self._within() & (idle < patience)
 
     def result(self) -> tuple[SingleRays, IntArray]:
         """Exact rays that have been found, and their rows."""

@@ -14,6 +14,9 @@ from creeping.shadow.attachment import line_tangents
 
 FINE_TURN = 0.08
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 3e-11."""
+MANY, APART = 512, 4
+"""Steps from which on one in so many is a point: they are as many for the sharpest ground alone, between rays that lie
+farther apart than points so do."""
 
 
 def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray, RayPoints]:
@@ -21,9 +24,9 @@ def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray
 
     Returns
     -------
-    times : (steps,), L
+    times : (m,), L
     points : RayPoints
-        (rays, steps)
+        (rays, m)
 
     Raises
     ------
@@ -31,7 +34,8 @@ def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray
         If the body is weighted.
     """
     tracer = RayTracer(fan.body, fan.length, turn=FINE_TURN)
-    equal: FloatArray = tracer.step * np.arange(tracer.steps + 1, dtype=np.float64)
+    count = tracer.steps if tracer.steps < MANY else -(-tracer.steps // APART)
+    equal: FloatArray = fan.length / count * np.arange(count + 1, dtype=np.float64)
     times = equal if times is None else times
     rays, steps = len(fan.points), len(times)
     starts, wave = fan.points[:, 0], fan.line.wave
