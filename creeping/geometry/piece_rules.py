@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.geometry.creased import tiles_of
 from creeping.geometry.surface import size
 from creeping.geometry.tile_rules import points_for
@@ -48,6 +48,7 @@ class PieceRules:
         # of each number of points the longest sides that may close, those that do, and what longer ones left
         self._rung = dict.fromkeys(POINTS, _rung(LONGEST))
         self._counts: dict[tuple[int, int], int] = {}
+        self._tiles: dict[int, int] = {}
         self._left = dict.fromkeys(POINTS, np.inf)
 
     def rule(self, body: Any, rate: float) -> tuple[int, int, int]:
@@ -58,13 +59,14 @@ class PieceRules:
         while self._rung:
             few = list(self._rung)
             rungs = np.array([min(self._rung[p], _rung(2 * _HALVES[p] / (rate * size(body)))) for p in few])
-            least = self._area / _sides(rungs) ** 2 * SMALLER * np.square(few)
+            least = self._least_tiles(rungs) * np.square(few)
             counts = [self._counts.get((int(r), p), int(n)) for r, p, n in zip(rungs, few, least, strict=True)]
             best = int(np.argmin(counts))
             rung, points, count = int(rungs[best]), few[best], counts[best]
             if count > MOST_NODES or (rung, points) in self._counts:
                 return rung, points, count
             nodes = self.nodes(body, rung, points)
+            self._tiles[rung] = len(nodes.points) // points**2
             error, same = nodes.error, nodes.error > LESS * self._left[points]
             if error <= CLOSED or (error <= OPEN and same):
                 # more than their sides tell, where the body bends
@@ -74,6 +76,16 @@ class PieceRules:
             else:
                 self._rung[points], self._left[points] = rung - RUNGS, error
         return 0, 0, MOST_NODES + 1
+
+    def _least_tiles(self, rungs: IntArray) -> FloatArray:
+        """Triangles that there are at least: for the area, and where others were counted, by their number.
+
+        A body of many small pieces has as many as they, however long sides may be.
+        """
+        least = self._area / _sides(rungs) ** 2 * SMALLER
+        for rung, count in self._tiles.items():
+            least = np.maximum(least, count * np.minimum(1.0, (_sides(rung) / _sides(rungs)) ** 2))
+        return np.asarray(least)
 
     def nodes(self, body: Any, rung: int, points: int) -> Any:
         """Nodes of a rule, kept; the last one used stands last."""
