@@ -8,7 +8,7 @@ points and ahead, and n.d has no jump at the shadow line, where the current of a
 
 Each tile is a flat triangle, over which the phase is linear: with phases u and v of two corners relative to the third,
 
-    ∫ e^{iφ} dS = 2A e^{iφ0} (g(u) - g(v))/(i(u - v)),    g(x) = (e^{ix} - 1)/(ix).
+    ∫ e^{iφ} dS = 2A e^{iφ0} (g(u) - g(v))/(i(u - v)),    g(x) = (e^{ix} - 1)/(ix)    (`kernels.triangle_waves`).
 
 The same integral serves a specular point, a flat facet as a whole, the rim of a facet and the forward lobe. Its error
 on curved ground is of the next order, κ/(k cos³θᵢ) of each tile's contribution.
@@ -27,6 +27,7 @@ from creeping.field.reflected import plane_reflection
 from creeping.geometry.creased import Tiles, is_convex, pieces_of, tiles_of
 from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.surface import size
+from creeping.kernels.threads import in_threads
 from creeping.shadow.occlusion import occluded
 from creeping.storage.memory import within_budget
 
@@ -40,12 +41,10 @@ USUAL = 0.95
 """Share of the area whose curvature the sides go by: next to a tip it is without bound."""
 OUTWARD = 1e-6
 """Distance from the body, in its sizes, at which a tile is asked whether the wave comes to it."""
-BLOCK = 2_000_000
-"""Directions times tiles at once."""
+EACH, SHARES = 3e-8, {"least": 8, "multiple": 4}
+"""Seconds that a tile takes in one direction, and how directions are shared among threads."""
 FLAT = 1e-6
 """Curvature, in inverse sizes, below which a tile is flat."""
-NEAR = 0.2
-"""Difference of phases below which the integral is its series."""
 
 
 class LitTiles(NamedTuple):
@@ -142,41 +141,19 @@ def phase_sums(corners: FloatArray, vectors: FloatArray, wavenumber: float, weig
     >>> bool(abs(found - (np.exp(6j) - 1) / 6j) < 1e-14)
     True
     """
-    out = np.zeros((len(vectors), weights.shape[1]), dtype=complex)
+    from creeping.field.kernels.triangle_waves import triangle_waves
+
+    corners = np.ascontiguousarray(corners)
     a, b, c = np.moveaxis(corners, 1, 0)
-    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    block = max(1, BLOCK // max(len(corners), 1))
-    for first in range(0, len(vectors), block):
-        some = slice(first, first + block)
-        phases = wavenumber * np.einsum("tkc,mc->kmt", corners, vectors[some])
-        out[some] = _simplex(phases) @ (doubled[:, None] * weights)
-    return out
-
-
-def _simplex(phases: FloatArray) -> ComplexArray:
-    """Integral of e^{iφ} over the unit simplex from phases at its corners (3, ...): (...)."""
-    # the corner opposite to the side with the largest difference: only where all are small do differences cancel
-    gaps = np.abs(phases - np.roll(phases, -1, axis=0))
-    opposite = (np.argmax(gaps, axis=0) + 2) % 3
-    base, one, two = (np.take_along_axis(phases, (opposite[None] + k) % 3, axis=0)[0] for k in range(3))
-    u, v = one - base, two - base
-    near = np.abs(u - v) < NEAR
-    apart = np.where(near, 1.0, u - v)
-    found = (_ramp(u) - _ramp(v)) / (1j * apart)
-    x, y = np.where(near, u, 0.0), np.where(near, v, 0.0)
-    total, power = np.zeros(found.shape, dtype=complex), np.ones(found.shape)
-    factor: complex = 0.5
-    for order in range(1, 9):
-        total += factor * power
-        # complete homogeneous polynomials of u and v over (order + 2)!
-        power = power * x + y**order
-        factor *= 1j / (order + 2)
-    return np.asarray(np.exp(1j * base) * np.where(near, total, found))
-
-
-def _ramp(x: FloatArray) -> ComplexArray:
-    """g(x), exact at 0."""
-    return np.asarray(np.exp(0.5j * x) * np.sinc(x / (2 * np.pi)))
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)[:, None]
+    # the kernel knows no complex weights
+    columns = np.ascontiguousarray(doubled * np.concatenate([weights.real, weights.imag], axis=1))
+    q, out = wavenumber * vectors, np.empty((len(vectors), 2, columns.shape[1]))
+    seconds = EACH * len(corners)
+    in_threads(lambda part: triangle_waves(corners, q[part], columns, out[part]), len(q), seconds=seconds, **SHARES)
+    sums = out[:, 0] + 1j * out[:, 1]
+    width = weights.shape[1]
+    return np.asarray(sums[:, :width] + 1j * sums[:, width:])
 
 
 class OpticsField(NamedTuple):
