@@ -1,0 +1,129 @@
+"""How far do the files of a folder come? Each to a far field, by the options that its refusals name.
+
+A file is opened without options; where it is refused and the refusal names an option that decides nothing for its user
+(`OPTIONS`), it is opened again with that. Then a fan and the far field of a hard body ten wavelengths across, in four
+directions, in a process of its own. One row a file: options, seconds of the processor for body, fan and field, what is
+lost at edges and tips, the largest field and the error of it, how many directions are unresolved, or the refusal.
+
+Run ``python -m studies.real_files FOLDER`` (a minute a file); no time limit but ``--limit`` seconds of the processor.
+"""
+
+import argparse
+import json
+import re
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import creeping as cr
+import scatterers as sc
+from creeping._typing import Any
+
+CAD, MESHES = (".step", ".stp", ".brep", ".iges", ".igs"), (".obj", ".off", ".ply", ".stl")
+OPTIONS: dict[str, Any] = {
+    "part": "largest",
+    "cap": 1e9,
+    "subdivide": "auto",
+    "union": True,
+    "sew": 1e-3,
+    "units": "m",
+}
+"""What is taken of an option that a refusal names, in this order."""
+ACROSS = 10.0
+"""Wavelengths across a body."""
+INCIDENT = (1.0, 0.4, 0.7)
+SEEN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.8, 0.0))
+
+Row = dict[str, Any]
+
+
+def far_field_of(path: Path, options: dict[str, Any]) -> Row:
+    """Row of a file that comes as far as a far field, or of its refusal."""
+    row: Row = {"file": path.name, "options": options, "stage": "body"}
+    began = time.process_time()
+    try:
+        body: Any = (sc.Cad if path.suffix.lower() in CAD else sc.Mesh)(path, cache=False, **options)
+        row |= {"body, s": time.process_time() - began, "stage": "fan"}
+        k = 2 * np.pi * ACROSS / float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
+        fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, INCIDENT), wavenumber=k)
+        losses = fan.losses()
+        row |= {"fan, s": time.process_time() - began, "stage": "field", "rays": len(fan.points)}
+        row["lost"] = None if losses is None else [float(share) for share in losses]
+        far = cr.far_field(fan, SEEN, wavenumber=k, boundary="hard")
+    except (ValueError, RuntimeError, MemoryError) as error:
+        return row | {"refusal": f"{type(error).__name__}: {error}"}
+    largest = int(np.argmax(np.abs(far.total)))
+    return row | {
+        "stage": "done",
+        "all, s": time.process_time() - began,
+        "method": str(far.method[0]),
+        "field": float(np.abs(far.total[largest])),
+        "error": float(far.error[largest]),
+        "unresolved": int(np.sum(far.unresolved)),
+    }
+
+
+def named_option(refusal: str, given: dict[str, Any]) -> dict[str, Any]:
+    """The options given, and the first that a refusal names beside them."""
+    for name, value in OPTIONS.items():
+        if name not in given and re.search(rf"\b{name}\b ?=|\b{name}\b in ", refusal):
+            return given | {name: value}
+    return given
+
+
+def followed(path: Path, limit: float) -> list[Row]:
+    """Rows of a file: one for each option that it was opened with, the last one where it comes to."""
+    rows: list[Row] = []
+    options: dict[str, Any] = {}
+    while True:
+        rows.append(_in_process(path, options, limit))
+        more = named_option(rows[-1].get("refusal", ""), options)
+        if more == options:
+            return rows
+        options = more
+
+
+def _in_process(path: Path, options: dict[str, Any], limit: float) -> Row:
+    command = [sys.executable, "-m", "studies.real_files", str(path), "--options", json.dumps(options)]
+    ended = subprocess.run([*command, "--limit", str(limit)], capture_output=True, text=True, check=False)
+    lines = [line for line in ended.stdout.splitlines() if line.startswith("{")]
+    if lines:
+        row: Row = json.loads(lines[-1])
+        return row
+    return {"file": path.name, "options": options, "stage": f"ended by {ended.returncode}"}
+
+
+def told(row: Row) -> str:
+    """A row as a line."""
+    parts = [f"{row['file']:36} {row['options']!s:28} {row['stage']:6}"]
+    parts += [f"{name} {row[name]:.1f}" for name in ("body, s", "fan, s", "all, s") if name in row]
+    if row["stage"] == "done":
+        parts.append(f"{row['method']}: |f| {row['field']:.3g}, error {row['error']:.2g}")
+        parts.append(f"{row['unresolved']} of {len(SEEN)} unresolved")
+    return "  ".join([*parts, row.get("refusal", "")])
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Print a line for each file, or with options the row of one."""
+    parser = argparse.ArgumentParser(prog="python -m studies.real_files", description=__doc__.splitlines()[0])
+    parser.add_argument("where", type=Path, help="a folder, or a file")
+    parser.add_argument("--options", type=json.loads, help="of that file, as JSON: nothing else is tried")
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds of the processor for each file")
+    given = parser.parse_args(arguments)
+    if given.options is not None:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(given.limit), int(given.limit) + 5))
+        print(json.dumps(far_field_of(given.where, given.options)))
+        return
+    files = sorted(given.where.iterdir()) if given.where.is_dir() else [given.where]
+    for path in files:
+        if path.suffix.lower() in (*CAD, *MESHES):
+            for row in followed(path, given.limit):
+                print(told(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()
