@@ -97,6 +97,7 @@ class SlotTerms:
         root = np.cbrt(wavenumber / 2)
         with np.errstate(divide="ignore", invalid="ignore"):
             self.T0, self.near = torsion / curvature, 0.5 / (self.xi * self.square)
+            self.uneven = np.cbrt(curvature / curvature[:, ::-1])
             ends = np.mean((1 + self.T0**2) / 6 - bend / 9, axis=1) / self.square
             self.L = 2 * root * integrals[:, 3] / (wavenumber * arclength) + ends
             self.P = 3.75 * self.E / self.xi - 1.5 * self.L
