@@ -48,7 +48,7 @@ def antenna_coupling(
     E along n at a monopole. With electric moments and H times the impedance of free space all values are of one kind,
     1/L^2: those of slots alone and of monopoles alone are those of the functions named, and what a monopole gives a
     slot is H of a unit I h, what a slot gives a monopole E of a unit V dl. On a plane the latter is
-    -2 ik (1 + i/kr) e^{ikr}/(4 pi r) for a slot across the path, along n x (direction of the path), and 0 for one along.
+    -2 ik (1 + i/kr) e^{ikr}/(4 pi r) for a slot along n x (direction of the path), across it, and 0 for one along it.
 
     The matrix is not symmetric: by reciprocity H at slot i of monopole j is minus E at monopole j of slot i, as hybrid
     parameters have it. Currents of slots and voltages of monopoles that receive come from voltages of slots and

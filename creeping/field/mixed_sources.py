@@ -22,14 +22,20 @@ def mixed_sources(rays: PortRays, axes: FloatArray, k: float, order: int) -> Por
 
 
 class MixedBeams(SlotBeams):
-    """Beams of a slot along an axis (3,), a unit tangent at its port; their field is E_n (n, 1), 1/L^2."""
+    """Beams of a slot along an axis (3,), a unit tangent at its port; their field (n, 2), 1/L^2, is E_n.
+
+    And that of a slot across, which tells what is the most that one could give.
+    """
 
     def received(self, fields: ComplexArray, axes: FloatArray) -> ComplexArray:
-        """E_n (n,), whatever the axes."""
+        """E_n of the slot itself (n,), whatever the axes."""
         return fields[:, 0]
 
-    def _carry(self, along: ComplexArray) -> None:
-        self.carried, self.leaning = np.ascontiguousarray(along), np.zeros_like(along)
+    def _carry(self, components: ComplexArray, start: FloatArray) -> None:
+        # b and p in terms of the axis, and of n x axis
+        both = np.stack([start, start[:, ::-1] * (1, -1)])
+        self.carried = np.ascontiguousarray(np.einsum("rsc,arc->rsa", components[:, :, 0], both))
+        self.leaning = np.zeros_like(self.carried)
 
     def _of_paths(self, path: tuple[Any, ...], order: int) -> tuple[PathTerms, ComplexArray]:
         terms = MixedTerms(*path)

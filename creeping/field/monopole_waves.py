@@ -7,11 +7,11 @@ Per unit of the moment and times the admittance of free space, with the letters 
 V to second order, of "electric hard" waves: what a slot across the path gives along b, H_b, and the charge at the foot,
 E_n = (i/k) (curl H)_n. The bracket stands under the integral of V, with all that it has there,
 
-    t/M + a t²/M²,   a = 1/4 + E M/ξ,
-    V_1/M + iE V_3/M + L V_2/M + i(P/ξ) V_1/M - iH V/M + a V_2/M² + r V,
-    r = (1 - 3a) (i/(2 ξ M))² - (3 E/ξ - L)/(2 ξ² M),   which leaves 1 + i/ks + (i/ks)² on a plane, 2 ξ M = ks
+    p t/M + a t²/M²,   a = q + p E M/ξ,   p = 1, q = 1/4,
+    p [V_1 + iE V_3 + L V_2 + i(P/ξ) V_1 - iH V]/M + a V_2/M² + r V,
+    r = (4q - 3a) (i/(2 ξ M))² - p (3 E/ξ - L)/(2 ξ² M),   which leaves 1 + i/ks + (i/ks)² on a plane, 2 ξ M = ks
 
-and in modes as a factor g = 1 + τ/M + a τ²/M² of [1 + L τ + (H/ξ)/τ² + iP/ξ], less (H/ξ) g'/τ, since R² has a double
+and in modes as a factor g = 1 + p τ/M + a τ²/M² of [1 + L τ + (H/ξ)/τ² + iP/ξ], less (H/ξ) g'/τ, since R² has a double
 pole: t R² = 1 - R', so that under the integral it is iξ V.
 
 Sources: [PW81] for leading order; Derivations, F33.
@@ -21,7 +21,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.port_waves import second_order
-from creeping.field.slot_waves import SlotTerms, geodesic_waves
+from creeping.field.slot_waves import SlotTerms, geodesic_waves, paths_of
 from creeping.field.special.airy import hard_modes
 from creeping.field.special.coupling_function import coupling_function
 from creeping.rays.port_rays import PortRays
@@ -34,7 +34,8 @@ class MonopoleTerms(SlotTerms):
         """E_n without w (m,), 1/L."""
         V1 = coupling_function(self.xi, 1)
         # a slot has T0s T0r at V_1; the mean of squares is more than that by half the square of the difference
-        charge = self.bracket(order, 0.5 * np.sum(self.uneven, axis=1), 0.25) + 0.5 * (self.T0[:, 0] - self.T0[:, 1]) ** 2 * V1 / self.square
+        charge = 0.5 * (self.T0[:, 0] - self.T0[:, 1]) ** 2 * V1 / self.square
+        charge = charge + self.bracket(order, np.ones_like(self.xi), 0.25)
         return np.asarray(self.carried(order)[:, 0, 0] + 1j * self.k * charge)
 
     def bracket(self, order: int, first: FloatArray, rest: float) -> ComplexArray:
@@ -77,7 +78,7 @@ class MonopoleTerms(SlotTerms):
 
 def monopole_waves(rays: PortRays, wavenumber: float, order: int) -> ComplexArray:
     """E_n of all geodesics (m,), 1/L^2; infinite on caustics."""
-    terms = MonopoleTerms(wavenumber, rays.arclength, rays.curvature, rays.torsion, rays.bend, rays.integrals)
+    terms = MonopoleTerms(*paths_of(rays, wavenumber))
     w, _ = geodesic_waves(rays, terms, wavenumber, order)
     with np.errstate(invalid="ignore"):
         return np.asarray(w * terms.upright(order))

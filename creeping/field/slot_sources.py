@@ -76,15 +76,16 @@ class SlotBeams(PortBeams):
         shape = len(p), len(self.known), *self._components.shape[1:]
         components = CubicSpline(self.known, self._components.reshape(shape), axis=1)(self.at)
         start = np.stack([b[:, 0], p[:, 0]], axis=1) @ axis
-        self._carry(np.einsum("rsac,rc->rsa", components, start))
+        self._carry(components, start)
 
     def received(self, fields: ComplexArray, axes: FloatArray) -> ComplexArray:
         """Fields of `sums` along axes (n, 3): (n,)."""
         return np.asarray(np.einsum("nc,nc->n", fields, axes))
 
-    def _carry(self, along: ComplexArray) -> None:
-        """Take components along b and p (rays, steps, 2)."""
+    def _carry(self, components: ComplexArray, start: FloatArray) -> None:
+        """Take what is carried (rays, steps, components, 2) of the axis, along b and p at its port (rays, 2)."""
         _, p, b = self.rays[:3]
+        along = np.einsum("rsac,rc->rsa", components, start)
         side, front = along[..., :1], along[..., 1:]
         self.carried = np.ascontiguousarray(side * b + front * p)
         self.leaning = np.ascontiguousarray((front * b - side * p) / self.turned[..., None])
