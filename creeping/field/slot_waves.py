@@ -12,7 +12,7 @@ V, T0 = T/kappa_n at source (s) and receiver (r), M = m1 m2 and c = J2'/J2, the 
     g = (1/(2 xi M)) w [U - (U_1 - 3iU/(2 xi))/(2M) + (i/2k) (c - 1/s) U]
 
 X with T0, K0 and m of one end, A_b the change of A with that end's place along b. V and the first U of S and g to
-second order, that of "electric hard" and "electric soft" waves: V with H less (1/2) (2/k)^(1/3) int kappa_n^(-2/3) K ds,
+second order, that of "electric hard" and "electric soft" waves: V with H less (1/2) (2/k)^(1/3) int kappa^(-2/3) K ds,
 K the Gaussian curvature, and U, under its integral and in its modes, with
 
     i E t^2 + L t + i P/xi,          exp{i E tau^2} [1 + L tau + i P/xi],       P = (15/4) E/xi - (3/2) L
