@@ -7,6 +7,7 @@ from .errors import SingularIncidenceError as SingularIncidenceError
 from .errors import StoredMapError as StoredMapError
 from .errors import SurfaceError as SurfaceError
 from .errors import ToleranceError as ToleranceError
+from .field.antennas import antenna_coupling as antenna_coupling
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
 from .field.comparison import Comparison as Comparison
 from .field.comparison import compare as compare

@@ -1,6 +1,6 @@
 """What the coupling of ports is: a matrix of complex values with their error, and the geodesics that gave them.
 
-Sources: Derivations, F25 and F28.
+Sources: Derivations, F25, F28 and F34.
 """
 
 # help() shows names of types instead of what they stand for
@@ -25,6 +25,15 @@ if TYPE_CHECKING:
     import xarray
 
     from creeping.rays.port_rays import PortRays
+
+
+MEANINGS = {
+    "point": "u of a unit source e^{ikr}/(4 pi r)",
+    "slot": "H of a unit magnetic dipole, times the impedance of free space",
+    "monopole": "E of a unit electric dipole, times the admittance of free space",
+    "monopoleslot": "H along slots and E along n at monopoles, in free space of one size, of unit dipoles",
+}
+"""What values are, by the kinds of ports."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +82,15 @@ class Coupling(ArrayResult, Drawn):
     """Fields between ports on a body, at port j of a unit source at port i; acts as their matrix.
 
     Of `coupling` u of e^{ikr}/(4 pi r); of `slot_coupling` H along slot j of a dipole along slot i; of
-    `monopole_coupling` E along the normal.
+    `monopole_coupling` E along the normal; of `antenna_coupling` what port j of both kinds receives so.
 
     Attributes
     ----------
     body : Surface
     ports, normals : (n, 3), L and 1
     values : (n, n) complex, 1/L, or 1/L^2 on a conductor
-        Symmetric; infinite on the diagonal, where source and receiver are one.
+        Infinite on the diagonal, where source and receiver are one. Symmetric, but for slots and monopoles, where one
+        way has the opposite of the other.
     error : (n, n)
         Of the values, meant to hold for 95 of 100 whose status is OK; at others a bound.
     status : (n, n) of int
@@ -94,8 +104,10 @@ class Coupling(ArrayResult, Drawn):
         Up to which geodesics were followed.
     length_unit : str
         "m" where the body knows it, else "L".
+    kinds : (n,) of str
+        "point", "slot" or "monopole".
     axes : (n, 3) or None
-        Unit tangents along the slots; None of `coupling` and `monopole_coupling`.
+        Unit tangents along the slots, and normals of monopoles beside them; None of `coupling` and `monopole_coupling`.
 
     Examples
     --------
@@ -121,6 +133,7 @@ class Coupling(ArrayResult, Drawn):
     order: int
     length: float
     length_unit: str
+    kinds: np.ndarray[Any, np.dtype[np.str_]]
     axes: FloatArray | None
     _rays: PortRays
     _waves: ComplexArray
@@ -163,6 +176,8 @@ class Coupling(ArrayResult, Drawn):
         departure, arrival = rays.directions[mine, 0], rays.directions[mine, 1]
         if source > receiver:
             departure, arrival = -arrival, -departure
+        # what a monopole gives a slot is the opposite of what that gives it
+        sign = -1 if source > receiver and self.kinds[one] != self.kinds[other] else 1
         return CouplingPaths(
             arclength=rays.arclength[mine],
             departure=departure,
@@ -170,17 +185,14 @@ class Coupling(ArrayResult, Drawn):
             spreading=rays.spreading[mine],
             fock_parameter=np.cbrt(self.wavenumber / 2) * rays.integrals[mine, 0],
             caustics=rays.caustics[mine],
-            wave=self._waves[mine],
+            wave=sign * self._waves[mine],
         )
 
     @property
     def _kind(self) -> tuple[str, str]:
         """Unit of the values, and what they are."""
-        if self.boundary != "pec":
-            return power(self.length_unit, -1), "u of a unit source e^{ikr}/(4 pi r)"
-        if self.axes is None:
-            return power(self.length_unit, -2), "E of a unit electric dipole, times the admittance of free space"
-        return power(self.length_unit, -2), "H of a unit magnetic dipole, times the impedance of free space"
+        kinds = sorted(set(self.kinds.tolist()))
+        return power(self.length_unit, -1 if kinds == ["point"] else -2), MEANINGS["".join(kinds)]
 
     def to_xarray(self) -> xarray.Dataset:
         """Values, error, status and method with names, by source and receiver: an ``xarray.Dataset``."""
@@ -200,6 +212,9 @@ class Coupling(ArrayResult, Drawn):
         }
         if self.axes is not None:
             variables["slot"] = (("source", "axis"), self.axes, {"long_name": "unit tangent along the slot"})
+        if len(set(self.kinds.tolist())) > 1:
+            variables["moment"] = (*variables.pop("slot")[:2], {"long_name": "unit vector along the moment"})
+            coordinates |= {f"{name}_kind": ((name,), self.kinds) for name in dims}
         words = {"boundary": self.boundary, "order": self.order, "conventions": "time factor exp(-i omega t)"}
         found: xarray.Dataset = library.Dataset(variables, coordinates, words)
         return found
@@ -208,7 +223,7 @@ class Coupling(ArrayResult, Drawn):
         """The same as a ``pandas.DataFrame``, one row an entry."""
         return (
             self.to_xarray()
-            .drop_vars(["port", "slot"], errors="ignore")
+            .drop_vars(["port", "slot", "moment"], errors="ignore")
             .drop_dims("axis", errors="ignore")
             .to_dataframe()
         )

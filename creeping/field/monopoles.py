@@ -21,10 +21,11 @@ from creeping.field.coupling_result import Coupling
 from creeping.field.monopole_waves import MonopoleTerms, monopole_waves
 from creeping.field.port_beams import PortBeams
 from creeping.field.port_coupling import coupled, port_geodesics
-from creeping.field.port_sources import scalar_sources
+from creeping.field.port_sources import PortSources, scalar_sources
 from creeping.field.port_waves import path_terms
 from creeping.geometry.arguments import checked_body
 from creeping.geometry.surface import Surface
+from creeping.rays.port_rays import PortRays
 from creeping.rays.reach import AUTO
 
 
@@ -82,9 +83,13 @@ def monopole_coupling(
     checked_plain(body, smooth="the coupling of monopoles")
     k = checked(wavenumber, order)
     rays = port_geodesics(body, ports, k, length)
+    return coupled(rays, monopole_sources(rays, k, order), k, "pec", order, "monopole")
+
+
+def monopole_sources(rays: PortRays, k: float, order: int) -> PortSources:
+    """Waves of monopoles, 1/L^2."""
     waves = partial(monopole_waves, rays, k)
-    sources = scalar_sources(rays, path_terms(rays, k), k, order, waves, MonopoleBeams, k)
-    return coupled(rays, sources, k, "pec", order)
+    return scalar_sources(rays, path_terms(rays, k), k, order, waves, MonopoleBeams, k)
 
 
 class MonopoleBeams(PortBeams):

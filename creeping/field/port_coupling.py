@@ -19,7 +19,8 @@ from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundari
 from creeping.field.coupling_result import Coupling
 from creeping.field.point_result import FieldStatus
 from creeping.field.port_sources import PortSources, point_sources
-from creeping.field.port_sums import port_sums
+from creeping.field.port_sums import PortSums, port_sums
+from creeping.field.served import Words
 from creeping.field.special.airy import hard_modes
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geodesics.equations import points_of_charts
@@ -102,7 +103,7 @@ def checked_wave(body: Surface, wavenumber: float, boundary: BoundaryLike, order
     if scalar_boundaries(boundary)[0].kind != "hard" or boundary == "pec":
         raise InvalidInputError(
             f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard', or use "
-            "slot_coupling or monopole_coupling for slots in and monopoles on a conductor"
+            "slot_coupling, monopole_coupling or antenna_coupling for slots in and monopoles on a conductor"
         )
     return k
 
@@ -146,13 +147,28 @@ def fan_length(body: Surface, k: float, length: float | Literal["auto"]) -> floa
 
 
 def coupled(
-    rays: PortRays, sources: PortSources, k: float, boundary: str, order: int, axes: FloatArray | None = None
+    rays: PortRays,
+    sources: PortSources,
+    k: float,
+    boundary: str,
+    order: int,
+    kind: str = "point",
+    axes: FloatArray | None = None,
 ) -> Coupling:
-    """The matrix, symmetric, with what has no meaning on its diagonal."""
-    found, n = port_sums(rays, sources, k), len(rays.ports)
+    """The matrix of ports of one kind, symmetric."""
+    return matrix_of(rays, port_sums(rays, sources, k), k, boundary, order, np.full(len(rays.ports), kind), axes)
 
-    def square(upper: Any, diagonal: Any) -> Any:
-        out = np.where(np.triu(np.ones((n, n), dtype=bool)), upper, upper.T)
+
+def matrix_of(
+    rays: PortRays, found: PortSums, k: float, boundary: str, order: int, kinds: Words, axes: FloatArray | None
+) -> Coupling:
+    """The matrix, with what has no meaning on its diagonal; ports of two kinds have the opposite the other way."""
+    n = len(rays.ports)
+    values = found.values
+    back = np.where(kinds[:, None] == kinds, values.T, -values.T)
+
+    def square(upper: Any, lower: Any, diagonal: Any) -> Any:
+        out = np.where(np.triu(np.ones((n, n), dtype=bool)), upper, lower)
         np.fill_diagonal(out, diagonal)
         return out
 
@@ -160,15 +176,16 @@ def coupled(
         body=rays.body,
         ports=rays.ports,
         normals=rays.normals,
-        values=square(found.values, np.inf),
-        error=square(found.error, np.inf),
-        status=square(found.status, int(FieldStatus.CAUSTIC)),
-        method=square(found.method, "none"),
+        values=square(values, back, np.inf),
+        error=square(found.error, found.error.T, np.inf),
+        status=square(found.status, found.status.T, int(FieldStatus.CAUSTIC)),
+        method=square(found.method, found.method.T, "none"),
         wavenumber=k,
         boundary=boundary,
         order=order,
         length=rays.length,
         length_unit=unit_of(rays.body),
+        kinds=kinds,
         axes=axes,
         _rays=rays,
         _waves=found.waves,

@@ -8,21 +8,30 @@ Error: that of a point source's wave, of all components, and what was not derive
 Sources: [P82]; Derivations, F24 and F28.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.port_beams import PortBeams
 from creeping.field.port_sources import PortSources, Sums, path_error
-from creeping.field.port_waves import path_terms
-from creeping.field.slot_waves import SlotTerms, slot_waves
+from creeping.field.port_waves import PathTerms, path_terms
+from creeping.field.slot_waves import SlotTerms, SlotWaves, slot_waves
 from creeping.geometry.surface import Surface
 from creeping.rays.port_rays import PortRays
 
 
-def slot_sources(rays: PortRays, axes: FloatArray, k: float, order: int) -> PortSources:
-    """Waves of slots along unit tangents (n, 3) at their ports, 1/L^2."""
+def slot_sources(
+    rays: PortRays,
+    axes: FloatArray,
+    k: float,
+    order: int,
+    waves_of: Callable[[PortRays, float, int], SlotWaves] = slot_waves,
+    kind: type["SlotBeams"] | None = None,
+) -> PortSources:
+    """Waves of slots along unit tangents (n, 3) at their ports, 1/L^2, and beams of a kind, by default `SlotBeams`."""
     terms = path_terms(rays, k)
-    made = slot_waves(rays, k, order)
+    made = waves_of(rays, k, order)
     source, receiver = axes[rays.first], axes[rays.second]
     waves = made.along(source, receiver)
     with np.errstate(invalid="ignore"):
@@ -30,16 +39,16 @@ def slot_sources(rays: PortRays, axes: FloatArray, k: float, order: int) -> Port
         strength, missing = made.bounds(source, receiver)
         own = strength * path_error(rays, terms, k) + missing
         if order == 1:
-            own = own + np.abs(slot_waves(rays, k, 2).along(source, receiver) - waves)
+            own = own + np.abs(waves_of(rays, k, 2).along(source, receiver) - waves)
     own = np.where(np.isfinite(sizes), own, 0.0)
 
     def beams(number: int) -> Sums:
         place = rays.body, rays.ports[number], rays.normals[number], axes[number], rays.length
-        made = SlotBeams(*place, k, order)
+        made = (kind or SlotBeams)(*place, k, order)
 
         def sums(targets: IntArray, beyond: float) -> tuple[ComplexArray, ComplexArray, FloatArray]:
             both = made.sums(rays.ports[targets], beyond)
-            found, again = (np.einsum("nc,nc->n", field, axes[targets]) for field in both)
+            found, again = (made.received(field, axes[targets]) for field in both)
             return found, again, np.linalg.norm(both[0], axis=1)
 
         return sums
@@ -64,18 +73,32 @@ class SlotBeams(PortBeams):
         from scipy.interpolate import CubicSpline
 
         _, p, b = self.rays[:3]
-        shape = len(p), len(self.known), 2, 2
+        shape = len(p), len(self.known), *self._components.shape[1:]
         components = CubicSpline(self.known, self._components.reshape(shape), axis=1)(self.at)
         start = np.stack([b[:, 0], p[:, 0]], axis=1) @ axis
+        self._carry(components, start)
+
+    def received(self, fields: ComplexArray, axes: FloatArray) -> ComplexArray:
+        """Fields of `sums` along axes (n, 3): (n,)."""
+        return np.asarray(np.einsum("nc,nc->n", fields, axes))
+
+    def _carry(self, components: ComplexArray, start: FloatArray) -> None:
+        """Take what is carried (rays, steps, components, 2) of the axis, along b and p at its port (rays, 2)."""
+        _, p, b = self.rays[:3]
         along = np.einsum("rsac,rc->rsa", components, start)
         side, front = along[..., :1], along[..., 1:]
         self.carried = np.ascontiguousarray(side * b + front * p)
         self.leaning = np.ascontiguousarray((front * b - side * p) / self.turned[..., None])
 
     def _wave(self, path: tuple[Any, ...], order: int) -> ComplexArray:
-        terms = SlotTerms(*path)
-        y = terms.hard.wave(order)
+        hard, components = self._of_paths(path, order)
+        y = hard.wave(order)
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = terms.carried(order) * (terms.hard.factor / y)[:, None, None]
+            ratio = components * (hard.factor / y)[:, None, None]
         self._components = np.where(np.isfinite(ratio), ratio, 0.0)
         return y
+
+    def _of_paths(self, path: tuple[Any, ...], order: int) -> tuple[PathTerms, ComplexArray]:
+        """The hard wave's terms, and what is carried of moments along b and p (m, components, 2)."""
+        terms = SlotTerms(*path)
+        return terms.hard, terms.carried(order)

@@ -1,17 +1,19 @@
 """The field of each geodesic between two slots in a conductor: its components along b and t at both ends.
 
 Per unit of the moment and times the impedance of free space, with w the wave of `creeping.field.port_waves` without its
-V, T0 = T/kappa_n at source (s) and receiver (r), M = m1 m2 and c = J2'/J2, the mean of both ends,
+V, T0 = T/kappa_n at source (s) and receiver (r), M = m1 m2 and c = J2'/J2, the mean of both ends, A as there,
 
     H_b from b   ik [w V + T0s T0r w V_1/M] - i c f - (i/J2) g + T0s T0r S0
     H_t from t   S + i c g + (i/J2) f
-    H_b from t   T0r S0 + T0s X,       H_t from b   T0s S0 + T0r X,       X = ik w [V_1/(3M) + iV/(3 xi M)]
+    H_b from t   T0r S0 + X_s,         H_t from b   T0s S0 + X_r
+    X = ik w [(T0 - K0/2) V_1/m^2 + (K0/2) iV/(2 xi M)],   K0 = A_b kappa_n^(-2/3), minus that at the source
     S = (k/(2 xi M)) w [U + (i/(2 xi M)) U],   S0 = (k/(2 xi M)) w U
     f = -i w [V - (V_1 - iV/(2 xi))/(2M) + (i/2k) (c - 1/s) V]
     g = (1/(2 xi M)) w [U - (U_1 - 3iU/(2 xi))/(2M) + (i/2k) (c - 1/s) U]
 
-V and the first U of S and g to second order, that of "electric hard" and "electric soft" waves: V with H less
-(1/2) (2/k)^(1/3) int kappa_n^(-2/3) K ds, K the Gaussian curvature, and U, under its integral and in its modes, with
+X with T0, K0 and m of one end, A_b the change of A with that end's place along b. V and the first U of S and g to
+second order, that of "electric hard" and "electric soft" waves: V with H less (1/2) (2/k)^(1/3) int kappa^(-2/3) K ds,
+K the Gaussian curvature, and U, under its integral and in its modes, with
 
     i E t^2 + L t + i P/xi,          exp{i E tau^2} [1 + L tau + i P/xi],       P = (15/4) E/xi - (3/2) L
     L = (2/ks) (k/2)^(1/3) int kappa_n^(2/3) [r/3 - 1/12 - (5/18) rho^2 T^2] ds + [(1 + rho^2 T^2)/6 - B/9]/M
@@ -25,13 +27,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.port_waves import LIMIT, PathTerms, second_order
 from creeping.field.shed_wave import limited
 from creeping.field.special.airy import soft_modes
 from creeping.field.special.coupling_function import coupling_function, soft_coupling_function
 from creeping.rays.port_rays import PortRays
 
+TURNED = 1.5
+"""Bound of |K0|."""
 NEAR, VARIES, TWIST = 0.5, 0.4, 0.2
 """Shares that are unsure: of the difference of both lengths of the near field, of that of T0 at both ends, of T0."""
 
@@ -77,7 +81,8 @@ class SlotWaves:
 class SlotTerms:
     """What the waves of geodesics (m,) depend on beside length and spreading, at one wavenumber.
 
-    Parameters as of `creeping.field.port_waves.PathTerms`, with all five integrals (m, 5).
+    Parameters as of `creeping.field.port_waves.PathTerms`, with all five integrals (m, 5), and ``turning`` (m, 2) as of
+    `creeping.rays.port_rays.PortRays`; beams have none, their sum brings it in.
     """
 
     def __init__(
@@ -88,6 +93,7 @@ class SlotTerms:
         torsion: FloatArray,
         bend: FloatArray,
         integrals: FloatArray,
+        turning: FloatArray | None = None,
     ) -> None:
         electric = integrals.copy()
         electric[:, 2] -= 0.5 * integrals[:, 4]
@@ -97,6 +103,11 @@ class SlotTerms:
         root = np.cbrt(wavenumber / 2)
         with np.errstate(divide="ignore", invalid="ignore"):
             self.T0, self.near = torsion / curvature, 0.5 / (self.xi * self.square)
+            self.uneven = np.cbrt(curvature / curvature[:, ::-1])
+            self.K0 = np.zeros_like(curvature)
+            if turning is not None:
+                lean = turning * (-1, 1) / np.cbrt(curvature) ** 2
+                self.K0 = np.clip(np.nan_to_num(lean), -TURNED, TURNED)
             ends = np.mean((1 + self.T0**2) / 6 - bend / 9, axis=1) / self.square
             self.L = 2 * root * integrals[:, 3] / (wavenumber * arclength) + ends
             self.P = 3.75 * self.E / self.xi - 1.5 * self.L
@@ -126,15 +137,21 @@ class SlotTerms:
     def carried(self, order: int) -> ComplexArray:
         """Components along b and t without w, J2'/J2 and 1/J2 (m, 2, 2), 1/L."""
         k, xi, M, (source, receiver) = self.k, self.xi, self.square, self.T0.T
-        V, V1, near = coupling_function(xi), coupling_function(xi, 1), self.near
+        V1, near = coupling_function(xi, 1), self.near
         S0 = k * near * soft_coupling_function(xi)
-        X = 1j * k * (V1 / (3 * M) + 2j / 3 * near * V)
         across = 1j * k * (self.hard.wave(order) / self.hard.factor + source * receiver * V1 / M)
         rows = [
-            [across + source * receiver * S0, receiver * S0 + source * X],
-            [source * S0 + receiver * X, k * near * self.soft(order)],
+            [across + source * receiver * S0, receiver * S0 + self.twisted(0)],
+            [source * S0 + self.twisted(1), k * near * self.soft(order)],
         ]
         return np.moveaxis(np.array(rows), -1, 0)
+
+    def twisted(self, end: int) -> ComplexArray:
+        """X of the first or the second end (m,), 1/L: along t there, of the hard wave."""
+        V, V1 = coupling_function(self.xi), coupling_function(self.xi, 1)
+        half = 0.5 * self.K0[:, end]
+        turned = (self.T0[:, end] - half) * self.uneven[:, end] * V1 / self.square
+        return np.asarray(1j * self.k * (turned + 1j * half * self.near * V))
 
     def near_field(self, spreading: FloatArray, cot: FloatArray, order: int) -> ComplexArray:
         """What J2, L, and J2'/J2, 1/L, add to the components without w (m, 2, 2), 1/L."""
@@ -165,7 +182,7 @@ class SlotTerms:
 
 def slot_waves(rays: PortRays, wavenumber: float, order: int) -> SlotWaves:
     """Of all geodesics (m,)."""
-    terms = SlotTerms(wavenumber, rays.arclength, rays.curvature, rays.torsion, rays.bend, rays.integrals)
+    terms = SlotTerms(*paths_of(rays, wavenumber))
     w, cot = geodesic_waves(rays, terms, wavenumber, order)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         components = terms.carried(order) + terms.near_field(rays.spreading, cot, order)
@@ -174,6 +191,12 @@ def slot_waves(rays: PortRays, wavenumber: float, order: int) -> SlotWaves:
     normals = np.stack([rays.normals[rays.first], rays.normals[rays.second]], axis=1)
     ends = np.stack([np.cross(normals, rays.directions), rays.directions], axis=2)
     return SlotWaves(components, ends, missing)
+
+
+def paths_of(rays: PortRays, k: float) -> tuple[Any, ...]:
+    """What `SlotTerms` asks for, of all geodesics."""
+    ends = rays.curvature, rays.torsion, rays.bend
+    return k, rays.arclength, *ends, rays.integrals, rays.turning
 
 
 def geodesic_waves(rays: PortRays, terms: SlotTerms, k: float, order: int) -> tuple[ComplexArray, FloatArray]:

@@ -86,11 +86,11 @@ def slot_coupling(
     checked_plain(body, smooth="the coupling of slots")
     k = checked(wavenumber, order)
     rays = port_geodesics(body, ports, k, length)
-    along = _tangential(axes, rays.normals)
-    return coupled(rays, slot_sources(rays, along, k, order), k, "pec", order, along)
+    along = tangential(axes, rays.normals)
+    return coupled(rays, slot_sources(rays, along, k, order), k, "pec", order, "slot", along)
 
 
-def _tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
+def tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
     """Unit tangents (n, 3) along given axes."""
     given = real_array(axes, "axes")
     if given.shape not in ((3,), normals.shape):

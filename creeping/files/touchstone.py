@@ -48,7 +48,7 @@ def write_touchstone(
     Raises
     ------
     InvalidInputError
-        If couplings are of slots or monopoles, of different ports or not in order.
+        If couplings are of slots or monopoles or both, of different ports or not in order.
     CreepingError
         If the file cannot be written.
     """

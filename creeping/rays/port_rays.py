@@ -7,11 +7,11 @@ arclength. Rays from port i to j > i serve both ways, so what is made of them is
 Sources: Derivations, R3 and F25.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import IntegrationError, SurfaceError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import sharpest_curvature
@@ -61,6 +61,8 @@ class PortRays:
         rho rho'' - (2/3) rho'^2 at both ends.
     integrals : (m, 5), L^(1/3), L^(-1/3), L^(-1/3), L^(1/3), L^(-1/3)
         Of A, of the second order, and of the Gaussian curvature; see `creeping.rays.kernels.port_fans`.
+    turning : (m, 2), L^(1/3) over L
+        Change of A with the place of each end along b = n x p there, the other end held.
     error : (m,), L
         Of the arclength, by polynomials of lower degree.
     folds, ended : (n, n), L^(1/3)
@@ -84,6 +86,7 @@ class PortRays:
     torsion: FloatArray
     bend: FloatArray
     integrals: FloatArray
+    turning: FloatArray
     error: FloatArray
     folds: FloatArray
     ended: FloatArray
@@ -91,6 +94,35 @@ class PortRays:
     def __len__(self) -> int:
         """Number of geodesics."""
         return len(self.first)
+
+    def among(self, begin: int, end: int) -> "PortRays":
+        """Those between ports of these numbers, which count from 0 then."""
+        ports = slice(begin, end)
+        found = self.chosen((self.first >= begin) & (self.second < end))
+        return replace(
+            found,
+            ports=self.ports[ports],
+            normals=self.normals[ports],
+            first=found.first - begin,
+            second=found.second - begin,
+            folds=self.folds[ports, ports],
+            ended=self.ended[ports, ports],
+        )
+
+    def across(self, count: int) -> "PortRays":
+        """Those from the first so many ports to the others."""
+        found = self.chosen((self.first < count) & (self.second >= count))
+        folds, ended = (np.full_like(whole, np.inf) for whole in (self.folds, self.ended))
+        folds[:count, count:], ended[:count, count:] = self.folds[:count, count:], self.ended[:count, count:]
+        return replace(found, folds=folds, ended=ended)
+
+    def chosen(self, some: BoolArray) -> "PortRays":
+        """Some of the geodesics, between the same ports."""
+        names = ("first", "second", "arclength", "points", "directions", "spreading", "rates", "caustics", "curvature")
+        parts: dict[str, Any] = {
+            name: getattr(self, name)[some] for name in (*names, "torsion", "bend", "integrals", "turning", "error")
+        }
+        return replace(self, **parts)
 
 
 def tangent_frames(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -256,6 +288,10 @@ def _assembled(
     def ends(of: int) -> FloatArray:
         return np.stack([start[:, of - lane.CURVATURE], known[:, of]], axis=1)
 
+    # of the Jacobi field that is 1 at the first end and 0 at the second
+    with np.errstate(divide="ignore", invalid="ignore"):
+        aside = known[:, lane.TURNING] / J2
+        turning = np.stack([known[:, lane.MOVING] - known[:, lane.BACK] * aside, aside], axis=1)
     return PortRays(
         body=body,
         ports=ports,
@@ -273,6 +309,7 @@ def _assembled(
         torsion=ends(lane.TORSION),
         bend=ends(lane.BEND),
         integrals=known[:, lane.INTEGRALS : lane.INTEGRALS + lane.PARTS],
+        turning=turning,
         error=start[:, lane.START],
         folds=folds[0],
         ended=folds[1],

@@ -3,7 +3,7 @@
 Rays m = 0 ... R - 1 leave at angles 2 pi m/R and are known at arclengths s = k h, k = -BEHIND ... Behind its port a
 ray is the opposite one, run backwards. Between the nodes everything is a polynomial of degree 5 in angle and in s.
 
-    A = int kappa^(2/3) ds,   A_theta = int (2/3) kappa^(-1/3) (J2 T' + 2 J2' T) ds
+    A = int kappa^(2/3) ds,   A_theta = int (2/3) kappa^(-1/3) (J2 T' + 2 J2' T) ds,   A_0 the same of J1
     g = kappa^(1/3) A_theta/J2
     int kappa^(4/3) [1/60 - (2/45) B - rho^2 (g^2/4 - (2/3) g T + (2/5) T^2)] ds
     int kappa^(4/3) [1/10 + r/4 - B/60 - (3/20) rho^2 T^2] ds
@@ -11,7 +11,7 @@ ray is the opposite one, run backwards. Between the nodes everything is a polyno
     int kappa^(-2/3) (kappa kappa_t - T^2) ds
 
 with T = b.Hp/|grad F|, b = n x p, r = rho kappa_t, B = rho rho'' - (2/3) rho'^2. A_theta is the change of A with the
-direction of launch; T' = d/ds T is by Codazzi the change of kappa across the ray.
+direction of launch, A_0 with its place along b; T' = d/ds T is by Codazzi the change of kappa across the ray.
 
 Sources: [C76]; Derivations, R1 and F25.
 """
@@ -30,8 +30,9 @@ BEHIND, AHEAD = 2, 3
 GUARD = 7
 """Steps traced beyond the last interval: three for its polynomial, one for each integral, two for derivatives."""
 SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS, ACROSS = 6, 7, 8, 9, 10, 11, 12, 13, 18
-"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, the integrals, kappa_t."""
-LANES, PARTS = 19, 5
+TURNING, MOVING = 19, 20
+"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, integrals, kappa_t, A_theta, A_0."""
+LANES, PARTS = 21, 5
 """Their number, and that of the integrals."""
 START = 3
 """Of the port itself: kappa, T and B."""
@@ -76,8 +77,8 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             across[ray, k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
             hx, hy, hz = xx * px + xy * py + xz * pz, xy * px + yy * py + yz * pz, xz * px + yz * py + zz * pz
             torsion[ray, k] = (hx * bx + hy * by + hz * bz) * inverse
-    rates = np.empty((6, J))
-    leaning = np.empty(J)
+    rates = np.empty((7, J))
+    leaning, moving = np.empty(J), np.empty(J)
     for ray in range(rays):
         opposite = (ray + half) % rays
         line = lanes[ray]
@@ -88,9 +89,10 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             )
             if not kappa[ray, k] > 0.0 and k <= last[ray]:
                 last[ray] = k - 1
-        leaning[0] = 0.0
+        leaning[0] = moving[0] = 0.0
         for k in range(count):
             leaning[k + 1] = leaning[k] + _stretch(rates, 4, k, step, k > 0)
+            moving[k + 1] = moving[k] + _stretch(rates, 6, k, step, k > 0)
         for k in range(count + 1):
             _add_torsion(kappa[ray, k], torsion[ray, k], leaning[k], states[ray, k, 8], squares, k, rates)
         for k in range(count):
@@ -107,6 +109,7 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
                 rates[3, k],
                 across[ray, k],
             )
+            to[TURNING], to[MOVING] = leaning[k], moving[k]
             for q in range(PARTS):
                 row = (0, 1, 2, 4, 5)[q]
                 so_far = line[BEHIND + k - 1, INTEGRALS + q] if k > 0 else 0.0
@@ -118,21 +121,21 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             copy(source, to)
             for lane in range(3, 6):
                 to[lane] = -source[lane]
-            to[SPREADING], to[ANGLE] = -source[SPREADING], -source[ANGLE]
+            to[SPREADING], to[ANGLE], to[TURNING] = -source[SPREADING], -source[ANGLE], -source[TURNING]
             for q in range(PARTS):
                 to[INTEGRALS + q] = -source[INTEGRALS + q]
 
 
 @njit(**options)
 def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, rates):
-    """Integrands at node k: of A, of both exponents without g, B, of A_theta in row 4, and of the last one."""
+    """Integrands at node k: of A, of both exponents without g, B, of A_theta in row 4, of the last one, and of A_0."""
     before, behind = kappa[k - 1] if k > 0 else kappa_back[1], kappa[k - 2] if k > 1 else kappa_back[2 - k]
     slope = (8 * (kappa[k + 1] - before) - (kappa[k + 2] - behind)) / (12 * step)
     bend = (16 * (kappa[k + 1] + before) - 30 * kappa[k] - kappa[k + 2] - behind) / (12 * step * step)
     before, behind = torsion[k - 1] if k > 0 else torsion_back[1], torsion[k - 2] if k > 1 else torsion_back[2 - k]
     twist = (8 * (torsion[k + 1] - before) - (torsion[k + 2] - behind)) / (12 * step)
     if not kappa[k] > 0.0:
-        for row in range(6):
+        for row in range(7):
             rates[row, k] = 0.0
         return
     rho = 1.0 / kappa[k]
@@ -147,6 +150,7 @@ def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, ra
     rates[3, k] = varies
     rates[5, k] = (kappa[k] * across[k] - torsion[k] ** 2) / (root * root)
     rates[4, k] = 2 / 3 / root * (states[k, 8] * twist + 2 * states[k, 9] * torsion[k])
+    rates[6, k] = 2 / 3 / root * (states[k, 6] * twist + 2 * states[k, 7] * torsion[k])
 
 
 @njit(**options)
