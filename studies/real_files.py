@@ -100,7 +100,7 @@ def _in_process(path: Path, options: dict[str, Any], limit: float) -> Row:
 def told(row: Row) -> str:
     """A row as a line."""
     parts = [f"{row['file']:36} {row['options']!s:28} {row['stage']:6}"]
-    parts += [f"{name} {row[name]:.1f}" for name in ("body, s", "fan, s", "all, s") if name in row]
+    parts += [f"{name[:-3]} {row[name]:.1f} s" for name in ("body, s", "fan, s", "all, s") if name in row]
     if row["stage"] == "done":
         parts.append(f"{row['method']}: |f| {row['field']:.3g}, error {row['error']:.2g}")
         parts.append(f"{row['unresolved']} of {len(SEEN)} unresolved")

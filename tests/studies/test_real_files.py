@@ -1,0 +1,35 @@
+"""A study of files: what is tried after a refusal, and how far a file comes."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from studies.real_files import followed, named_option, told
+
+
+def test_one_option_more_at_a_time():
+    refusal = "holds 2 surfaces; take one, e.g. part='largest', or all with union=True"
+    once = named_option(refusal, {})
+    assert once == {"part": "largest"}
+    assert named_option(refusal, once) == {"part": "largest", "union": True}
+    assert named_option("too coarse for a departure of 3", once) == once
+
+
+@pytest.mark.slow
+def test_a_file_comes_to_its_far_field(tmp_path):
+    """A sphere without a unit, and a file of nothing."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.5)
+    ball.export(tmp_path / "ball.obj")
+    rows = followed(tmp_path / "ball.obj", 300.0)
+    assert [row["stage"] for row in rows] == ["body", "done"]
+    assert rows[0]["options"] == {}
+    assert rows[1]["options"] == {"units": "m"}
+    assert rows[1]["error"] < 0.1 * rows[1]["field"]
+    assert rows[1]["unresolved"] == 0
+    assert "unresolved" in told(rows[1])
+    assert "units" in told(rows[0])
+    (tmp_path / "nothing.obj").write_text("")
+    last = followed(tmp_path / "nothing.obj", 300.0)[-1]
+    assert last["stage"] == "body"
+    assert last["refusal"]
+    assert np.isfinite(rows[1]["all, s"])
