@@ -6,7 +6,7 @@ true error that 95 of 100 points keep to, per cent of the incident wave. Parts:
 
     lit, close, shadow, axis    E and H off the body, the larger error of the two, as in `studies.near_coverage`
     J lit, J dark               the current on lit ground, and in the shadow, the penumbra included
-    charge                      n.E, judged by the error of J
+    charge                      n.E, judged by its own error
     not OK                      per cent of the points off the body, and on it
 
 Factors were set on the first four bodies, at k = 10, 20 and 30; the others have no share in them.
@@ -15,6 +15,7 @@ Run ``python -m studies.conductor_coverage`` (ten minutes), ``--quick`` for the 
 """
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def row(name: str, k: float, seed: int) -> dict[str, float]:
         part: (off, near, mask) for part, mask in parts_off(fan, points, axis, near.method == "layer").items()
     }
     masks |= {"J lit": (wrong, current, lit), "J dark": (wrong, current, ~lit)}
-    masks["charge"] = (mistaken, current, np.ones(wrong.shape, bool))
+    masks["charge"] = (mistaken, replace(current, error=current.charge_error), np.ones(wrong.shape, bool))
     found = not_ok(near, current) | {"residual": residual}
     for part, (true, field, mask) in masks.items():
         found |= coverage(part, true, field, mask, residual=residual, quantile=0.95)

@@ -89,7 +89,7 @@ def point_dataset(field: "PointField", parts: tuple[str, ...]) -> "xarray.Datase
     return _of_points(field, variables, ("point",), {})
 
 
-def vector_dataset(field: "PointData", vectors: "dict[str, ComplexArray]") -> "xarray.Dataset":
+def vector_dataset(field: "PointData", vectors: "dict[str, ComplexArray | FloatArray]") -> "xarray.Dataset":
     """Vectors (..., 3) or (..., 3, 2) and scalars at points with error and status: see `ConductorField.to_xarray`."""
     both = field.status.ndim == field.points.ndim
     rows = ("point", "polarisation") if both else ("point",)

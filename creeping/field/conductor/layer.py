@@ -108,10 +108,11 @@ def _between(
             H_t = H_t + w[:, j + 2, None] * (top[:, MAGNETIC] - normal_H[j][:, None] * n)
     field = np.concatenate([E_t + E_n[:, None] * n, H_t + H_n[:, None] * n], axis=1)
     left_out = total * (heights[0] / LOWEST) ** 3
-    shared = [w[:, 0] * off, w[:, 2] * errors[0], w[:, 3] * errors[1]]
+    shared = [w[:, 2] * errors[0], w[:, 3] * errors[1]]
+    of_charge = (w[:, 0] - w[:, 1] * total) * surface.charge_error[:, i]
     across = [v[:, j + 1] * error for j, error in enumerate(errors)]
-    of_H = np.linalg.norm([*shared, w[:, 1] * off, LEFT_OUT * left_out], axis=0)
-    of_E = np.linalg.norm([*shared, *across, LEFT_OUT * left_out, LEFT_OUT_ACROSS * left_out], axis=0)
+    of_H = np.linalg.norm([*shared, w[:, 0] * off, w[:, 1] * surface.slope_error[:, i], LEFT_OUT * left_out], axis=0)
+    of_E = np.linalg.norm([*shared, *across, of_charge, LEFT_OUT * left_out, LEFT_OUT_ACROSS * left_out], axis=0)
     return field, np.maximum(of_E, of_H)
 
 

@@ -186,6 +186,7 @@ def conductor_current(
         points=y.copy(),
         values=values,
         charge=_scalars(list(found.charge.T), shape, single),
+        charge_error=_scalars(list(found.charge_error.T), shape, single),
         lit=lit,
         creeping=creeping,
         **_judgement(fields, [np.linalg.norm(one.values, axis=1) for one in fields], shape, single),
@@ -266,7 +267,9 @@ def _on_body(found: OnConductor, i: int, n: FloatArray) -> Served:
             np.concatenate([(its * charge)[:, None] * n, np.cross(one, n)], axis=1)
             for its, one in ((part, J.wave), (1 - part, J.creeping))
         )
-    return Served(wave, creeping, J.error, J.error_by, J.status, J.method)
+    # E there is the charge's
+    error = np.maximum(J.error, found.charge_error[:, i])
+    return Served(wave, creeping, error, J.error_by, J.status, J.method)
 
 
 def _from_elsewhere(rays: Served, left: float) -> Served:

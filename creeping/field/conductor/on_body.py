@@ -6,9 +6,10 @@
 J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
 the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
 (`creeping.field.conductor.mode_beams`). Where the integral equation is solved its solution stands for all of it
-(`creeping.field.currents.whole_solution`). Divergences on the surface are differences between points 0.02/k to either
-side. Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
-ground BEYOND |J_thrown| stands besides, for what comes to it later.
+(`creeping.field.currents.whole_solution`). Divergences are by `creeping.field.conductor.divergence`.
+Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
+ground BEYOND |J_thrown| stands besides, for what comes to it later. The charge of expansions has the error of J; that
+of the solution has it over kh, h the step of differences, and what two steps tell.
 
 Sources: [CK13, sec. 6.2]; Derivations, F18 and F26.
 """
@@ -20,10 +21,11 @@ import numpy as np
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
+from creeping.field.conductor.divergence import Crosses, crosses
 from creeping.field.conductor.marched import current_marches, marched_current
 from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
 from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
-from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
+from creeping.field.currents.nodes import TAKEN_OVER, lit_part
 from creeping.field.currents.whole_solution import ON_BODY, lit_ground, resolved_at, solved_at
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error, without_tips
@@ -34,13 +36,11 @@ from creeping.field.served import Served, Words, measured_field
 from creeping.field.strip_waves import without_tubes
 from creeping.field.surface import surface_waves
 from creeping.geometry.quadrature import nodes_at
-from creeping.geometry.surface import normal, project, size
+from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays, shed_on
 
-APART = 0.02
-"""Distance of the points between which currents are differenced, over the wavelength over 2 pi."""
 MERGED = 1e-3
 """Error of the sum over rays, as a share of the incident wave, from which beams are asked."""
 FAVOUR = {"beams": 1.0, "march": 0.3}
@@ -64,11 +64,14 @@ class OnConductor:
         n.E, in units of the incident E.
     slope : (n, p) complex
         (1/k) dH_n/dn.
+    charge_error, slope_error : (n, p)
     """
 
     current: list[Served]
     charge: ComplexArray
     slope: ComplexArray
+    charge_error: FloatArray
+    slope_error: FloatArray
 
 
 def on_conductor(
@@ -83,24 +86,29 @@ def on_conductor(
 
     ``left`` (p,) is what ``currents`` of the whole body leave inside of each incident wave, 0 on a body that is convex.
     """
-    around, normals, apart = _crosses(fan, points, k)
+    solved = currents is not None and currents.solved
+    cross = crosses(fan.body, fan.line.direction, points, k, rough=solved)
     if currents is not None and currents.solved:
-        served, total = _solved_on(currents, points, around, normals, left)
+        served, total = _solved_on(currents, points, cross, left)
     else:
-        served, total = _by_expansions(fan, (around, normals), k, electric, left, currents)
-    magnetic = np.cross(total, normals[:, :, None], axis=1)
-    charge, turned = (_divergence(v.reshape(5, len(points), *v.shape[1:]), apart) for v in (total, magnetic))
-    return OnConductor(served, charge / (1j * k), -turned / k)
+        served, total = _by_expansions(fan, cross, k, electric, left, currents)
+    magnetic = np.cross(total, cross.normals[:, :, None], axis=1)
+    (charge, rough), (turned, uneven) = cross.divergence(total), cross.divergence(magnetic)
+    own = np.stack([one.error for one in served], axis=1)
+    if solved:
+        own = own / np.minimum(k * cross.step, 1.0)[:, None]
+    off, slope_off = np.hypot(own, rough / k), np.hypot(own, uneven / k)
+    return OnConductor(served, charge / (1j * k), -turned / k, off, slope_off)
 
 
 def _solved_on(
-    currents: ConductorCurrents, points: FloatArray, around: FloatArray, normals: FloatArray, left: FloatArray
+    currents: ConductorCurrents, points: FloatArray, cross: Crosses, left: FloatArray
 ) -> tuple[list[Served], ComplexArray]:
-    """J of solved currents at points (n,) for each polarisation, and at them and around them (5n, 3, p)."""
-    total = solved_at(currents, around, normals)
-    count = len(points)
-    lit = lit_ground(currents.body, points, normals[:count], currents.direction)
-    smooth = resolved_at(currents, points, normals[:count])
+    """J of solved currents at points (n,) for each polarisation, and at them and around them (9n, 3, p)."""
+    total = solved_at(currents, cross.points, cross.normals)
+    count, n = len(points), cross.normals[: len(points)]
+    lit = lit_ground(currents.body, points, n, currents.direction)
+    smooth = resolved_at(currents, points, n)
     served = []
     for i, share in enumerate(left):
         J = total[:count, :, i]
@@ -112,18 +120,15 @@ def _solved_on(
 
 def _by_expansions(
     fan: RayFan,
-    places: tuple[FloatArray, FloatArray],
+    cross: Crosses,
     k: float,
     electric: ComplexArray,
     left: FloatArray,
     currents: ConductorCurrents | None,
 ) -> tuple[list[Served], ComplexArray]:
-    """J of expansions at points (n,) for each polarisation, and at them and around them (5n, 3, p).
-
-    ``places`` are the points and those around them (5n, 3), L, and their normals.
-    """
-    around, normals = places
-    count = len(around) // 5
+    """J of expansions at points (n,) for each polarisation, and at them and around them (5n, 3, p)."""
+    around, normals = cross.points, cross.normals
+    count = len(around) // cross.blocks
     lit, lit_off, share = _lit_at(fan, around, normals, k, electric)
     if currents is not None and not convex(fan):
         at = np.flatnonzero(share > 0)
@@ -141,24 +146,6 @@ def _by_expansions(
         dropped = np.all(one.creeping == 0, axis=1) | ~np.all(np.isfinite(sums.values[:count]), axis=1)
         total[:, :, i] = lit[:, :, i] + np.where(np.tile(dropped, 5)[:, None], 0.0, sums.values)
     return served, total
-
-
-def _crosses(fan: RayFan, points: FloatArray, k: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points, those to either side of them along two tangents (5n, 3), their normals, and steps (2, n, 3)."""
-    n = normal(fan.body, points)
-    first = axes_of_incidence(n, fan.line.direction)
-    ends = [
-        project(fan.body, points + sign * APART / k * t) for t in (first, np.cross(n, first)) for sign in (1.0, -1.0)
-    ]
-    around = np.concatenate([points, *ends])
-    return around, normal(fan.body, around), np.stack([ends[0] - ends[1], ends[2] - ends[3]])
-
-
-def _divergence(values: ComplexArray, apart: FloatArray) -> ComplexArray:
-    """Surface divergence (n, p), 1/L, of tangential vectors at points and around them (5, n, 3, p)."""
-    change = np.stack([values[1] - values[2], values[3] - values[4]])
-    slopes = np.sum(apart[..., None] * change, axis=2) / np.sum(apart**2, axis=2)[..., None]
-    return np.asarray(slopes.sum(axis=0))
 
 
 def _lit_at(

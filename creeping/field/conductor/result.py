@@ -116,8 +116,9 @@ class ConductorCurrent(ArrayResult, PointData):
         with "lit+".
     values : (..., 3) or (..., 3, 2) complex
     charge : (...) or (..., 2) complex
-        n.E = div J/(ik), the surface charge over the permittivity of free space, in units of the incident E; its error
-        is that of J.
+        n.E = div J/(ik), the surface charge over the permittivity of free space, in units of the incident E.
+    charge_error : (...) or (..., 2)
+        Of the charge, in the sense of the error: that of J by expansions, larger where the integral equation is solved.
     lit, creeping : as values
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
     incident_electric : (3,) or (3, 2) complex
@@ -138,6 +139,7 @@ class ConductorCurrent(ArrayResult, PointData):
 
     values: ComplexArray
     charge: ComplexArray
+    charge_error: FloatArray
     lit: ComplexArray
     creeping: ComplexArray
     incident_electric: ComplexArray
@@ -161,6 +163,5 @@ class ConductorCurrent(ArrayResult, PointData):
         """J, its parts, charge, error and status with names: an ``xarray.Dataset`` by point and component."""
         from creeping.field.labelled import vector_dataset
 
-        return vector_dataset(
-            self, {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
-        )
+        parts = {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
+        return vector_dataset(self, parts | {"charge_error": self.charge_error})

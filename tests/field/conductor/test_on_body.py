@@ -6,6 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError
+from creeping.field.conductor.divergence import crosses
 from creeping.field.currents import whole_solution
 from creeping.field.polarisation import spherical_frame
 from creeping.geometry.quadrature import body_nodes
@@ -38,6 +39,44 @@ def test_sphere_at_all_angles(ball, mie, rng, k, limit):
     assert np.mean(off[found.ok] <= found.error[found.ok]) > 0.95
     assert np.mean(charge[found.ok] <= found.error[found.ok]) > 0.95
     assert np.median(found.error / off) < 10
+
+
+def test_charge_where_the_equation_is_solved(ball, mie, rng):
+    """Anywhere, between nodes and on them: sums over nodes are rough from one point to the next."""
+    nodes = body_nodes(ball.body, 1.5 * 8.0).points[::29]
+    x = np.concatenate([vectors(rng, 150), nodes, nodes + 1e-3 * rng.normal(size=nodes.shape)])
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    found = cr.conductor_current(ball, x, wavenumber=8.0, method="equation")
+    _, charge = wrong(found, x, *mie(8.0, x))
+    assert set(found.method.ravel()) == {"equation"}
+    assert np.quantile(charge, 0.99) < 0.02
+    assert np.mean(charge <= found.charge_error) > 0.97
+    assert np.all(found.charge_error >= found.error)
+    field = cr.conductor_field(ball, x[:5], wavenumber=8.0, method="equation")
+    np.testing.assert_array_equal(field.error, found.charge_error[:5])
+
+
+def test_divergence_is_of_fourth_order_between_wide_steps(rng):
+    """Of v = c - (c.n) n on a sphere, whose divergence is -2 c.n; and what two steps tell is more than is left."""
+    x, c = vectors(rng, 60), np.array([0.3, -0.5, 0.8])
+    ball = sc.Sphere()
+    left = []
+    for k in (2.0, 4.0):
+        cross = crosses(ball, OBLIQUE, x, k, rough=True)
+        assert cross.blocks == 9
+        assert len(cross.points) == 9 * len(x)
+        n = cross.normals
+        v = (c - (n @ c)[:, None] * n)[:, :, None] * np.array([1.0, 2j])
+        found, off = cross.divergence(v)
+        wrong = np.abs(found - np.outer(-2 * x @ c, [1.0, 2j]))
+        assert np.all(wrong <= off + 1e-12)
+        left.append(wrong.max())
+    assert left[1] < left[0] / 12
+    close = crosses(ball, OBLIQUE, x, 2.0, rough=False)
+    n = close.normals
+    found, off = close.divergence((c - (n @ c)[:, None] * n)[:, :, None])
+    np.testing.assert_allclose(found[:, 0], -2 * x @ c, atol=1e-3)
+    assert not np.any(off)
 
 
 def test_the_focus_behind_a_sphere(ball, mie):
