@@ -28,12 +28,12 @@ ALIKE = (1e-2, 1e-1)
 ROUNDS = 10
 FAR, FAR_ON_PIECES = 3.0, 1.5
 """Cells by which a search may move before it is given up, as most of those on bodies with creases are."""
-SLOW, IDLE, IDLE_ON_PIECES = 0.95, 3, 1
+SLOW, IDLE, IDLE_ON_PIECES = 0.95, 5, 1
 """And rounds in a row that do not bring the residual down to this share: where fans fold finely most go nowhere."""
-STEP, STEP_ON_PIECES, LEAST_CELL = 8.0, 2.0, 0.008
-"""First step of Newton's method, in cells, from which on a search is given up at once: nothing is a cell away. On
-bodies with creases cells of dense fans count as cells of so many body sizes: what is near does not hang on the number
-of rays."""
+CROWDED, STEP, STEP_ON_PIECES, LEAST_CELL = 500, 8.0, 2.0, 0.008
+"""Searches of one direction that are so many that a fan folds finely, and the first step of Newton's method, in cells,
+from which on one is given up at once there: nothing is a cell away. On bodies with creases always, and cells of dense
+fans count as cells of so many body sizes: what is near does not hang on the number of rays."""
 LONG, LONG_ON_PIECES = (2, 1), (1,)
 """Steps of the searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
 creases sharp places next to tips and edges make the steps short all over it, and long ones lead astray there."""
@@ -50,6 +50,7 @@ def rays_towards(
     near: FloatArray,
     times: FloatArray,
     cell: FloatArray,
+    together: IntArray | None = None,
 ) -> tuple[SingleRays, IntArray, FloatArray]:
     """Rays with p = r next to given points and times.
 
@@ -61,6 +62,8 @@ def rays_towards(
     times : (n,)
     cell : (n, 2), L
         Distances of neighbouring rays and samples: a search that leaves its neighbourhood is given up.
+    together : (n,), optional
+        How many searches each direction r has; one if not given.
 
     Returns
     -------
@@ -70,11 +73,14 @@ def rays_towards(
         Their rows, and how far along the line they start from where the search began, in cells.
     """
     missing, parts = np.arange(len(times)), []
-    levels = LONG_ON_PIECES if is_creased(tracer.body) else LONG
+    together = np.ones(len(times), dtype=np.int64) if together is None else together
+    creased = is_creased(tracer.body)
+    levels = LONG_ON_PIECES if creased else LONG
+    longest = np.full(len(times), STEP_ON_PIECES) if creased else np.where(together > CROWDED, STEP, np.inf)
     for number, long in enumerate(levels):
         if number and not len(missing):
             break
-        rows = directions[missing], observers[missing], near[missing], times[missing], cell[missing]
+        rows = directions[missing], observers[missing], near[missing], times[missing], cell[missing], longest[missing]
         search = _Search(tracer, *rows, long, NEARLY if long == levels[0] else 0.0)
         rays, found = search.result()
         parts.append((rays, missing[found], search.moved[found]))
@@ -90,6 +96,8 @@ def rays_towards(
 
 class _Search:
     """What `rays_towards` finds with steps of so many, without another look after one from a residual of ``nearly``.
+
+    None whose first step would be longer than ``longest`` (n,), in cells.
 
     Attributes
     ----------
@@ -107,6 +115,7 @@ class _Search:
         near: FloatArray,
         times: FloatArray,
         cell: FloatArray,
+        longest: FloatArray,
         long: int,
         nearly: float,
     ) -> None:
@@ -117,8 +126,7 @@ class _Search:
         self.lanes, self.first = np.empty((n, LANES)), np.empty((n, START_LANES))
         self.creased = is_creased(tracer.body)
         self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.creased else cell
-        limits = (FAR_ON_PIECES, IDLE_ON_PIECES, STEP_ON_PIECES) if self.creased else (FAR, IDLE, STEP)
-        self.far, patience, longest = limits
+        self.far, patience = (FAR_ON_PIECES, IDLE_ON_PIECES) if self.creased else (FAR, IDLE)
         idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
@@ -134,7 +142,7 @@ class _Search:
                 break
             step = self._step(last)
             if number == 0:
-                idle[last[step > longest]] = patience
+                idle[last[step > longest[last]]] = patience
             active = last[~self.wanted[last] & (idle[last] < patience)]
             if not len(active):
                 break
