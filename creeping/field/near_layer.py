@@ -1,12 +1,13 @@
 """The total field nearer to the body than currents serve: between the field on it and that of currents above.
 
-Along the normal at x, h above the body, t = kh and c = |n.d|, at least 0.15,
+Along the normal at x, h above the body, t = kh and c = -n.d, at least 0.15,
 
     u = a cos ct + b sin(ct)/c + a' t sin(ct)/c + b' 3 (sin ct - ct cos ct)/c^3
 
 with u and du/dn on the body from the surface field and u at 0.27 and 0.54 wavelengths from currents. Incident and
 reflected wave of a plane are a and b; where the wave grazes the four are 1, t, t^2 and t^3. Each weight of a value is 1
-at most; what four terms leave out is about 0.08 |kappa_1 + kappa_2|/k of the incident wave, 0.03 on an impedance.
+at most; what four terms leave out is about 0.1 |kappa_1 + kappa_2|/k of the incident wave, 0.03 on an impedance; on a
+saddle the root of kappa_1^2 + kappa_2^2 stands for the sum.
 
 Sources: Derivations, F20.
 """
@@ -31,8 +32,8 @@ CLEAR = 0.2
 """Distance from all of the body that nodes must tell of these, in wavelengths: they are too far apart to tell more."""
 GRAZING = 0.15
 """Least c: below, the four terms are powers of t to rounding."""
-LEFT_OUT = {"soft": 0.08, "hard": 0.08, "impedance": 0.03}
-"""Error of four terms, in |kappa_1 + kappa_2|/k."""
+LEFT_OUT = {"soft": 0.1, "hard": 0.1, "impedance": 0.03}
+"""Error of four terms, in |kappa_1 + kappa_2|/k, or on a saddle the root of the sum of squares."""
 FOOT = 1e-6
 """Distance, in body sizes, up to which a point is above its foot."""
 
@@ -50,10 +51,11 @@ def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind
         incident, scattered, its = total_at(currents, top[good], occluded(body, top[good], d))
         known.append(incident + scattered)
         errors.append(its)
-    weights = _weights(np.maximum(np.abs(n[good] @ d), GRAZING), k * height)
+    # waves behind the body run along it
+    weights = _weights(np.maximum(-n[good] @ d, GRAZING), k * height)
     errors = [weights[:, i] * one for i, one in enumerate(errors)]
     values = np.sum(weights * np.stack(known, axis=1), axis=1)
-    error = np.linalg.norm([*errors, LEFT_OUT[kind.kind] * nodes.total_curvature / k], axis=0)
+    error = np.linalg.norm([*errors, LEFT_OUT[kind.kind] * nodes.bending / k], axis=0)
     return at, measured_field(values, error, "layer", "extinction+expansion")
 
 

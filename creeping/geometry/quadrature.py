@@ -81,6 +81,12 @@ class BodyNodes:
         """kappa_1 + kappa_2 (n,), 1/L."""
         return np.asarray(np.sum(self.hessians[:, :3], axis=1) - self.curvature(self.normals))
 
+    @property
+    def bending(self) -> FloatArray:
+        """|kappa_1 + kappa_2| (n,), 1/L, of a saddle (kappa_1^2 + kappa_2^2)^(1/2): what curvature does to a field."""
+        saddle = np.maximum(-adjugate_form(self.normals, self.hessians[:, SYMMETRIC]), 0.0)
+        return np.asarray(np.sqrt(self.total_curvature**2 + 2 * saddle))
+
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of points (m, 3) from the body as nodes tell it, L: the nearest less their spacing."""
         return np.asarray(np.sqrt(np.maximum(self.nearest(points) ** 2 - (0.5 * self.spacing_at(points)) ** 2, 0.0)))

@@ -8,8 +8,8 @@ Along the normal at x, t = kh above the body, the four terms of `creeping.field.
     E_t   value 0; values at three heights
 
 The slopes are div E = 0, (curl H)_t = 0 and div H = 0 on the body, where E_t = 0 and H_n = 0. What four terms leave out
-is about A |kappa_1 + kappa_2|/k of the incident wave, A = 0.1, and 0.3 of E_t; curl E = ikH gives a slope of E_t by the
-gradient of the charge, which is not known well enough.
+is about A |kappa_1 + kappa_2|/k of the incident wave, A = 0.1, and 0.3 of E_t, on a saddle with the root of the sum of
+squares; curl E = ikH gives a slope of E_t by the gradient of the charge, which is not known well enough.
 
 Sources: [CK13, sec. 6.2]; Derivations, F20 and F26.
 """
@@ -34,7 +34,8 @@ SPACED = 2.6
 CLEAR = 0.8
 """Share of the least height that nodes must tell of it: they are too far apart to tell more."""
 LEFT_OUT, LEFT_OUT_ACROSS = 0.1, 0.3
-"""Error of four terms, in |kappa_1 + kappa_2|/k, and of those of E_t; as the cube of the heights they span."""
+"""Error of four terms, in |kappa_1 + kappa_2|/k or on a saddle the root of the sum of squares, and of those of E_t; as
+the cube of the heights they span."""
 
 
 def lowest_height(fan: RayFan, wavenumber: float) -> float:
@@ -107,7 +108,7 @@ def _between(
         if j < 2:
             H_t = H_t + w[:, j + 2, None] * (top[:, MAGNETIC] - normal_H[j][:, None] * n)
     field = np.concatenate([E_t + E_n[:, None] * n, H_t + H_n[:, None] * n], axis=1)
-    left_out = total * (heights[0] / LOWEST) ** 3
+    left_out = nodes.bending / k * (heights[0] / LOWEST) ** 3
     shared = [w[:, 2] * errors[0], w[:, 3] * errors[1]]
     of_charge = (w[:, 0] - w[:, 1] * total) * surface.charge_error[:, i]
     across = [v[:, j + 1] * error for j, error in enumerate(errors)]
