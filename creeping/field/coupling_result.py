@@ -31,7 +31,7 @@ MEANINGS = {
     "point": "u of a unit source e^{ikr}/(4 pi r)",
     "slot": "H of a unit magnetic dipole, times the impedance of free space",
     "monopole": "E of a unit electric dipole, times the admittance of free space",
-    "monopoleslot": "H along slots and E along n at monopoles, in free space of one size, of unit dipoles",
+    "monopoleslot": "H along slots, times the impedance of free space, and E along n at monopoles, of unit dipoles",
 }
 """What values are, by the kinds of ports."""
 

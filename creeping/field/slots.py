@@ -95,7 +95,7 @@ def tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
     given = real_array(axes, "axes")
     if given.shape not in ((3,), normals.shape):
         raise InvalidInputError(
-            f"axes have shape {given.shape} for {len(normals)} ports; give ({len(normals)}, 3) or one axis (3,) for all"
+            f"axes have shape {given.shape} for {len(normals)} slots; give ({len(normals)}, 3) or one axis (3,) for all"
         )
     given = np.broadcast_to(given, normals.shape)
     long = np.linalg.norm(given, axis=1)

@@ -29,6 +29,8 @@ CLOSED, OPEN = 1e-4, 1e-3
 """Integral of n, as a share of the area, that is small enough, and beyond which pieces do not make a closed body."""
 LESS = 0.5
 """Ratio by which it must become less with shorter sides to become less at all."""
+NEARLY = 0.9
+"""Share of triangles that were counted that there are at least with other sides."""
 MOST_NODES = 3_000_000
 """Most nodes."""
 KEPT = 4
@@ -80,11 +82,12 @@ class PieceRules:
     def _least_tiles(self, rungs: IntArray) -> FloatArray:
         """Triangles that there are at least: for the area, and where others were counted, by their number.
 
-        A body of many small pieces has as many as they, however long sides may be.
+        A body of many small pieces has more than its area asks for. Of shorter sides there are as many, of longer ones
+        fewer by the square, or nearly.
         """
         least = self._area / _sides(rungs) ** 2 * SMALLER
         for rung, count in self._tiles.items():
-            least = np.maximum(least, count * np.minimum(1.0, (_sides(rung) / _sides(rungs)) ** 2))
+            least = np.maximum(least, NEARLY * count * np.minimum(1.0, (_sides(rung) / _sides(rungs)) ** 2))
         return np.asarray(least)
 
     def nodes(self, body: Any, rung: int, points: int) -> Any:

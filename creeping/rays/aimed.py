@@ -29,11 +29,11 @@ ROUNDS = 10
 FAR, FAR_ON_PIECES = 3.0, 1.5
 """Cells by which a search may move before it is given up, as most of those on bodies with creases are."""
 SLOW, IDLE, IDLE_ON_PIECES = 0.95, 5, 1
-"""And rounds in a row that do not bring the residual down to this share: where fans fold finely most go nowhere."""
+"""And rounds in a row that do not bring the residual down to this share, where most go nowhere."""
 CROWDED, STEP, STEP_ON_PIECES, LEAST_CELL = 500, 8.0, 2.0, 0.008
-"""Searches of one direction that are so many that a fan folds finely, and the first step of Newton's method, in cells,
-from which on one is given up at once there: nothing is a cell away. On bodies with creases always, and cells of dense
-fans count as cells of so many body sizes: what is near does not hang on the number of rays."""
+"""Searches of one direction that are so many that a fan folds finely: IDLE ends some there, and the first step of
+Newton's method, in cells, from which on nothing is a cell away. On bodies with creases always, and cells of dense fans
+count as cells of so many body sizes: what is near does not hang on the number of rays."""
 LONG, LONG_ON_PIECES = (2, 1), (1,)
 """Steps of the searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
 creases sharp places next to tips and edges make the steps short all over it, and long ones lead astray there."""
@@ -84,7 +84,7 @@ def rays_towards(
         search = _Search(tracer, *rows, long, NEARLY if long == levels[0] else 0.0)
         rays, found = search.result()
         parts.append((rays, missing[found], search.moved[found]))
-        # those that the search ended too early, or that steps so long led astray
+        # those that were not given up, or that steps so long led astray
         open_still = search.unsure
         open_still[found] = False
         missing = missing[open_still]
@@ -104,7 +104,7 @@ class _Search:
     moved : (n,)
         How far along the line each has come, in cells.
     unsure : (n,)
-        Which have not been given up: their search ended next to a ray, or never did.
+        Which may have a ray yet: of those that can be given up, the ones that ended next to one or did not end.
     """
 
     def __init__(
@@ -126,7 +126,9 @@ class _Search:
         self.lanes, self.first = np.empty((n, LANES)), np.empty((n, START_LANES))
         self.creased = is_creased(tracer.body)
         self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.creased else cell
-        self.far, patience = (FAR_ON_PIECES, IDLE_ON_PIECES) if self.creased else (FAR, IDLE)
+        self.far = FAR_ON_PIECES if self.creased else FAR
+        trusted = np.isinf(longest)
+        patience = np.where(trusted, ROUNDS, IDLE_ON_PIECES if self.creased else IDLE)
         idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
@@ -137,16 +139,16 @@ class _Search:
             self.wanted[active] = residual <= max(CLOSE, nearly)
             idle[active] = np.where(residual <= SLOW * best[active], 0, idle[active] + 1)
             best[active] = np.fmin(residual, best[active])
-            last = active[(residual > CLOSE) & self._within(active) & (idle[active] < patience)]
+            last = active[(residual > CLOSE) & self._within(active) & (idle[active] < patience[active])]
             if not len(last):
                 break
             step = self._step(last)
             if number == 0:
-                idle[last[step > longest[last]]] = patience
-            active = last[~self.wanted[last] & (idle[last] < patience)]
+                idle[last[step > longest[last]]] = ROUNDS
+            active = last[~self.wanted[last] & (idle[last] < patience[last])]
             if not len(active):
                 break
-        self.unsure = self._within() & (idle < patience)
+        self.unsure = trusted | (self._within() & (idle < patience))
 
     def result(self) -> tuple[SingleRays, IntArray]:
         """Exact rays that have been found, and their rows."""

@@ -216,7 +216,8 @@ def launch(
     wavenumber : float, optional, 1/L
         Lowest that "auto" is to serve; where the median k rho at the launch points is 10 if not given.
     n_rays : int, optional
-        Rays, shared among the arcs by length; if not given one per point of the line, or 8192 of lines of many curves.
+        Rays, shared among the arcs by length; if not given one per point of the line, at most 8192, or 32 an arc, where
+        it has several.
     n_steps : int, optional
         Equal steps of travel time; 64 or more, enough to count caustics, if not given.
     launch_from : {"attached", "all"}

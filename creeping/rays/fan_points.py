@@ -15,8 +15,8 @@ from creeping.shadow.attachment import line_tangents
 FINE_TURN = 0.08
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 3e-11."""
 MANY, APART = 512, 4
-"""Steps from which on one in so many is a point: they are as many for the sharpest ground alone, between rays that lie
-farther apart than points so do."""
+"""Points of a ray that are enough, unless they were more than so many steps apart: strips between them err by 3e-5 of J
+then, between rays that lie much farther apart."""
 
 
 def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray, RayPoints]:
@@ -34,7 +34,7 @@ def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray
         If the body is weighted.
     """
     tracer = RayTracer(fan.body, fan.length, turn=FINE_TURN)
-    count = tracer.steps if tracer.steps < MANY else -(-tracer.steps // APART)
+    count = min(tracer.steps, max(MANY, -(-tracer.steps // APART)))
     equal: FloatArray = fan.length / count * np.arange(count + 1, dtype=np.float64)
     times = equal if times is None else times
     rays, steps = len(fan.points), len(times)

@@ -14,8 +14,8 @@ from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.line import ShadowLine
 
 MANY, FEW = 8192, 32
-"""Rays of a line, and on each of its arcs, that are more than enough to begin with: lines of many holes and fillets
-have as many points on each as a body's only one."""
+"""Rays that are enough for a line of several arcs to begin with, or so many for each in the mean: of many holes and
+fillets each has as many points as a body's only curve."""
 
 
 class Starts(NamedTuple):
@@ -48,7 +48,9 @@ class Starts(NamedTuple):
         arcs = line.arcs(launch_from)
         if n_rays is None:
             shares = [(a.end - a.start) / line.curves[a.curve].length * len(line.curves[a.curve].points) for a in arcs]
-            n_rays = min(sum(max(1, round(share)) for share in shares), max(MANY, FEW * len(arcs)))
+            n_rays = sum(max(1, round(share)) for share in shares)
+            if len(arcs) > 1:
+                n_rays = min(n_rays, max(MANY, FEW * len(arcs)))
         launch = line.launch_points(max(n_rays, len(arcs)), launch_from)
         there = np.flatnonzero(launch.there[0])
         _, arc = np.unique(launch.arc_index[0, there], return_inverse=True)

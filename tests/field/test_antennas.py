@@ -123,8 +123,8 @@ def test_blocks_of_one_kind_are_those_of_its_function(both):
     assert np.array_equal(found.error, found.error.T)
 
 
-def test_reciprocity(both):
-    """Ports in another order: other fans, other polynomials, the same geodesics and fields."""
+def test_order_of_ports_does_not_matter(both):
+    """The slot of each pair is its source, whatever its number."""
     body, (slots, axes, monopoles) = sc.Ellipsoid(1.0, 0.8, 0.6), both
     there = cr.antenna_coupling(body, slots, axes, monopoles, wavenumber=20.0)
     back = cr.antenna_coupling(body, slots[::-1], axes[::-1], monopoles[::-1], wavenumber=20.0)
@@ -132,7 +132,7 @@ def test_reciprocity(both):
     one, other = there[:n, n:], back[:n, n:][::-1, ::-1]
     fine = there.ok[:n, n:] & (there.method[:n, n:] == "rays")
     assert fine.sum() > 20
-    assert np.median(np.abs(one - other)[fine] / np.abs(one)[fine]) < 1e-3
+    assert np.all(np.abs(one - other)[fine] <= 1e-7 * np.abs(one).max())
 
 
 def test_changes_of_the_path_are_those_of_its_reverse(both):

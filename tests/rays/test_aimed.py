@@ -6,8 +6,10 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.far_geometry import far_geometry
+from creeping.rays import aimed
 
 OGIVE = sc.Ogive(1.0, 10.0)
+SEEN = cr.fibonacci_directions(10)
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +60,25 @@ def test_what_passes_by_a_tip_is_found_however_rays_lie(n_rays, angle):
     assert np.bincount(found.observer, minlength=4).tolist() == [1, 2, 1, 1]
     from_tip = np.linalg.norm(found.rays.points[beside] - [0, 0, -5.0], axis=1)
     assert np.all(from_tip < 0.02 * np.ptp(OGIVE.bounds[:, 2]))
+
+
+def test_rays_of_a_thin_body_do_not_hang_on_the_number_that_a_fan_has():
+    """One search of a hundred comes no nearer for five rounds, and then does."""
+    body, d = sc.Ellipsoid(1.0, 0.7, 0.2), np.array([0.2, -0.9, 0.3])
+    line = cr.shadow_line(body, d / np.linalg.norm(d))
+    counts = [
+        len(far_geometry(cr.launch(cr.DirectFlow(body, rtol=1e-8), line, wavenumber=6.0, n_rays=n), SEEN).shed.observer)
+        for n in (96, 384)
+    ]
+    assert counts[0] == counts[1] > 60
+
+
+def test_what_is_crowded_is_given_up_sooner_but_loses_nothing_that_matters(monkeypatch):
+    """Searches that end at their first step, or after idle rounds, against those that go on."""
+    body, d = sc.TwistedEllipsoid(), np.array([0.3, 0.5, 0.812])
+    line, found = cr.shadow_line(body, d / np.linalg.norm(d)), []
+    for crowded in (0, 10**9):
+        monkeypatch.setattr(aimed, "CROWDED", crowded)
+        fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), line, length=4.0, n_rays=256)
+        found.append(len(far_geometry(fan, SEEN).shed.observer))
+    assert 0.97 * found[1] <= found[0] <= found[1]

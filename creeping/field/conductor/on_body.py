@@ -96,7 +96,7 @@ def on_conductor(
     (charge, rough), (turned, uneven) = cross.divergence(total), cross.divergence(magnetic)
     own = np.stack([one.error for one in served], axis=1)
     if solved:
-        own = own / np.minimum(k * cross.step, 1.0)[:, None]
+        own = own / (k * cross.step)[:, None]
     off, slope_off = np.hypot(own, rough / k), np.hypot(own, uneven / k)
     return OnConductor(served, charge / (1j * k), -turned / k, off, slope_off)
 

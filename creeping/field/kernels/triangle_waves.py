@@ -20,7 +20,7 @@ from creeping.kernels.block import entry_options, options
 from creeping.kernels.turns import cosine_sine
 
 NEAR, TERMS = 0.2, 8
-"""Difference of phases below which the integral is its series, and terms of that: the next is below 1e-13."""
+"""Difference of phases below which the integral is its series, and terms of that: the next is below 1e-12."""
 
 
 @njit(**options)
