@@ -17,16 +17,17 @@ from numpy.typing import ArrayLike
 
 from studies.reference._boundary import ComplexArray, FloatArray, positive
 from studies.reference.clouds import Body
-from studies.reference.dipoles import _field, _tangents
+from studies.reference.dipoles import _field
 from studies.reference.slots import (
     TERMS,
-    _electric,
-    _magnetic_of_electric,
-    fade,
+    between,
+    electric,
     field_of_moments,
-    from_above,
-    on_body,
+    magnetic_of_electric,
+    monopoles_at,
     outward,
+    partial_waves,
+    slots_along,
 )
 
 
@@ -35,15 +36,9 @@ def sphere_antennas(wavenumber: float, radius: float, angles: ArrayLike, *, term
     positive(wavenumber=wavenumber, radius=radius)
     x, s = wavenumber * radius, np.asarray(angles, dtype=float)
     c = np.cos(s)
-    # hₙ₋₁/hₙ, upwards, where ξₙ'/ξₙ = hₙ₋₁/hₙ - n/x
-    ratio = 1j
-    before, value = np.ones_like(c), c.copy()
     total = np.zeros(c.shape, dtype=complex)
-    for n in range(1, terms):
-        ratio = 1 / ((2 * n - 1) / x - ratio)
-        slope = -n * (before - c * value) / np.sin(s)
-        total += (2 * n + 1) / (4 * np.pi) * fade(n / terms) / (ratio - n / x) * slope
-        before, value = value, ((2 * n + 1) * c * value - n * before) / (n + 1)
+    for n, weight, soft, before, value in partial_waves(x, c, terms):
+        total -= weight / soft * n * (before - c * value) / np.sin(s)
     return np.asarray(total / (x * radius**2))
 
 
@@ -87,21 +82,11 @@ def slots_of_monopoles(
     per_wavelength: float = 7.0,
 ) -> Received:
     """H at slots of monopoles at the sources; parameters as of `studies.reference.ports.coupled`."""
-    positive(wavenumber=wavenumber, depth=depth)
-    x, ports = (body.map(np.asarray(given, dtype=float)) for given in (points, sources))
-    tangents = np.stack(_tangents(outward(body, x)), axis=1)
-    field = from_above(
-        body,
-        wavenumber,
-        np.asarray(sources, dtype=float),
-        x,
-        outward(body, ports)[:, None],
-        (field_of_moments, _magnetic, _magnetic_of_electric),
-        depth=depth,
-        heights=heights,
-        per_wavelength=per_wavelength,
-    )
-    values, fewer = (np.einsum("nsac,nrc->nsr", one, tangents) for one in on_body(field, heights))
+    fields = field_of_moments, _magnetic, magnetic_of_electric
+    given = depth, heights, per_wavelength
+    ports, x, _, both = between(body, wavenumber, sources, points, monopoles_at, fields, *given)
+    tangents = slots_along(body, x)
+    values, fewer = (np.einsum("nsac,nrc->nsr", one, tangents) for one in both)
     return Received(ports, x, tangents, values, np.max(np.abs(values - fewer), axis=2))
 
 
@@ -116,24 +101,13 @@ def monopoles_of_slots(
     per_wavelength: float = 7.0,
 ) -> Received:
     """E_n at monopoles of slots at the sources; parameters as of `studies.reference.ports.coupled`."""
-    positive(wavenumber=wavenumber, depth=depth)
-    x, ports = (body.map(np.asarray(given, dtype=float)) for given in (points, sources))
-    tangents = np.stack(_tangents(outward(body, ports)), axis=1)
-    field = from_above(
-        body,
-        wavenumber,
-        np.asarray(sources, dtype=float),
-        x,
-        tangents,
-        (_electric, _electric, _field),
-        depth=depth,
-        heights=heights,
-        per_wavelength=per_wavelength,
-    )
-    values, fewer = (np.einsum("nsac,nc->nsa", one, outward(body, x)) for one in on_body(field, heights))
+    fields = electric, electric, _field
+    given = depth, heights, per_wavelength
+    ports, x, tangents, both = between(body, wavenumber, sources, points, slots_along, fields, *given)
+    values, fewer = (np.einsum("nsac,nc->nsa", one, outward(body, x)) for one in both)
     return Received(ports, x, tangents, values, np.max(np.abs(values - fewer), axis=2))
 
 
 def _magnetic(x: FloatArray, z: FloatArray, p: FloatArray, k: float) -> ComplexArray:
     """H of electric moments p at z (s, 3), ∇ e^{ikr}/(4πr) × p: (n, 3, s)."""
-    return -_electric(x, z, p, k)
+    return -electric(x, z, p, k)

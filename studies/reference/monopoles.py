@@ -17,21 +17,16 @@ from numpy.typing import ArrayLike
 from studies.reference._boundary import ComplexArray, FloatArray, positive
 from studies.reference.clouds import Body
 from studies.reference.dipoles import _field
-from studies.reference.slots import TERMS, fade, field_of_moments, from_above, on_body, outward
+from studies.reference.slots import TERMS, between, field_of_moments, monopoles_at, outward, partial_waves
 
 
 def sphere_monopoles(wavenumber: float, radius: float, angles: ArrayLike, *, terms: int = TERMS) -> ComplexArray:
     """E_n at angles (m,) from the monopole, radians, not 0: (m,), 1/L²."""
     positive(wavenumber=wavenumber, radius=radius)
     x, c = wavenumber * radius, np.cos(np.asarray(angles, dtype=float))
-    # hₙ₋₁/hₙ, upwards, where ξₙ'/ξₙ = hₙ₋₁/hₙ - n/x
-    ratio = 1j
-    before, value = np.ones_like(c), c.copy()
     total = np.zeros(c.shape, dtype=complex)
-    for n in range(1, terms):
-        ratio = 1 / ((2 * n - 1) / x - ratio)
-        total += (2 * n + 1) * n * (n + 1) / (4 * np.pi) * fade(n / terms) / (ratio - n / x) * value
-        before, value = value, ((2 * n + 1) * c * value - n * before) / (n + 1)
+    for n, weight, soft, _, value in partial_waves(x, c, terms):
+        total += n * (n + 1) * weight / soft * value
     return np.asarray(-1j / (x * radius) ** 2 * total)
 
 
@@ -72,18 +67,8 @@ def coupled_monopoles(
     per_wavelength: float = 7.0,
 ) -> CoupledMonopoles:
     """Fields of monopoles on a conductor; parameters as of `studies.reference.ports.coupled`."""
-    positive(wavenumber=wavenumber, depth=depth)
-    x, ports = (body.map(np.asarray(given, dtype=float)) for given in (points, sources))
-    field = from_above(
-        body,
-        wavenumber,
-        np.asarray(sources, dtype=float),
-        x,
-        outward(body, ports)[:, None],
-        (field_of_moments, field_of_moments, _field),
-        depth=depth,
-        heights=heights,
-        per_wavelength=per_wavelength,
-    )
-    values, fewer = (np.einsum("nsac,nc->ns", one, outward(body, x)) for one in on_body(field, heights))
+    fields = field_of_moments, field_of_moments, _field
+    given = depth, heights, per_wavelength
+    ports, x, _, both = between(body, wavenumber, sources, points, monopoles_at, fields, *given)
+    values, fewer = (np.einsum("nsac,nc->ns", one, outward(body, x)) for one in both)
     return CoupledMonopoles(ports, x, values, np.abs(values - fewer))

@@ -14,7 +14,7 @@ On other bodies by electric dipoles inside (`studies.reference.dipoles`), with m
 their ports, and their images: the field is H(0) + H₁ h + H₂ h² + ....
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,23 +38,27 @@ def sphere_slots(
     positive(wavenumber=wavenumber, radius=radius)
     x, s = wavenumber * radius, np.asarray(angles, dtype=float)
     c, sine = np.cos(s), np.sin(s)
-    # hₙ₋₁/hₙ, upwards, where ξₙ'/ξₙ = hₙ₋₁/hₙ - n/x
-    ratio = 1j
-    before, value = np.ones_like(c), c.copy()
     # slopes of F and D, and their negative Laplacians
     slopes, values = np.zeros((2, *s.shape), dtype=complex), np.zeros((2, *s.shape), dtype=complex)
-    for n in range(1, terms):
-        ratio = 1 / ((2 * n - 1) / x - ratio)
-        soft = ratio - n / x
-        weight = (2 * n + 1) / (4 * np.pi) * fade(n / terms)
+    for n, weight, soft, before, value in partial_waves(x, c, terms):
         slope = -n * (before - c * value) / sine
         for row, factor in enumerate((soft, 1 / soft)):
             slopes[row] += weight * factor / (n * (n + 1)) * slope
             values[row] += weight * factor * value
-        before, value = value, ((2 * n + 1) * c * value - n * before) / (n + 1)
     second = -values - c / sine * slopes
     factor = -1j / radius**2
     return factor * (slopes[0] / sine - second[1]), factor * (second[0] - slopes[1] / sine)
+
+
+def partial_waves(x: float, c: FloatArray, terms: int) -> Iterator[tuple[int, float, complex, FloatArray, FloatArray]]:
+    """Of so many terms n, (2n+1)/4π faded, ξₙ'/ξₙ at x, and Pₙ₋₁ and Pₙ at c = cos s (m,)."""
+    # hₙ₋₁/hₙ, upwards, where ξₙ'/ξₙ = hₙ₋₁/hₙ - n/x
+    ratio = 1j
+    before, value = np.ones_like(c), c.copy()
+    for n in range(1, terms):
+        ratio = 1 / ((2 * n - 1) / x - ratio)
+        yield n, (2 * n + 1) / (4 * np.pi) * fade(n / terms), ratio - n / x, before, value
+        before, value = value, ((2 * n + 1) * c * value - n * before) / (n + 1)
 
 
 def plane_slots(wavenumber: float, distances: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
@@ -105,23 +109,53 @@ def coupled_slots(
     per_wavelength: float = 7.0,
 ) -> CoupledSlots:
     """Fields of slots in a conductor; parameters as of `studies.reference.ports.coupled`."""
+    fields = electric, field_of_moments, magnetic_of_electric
+    given = depth, heights, per_wavelength
+    ports, x, tangents, (values, fewer) = between(body, wavenumber, sources, points, slots_along, fields, *given)
+    spread = np.max(np.linalg.norm(values - fewer, axis=3), axis=2)
+    return CoupledSlots(ports, x, tangents, values, spread)
+
+
+def between(
+    body: Body,
+    wavenumber: float,
+    sources: ArrayLike,
+    points: ArrayLike,
+    moments_of: Callable[[Body, FloatArray], FloatArray],
+    fields: tuple[Field, Field, Field],
+    depth: float,
+    heights: tuple[float, ...],
+    per_wavelength: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, tuple[ComplexArray, ComplexArray]]:
+    """Ports (s, 3), points (n, 3), the ports' moments (s, a, 3), and their fields on the body, as of `on_body`.
+
+    Parameters as of `coupled_slots`, and those of `from_above`.
+    """
     positive(wavenumber=wavenumber, depth=depth)
     x, ports = (body.map(np.asarray(given, dtype=float)) for given in (points, sources))
-    tangents = np.stack(_tangents(outward(body, ports)), axis=1)
+    moments = moments_of(body, ports)
     field = from_above(
         body,
         wavenumber,
         np.asarray(sources, dtype=float),
         x,
-        tangents,
-        (_electric, field_of_moments, _magnetic_of_electric),
+        moments,
+        fields,
         depth=depth,
         heights=heights,
         per_wavelength=per_wavelength,
     )
-    values, fewer = on_body(field, heights)
-    spread = np.max(np.linalg.norm(values - fewer, axis=3), axis=2)
-    return CoupledSlots(ports, x, tangents, values, spread)
+    return ports, x, moments, on_body(field, heights)
+
+
+def slots_along(body: Body, points: FloatArray) -> FloatArray:
+    """Two unit tangents (n, 2, 3) at points of a body."""
+    return np.stack(_tangents(outward(body, points)), axis=1)
+
+
+def monopoles_at(body: Body, points: FloatArray) -> FloatArray:
+    """Unit normals (n, 1, 3) at points of a body."""
+    return outward(body, points)[:, None]
 
 
 def outward(body: Body, points: FloatArray) -> FloatArray:
@@ -205,7 +239,7 @@ def _away(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     return distance, away / distance[:, :, None]
 
 
-def _electric(x: FloatArray, z: FloatArray, p: FloatArray, k: float) -> ComplexArray:
+def electric(x: FloatArray, z: FloatArray, p: FloatArray, k: float) -> ComplexArray:
     """E of magnetic moments p at z (s, 3), -∇ e^{ikr}/(4πr) × p: (n, 3, s)."""
     r, s = _away(x, z)
     g = np.exp(1j * k * r) / (4 * np.pi * r)
@@ -220,7 +254,7 @@ def field_of_moments(x: FloatArray, z: FloatArray, p: FloatArray, k: float) -> C
     return np.moveaxis((g * (1 - near))[:, :, None] * p + along[:, :, None] * s, 2, 1)
 
 
-def _magnetic_of_electric(x: FloatArray, y: FloatArray, p: FloatArray, k: float) -> ComplexArray:
+def magnetic_of_electric(x: FloatArray, y: FloatArray, p: FloatArray, k: float) -> ComplexArray:
     """H of the dipoles of `studies.reference.dipoles`: (n, 3, s)."""
     r, s = _away(x, y)
     g = np.exp(1j * k * r) / r * (k * k + 1j * k / r)
