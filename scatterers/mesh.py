@@ -42,7 +42,12 @@ NOISE = 2e-4
 """Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
 MOST_NOISE = 5e-3
 """Noise in units of the mean edge up to which jets find joints."""
-MOST_SUBDIVISIONS = 3
+OF_SOURCE, SMOOTHED = (1.3, 1.0, 0.65), 1e-3
+"""Spacings for a subdivided mesh, in edges of its source, and smoothing: finer grids and less of it leave ripples."""
+UNCERTAIN_SUBDIVIDED = 0.4
+"""And of a subdivided mesh, relative to a fit that follows its source as it is."""
+MOST_SUBDIVISIONS, FEWEST_SUBDIVIDED = 3, 300
+"""With "auto" a coarse mesh is subdivided once: its vertices hold no more; twice if it has fewer vertices then."""
 FEW_BAD = 0.05
 """Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
 UNCERTAIN = 0.25
@@ -68,8 +73,8 @@ class Mesh(FittedBody):
     union : bool
         Take the outer surface of all parts, which may cross each other; needs the library manifold3d.
     subdivide : {"auto", 1, 2, 3}, optional
-        Loop's subdivision of a coarse mesh of a smooth body, which passes near its vertices; "auto" as often as it
-        takes. `repairs` tell by how much vertices moved.
+        Loop's subdivision of a coarse mesh of a smooth body, whose surface passes by its vertices; "auto" where the
+        mesh is too coarse. `repairs` tell by how much vertices moved.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -82,7 +87,8 @@ class Mesh(FittedBody):
     quality : MeshQuality
     fit : FitReport
     coarse_fit : SplineBody
-        The same body fitted on a coarser grid: what differs on it is uncertain.
+        The same body fitted on a coarser grid: what differs on it is uncertain. Of a subdivided mesh, on a finer one
+        that follows the mesh as it is.
     repairs : tuple of str
         What was changed in the mesh.
 
@@ -141,6 +147,8 @@ class Mesh(FittedBody):
             if regions.count > 1 or (regions.crease.any() and quality.verdict == "sharp"):
                 notes = {"repairs": list(mesh.repairs), "source": source_name(source)}
                 return PieceCloud(mesh.vertices, mesh.triangles, regions, None, quality, notes)
+        if mesh.nearer is not None:
+            return _subdivided_cloud(mesh, mesh.nearer, jets, quality, source_name(source))
         # nearly all of it bad: a whole fit tells what it is worth
         coarse = quality.verdict == "too coarse" and quality.bad_share > FEW_BAD
         bad = quality.bad & (quality.verdict != "noisy") & (not coarse)
@@ -175,9 +183,36 @@ class Mesh(FittedBody):
             mean_curvature=None if noisy else mean,
             quality=quality,
             uncertain=UNCERTAIN if coarse else np.inf,
-            moved=mesh.moved,
             notes={"repairs": list(mesh.repairs), "source": source_name(source)},
         )
+
+
+def _subdivided_cloud(
+    mesh: TriangleMesh, nearer: FloatArray, jets: Jets, quality: MeshQuality, name: str
+) -> PointCloud:
+    """Points of a subdivided mesh, for grids and a smoothing that leave out what its source does not hold."""
+    edge = quality.edge_mean * 2**mesh.subdivided
+    grids = tuple(cells * edge for cells in OF_SOURCE)
+
+    def cloud(vertices: FloatArray, jets: Jets, other: PointCloud | None) -> PointCloud:
+        return PointCloud(
+            vertices,
+            jets.normals,
+            edge=quality.edge_mean,
+            spacing=grids[0],
+            noise=0.0,
+            non_smooth=np.zeros((0, 3)),
+            distance=partial(signed_distance, vertices, jets),
+            mean_curvature=None,
+            quality=quality,
+            notes={"repairs": list(mesh.repairs), "source": name},
+            uncertain=UNCERTAIN_SUBDIVIDED,
+            smoothing=SMOOTHED,
+            finer=grids,
+            nearer=other,
+        )
+
+    return cloud(mesh.vertices, jets, cloud(nearer, osculating_jets(nearer, mesh.triangles), None))
 
 
 def examined_mesh(
@@ -235,12 +270,12 @@ def _examined(
     for count in range(0 if times in (None, "auto") else int(times or 0), MOST_SUBDIVISIONS + 1):
         if count:
             notes: list[str] = []
-            vertices, triangles, moved = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
-            found = TriangleMesh(vertices, triangles, (*mesh.repairs, *notes), moved)
+            finer = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
+            found = TriangleMesh(finer.vertices, finer.triangles, (*mesh.repairs, *notes), count, finer.nearer)
         progress(f"normals of {len(found.vertices)} vertices")
         jets = osculating_jets(found.vertices, found.triangles)
         quality, joints = _with_joints(assess(found, jets), found, jets)
-        enough = quality.verdict != "too coarse" or (count and quality.bad_share < FEW_BAD)
+        enough = quality.verdict != "too coarse" or (count and len(found.vertices) >= FEWEST_SUBDIVIDED)
         if times != "auto" or enough or 4 * len(found.vertices) > MOST_SUBDIVIDED:
             break
     for line in found.repairs[len(mesh.repairs) :]:

@@ -42,8 +42,12 @@ class PointCloud:
         Plain values that are kept beside the fit: ``repairs``, and what else a kind of body has to tell.
     uncertain : float
         Difference of the curvatures of two fits, relative to their rms, beyond which the body is refused.
-    moved : float
-        Rms distance by which a subdivision has moved the vertices of the source, L.
+    smoothing : float or None
+        Weight of the fourth differences where it is known what is due; None: the least, or by the noise.
+    finer : tuple of float, L
+        Spacings that are tried in turn where this is set: the first on which the fit serves is taken.
+    nearer : PointCloud or None
+        What the second fit is made to, if not to the same: of a subdivided mesh, points nearer to its source, as many.
     """
 
     points: FloatArray
@@ -57,7 +61,9 @@ class PointCloud:
     quality: MeshQuality
     notes: dict[str, Any]
     uncertain: float = np.inf
-    moved: float = 0.0
+    smoothing: float | None = None
+    finer: tuple[float, ...] = ()
+    nearer: "PointCloud | None" = None
 
     @property
     def reach(self) -> float:

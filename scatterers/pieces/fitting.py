@@ -19,8 +19,8 @@ from scatterers.pieces.patch import COARSER, SPACING, TIP, Closeness, Patch, pol
 from scatterers.pieces.regions import Regions
 from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
 from scatterers.pieces.trust import astray, doubtful, rough
-from scatterers.spline.compared import curvatures
-from scatterers.spline.fitting import SMOOTHING, tangents
+from scatterers.spline.compared import curvatures, tangents
+from scatterers.spline.fitting import SMOOTHING
 from scatterers.spline.report import FitReport
 from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.quality import BAD

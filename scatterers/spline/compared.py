@@ -1,9 +1,8 @@
-"""Curvatures of a spline at points of its body: two fits of one body differ there by about the error of the coarser."""
+"""What a spline makes of points of its body: two fits of one body differ there by about the error of the coarser."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.spline.fitting import tangents
 from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
 
 FloatArray = NDArray[np.float64]
@@ -29,3 +28,18 @@ def curvatures(
     form = np.einsum("ani,nij,bnj->abn", t, entries[:, SYMMETRIC], t) / slope
     gauss = form[0, 0] * form[1, 1] - form[0, 1] ** 2
     return np.concatenate([form[0, 0], form[1, 1]]), gauss, slope
+
+
+def left_at(spline: TensorSpline, points: FloatArray, normals: FloatArray) -> tuple[float, float]:
+    """Rms of F/|grad F| at points (n, 3), L, and rms angle between grad F and unit normals (n, 3) there, radians."""
+    value, gradient, _ = evaluated(spline.compiled, points)
+    slope = np.linalg.norm(gradient, axis=1)
+    turn = np.linalg.norm(gradient / slope[:, None] - normals, axis=1)
+    return float(np.sqrt(np.mean((value / slope) ** 2))), float(np.sqrt(np.mean(turn**2)))
+
+
+def tangents(normals: FloatArray) -> FloatArray:
+    """Two orthonormal tangents at unit normals: (n, 3) -> (2, n, 3)."""
+    e = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    e /= np.linalg.norm(e, axis=1, keepdims=True)
+    return np.stack([e, np.cross(normals, e)])

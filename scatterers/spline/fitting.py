@@ -27,8 +27,9 @@ from numpy.typing import NDArray
 
 from scatterers.kernels.spline_constants import OVERREAD
 from scatterers.spline.cardinal import Cardinal
+from scatterers.spline.compared import left_at, tangents
 from scatterers.spline.roughness import fourth_bands, ranges
-from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated, weights
+from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
 
 FloatArray = NDArray[np.float64]
 OFFSET_WEIGHT = 0.01
@@ -44,6 +45,8 @@ PADDING = 5.0
 """Cells between the body and the faces of the grid."""
 NEAR = 7.0
 """Cells from the points within which a given distance is asked for: beyond, no sample sees what is there."""
+AWAY = 1.2
+"""Cells from the points within which parts of either sign come that the body bounds."""
 QUASI = np.array([13, -112, 438, -112, 13]) / 240
 MAX_NODES = 8_000_000
 ITERATIONS = 480
@@ -265,6 +268,8 @@ class _Equations:
         axes = [self.low[k] + self.spacing * (np.arange(self.shape[k]) - 2.0) for k in range(3)]
         where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         values, off = self._plane_distance(where, self._nearest(where))
+        stray = self._stray(values, off)
+        values[stray] *= -1
         if distance is not None:
             near = np.flatnonzero(off < NEAR * self.spacing)
             found = distance(where[near])
@@ -275,6 +280,24 @@ class _Equations:
         for axis in range(3):
             c = convolve1d(c, QUASI, axis=axis, mode="nearest")
         return np.concatenate([c.ravel(), np.zeros(OVERREAD)])
+
+    def _stray(self, values: FloatArray, off: FloatArray) -> NDArray[np.bool_]:
+        """Nodes (m,) whose sign is wrong: parts of one sign that keep away from the points, which are so far off, L.
+
+        At a sharp vertex of a coarse mesh the normal may lean so far that nodes in front of it lie behind its plane.
+        """
+        from scipy.ndimage import label
+
+        near, stray = off <= AWAY * self.spacing, np.zeros(len(off), dtype=bool)
+        for side in (values < 0, values >= 0):
+            part, count = label(side.reshape(self.shape))
+            part = part.ravel()
+            meant = np.zeros(count + 1, dtype=bool)
+            meant[part[near | ~side]] = True
+            # thicker than all that is near points, or all of what is outside
+            meant[np.argmax(np.bincount(part, side))] = True
+            stray |= ~meant[part]
+        return stray
 
     def residual(
         self, c: FloatArray, *, targets: bool, rough: bool = True, out: FloatArray | None = None
@@ -334,18 +357,8 @@ class _Equations:
     def result(self, c: FloatArray, iterations: int, change: float) -> Fitted:
         """The spline, and what is left at the points."""
         spline = self.spline(c)
-        value, gradient, _ = evaluated(spline.compiled, self.points[self.fitted])
-        slope = np.linalg.norm(gradient, axis=1)
-        turn = np.linalg.norm(gradient / slope[:, None] - self.normals[self.fitted], axis=1)
-        misfit = float(np.sqrt(np.mean((value / slope) ** 2)))
-        return Fitted(spline, self.spacing, iterations, change, misfit, float(np.sqrt(np.mean(turn**2))))
-
-
-def tangents(normals: FloatArray) -> FloatArray:
-    """Two orthonormal tangents at unit normals: (n, 3) -> (2, n, 3)."""
-    e = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
-    e /= np.linalg.norm(e, axis=1, keepdims=True)
-    return np.stack([e, np.cross(normals, e)])
+        misfit, turn = left_at(spline, self.points[self.fitted], self.normals[self.fitted])
+        return Fitted(spline, self.spacing, iterations, change, misfit, turn)
 
 
 class _Watch:
@@ -372,27 +385,3 @@ class _Watch:
         if not self.guided:
             return 0.0
         return float(np.sqrt(np.mean((curvatures.mean(axis=0) - self.guide) ** 2)))
-
-
-def accumulate_numpy(
-    places: FloatArray,
-    values: FloatArray,
-    slopes: FloatArray,
-    weight: FloatArray,
-    shape: NDArray[np.int64],
-    c: FloatArray,
-    out: FloatArray,
-) -> float:
-    """Numpy twin of `scatterers.kernels.normal_equations.accumulate`."""
-    cell = places.astype(np.int64)
-    w = weights(places - cell, 1)
-    value, slope = w[..., 0], w[..., 1]
-    steps = np.arange(6)
-    i, j, k = (cell[:, axis, None] + steps for axis in range(3))
-    index = (i[:, :, None, None] * shape[1] + j[:, None, :, None]) * shape[2] + k[:, None, None, :]
-    triples = [(value, value, value), (slope, value, value), (value, slope, value), (value, value, slope)]
-    rows = np.stack([np.einsum("na,nb,nc->nabc", a[:, 0], b[:, 1], d[:, 2]) for a, b, d in triples], axis=1)
-    left = np.column_stack([values, slopes]) - np.einsum("nqabc,nabc->nq", rows, c[index])
-    scale = np.array([weight[0], *3 * [weight[1]]])
-    np.add.at(out, index, np.einsum("nq,nqabc->nabc", scale * left, rows))
-    return float(np.sum(scale * left**2))

@@ -13,21 +13,21 @@ class FitReport:
     points : int
         Points of the body that were fitted.
     spacing, coarser_spacing : float
-        Of the grids, L.
+        Of the grids, L; of a subdivided mesh the second is the finer one.
     nodes : tuple of int
         Of the finer grid.
     misfit : float
-        Rms distance of the points from the body, with what a subdivision has moved the vertices by, L.
+        Rms distance of the points from the body, L; of a subdivided mesh, of points nearer to its vertices.
     turn : float
-        Rms angle between the body's normals and those of the points, with what such a move turns them by, radians.
+        Rms angle between the body's normals and those of these points, radians.
     slope : tuple of float
         Least and largest |grad F| on the body; 1 for a signed distance.
     normal_curvature, gaussian_curvature : float
         Rms of kappa_n over points and directions, 1/L, and of K, 1/L^2.
     normal_curvature_error, gaussian_curvature_error : float
-        Rms difference between the two fits, of points without noise the angle of normals over the spacing, which is in
-        both, and what a subdivision bends: the square root of the sum of their squares. The error of the finer fit is
-        about a third of it where the grids resolve the body, since curvatures converge with order 4.
+        Rms difference between the two fits and, of points without noise, the angle of normals over the spacing, which
+        is in both: the square root of the sum of their squares. The error of the finer fit is about a third of it
+        where the grids resolve the body, since curvatures converge with order 4; of a subdivided mesh it is all of it.
     noise : float
         Rms distance of the points from a smooth body, estimated before the fit, L.
     smoothing : float

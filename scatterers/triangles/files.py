@@ -53,14 +53,17 @@ class TriangleMesh:
         Vertex numbers, counter-clockwise seen from outside.
     repairs : tuple of str
         What was changed, one sentence each.
-    moved : float
-        Rms distance by which a subdivision has moved the vertices, m.
+    subdivided : int
+        How often.
+    nearer : (n, 3), m, or None
+        Of a subdivided mesh: the vertices when its surface passes nearer to those of the source.
     """
 
     vertices: FloatArray
     triangles: IntArray
     repairs: tuple[str, ...] = ()
-    moved: float = 0.0
+    subdivided: int = 0
+    nearer: FloatArray | None = None
 
     def __repr__(self) -> str:
         size = " x ".join(f"{v:.4g}" for v in np.ptp(self.vertices, axis=0))

@@ -2,13 +2,15 @@
 
 Parts are connected through edges, and numbered from 1 by area, the largest first. Holes are closed by triangles from
 their border to its middle. The outer surface of parts that cross is that of their union, by the library manifold3d.
-Loop's subdivision, of trimesh, has a smooth surface as its limit, which passes near the vertices, not through them.
+Loop's subdivision, of trimesh, has a smooth surface as its limit, which passes near the vertices it is given: these are
+moved first, so that it passes near the ones of the mesh.
 
 Sources: [L87] Loop, Smooth subdivision surfaces based on triangles, University of Utah 1987.
 """
 
 import importlib.util
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,20 +175,48 @@ def united(
     return found
 
 
-def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note) -> tuple[FloatArray, IntArray, float]:
-    """Loop's subdivision, so many times, and how far it moves the vertices, rms, which is told as well."""
+class Subdivision(NamedTuple):
+    """A subdivided mesh, and the same with its surface nearer to the vertices of the source.
+
+    Attributes
+    ----------
+    vertices, triangles : (n, 3), in the unit of the source, and (m, 3)
+    nearer : (n, 3)
+        What the vertices are when the surface is moved by what it still misses.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    nearer: FloatArray
+
+
+def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note) -> Subdivision:
+    """Loop's subdivision, so many times, of vertices that are moved first by what it would move them.
+
+    With x -> S x the subdivision, read at the vertices that were there before, S(2x - S x) misses x by (1 - S)^2 x
+    where S x misses it by (1 - S) x: a tenth on meshes with twelve vertices around a body. How far is told.
+    """
     import trimesh
 
-    fine, corners = trimesh.remesh.subdivide_loop(vertices, triangles, iterations=times)
-    # the first vertices are the old ones, moved
-    moved = np.linalg.norm(fine[: len(vertices)] - vertices, axis=1)
+    def subdivision(x: FloatArray) -> tuple[FloatArray, IntArray]:
+        fine, corners = trimesh.remesh.subdivide_loop(x, triangles, iterations=times)
+        return np.asarray(fine, dtype=float), np.asarray(corners, dtype=np.int64)
+
+    count, bases = len(vertices), [vertices]
+    found = []
+    for _ in range(3):
+        # the first vertices are the old ones, moved
+        found.append(subdivision(bases[-1]))
+        bases.append(bases[-1] + vertices - found[-1][0][:count])
+    fine, corners = found[1]
+    moved = np.linalg.norm(fine[:count] - vertices, axis=1)
     rms, most = float(np.sqrt(np.mean(moved**2))), float(moved.max())
     edge = float(np.mean(np.linalg.norm(vertices[triangles] - np.roll(vertices[triangles], 1, axis=1), axis=2)))
     note(
-        f"subdivided {times} time{'s' * (times != 1)} after Loop: {len(vertices)} vertices became {len(fine)}, "
+        f"subdivided {times} time{'s' * (times != 1)} after Loop: {count} vertices became {len(fine)}, "
         f"moved by {rms:.2g} m rms, {most:.2g} at most (mean edge {edge:.2g} m)"
     )
-    return np.asarray(fine, dtype=float), np.asarray(corners, dtype=np.int64), rms
+    return Subdivision(fine, corners, found[2][0])
 
 
 def areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:
