@@ -96,10 +96,11 @@ def far_field(
     # currents go across joints, by marching, not round edges; those of a conductor only if they are solved
     serve = not creased or (order == 2 and not has_edges(fan.body) and (len(kinds) == 1 or pairs_of(fan.body, k) > 0))
     # a conductor's sums are of six columns, those of one scalar problem of one to four
-    cheap = method == "auto" and order == 2 and len(r) and affordable(fan, len(kinds) * len(r), k, distant=True)
+    auto = serve and method == "auto" and order == 2 and len(r)
+    cheap = auto and affordable(fan, len(kinds) * len(r), k, distant=True)
     # there are no modes of an admittance that varies
     must = serve and (method == "currents" or (method == "auto" and kinds[0].varies and not creased))
-    if must or (serve and cheap) or solve:
+    if must or cheap or solve:
         try:
             currents = kept_currents(fan, k, boundary, solve=solve)
             # the equation knows of tips, expansions do not

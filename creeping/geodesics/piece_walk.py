@@ -1,6 +1,6 @@
 """Rays of a body of pieces as they go: together from stop to stop on their pieces, one by one where they leave them.
 
-All rays on one piece are traced through a window of stops in one call. Where one of them has left its piece, the time
+All rays on one piece are traced through a window of stops in one call, no farther than it is wide. Where one of them has left its piece, the time
 is found again between exact states, TIGHT around it, so that it is exact to rounding; from there it goes by itself to
 the next stop, and so do rays next to a tip, in steps that do not reach through it.
 
@@ -22,7 +22,7 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.piece_exits import REACH, Exits, PieceExits
 from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X
-from creeping.geometry.creased import SMOOTH, nearest_crease, piece_ahead, pieces_of
+from creeping.geometry.creased import SMOOTH, nearest_crease, piece_ahead, pieces_across, pieces_of
 from creeping.geometry.surface import size
 
 GAP, WINDOW = 0.1, 0.3
@@ -54,7 +54,7 @@ class Walk:
     def __init__(self, body: Any, states: FloatArray, rtol: float, step: float | None) -> None:
         self.body, self.pieces, self.size = body, pieces_of(body), size(body)
         self.rtol, self.step = rtol, step
-        self.exits = PieceExits(body)
+        self.exits, self.across = PieceExits(body), pieces_across(body)
         self.states = np.array(states, dtype=float)
         self.lanes, n = states.shape[1], len(states)
         self.on = piece_ahead(body, states[:, X], states[:, P])
@@ -108,6 +108,8 @@ class Walk:
 
     def _together(self, number: int, mine: IntArray, place: int, stops: FloatArray, out: FloatArray) -> None:
         own = stops[place:] - stops[place]
+        # far beyond the borders of a small piece steps are many, and for nothing
+        own = own[: max(2, int(np.searchsorted(own, self.across[number], side="right")))]
         found = self._later(self._safely(number, self.states[mine], own[1:]), mine, stops[place])
         path = np.concatenate([self.states[mine, None], found], axis=1)
         exits = self._exits(number, mine, path, np.broadcast_to(own, (len(mine), len(own))))

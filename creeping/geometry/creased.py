@@ -169,6 +169,19 @@ def pieces_of(body: Any) -> tuple[Any, ...]:
     return kept(body, "pieces", made)
 
 
+def pieces_across(body: Any) -> FloatArray:
+    """Diagonal of the box about each piece (n,), L; found once."""
+
+    def made() -> FloatArray:
+        tiles = tiles_of(body, SAMPLE)
+        out = np.zeros(len(body.pieces))
+        for number in np.unique(tiles.pieces):
+            out[number] = np.linalg.norm(np.ptp(tiles.corners[tiles.pieces == number].reshape(-1, 3), axis=0))
+        return out
+
+    return kept(body, "pieces across", made)
+
+
 def piece_ahead(body: Any, points: FloatArray, directions: FloatArray) -> IntArray:
     """Piece on which what starts at points along directions goes: (n, 3), (3,) or (n, 3) -> (n,)."""
     return np.asarray(body.piece(points + AHEAD * size(body) * directions), dtype=np.int64)
