@@ -1,8 +1,9 @@
 """Rays of a body of pieces as they go: together from stop to stop on their pieces, one by one where they leave them.
 
-All rays on one piece are traced through a window of stops in one call, no farther than it is wide. Where one of them has left its piece, the time
-is found again between exact states, TIGHT around it, so that it is exact to rounding; from there it goes by itself to
-the next stop, and so do rays next to a tip, in steps that do not reach through it.
+All rays on one piece are traced through a window of stops in one call, but no farther than the piece is wide: steps
+are many beyond its borders. Where one of them has left its piece, the time is found again between exact states, TIGHT
+around it, so that it is exact to rounding; from there it goes by itself to the next stop, and so do rays next to a tip,
+in steps that do not reach through it.
 
 What a ray does is bounded: after CROSSINGS it stays on its piece up to the end of the window, and after ROUNDS, or
 where no step however short is left to it, it ends as data, at the nearest edge or tip, without a crease if none is
@@ -108,7 +109,6 @@ class Walk:
 
     def _together(self, number: int, mine: IntArray, place: int, stops: FloatArray, out: FloatArray) -> None:
         own = stops[place:] - stops[place]
-        # far beyond the borders of a small piece steps are many, and for nothing
         own = own[: max(2, int(np.searchsorted(own, self.across[number], side="right")))]
         found = self._later(self._safely(number, self.states[mine], own[1:]), mine, stops[place])
         path = np.concatenate([self.states[mine, None], found], axis=1)

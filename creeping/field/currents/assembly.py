@@ -14,7 +14,14 @@ from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
 from creeping.field.currents.nodes import LitNodes, lit_nodes, ray_nodes
 from creeping.field.currents.waves import lit_waves, ray_waves
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.currents.whole_solution import ASKED, MOST, pairs_of, solved_on_whole_body, why_not
+from creeping.field.currents.whole_solution import (
+    ASKED,
+    MOST,
+    pairs_of,
+    solved_on_whole_body,
+    too_many,
+    why_not,
+)
 from creeping.geometry.arguments import one_of
 from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import size
@@ -72,8 +79,8 @@ def surface_currents(
     kinds = scalar_boundaries(boundary)
     checked_plain(fan.body, edgeless="" if solve else "the method of currents")
     k = checked(wavenumber, 2)
-    refused = why_not(fan.body, k)
     most = ASKED if solve else MOST
+    refused = why_not(fan.body, k) or (too_many(fan.body, k, most) if solve else "")
     possible = not refused if solve else solve is None and pairs_of(fan.body, k) > 0
     if solve and refused:
         raise InvalidInputError(
@@ -97,7 +104,8 @@ def surface_currents(
             raise
         return solved_on_whole_body(_no_currents(fan, k, CONDUCTOR if len(kinds) == 2 else kinds[0]), most)
     poor = facing or currents.unserved > CUT or currents.stepped > 0
-    if possible and (solve or poor or not currents.extinction <= POOR):
+    wanted = possible and (solve or poor or not currents.extinction <= POOR)
+    if wanted and not too_many(fan.body, k, most):
         return solved_on_whole_body(currents, most)
     if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
         currents.values[currents.lit] += currents.thrown(lit.points, lit.normals)

@@ -73,6 +73,15 @@ def why_not(body: Surface, wavenumber: float) -> str:
     return "" if nodes**2 <= ASKED else f"it needs {nodes} nodes, more than {int(ASKED**0.5)}"
 
 
+def too_many(body: Surface, wavenumber: float, most: float) -> str:
+    """Why nodes are too many to be solved between by so many pairs, or nothing; they are made, and kept.
+
+    Until then their number is that of a mesh that need not close.
+    """
+    nodes = len(body_nodes(body, RATE * wavenumber).points)
+    return f"it needs {nodes} nodes, more than {int(most**0.5)}" if nodes**2 > most else ""
+
+
 def _is_rough(body: Surface) -> bool:
     """Whether a body says of itself that it is somewhere not smooth enough for rays: what it is there is not known."""
     rough = getattr(body, "non_smooth", None)

@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.currents import whole_solution
+from creeping.field.currents import assembly, whole_solution
 from creeping.field.currents.kept import kept_currents
 from creeping.field.currents.node_sums import sums_at
 from creeping.field.currents.second_kind import twice_incident
@@ -113,6 +113,20 @@ def test_what_would_take_too_long_has_one_bounce(monkeypatch):
     # what is left of the equation is its change
     assert 0 < np.sqrt(np.mean(np.abs(solved.change) ** 2)) < 0.01
     np.testing.assert_allclose(solved.weights.sum(), body_nodes(fan.body, 16.0).weights.sum())
+
+
+def test_nodes_that_close_may_be_too_many_where_those_of_the_first_mesh_are_not(monkeypatch):
+    """`node_count` is of a mesh that need not close: of a mesh of 250 vertices a twentieth of the pairs that are."""
+    fan = fan_on(sc.TwistedEllipsoid(), DIP, 8.0)
+    nodes = len(body_nodes(fan.body, whole_solution.RATE * 8.0).points)
+    assert whole_solution.too_many(fan.body, 8.0, float(nodes**2)) == ""
+    assert f"needs {nodes} nodes, more than {nodes - 1}" in whole_solution.too_many(fan.body, 8.0, (nodes - 1.0) ** 2)
+    for most in ("MOST", "ASKED"):
+        monkeypatch.setattr(assembly, most, (nodes - 1.0) ** 2)
+    assert whole_solution.pairs_of(fan.body, 8.0) == nodes**2
+    assert not cr.surface_currents(fan, wavenumber=8.0, boundary="hard").solved
+    with pytest.raises(cr.InvalidInputError, match=f"needs {nodes} nodes, more than"):
+        cr.surface_currents(fan, wavenumber=8.0, boundary="hard", solve=True)
 
 
 @pytest.mark.slow
