@@ -12,12 +12,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.clouds import PieceCloud, PointCloud
+from scatterers.base.clouds import DISTRUSTED, Nearer, PieceCloud, PointCloud
 from scatterers.base.fitted_body import FittedBody, checked_options
 from scatterers.pieces.joints import Jointed, jointed
 from scatterers.pieces.regions import regions_of
@@ -27,8 +27,8 @@ from scatterers.triangles.choice import Choice
 from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers.triangles.jet_points import centroids, signed_distance
 from scatterers.triangles.jets import Jets, angle_weighted_normals, osculating_jets
-from scatterers.triangles.parts import MOST_SUBDIVIDED, subdivided
 from scatterers.triangles.quality import FEWEST_RIMS, MeshQuality, assess, jumps_at, noise_at_most
+from scatterers.triangles.subdivision import MOST_SUBDIVIDED, Subdivision, edges_where_curved, subdivided
 
 FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0
@@ -42,12 +42,13 @@ NOISE = 2e-4
 """Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
 MOST_NOISE = 5e-3
 """Noise in units of the mean edge up to which jets find joints."""
-OF_SOURCE, SMOOTHED = (1.3, 1.0, 0.65), 1e-3
-"""Spacings for a subdivided mesh, in edges of its source, and smoothing: finer grids and less of it leave ripples."""
-UNCERTAIN_SUBDIVIDED = 0.4
-"""And of a subdivided mesh, relative to a fit that follows its source as it is."""
+OF_SOURCE, NARROWEST, SMOOTHED = (1.3, 1.0, 0.65), 0.45, 1e-3
+"""Spacings for a subdivided mesh, in edges of its source where it curves, these no less than so much of the mean edge;
+and smoothing: finer grids and less of it leave ripples."""
+UNCERTAIN_SUBDIVIDED = 0.5
+"""And of a subdivided mesh, of which more is counted."""
 MOST_SUBDIVISIONS, FEWEST_SUBDIVIDED = 3, 300
-"""With "auto" a coarse mesh is subdivided once: its vertices hold no more; twice if it has fewer vertices then."""
+"""With "auto" a coarse mesh is subdivided once: its vertices hold no more; again while it has fewer than so many."""
 FEW_BAD = 0.05
 """Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
 UNCERTAIN = 0.25
@@ -134,21 +135,13 @@ class Mesh(FittedBody):
     def _points(
         self, source: Any, units: str | None, strict: bool, choice: Choice, progress: Callable[[str], None]
     ) -> PointCloud | PieceCloud:
-        mesh, jets, quality, joints = _examined(source, units, choice, progress)
-        if quality.verdict not in ("smooth", "noisy"):
-            if strict:
-                raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
-            if joints is not None:
-                regions = regions_of(joints.vertices, joints.triangles, sharp=joints.sharp, level=joints.level)
-                notes = {"repairs": list(mesh.repairs), "source": source_name(source)}
-                return PieceCloud(joints.vertices, joints.triangles, regions, None, quality, notes, joints.noise)
-            regions = regions_of(mesh.vertices, mesh.triangles)
-            # creases that end on smooth ground are folds of a coarse mesh, unless most sharp edges are in chains
-            if regions.count > 1 or (regions.crease.any() and quality.verdict == "sharp"):
-                notes = {"repairs": list(mesh.repairs), "source": source_name(source)}
-                return PieceCloud(mesh.vertices, mesh.triangles, regions, None, quality, notes)
-        if mesh.nearer is not None:
-            return _subdivided_cloud(mesh, mesh.nearer, jets, quality, source_name(source))
+        mesh, jets, quality, pieces = _examined(source, units, choice, progress)
+        if strict and quality.verdict not in ("smooth", "noisy"):
+            raise ValueError(f"the mesh is not smooth enough ({quality.verdict}): {quality.reasons}")
+        if pieces is not None:
+            return pieces
+        if mesh.loop is not None:
+            return _subdivided_cloud(mesh, mesh.loop, jets, quality, source_name(source))
         # nearly all of it bad: a whole fit tells what it is worth
         coarse = quality.verdict == "too coarse" and quality.bad_share > FEW_BAD
         bad = quality.bad & (quality.verdict != "noisy") & (not coarse)
@@ -187,32 +180,29 @@ class Mesh(FittedBody):
         )
 
 
-def _subdivided_cloud(
-    mesh: TriangleMesh, nearer: FloatArray, jets: Jets, quality: MeshQuality, name: str
-) -> PointCloud:
+def _subdivided_cloud(mesh: TriangleMesh, loop: Subdivision, jets: Jets, quality: MeshQuality, name: str) -> PointCloud:
     """Points of a subdivided mesh, for grids and a smoothing that leave out what its source does not hold."""
-    edge = quality.edge_mean * 2**mesh.subdivided
-    grids = tuple(cells * edge for cells in OF_SOURCE)
-
-    def cloud(vertices: FloatArray, jets: Jets, other: PointCloud | None) -> PointCloud:
-        return PointCloud(
-            vertices,
-            jets.normals,
-            edge=quality.edge_mean,
-            spacing=grids[0],
-            noise=0.0,
-            non_smooth=np.zeros((0, 3)),
-            distance=partial(signed_distance, vertices, jets),
-            mean_curvature=None,
-            quality=quality,
-            notes={"repairs": list(mesh.repairs), "source": name},
-            uncertain=UNCERTAIN_SUBDIVIDED,
-            smoothing=SMOOTHED,
-            finer=grids,
-            nearer=other,
-        )
-
-    return cloud(mesh.vertices, jets, cloud(nearer, osculating_jets(nearer, mesh.triangles), None))
+    curvature = np.abs(jets.principal).max(axis=1)
+    edge = max(edges_where_curved(mesh.vertices, mesh.triangles, curvature), NARROWEST * quality.edge_mean)
+    grids = tuple(cells * edge * 2**loop.times for cells in OF_SOURCE)
+    others = osculating_jets(loop.nearer, mesh.triangles)
+    return PointCloud(
+        mesh.vertices,
+        jets.normals,
+        # what is said of a vertex of the source is of an edge about it
+        edge=grids[0] / OF_SOURCE[0] / DISTRUSTED,
+        spacing=grids[0],
+        noise=0.0,
+        non_smooth=np.zeros((0, 3)),
+        distance=partial(signed_distance, mesh.vertices, jets),
+        mean_curvature=None,
+        quality=quality,
+        notes={"repairs": list(mesh.repairs), "source": name},
+        uncertain=UNCERTAIN_SUBDIVIDED,
+        smoothing=SMOOTHED,
+        narrower=grids[1:],
+        nearer=Nearer(loop.nearer, others.normals, partial(signed_distance, loop.nearer, others), loop.source),
+    )
 
 
 def examined_mesh(
@@ -256,31 +246,67 @@ def examined_mesh(
     'sharp'
     """
     choice = Choice(part, cap, union, subdivide)
-    mesh, _, quality, _ = _examined(source, units, choice, lambda _: None)
-    return mesh, quality
+    found = _examined(source, units, choice, lambda _: None)
+    return found.mesh, found.quality
 
 
-def _examined(
-    source: Any, units: str | None, choice: Choice, progress: Callable[[str], None]
-) -> tuple[TriangleMesh, Jets, MeshQuality, Jointed | None]:
+class _Examined(NamedTuple):
+    """A mesh, its vertices' jets, what these say of it, and its smooth pieces if it has edges or joints."""
+
+    mesh: TriangleMesh
+    jets: Jets
+    quality: MeshQuality
+    pieces: PieceCloud | None
+
+
+def _examined(source: Any, units: str | None, choice: Choice, progress: Callable[[str], None]) -> _Examined:
+    """The mesh of a source, subdivided where that is asked for and it is smooth."""
     progress("reading the mesh")
-    mesh = read_mesh(source, units, choice, progress=progress)
-    times = choice.subdivide
+    mesh, times = read_mesh(source, units, choice, progress=progress), choice.subdivide
+    progress(f"normals of {len(mesh.vertices)} vertices")
+    jets, quality, joints = _judged(mesh)
+    pieces = _pieces(mesh, quality, joints, source_name(source))
+    if times is None or (times == "auto" and (quality.verdict != "too coarse" or pieces is not None)):
+        return _Examined(mesh, jets, quality, pieces)
+    if pieces is not None:
+        raise ValueError(
+            f"the mesh has {pieces.regions.count} smooth pieces ({quality.verdict}), between which subdivide = {times} "
+            "would round it off; leave it out: the pieces are taken as they are, up to their edges"
+        )
     found = mesh
-    for count in range(0 if times in (None, "auto") else int(times or 0), MOST_SUBDIVISIONS + 1):
-        if count:
-            notes: list[str] = []
-            finer = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
-            found = TriangleMesh(finer.vertices, finer.triangles, (*mesh.repairs, *notes), count, finer.nearer)
+    for count in range(1, MOST_SUBDIVISIONS + 1) if times == "auto" else (int(times),):
+        if times == "auto" and 4 * len(found.vertices) > MOST_SUBDIVIDED:
+            break
+        notes: list[str] = []
+        loop = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
+        found = TriangleMesh(loop.vertices, loop.triangles, (*mesh.repairs, *notes), loop)
         progress(f"normals of {len(found.vertices)} vertices")
-        jets = osculating_jets(found.vertices, found.triangles)
-        quality, joints = _with_joints(assess(found, jets), found, jets)
-        enough = quality.verdict != "too coarse" or (count and len(found.vertices) >= FEWEST_SUBDIVIDED)
-        if times != "auto" or enough or 4 * len(found.vertices) > MOST_SUBDIVIDED:
+        jets, quality, _ = _judged(found)
+        if quality.verdict != "too coarse" or len(found.vertices) >= FEWEST_SUBDIVIDED:
             break
     for line in found.repairs[len(mesh.repairs) :]:
         progress(line)
-    return found, jets, quality, joints
+    return _Examined(found, jets, quality, None)
+
+
+def _judged(mesh: TriangleMesh) -> tuple[Jets, MeshQuality, Jointed | None]:
+    jets = osculating_jets(mesh.vertices, mesh.triangles)
+    return jets, *_with_joints(assess(mesh, jets), mesh, jets)
+
+
+def _pieces(mesh: TriangleMesh, quality: MeshQuality, joints: Jointed | None, name: str) -> PieceCloud | None:
+    """The smooth pieces of a mesh with edges or joints; None if it is one smooth piece."""
+    if quality.verdict in ("smooth", "noisy"):
+        return None
+    notes = {"repairs": list(mesh.repairs), "source": name}
+    if joints is not None:
+        regions = regions_of(joints.vertices, joints.triangles, sharp=joints.sharp, level=joints.level)
+        return PieceCloud(joints.vertices, joints.triangles, regions, None, quality, notes, joints.noise)
+    regions = regions_of(mesh.vertices, mesh.triangles)
+    # creases that end on smooth ground are folds of a coarse mesh, unless most sharp edges are in chains
+    if regions.count > 1 or (regions.crease.any() and quality.verdict == "sharp"):
+        return PieceCloud(mesh.vertices, mesh.triangles, regions, None, quality, notes)
+    return None
 
 
 def _with_joints(quality: MeshQuality, mesh: TriangleMesh, jets: Jets) -> tuple[MeshQuality, Jointed | None]:

@@ -156,12 +156,12 @@ class Job:
         return entry, names
 
     def _uncertainty(self, far: FarField, fan: RayFan) -> dict[str, Any]:
-        """Rms and largest change on the coarser fit, or why there is none to tell."""
+        """Rms and largest change on the second fit, or why there is none to tell."""
         asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
         try:
             change = far_field_uncertainty(fan, far.directions, **asked)
         except CreepingError as error:
-            # the coarser fit may have a shadow line that cannot be followed
+            # the second fit may have a shadow line that cannot be followed
             return {"rms": None, "max": None, "reason": str(error)}
         known = np.zeros(0) if change is None else change[np.isfinite(change)]
         if not len(known):

@@ -11,16 +11,17 @@ from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.far import far_field
 from creeping.geometry.arguments import one_of
 from creeping.rays.fan import RayFan
-from creeping.rays.uncertain_body import coarse_fan
+from creeping.rays.uncertain_body import coarse_factor, coarse_fan
 
 
 def far_field_uncertainty(
     fan: RayFan, observation: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
 ) -> FloatArray | None:
-    """Change of the far field when the body is replaced by its coarser fit, the shadow line and rays anew.
+    """Change of the far field when the body is replaced by its second fit, the shadow line and rays anew.
 
-    It is about the error of the coarser fit's field, two to four times that of the fan's own where grids resolve the
-    body. Nothing is said of the error of the asymptotic method.
+    It is about the error of the field of the worse fit: where that is the second, on a coarser grid that resolves the
+    body, two to four times that of the fan's own; of a subdivided mesh, whose ``coarse_factor`` it is multiplied by,
+    the fan's. Nothing is said of the error of the asymptotic method.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ def far_field_uncertainty(
     Returns
     -------
     (m,) or (m, 2, 2), L, or None
-        |f - f on the coarser fit|; None for a body that is known exactly.
+        |f - f on the second fit|, times that factor; None for a body that is known exactly.
 
     Raises
     ------
@@ -59,4 +60,4 @@ def far_field_uncertainty(
     mine, its = (
         far_field(one, observation, wavenumber=wavenumber, boundary=boundary, order=order) for one in (fan, other)
     )
-    return np.abs(mine.total - its.total)
+    return coarse_factor(fan) * np.abs(mine.total - its.total)

@@ -2,7 +2,8 @@
 
 A body known from points offers itself ``coarse_fit`` as well (see `creeping.geometry.surface.Surface`). Rays of a fan
 are traced on both, from the same points, projected, and with the same d; they differ by about the error of the coarse
-fit. Or the whole incidence is done again on it, shadow line and all (`coarse_fan`), for what follows from a fan.
+fit, or where the body errs by more than that it says by how much (``coarse_factor``). Or the whole incidence is done
+again on it, shadow line and all (`coarse_fan`), for what follows from a fan.
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ RTOL = 1e-10
 
 @dataclass(frozen=True)
 class BodyUncertainty:
-    """Differences at the last steps of rays on a body and on its coarser fit.
+    """Differences at the last steps of rays on a body and on its second fit, times the body's ``coarse_factor``.
 
     Attributes
     ----------
@@ -98,7 +99,7 @@ def body_uncertainty(fan: RayFan, *, n_rays: int = RAYS) -> BodyUncertainty | No
     if not both.any():
         return None
     # times of detachment are infinite here
-    off = ends[0][both, :5] - ends[1][both, :5]
+    off = coarse_factor(fan) * (ends[0][both, :5] - ends[1][both, :5])
 
     def rms(values: FloatArray) -> float:
         return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
@@ -107,7 +108,7 @@ def body_uncertainty(fan: RayFan, *, n_rays: int = RAYS) -> BodyUncertainty | No
 
 
 def coarse_fan(fan: RayFan) -> RayFan | None:
-    """The same incidence on the coarser fit, None for a body that is known exactly.
+    """The same incidence on the second fit, None for a body that is known exactly.
 
     As many rays and steps as the fan has, from its own shadow line, by direct integration.
     """
@@ -118,6 +119,11 @@ def coarse_fan(fan: RayFan) -> RayFan | None:
     rays, steps = max(len(fan.points), 1), len(fan.travel_time) - 1
     flow = DirectFlow(coarse_fit, rtol=RTOL)
     return launch(flow, line, length=fan.length, n_rays=rays, n_steps=steps, max_gap=float("inf"))
+
+
+def coarse_factor(fan: RayFan) -> float:
+    """How much more the body of a fan errs than it differs from its second fit."""
+    return float(getattr(fan.body, "coarse_factor", 1.0))
 
 
 def _ends(body: Any, starts: FloatArray, fan: RayFan) -> FloatArray:

@@ -3,17 +3,35 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.pieces.regions import Regions
 from scatterers.triangles.quality import MeshQuality
+from scatterers.triangles.subdivision import Source
 
 FloatArray = NDArray[np.float64]
 DISTRUSTED = 2.0
 """Edges about a non-smooth point within which nothing is trusted."""
+
+
+class Nearer(NamedTuple):
+    """The points of a subdivided mesh where its surface passes nearer to the vertices of its source.
+
+    Attributes
+    ----------
+    points, normals : (n, 3), L and 1
+    distance : callable
+        As of a `PointCloud`.
+    source : Source
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    distance: Callable[[FloatArray], FloatArray]
+    source: Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +62,10 @@ class PointCloud:
         Difference of the curvatures of two fits, relative to their rms, beyond which the body is refused.
     smoothing : float or None
         Weight of the fourth differences where it is known what is due; None: the least, or by the noise.
-    finer : tuple of float, L
-        Spacings that are tried in turn where this is set: the first on which the fit serves is taken.
-    nearer : PointCloud or None
-        What the second fit is made to, if not to the same: of a subdivided mesh, points nearer to its source, as many.
+    narrower : tuple of float, L
+        Spacings that are tried in turn where the fit at ``spacing`` is no body.
+    nearer : Nearer or None
+        What the second fit is made to, if not to the same; as many points.
     """
 
     points: FloatArray
@@ -62,8 +80,8 @@ class PointCloud:
     notes: dict[str, Any]
     uncertain: float = np.inf
     smoothing: float | None = None
-    finer: tuple[float, ...] = ()
-    nearer: "PointCloud | None" = None
+    narrower: tuple[float, ...] = ()
+    nearer: Nearer | None = None
 
     @property
     def reach(self) -> float:

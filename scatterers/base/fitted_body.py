@@ -35,7 +35,7 @@ SLACK = 0.02
 
 
 class SplineBody(LevelBody):
-    """Body F = 0 of a spline, or of one for each of its smooth pieces; the coarser fit is one.
+    """Body F = 0 of a spline, or of one for each of its smooth pieces; the second fit is one.
 
     Attributes
     ----------
@@ -179,6 +179,11 @@ class FittedBody(SplineBody):
             folder, key, arrays, text = self._kept
             _fit_cache.store(folder, key, arrays | charts, text | {NO_CHARTS: self._no_charts})
 
+    @property
+    def coarse_factor(self) -> float:
+        """The body's error over its difference from ``coarse_fit``."""
+        return self.fit.factor
+
     def _describe(self, arrays: dict[str, FloatArray], text: dict[str, Any]) -> None:
         """Take over what is known of the fit."""
         self.fit = FitReport.from_json(text["fit"])
@@ -194,13 +199,13 @@ class FittedBody(SplineBody):
         if isinstance(cloud, PieceCloud):
             return _fitted_pieces(cloud, progress)
         _require_smooth_points(cloud)
-        fine, coarse, report = good_fit(cloud, progress)
+        found = good_fit(cloud, progress)
         arrays = (
-            {"rough": cloud.non_smooth, "badness": cloud.quality.badness}
-            | _packed(fine.spline, "fine")
-            | _packed(coarse.spline, "coarse")
+            {"rough": found.non_smooth, "badness": cloud.quality.badness}
+            | _packed(found.fine.spline, "fine")
+            | _packed(found.coarse.spline, "coarse")
         )
-        text = {"fit": report.to_json(), "quality": cloud.quality.to_json(), "reach": cloud.reach}
+        text = {"fit": found.report.to_json(), "quality": cloud.quality.to_json(), "reach": cloud.reach}
         return arrays, text | cloud.notes
 
 

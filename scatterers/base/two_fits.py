@@ -8,15 +8,17 @@ Sources: Derivations, B6.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.clouds import PointCloud
-from scatterers.spline.compared import curvatures, left_at, tangents
-from scatterers.spline.fitting import SMOOTHING, Fitted, fit
+from scatterers.base.clouds import Nearer, PointCloud
+from scatterers.spline.compared import curvatures, left_at, principal_curvatures, tangents
+from scatterers.spline.fitting import MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
 from scatterers.spline.report import FitReport
 from scatterers.spline.samples import Samples
+from scatterers.triangles.subdivision import BLIND, Source, turns, unseen
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -32,83 +34,136 @@ SECOND = 0.4
 """Share of noisy points that the second fit sees."""
 SLOPES = (0.5, 1.6)
 """|grad F| on the body: F is near a signed distance, or the fit has failed."""
+MOST_BLIND = 0.05
+"""Share of the vertices of a mesh that is subdivided about which it may show nothing."""
 
 
-def good_fit(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, FitReport]:
-    """Both fits on the first of the spacings that serves, and what is known of them; ValueError if none does."""
-    for number, spacing in enumerate(cloud.finer, 1):
+class NoBodyError(ValueError):
+    """F = 0 of a fit is not one body, or |grad F| is far from 1 on it; on a narrower grid it may be."""
+
+
+class TwoFits(NamedTuple):
+    """What a cloud comes to.
+
+    Attributes
+    ----------
+    fine, coarse : Fitted
+    report : FitReport
+    non_smooth : (m, 3), L
+        Places about which nothing is known: of the cloud, or what the fit makes blind ones of.
+    """
+
+    fine: Fitted
+    coarse: Fitted
+    report: FitReport
+    non_smooth: FloatArray
+
+
+def good_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
+    """Both fits at the first of the spacings at which they are bodies, and what is known of them.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or curvatures are too uncertain: on a narrower grid both fits would follow the same noise.
+    """
+    spacings = (cloud.spacing, *cloud.narrower)
+    for spacing in spacings[:-1]:
         try:
-            return _checked_fit(replace(cloud, spacing=spacing, finer=()), progress)
-        except ValueError as error:
-            if number == len(cloud.finer):
-                raise
-            progress(f"on a grid of {spacing:.3g} m {error}")
-    return _checked_fit(cloud, progress)
+            return _checked_fit(replace(cloud, spacing=spacing), progress)
+        except NoBodyError as error:
+            progress(str(error))
+    return _checked_fit(replace(cloud, spacing=spacings[-1]), progress)
 
 
-def _checked_fit(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, FitReport]:
+def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     fine, coarse, smoothing = fits(cloud, progress)
-    report, doubt = compared(cloud, fine, coarse, smoothing)
+    non_smooth = cloud.non_smooth if cloud.nearer is None else _blind(cloud, cloud.nearer.source, fine)
+    report, doubt = compared(replace(cloud, non_smooth=non_smooth), fine, coarse, smoothing)
     if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
-        raise ValueError(
+        raise NoBodyError(
             f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
-            f"of 1; it is too thin or too curved for the distance of its points: refine the mesh there" + _finer(cloud)
+            f"of 1; it is too thin or too curved for the distance of its points: refine the mesh there" + _remedy(cloud)
         )
     if doubt > cloud.uncertain:
         raise ValueError(
             f"the mesh is too coarse: its curvatures are uncertain by {100 * doubt:.0f} %; "
-            f"{cloud.quality.reasons}{_finer(cloud)}"
+            f"{cloud.quality.reasons}{_remedy(cloud)}"
         )
-    return fine, coarse, report
+    return TwoFits(fine, coarse, report, non_smooth)
+
+
+def _blind(cloud: PointCloud, source: Source, fine: Fitted) -> FloatArray:
+    """Vertices (m, 3) of the mesh that was subdivided about which it shows no curvature; ValueError if many."""
+    turn = turns(source, principal_curvatures(fine.spline, source.vertices)[0])
+    blind = turn > BLIND
+    if np.mean(blind) > MOST_BLIND:
+        raise ValueError(
+            f"the mesh is too coarse: at {np.sum(blind)} of {len(turn)} vertices its body turns by more than "
+            f"{np.degrees(BLIND):.0f} degrees over an edge (up to {np.degrees(turn.max()):.0f}); give more "
+            "vertices there"
+        )
+    return source.vertices[blind]
 
 
 def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
     """The fit, one on another grid, and the smoothing: the least that leaves the points off by their noise."""
-    # where most jets are bad, so is the distance that they give, and samples leave much free
-    coarse = bool(np.isfinite(cloud.uncertain))
+    # jets of a mesh that is judged by its fit are no good start, and its samples leave much free
+    doubtful = bool(np.isfinite(cloud.uncertain))
+    noisy = bool(cloud.noise)
 
-    def fitted(of: PointCloud, spacing: float, smoothing: float, some: NDArray[np.bool_] | slice) -> Fitted:
+    def fitted(
+        of: PointCloud | Nearer,
+        spacing: float,
+        smoothing: float,
+        weight: float,
+        some: NDArray[np.bool_] | slice = slice(None),
+    ) -> Fitted:
         return fit(
             of.points[some],
             of.normals[some],
             spacing,
             distance=of.distance,
-            trusted=of.smooth[some] if len(of.non_smooth) else None,
-            mean_curvature=None if of.mean_curvature is None else of.mean_curvature[some],
+            trusted=cloud.smooth[some] if len(cloud.non_smooth) else None,
+            mean_curvature=None if cloud.mean_curvature is None else cloud.mean_curvature[some],
             smoothing=smoothing,
-            normal_weight=NORMAL_WEIGHT if of.noise or of.nearer else 1.0,
-            keep_start=not (of.noise or coarse),
+            normal_weight=weight,
+            keep_start=not (noisy or doubtful),
             progress=progress,
         )
 
-    every = slice(None)
-    smoothing = cloud.smoothing or (SMOOTHINGS[0] if cloud.noise or coarse else SMOOTHING)
-    fine = fitted(cloud, cloud.spacing, smoothing, every)
-    require_one_body(_samples(fine), _finer(cloud))
-    for more in SMOOTHINGS[1:] if cloud.noise else ():
+    plain = NORMAL_WEIGHT if noisy else 1.0
+    weight = plain if cloud.nearer is None else NORMAL_WEIGHT
+    smoothing = cloud.smoothing or (SMOOTHINGS[0] if noisy or doubtful else SMOOTHING)
+    fine = fitted(cloud, cloud.spacing, smoothing, weight)
+    for more in SMOOTHINGS[1:] if noisy else ():
         # what is smoother is off by more
         if fine.misfit > EXCESS * cloud.noise:
             break
-        smoother = fitted(cloud, cloud.spacing, more, every)
+        smoother = fitted(cloud, cloud.spacing, more, weight)
         if smoother.misfit > EXCESS * cloud.noise:
             break
         fine, smoothing = smoother, more
-    # fits to the same noise err alike
-    fewer = np.random.default_rng(0).random(len(cloud.points)) < SECOND if cloud.noise else every
-    other = fitted(cloud.nearer or cloud, (FINER if cloud.nearer else COARSENING) * cloud.spacing, smoothing, fewer)
-    if cloud.nearer and not _one_body(_samples(other)):
-        # between points that are too far apart for it
-        other = fitted(cloud.nearer, COARSENING * cloud.spacing, smoothing, fewer)
-    require_one_body(_samples(other), _finer(cloud))
+    _require_one_body(fine, cloud)
+    if cloud.nearer is None:
+        # fits to the same noise err alike
+        fewer = np.random.default_rng(0).random(len(cloud.points)) < SECOND if noisy else slice(None)
+        other = fitted(cloud, COARSENING * cloud.spacing, smoothing, plain, fewer)
+    else:
+        finest = spacing_of(cloud.nearer.points, MAX_NODES)
+        other = fitted(cloud.nearer, max(FINER * cloud.spacing, finest), smoothing, plain)
+        if not _one_body(_samples(other)):
+            # between points that are too far apart for it
+            other = fitted(cloud.nearer, COARSENING * cloud.spacing, smoothing, plain)
+    _require_one_body(other, cloud)
     return fine, other, smoothing
 
 
 def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) -> tuple[FitReport, float]:
     """Curvatures of both fits at the points, non-smooth places left out, and how far these are uncertain to their rms.
 
-    What both grids have in common their difference does not show: the normals that the finer one does not reach do, as
-    an angle over a cell, unless it is the points' noise that it does not follow. Where the second fit is to points
-    nearer to the source, misfit and turn are those of these.
+    What both grids have in common their difference does not show: see `_shared`. Where the second fit is to points
+    nearer to the source, misfit and turn are those of these, and the misfit no less than that of the source.
     """
     points, normals = cloud.points, cloud.normals
     if len(cloud.non_smooth):
@@ -117,18 +172,16 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
     found = [curvatures(one.spline, points, along) for one in (fine, coarse)]
     (kappa, gauss, slope), (other_kappa, other_gauss, _) = found
 
-    def rms(values: FloatArray) -> float:
-        return float(np.sqrt(np.mean(values**2)))
-
-    scattered = bool(cloud.noise) or bool(np.isfinite(cloud.uncertain))
-    shared = 0.0 if scattered else fine.turn / fine.spacing
-    # K = k1 k2, both off by as much, kappa taken along two directions at right angles
-    shared_gauss = np.sqrt(2) * rms(kappa) * shared
-    error = float(np.hypot(rms(kappa - other_kappa), shared))
-    gauss_error = float(np.hypot(rms(gauss - other_gauss), shared_gauss))
+    shared, shared_gauss = _shared(cloud, fine, _rms(kappa))
     misfit, turn = fine.misfit, fine.turn
     if cloud.nearer is not None:
         misfit, turn = left_at(fine.spline, cloud.nearer.points, cloud.nearer.normals)
+        misfit = max(misfit, left_at(fine.spline, cloud.nearer.source.vertices)[0])
+        # a body that is off by t has kappa off by kappa^2 t, and K by (kappa_1 + kappa_2) K t
+        shared = float(np.hypot(shared, _rms(kappa**2) * misfit))
+        shared_gauss = float(np.hypot(shared_gauss, _rms(kappa.reshape(2, -1).sum(axis=0) * gauss) * misfit))
+    difference = _rms(kappa - other_kappa)
+    error = float(np.hypot(difference, shared))
     report = FitReport(
         points=len(cloud.points),
         spacing=fine.spacing,
@@ -137,18 +190,43 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
         misfit=misfit,
         turn=turn,
         slope=(float(slope.min()), float(slope.max())),
-        normal_curvature=rms(kappa),
+        normal_curvature=_rms(kappa),
         normal_curvature_error=error,
-        gaussian_curvature=rms(gauss),
-        gaussian_curvature_error=gauss_error,
+        gaussian_curvature=_rms(gauss),
+        gaussian_curvature_error=float(np.hypot(_rms(gauss - other_gauss), shared_gauss)),
         noise=cloud.noise,
         smoothing=smoothing,
+        factor=1.0 if cloud.nearer is None else error / difference,
     )
     return report, error / report.normal_curvature
 
 
+def _shared(cloud: PointCloud, fine: Fitted, rms_kappa: float) -> tuple[float, float]:
+    """Errors of kappa_n and of K, rms, that both fits have.
+
+    The normals that the finer grid does not reach show them, as an angle over a cell. Those of noise, or of a mesh that
+    is judged by its fit, no fit is to reach; of a subdivided mesh it is what the source does not show.
+    """
+    if cloud.nearer is not None:
+        source = cloud.nearer.source
+        return unseen(source, *principal_curvatures(fine.spline, source.vertices))
+    if cloud.noise or np.isfinite(cloud.uncertain):
+        return 0.0, 0.0
+    shared = fine.turn / fine.spacing
+    # K = k1 k2, both off by as much, kappa taken along two directions at right angles
+    return shared, float(np.sqrt(2)) * rms_kappa * shared
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
 def _samples(fitted: Fitted) -> Samples:
     return Samples(fitted.spline.at_nodes(), fitted.spline.origin, fitted.spline.spacing)
+
+
+def _require_one_body(fitted: Fitted, cloud: PointCloud) -> None:
+    require_one_body(_samples(fitted), _remedy(cloud))
 
 
 def _one_body(samples: Samples) -> bool:
@@ -157,10 +235,10 @@ def _one_body(samples: Samples) -> bool:
 
 
 def require_one_body(samples: Samples, remedy: str = "") -> None:
-    """ValueError unless F = 0 is one body; with what helps beside the usual."""
+    """NoBodyError unless F = 0 is one body; with what helps beside the usual."""
     if _one_body(samples):
         return
-    raise ValueError(
+    raise NoBodyError(
         f"the fit has failed: F = 0 falls into {len(samples.middles())} parts on a grid of spacing "
         f"{samples.spacing[0]:.3g} m"
         + (" with a cavity" if samples.has_cavity() else "")
@@ -168,8 +246,8 @@ def require_one_body(samples: Samples, remedy: str = "") -> None:
     )
 
 
-def _finer(cloud: PointCloud) -> str:
-    """What helps a mesh, not a CAD file, that is too coarse for its fit."""
-    if cloud.quality.verdict != "too coarse" or "edges" in cloud.notes:
+def _remedy(cloud: PointCloud) -> str:
+    """What helps a mesh, not a CAD file nor one that is subdivided, that is too coarse for its fit."""
+    if cloud.quality.verdict != "too coarse" or "edges" in cloud.notes or cloud.nearer is not None:
         return ""
-    return '; or subdivide="auto", which takes a smooth surface near its vertices'
+    return '; or subdivide="auto", which takes a smooth surface by its vertices'

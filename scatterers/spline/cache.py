@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-SCHEMA = 13
+SCHEMA = 14
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
 NAME = re.compile(r"[a-z]+-[0-9a-f]{24}\.npz")

@@ -1,4 +1,4 @@
-"""What a spline makes of points of its body: two fits of one body differ there by about the error of the coarser."""
+"""What a spline makes of points of its body: two fits of one body differ there by about the error of the worse."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,19 @@ def curvatures(
     return np.concatenate([form[0, 0], form[1, 1]]), gauss, slope
 
 
-def left_at(spline: TensorSpline, points: FloatArray, normals: FloatArray) -> tuple[float, float]:
+def principal_curvatures(spline: TensorSpline, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Principal curvatures (n, 2) and K (n,) at points brought onto the spline."""
+    kappa, gauss, _ = curvatures(spline, points)
+    mean = kappa.reshape(2, -1).mean(axis=0)
+    half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
+    return np.stack([mean - half, mean + half], axis=1), gauss
+
+
+def left_at(spline: TensorSpline, points: FloatArray, normals: FloatArray | None = None) -> tuple[float, float]:
     """Rms of F/|grad F| at points (n, 3), L, and rms angle between grad F and unit normals (n, 3) there, radians."""
     value, gradient, _ = evaluated(spline.compiled, points)
     slope = np.linalg.norm(gradient, axis=1)
-    turn = np.linalg.norm(gradient / slope[:, None] - normals, axis=1)
+    turn = 0.0 if normals is None else np.linalg.norm(gradient / slope[:, None] - normals, axis=1)
     return float(np.sqrt(np.mean((value / slope) ** 2))), float(np.sqrt(np.mean(turn**2)))
 
 

@@ -268,14 +268,13 @@ class _Equations:
         axes = [self.low[k] + self.spacing * (np.arange(self.shape[k]) - 2.0) for k in range(3)]
         where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         values, off = self._plane_distance(where, self._nearest(where))
-        stray = self._stray(values, off)
-        values[stray] *= -1
         if distance is not None:
             near = np.flatnonzero(off < NEAR * self.spacing)
             found = distance(where[near])
             # a foot that is farther off than the nearest point is none
             good = np.abs(found) <= off[near] * (1 + 1e-9)
             values[near[good]] = found[good]
+        values[self._stray(values, off)] *= -1
         c = values.reshape(self.shape) / self.spacing
         for axis in range(3):
             c = convolve1d(c, QUASI, axis=axis, mode="nearest")

@@ -6,7 +6,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class FitReport:
-    """Numbers of a fit; curvatures differ between it and a fit on a coarser grid by about their error there.
+    """Numbers of a fit; curvatures differ between it and a fit on another grid by about their error on the coarser.
 
     Attributes
     ----------
@@ -15,9 +15,9 @@ class FitReport:
     spacing, coarser_spacing : float
         Of the grids, L; of a subdivided mesh the second is the finer one.
     nodes : tuple of int
-        Of the finer grid.
+        Of the grid of the fit.
     misfit : float
-        Rms distance of the points from the body, L; of a subdivided mesh, of points nearer to its vertices.
+        Rms distance of the points from the body, L; of a subdivided mesh, of its vertices or of points nearer to them.
     turn : float
         Rms angle between the body's normals and those of these points, radians.
     slope : tuple of float
@@ -27,11 +27,14 @@ class FitReport:
     normal_curvature_error, gaussian_curvature_error : float
         Rms difference between the two fits and, of points without noise, the angle of normals over the spacing, which
         is in both: the square root of the sum of their squares. The error of the finer fit is about a third of it
-        where the grids resolve the body, since curvatures converge with order 4; of a subdivided mesh it is all of it.
+        where the grids resolve the body, since curvatures converge with order 4. Of a subdivided mesh it is all of it,
+        and what the source cannot show stands for the normals (`scatterers.triangles.subdivision`).
     noise : float
         Rms distance of the points from a smooth body, estimated before the fit, L.
     smoothing : float
         Weight of the fourth differences that was taken.
+    factor : float
+        By how much the body errs more than it differs from the second fit; 1, of a subdivided mesh larger.
     """
 
     points: int
@@ -47,6 +50,7 @@ class FitReport:
     gaussian_curvature_error: float
     noise: float
     smoothing: float
+    factor: float = 1.0
 
     def to_json(self) -> dict[str, Any]:
         """Plain numbers."""

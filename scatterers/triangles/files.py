@@ -20,6 +20,7 @@ from scatterers.triangles.choice import Choice, silent, whole_body
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.cutting import uncrossed
 from scatterers.triangles.form import check_whole
+from scatterers.triangles.subdivision import Subdivision
 from scatterers.triangles.threemf import read_3mf
 from scatterers.triangles.topology import cleaned, oriented
 
@@ -53,17 +54,14 @@ class TriangleMesh:
         Vertex numbers, counter-clockwise seen from outside.
     repairs : tuple of str
         What was changed, one sentence each.
-    subdivided : int
-        How often.
-    nearer : (n, 3), m, or None
-        Of a subdivided mesh: the vertices when its surface passes nearer to those of the source.
+    loop : Subdivision or None
+        What it comes of, if it is subdivided.
     """
 
     vertices: FloatArray
     triangles: IntArray
     repairs: tuple[str, ...] = ()
-    subdivided: int = 0
-    nearer: FloatArray | None = None
+    loop: Subdivision | None = None
 
     def __repr__(self) -> str:
         size = " x ".join(f"{v:.4g}" for v in np.ptp(self.vertices, axis=0))

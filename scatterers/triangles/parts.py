@@ -1,16 +1,11 @@
-"""What of a mesh is the body: one of several parts, holes closed, crossing parts united, and a finer smooth surface.
+"""What of a mesh is the body: one of several parts, holes closed, crossing parts united.
 
 Parts are connected through edges, and numbered from 1 by area, the largest first. Holes are closed by triangles from
 their border to its middle. The outer surface of parts that cross is that of their union, by the library manifold3d.
-Loop's subdivision, of trimesh, has a smooth surface as its limit, which passes near the vertices it is given: these are
-moved first, so that it passes near the ones of the mesh.
-
-Sources: [L87] Loop, Smooth subdivision surfaces based on triangles, University of Utah 1987.
 """
 
 import importlib.util
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +17,6 @@ IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 LISTED = 8
 """Parts that an error lists."""
-MOST_SUBDIVIDED = 60_000
-"""Vertices beyond which a mesh is not subdivided."""
 
 
 def parts_of(vertices: FloatArray, triangles: IntArray) -> IntArray:
@@ -173,50 +166,6 @@ def united(
     found = np.asarray(whole.vert_properties, dtype=float)[:, :3], np.asarray(whole.tri_verts).astype(np.int64)
     note(f"{len(solids)} parts of {name} united: {len(triangles)} triangles became {len(found[1])}")
     return found
-
-
-class Subdivision(NamedTuple):
-    """A subdivided mesh, and the same with its surface nearer to the vertices of the source.
-
-    Attributes
-    ----------
-    vertices, triangles : (n, 3), in the unit of the source, and (m, 3)
-    nearer : (n, 3)
-        What the vertices are when the surface is moved by what it still misses.
-    """
-
-    vertices: FloatArray
-    triangles: IntArray
-    nearer: FloatArray
-
-
-def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note) -> Subdivision:
-    """Loop's subdivision, so many times, of vertices that are moved first by what it would move them.
-
-    With x -> S x the subdivision, read at the vertices that were there before, S(2x - S x) misses x by (1 - S)^2 x
-    where S x misses it by (1 - S) x: a tenth on meshes with twelve vertices around a body. How far is told.
-    """
-    import trimesh
-
-    def subdivision(x: FloatArray) -> tuple[FloatArray, IntArray]:
-        fine, corners = trimesh.remesh.subdivide_loop(x, triangles, iterations=times)
-        return np.asarray(fine, dtype=float), np.asarray(corners, dtype=np.int64)
-
-    count, bases = len(vertices), [vertices]
-    found = []
-    for _ in range(3):
-        # the first vertices are the old ones, moved
-        found.append(subdivision(bases[-1]))
-        bases.append(bases[-1] + vertices - found[-1][0][:count])
-    fine, corners = found[1]
-    moved = np.linalg.norm(fine[:count] - vertices, axis=1)
-    rms, most = float(np.sqrt(np.mean(moved**2))), float(moved.max())
-    edge = float(np.mean(np.linalg.norm(vertices[triangles] - np.roll(vertices[triangles], 1, axis=1), axis=2)))
-    note(
-        f"subdivided {times} time{'s' * (times != 1)} after Loop: {count} vertices became {len(fine)}, "
-        f"moved by {rms:.2g} m rms, {most:.2g} at most (mean edge {edge:.2g} m)"
-    )
-    return Subdivision(fine, corners, found[2][0])
 
 
 def areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:

@@ -56,6 +56,14 @@ def test_a_coarser_body_of_another_size_has_the_field_of_another_frequency(bound
     assert found.max() > 1e-3 * np.abs(mine).max()
 
 
+def test_what_a_body_errs_by_more_is_in_its_field():
+    more = Unsure(BODY, COARSE_FIT)
+    more.coarse_factor = 3.0
+    once, thrice = (cr.far_field_uncertainty(fan_of(body), grid(3), wavenumber=K) for body in (UNSURE, more))
+    np.testing.assert_allclose(thrice, 3 * once, rtol=1e-9)
+    assert once.max() > 0
+
+
 def test_the_other_fan_is_of_the_coarser_body():
     fan, other = fan_of(UNSURE), coarse_fan(fan_of(UNSURE))
     assert other.body is COARSE_FIT and other.points.shape == fan.points.shape

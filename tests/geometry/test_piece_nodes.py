@@ -5,7 +5,7 @@ import pytest
 
 import scatterers as sc
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import Tiles
+from creeping.geometry.creased import Tiles, pieces_across
 from creeping.geometry.curvature import gaussian_curvature
 from creeping.geometry.graded_tiles import BEND, graded
 from creeping.geometry.quadrature import body_nodes, node_count
@@ -98,3 +98,8 @@ def test_pieces_that_do_not_close_are_refused(monkeypatch):
 
 
 TILES = sc.Capsule.tiles
+
+
+def test_pieces_are_as_wide_as_their_boxes():
+    """Two halves of a ball, 2 x 2 x 1, and a cylinder between them, 2 x 2 x 2, by the corners of triangles."""
+    np.testing.assert_allclose(pieces_across(PILL), [3.0, np.sqrt(12.0), 3.0], rtol=3e-3)

@@ -208,6 +208,15 @@ def test_error_goes_with_the_difference_of_the_bodies():
     assert 1e-4 < found[0].points < 1e-2
 
 
+def test_a_body_that_errs_by_more_than_it_differs_says_by_how_much():
+    one, two = (
+        body_uncertainty(fan_of(Wrapped(coarse_fit=COARSE_FIT, coarse_factor=factor)), n_rays=6)
+        for factor in (1.0, 2.5)
+    )
+    for name in ("points", "spreading", "attenuation"):
+        assert getattr(two, name) == pytest.approx(2.5 * getattr(one, name)) and getattr(one, name) > 0
+
+
 def test_the_same_body_has_no_error():
     found = body_uncertainty(fan_of(Wrapped(coarse_fit=EXACT)), n_rays=6)
     assert max(found.points, found.spreading, found.attenuation) < 1e-12

@@ -318,3 +318,19 @@ def test_values_at_the_nodes_are_those_of_the_spline(rng):
     assert values.shape == tuple(n - 4 for n in fit_spline.coefficients.shape)
     nodes = np.moveaxis(np.indices(values.shape), 0, -1) * fit_spline.spacing + fit_spline.origin
     np.testing.assert_allclose(values, fit_spline.value(nodes), atol=1e-13)
+
+
+def test_parts_that_keep_away_from_the_points_change_their_sign():
+    normals = fibonacci(600)
+    equations = _Equations(normals, normals, 0.2, 1e-8, 1.0)
+    axes = [equations.low[k] + 0.2 * (np.arange(equations.shape[k]) - 2.0) for k in range(3)]
+    where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    values = np.linalg.norm(where, axis=1) - 1
+    assert not equations._stray(values, np.abs(values)).any()
+    far = np.linalg.norm(where - [1.3, 1.3, 1.3], axis=1) < 0.3
+    inside = np.linalg.norm(where, axis=1) < 0.3
+    wrong = np.where(far | inside, -values, values)
+    np.testing.assert_array_equal(equations._stray(wrong, np.abs(values)), far | inside)
+    # what comes near to the points is no stray part
+    near = np.linalg.norm(where - [1.0, 0, 0], axis=1) < 0.3
+    assert not equations._stray(np.where(near, -values, values), np.abs(values)).any()

@@ -5,6 +5,9 @@ import pytest
 import trimesh
 
 import scatterers as sc
+from creeping.geometry.curvature import gaussian_curvature
+from creeping.geometry.directions import fibonacci_directions
+from creeping.geometry.surface import project
 from scatterers.triangles.choice import Choice
 
 
@@ -144,6 +147,68 @@ def test_a_coarse_ball_opens_when_subdivided():
     assert 1 - radius.mean() < 1.1 * fit.misfit
     assert abs(fit.normal_curvature - 1) < 1.1 * fit.normal_curvature_error
     assert abs(fit.gaussian_curvature - 1) < 1.1 * fit.gaussian_curvature_error
+
+
+@pytest.mark.parametrize("axes", [(1, 1, 1), (1, 0.8, 0.6), (4, 1, 1)])
+def test_a_subdivided_mesh_passes_by_its_vertices_and_errs_about_as_stated(axes):
+    mesh = ball()
+    mesh.apply_scale(axes)
+    body, exact = sc.Mesh(mesh, subdivide=1, cache=False), sc.Ellipsoid(*axes)
+    off = body.level(mesh.vertices) / np.linalg.norm(body.gradient(mesh.vertices), axis=1)
+    assert np.sqrt(np.mean(off**2)) < 2e-3 * max(axes) and np.sqrt(np.mean(off**2)) < 1.3 * body.fit.misfit
+    x = project(exact, mesh.triangles_center)
+    n = exact.gradient(x) / np.linalg.norm(exact.gradient(x), axis=1, keepdims=True)
+    t = np.cross(n, [0.36, 0.48, 0.8])
+    t /= np.linalg.norm(t, axis=1, keepdims=True)
+    found, wanted = (
+        np.einsum("ni,nij,nj->n", t, one.hessian(x), t) / np.linalg.norm(one.gradient(x), axis=1)
+        for one in (body, exact)
+    )
+    assert np.sqrt(np.mean((found - wanted) ** 2)) < 1.4 * body.fit.normal_curvature_error
+
+
+def noisy_ball(rng, noise):
+    mesh = ball(times=3)
+    mesh.vertices = mesh.vertices * (1 + noise * rng.normal(size=len(mesh.vertices)))[:, None]
+    return mesh
+
+
+def test_a_noisy_mesh_that_is_subdivided_errs_by_what_is_stated(rng):
+    body = sc.Mesh(noisy_ball(rng, 0.005), subdivide=1, cache=False)
+    x = project(body, fibonacci_directions(500))
+    error = np.sqrt(np.mean((gaussian_curvature(body, x) - 1) ** 2))
+    assert 0.1 < error < 1.1 * body.fit.gaussian_curvature_error
+
+
+def test_a_noisy_mesh_is_no_better_for_a_narrower_grid(rng):
+    """On the narrowest both fits would follow the noise, and agree."""
+    mesh = noisy_ball(rng, 0.012)
+    assert sc.examined_mesh(mesh)[1].verdict == "noisy"
+    with pytest.raises(ValueError, match="curvatures are uncertain by"):
+        sc.Mesh(mesh, subdivide=1, cache=False)
+
+
+def test_a_mesh_whose_curvature_is_within_its_edges_is_refused():
+    """An icosphere of 42 vertices drawn out by 4 turns by 121 degrees over an edge at its ends."""
+    mesh = ball(times=1)
+    mesh.apply_scale((4, 1, 1))
+    with pytest.raises(ValueError, match=r"at \d+ of 42 vertices its body turns by more than 86 degrees over an edge"):
+        sc.Mesh(mesh, subdivide=1, cache=False)
+
+
+@pytest.mark.parametrize("make", [trimesh.creation.box, trimesh.creation.cylinder, trimesh.creation.capsule])
+def test_bodies_of_pieces_are_not_subdivided(make):
+    mesh = make(**({} if make is trimesh.creation.box else {"radius": 0.5, "height": 1.0}))
+    with pytest.raises(ValueError, match=r"smooth pieces .*, between which subdivide = 1 would round it off; leave it"):
+        sc.examined_mesh(mesh, subdivide=1)
+    assert sc.examined_mesh(mesh, subdivide="auto")[0].repairs == ()
+
+
+def test_what_a_subdivision_makes_is_bounded():
+    with pytest.raises(
+        ValueError, match="subdivide = 3 makes 655488 vertices of 10242, more than 250000; subdivide fewer"
+    ):
+        sc.examined_mesh(ball(times=5), subdivide=3)
 
 
 @pytest.mark.parametrize(
