@@ -96,8 +96,8 @@ def far_field(
     # currents go across joints, by marching, not round edges; those of a conductor only if they are solved
     serve = not creased or (order == 2 and not has_edges(fan.body) and (len(kinds) == 1 or pairs_of(fan.body, k) > 0))
     # a conductor's sums are of six columns, those of one scalar problem of one to four
-    auto = serve and method == "auto" and order == 2 and len(r)
-    cheap = auto and affordable(fan, len(kinds) * len(r), k, distant=True)
+    auto = method == "auto" and order == 2 and len(r) > 0
+    cheap = serve and auto and affordable(fan, len(kinds) * len(r), k, distant=True)
     # there are no modes of an admittance that varies
     must = serve and (method == "currents" or (method == "auto" and kinds[0].varies and not creased))
     if must or cheap or solve:
@@ -116,7 +116,7 @@ def far_field(
     geometry = far_geometry(fan, r)
     far = field_of(geometry, k, boundary, order)
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
-    level = measured_level(fan, k, boundary) if method == "auto" and order == 2 and len(r) else None
+    level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far
 
 

@@ -100,7 +100,7 @@ def surface_currents(
         currents, facing = _expanded(fan, lit, k, kinds), faces_itself(lit)
     except SurfaceError:
         # along the axis of a capsule rays start on a joint
-        if not possible:
+        if not possible or too_many(fan.body, k, most):
             raise
         return solved_on_whole_body(_no_currents(fan, k, CONDUCTOR if len(kinds) == 2 else kinds[0]), most)
     poor = facing or currents.unserved > CUT or currents.stepped > 0
