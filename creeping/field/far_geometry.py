@@ -6,7 +6,7 @@ numbered through: (incidence 0, its first observer), (incidence 0, its second), 
 
 from collections.abc import Callable
 from functools import cached_property
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
@@ -40,6 +40,8 @@ _KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionar
 _STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()
 AT_ONCE = 20_000_000
 """Samples of rays, times observers, that are searched before signals are heard: 0.1 s."""
+CELLS = (64, 2048)
+"""Room for cells of an observer at first, of smooth bodies and where rays part at tips; more is made where they are."""
 NUDGE = 1e-6
 """Least angle between an observer and the forward direction in the forward integral, radians."""
 ALONG = 0.9
@@ -77,8 +79,6 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
 
 
 def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":
-    from weakref import ref
-
     known = ref(fan)
 
     def make() -> tuple[Strip, ...]:
@@ -200,7 +200,7 @@ class FarGeometry:
         self._chi, self._roots = np.zeros((n, many)), np.ones(n)
         back = np.ascontiguousarray((self.angle > np.pi / 2).reshape(n, many))
         # a ray crosses about once in every half turn; at worst each sample is a cell and a crossing
-        cells, crossings = 64, 2 + int(self.tracer.steps * TURN / np.pi)
+        cells, crossings = CELLS[is_creased(self.body)], 2 + int(self.tracer.steps * TURN / np.pi)
         most = len(times) * PARTS
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
         self.ends = RayEnds(self.tracer, launch, states, times)

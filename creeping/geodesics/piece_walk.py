@@ -45,14 +45,21 @@ ROUNDS = 400
 STEPS = 1000
 """Between outputs, after which rays are given up that are traced together: where a piece is known some tens do, far
 beyond its borders F may be anything."""
+ALONE, WHOLE_WINDOW = -1, 30
+"""Numbers of groups of rays: those that go by themselves, and from which on they go to the end of a window; below it to
+two to that many stops."""
+EVEN = 1e-12
+"""Difference of gaps between stops, in body sizes, up to which they are alike."""
 OWN = 1e-12
 """Relative tolerance of what rays do by themselves, where they go by equal steps else."""
 
 
 class Walk:
-    """Rays (n, lanes) on their pieces: their states, ends and the joints they have passed."""
+    """Rays (n, lanes) on their pieces: their states, ends and the joints they have passed. They begin at 0 or (n,)."""
 
-    def __init__(self, body: Any, states: FloatArray, rtol: float, step: float | None) -> None:
+    def __init__(
+        self, body: Any, states: FloatArray, rtol: float, step: float | None, begin: FloatArray | None = None
+    ) -> None:
         self.body, self.pieces, self.size = body, pieces_of(body), size(body)
         self.rtol, self.step = rtol, step
         self.exits, self.across = PieceExits(body), pieces_across(body)
@@ -62,6 +69,7 @@ class Walk:
         self.end = np.full(n, np.inf)
         self.crease = np.full(n, -1, dtype=np.int64)
         self.stuck = np.zeros(n, dtype=bool)
+        self.begin = np.zeros(n) if begin is None else begin
         self.passed: list[tuple[IntArray, FloatArray, IntArray]] = []
         # within a window: time, last stop, longest step and crossings of each ray
         self.now, self.place = np.zeros(n), np.zeros(n, dtype=np.int64)
@@ -74,7 +82,8 @@ class Walk:
             return out
         self._untrusted(stops[0])
         loose = np.flatnonzero((self.end <= stops[0]) & (self.end + beyond > stops[0]) & ~self.stuck)
-        self.now[:], self.place[:], self.longest[:], self.crossed[:] = stops[0], 0, np.inf, 0
+        self.now[:], self.longest[:], self.crossed[:] = np.maximum(self.begin, stops[0]), np.inf, 0
+        self.place[:] = np.searchsorted(stops, self.now, side="right") - 1
         for _ in range(ROUNDS):
             rows = np.flatnonzero(np.isinf(self.end) & (self.place < len(stops) - 1))
             if not len(rows):
@@ -91,42 +100,53 @@ class Walk:
         """End rays, without a crease, that begin a window where the body is not trusted: of them nothing is known."""
         if not hasattr(self.body, "non_smooth"):
             return
-        rows = np.flatnonzero(np.isinf(self.end))
+        rows = np.flatnonzero(np.isinf(self.end) & (self.begin <= begin))
         lost = rows[np.asarray(self.body.non_smooth(self.states[rows, X]), dtype=bool)]
         self.end[lost] = begin
 
     def _round(self, rows: IntArray, stops: FloatArray, out: FloatArray) -> None:
         """Take each ray on by one step of its own, or all the way to the last stop with the others."""
         alone = (self.now[rows] > stops[self.place[rows]]) | np.isfinite(self.longest[rows])
-        alone |= self.exits.near_tips(self.states[rows], stops[-1] - self.now[rows], NEXT * self.size)
-        groups = np.stack([self.on[rows], np.where(alone, -1, self.place[rows])], axis=1)
-        for number, place in np.unique(groups, axis=0):
-            mine = rows[(groups[:, 0] == number) & (groups[:, 1] == place)]
-            if place < 0:
+        near = self.exits.near_tips(self.states[rows], stops[-1] - self.now[rows], NEXT * self.size)
+        # between stops as far apart as all others, rays that are at different ones go together
+        gaps = np.diff(stops)
+        even = np.ptp(gaps) <= EVEN * self.size
+        how_far = np.where(even, WHOLE_WINDOW, WHOLE_WINDOW + 1 + self.place[rows])
+        # on the way to a tip, those that are about as many stops from it
+        free = (self.exits.to_tips(self.states[rows]) - NEXT * self.size) / gaps[0]
+        how_far = np.where(near, np.floor(np.log2(np.clip(free, 0.5, 2.0**20))) if even else ALONE, how_far)
+        groups = np.stack([self.on[rows], np.where(alone, ALONE, how_far)], axis=1).astype(np.int64)
+        for number, far in np.unique(groups, axis=0):
+            mine = rows[(groups[:, 0] == number) & (groups[:, 1] == far)]
+            if far == ALONE:
                 self._alone(int(number), mine, stops, out)
             else:
-                self._together(int(number), mine, int(place), stops, out)
+                self._together(int(number), mine, stops, out, 2**far if far < WHOLE_WINDOW else len(stops))
 
-    def _together(self, number: int, mine: IntArray, place: int, stops: FloatArray, out: FloatArray) -> None:
-        own = stops[place:] - stops[place]
-        own = own[: max(2, int(np.searchsorted(own, self.across[number], side="right")))]
-        found = self._later(self._safely(number, self.states[mine], own[1:]), mine, stops[place])
+    def _together(self, number: int, mine: IntArray, stops: FloatArray, out: FloatArray, many: int) -> None:
+        """Go on with rays on one piece through as many stops, as far as the window has them and it is wide."""
+        begin = self.place[mine]
+        own = stops[begin.min() :] - stops[begin.min()]
+        own = own[: max(2, min(many + 1, int(np.searchsorted(own, self.across[number], side="right"))))]
+        found = self._later(self._safely(number, self.states[mine], own[1:]), mine, stops[begin])
         path = np.concatenate([self.states[mine, None], found], axis=1)
         exits = self._exits(number, mine, path, np.broadcast_to(own, (len(mine), len(own))))
         known = np.cumprod(np.all(np.isfinite(path[..., :BARE]), axis=2), axis=1).sum(axis=1) - 1
-        last = np.where(exits.gone, np.minimum(exits.interval, known), known)
+        most = np.minimum(len(own) - 1, len(stops) - 1 - begin)
+        off = exits.gone & (exits.interval < most)
+        last = np.minimum(np.where(off, np.minimum(exits.interval, known), known), most)
         reached = np.arange(1, len(own)) <= last[:, None]
         ray, stop = np.nonzero(reached)
-        out[mine[ray], place + 1 + stop] = found[ray, stop]
+        out[mine[ray], begin[ray] + 1 + stop] = found[ray, stop]
         n = np.arange(len(mine))
-        self.states[mine], self.place[mine], self.now[mine] = path[n, last], place + last, stops[place + last]
-        lost = (last < len(own) - 1) & ~exits.gone
+        self.states[mine], self.place[mine], self.now[mine] = path[n, last], begin + last, stops[begin + last]
+        lost = (last < most) & ~off
         self.longest[mine[lost]] = self.size
-        gone = np.flatnonzero(exits.gone)
+        gone = np.flatnonzero(off)
         if len(gone):
             k = exits.interval[gone]
-            far, begin = path[gone, np.minimum(k + 1, path.shape[1] - 1)], own[k]
-            self._cross(number, mine[gone], far, own[k + 1] - begin, exits.some(gone).since(begin), stops, out)
+            far, since = path[gone, np.minimum(k + 1, path.shape[1] - 1)], own[k]
+            self._cross(number, mine[gone], far, own[k + 1] - since, exits.some(gone).since(since), stops, out)
 
     def _alone(self, number: int, mine: IntArray, stops: FloatArray, out: FloatArray) -> None:
         """Go on with each ray to its next stop, if a step that does not reach through a tip does.

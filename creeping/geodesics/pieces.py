@@ -68,3 +68,15 @@ def trace_pieces(
     order = np.lexsort((moments, rays))
     passages = Passages(rays[order], moments[order], creases[order])
     return PieceTrace(out, walk.end, walk.crease, passages)
+
+
+def trace_to(body: Any, states: FloatArray, lengths: FloatArray, *, rtol: float) -> tuple[FloatArray, FloatArray]:
+    """Trace states (n, 6 or 10) to a length (n,) each: (n, the same), and the lengths (n,) at which rays ended, or inf.
+
+    They begin one after the other and arrive together, so that windows and stops serve them all.
+    """
+    latest = np.array([np.max(lengths, initial=0.0)])
+    walk = Walk(body, states, rtol, None, latest - lengths)
+    for stops, _ in windows(latest, GAP * walk.size, WINDOW * walk.size):
+        walk.window(stops, 0.0)
+    return walk.states, walk.end - walk.begin

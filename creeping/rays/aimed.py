@@ -5,7 +5,7 @@ They are found by Newton's method on p(σ, s) = r, with p and b = n x p at the e
     b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ (dt + d.T dσ) - τ J dσ⊥,   τ = b.Hp/|grad F|,
 
 dσ along the line, whose tangent T need not be across d, and dσ⊥ = b0.T dσ. Rays of longer steps than those of what is
-found tell enough, but where the ground of a body with creases is sharp, the last steps look at exact ones.
+found tell enough; on a body with creases nothing but the ends of rays.
 
 Sources: Derivations, R12.
 """
@@ -13,9 +13,11 @@ Sources: Derivations, R12.
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geodesics.states import P, X
 from creeping.geometry.creased import is_creased
-from creeping.geometry.surface import size
-from creeping.rays.quantities import LANES, START_LANES, RayPoints
+from creeping.geometry.curvature import second_form
+from creeping.geometry.surface import normal, size
+from creeping.rays.quantities import RayPoints
 from creeping.rays.single_rays import SingleRays
 from creeping.rays.tracer import RayTracer
 
@@ -34,13 +36,13 @@ CROWDED, STEP, STEP_ON_PIECES, LEAST_CELL = 500, 8.0, 2.0, 0.008
 """Searches of one direction that are so many that a fan folds finely: IDLE ends some there, and the first step of
 Newton's method, in cells, from which on nothing is a cell away. On bodies with creases always, and cells of dense fans
 count as cells of so many body sizes: what is near does not hang on the number of rays."""
-LONG, LONG_ON_PIECES = (2, 1), (1,)
-"""Steps of the searches, in steps of what they find: points err less than derivatives of curvature do. On a body with
-creases sharp places next to tips and edges make the steps short all over it, and long ones lead astray there."""
+LONG = (2, 1)
+"""Steps of the searches on a smooth body, in steps of what they find: points err less than derivatives of curvature
+do."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
 EXACT, HOPE = 3, 0.25
-"""Rounds on exact rays there, and residuals up to which they are taken."""
+"""Rounds more on bodies with creases, and residuals up to which they are taken."""
 
 
 def rays_towards(
@@ -75,7 +77,7 @@ def rays_towards(
     missing, parts = np.arange(len(times)), []
     together = np.ones(len(times), dtype=np.int64) if together is None else together
     creased = is_creased(tracer.body)
-    levels = LONG_ON_PIECES if creased else LONG
+    levels = (1,) if creased else LONG
     longest = np.full(len(times), STEP_ON_PIECES) if creased else np.where(together > CROWDED, STEP, np.inf)
     for number, long in enumerate(levels):
         if number and not len(missing):
@@ -123,7 +125,7 @@ class _Search:
         self.tracer, self.directions, self.observers, self.cell = tracer, directions, observers, cell
         self.starts, self.tangents = tracer.onto_line(near, directions)
         self.times, self.begin, self.moved = times.copy(), times, np.zeros(n)
-        self.lanes, self.first = np.empty((n, LANES)), np.empty((n, START_LANES))
+        self.ends = np.empty((n, 8))
         self.creased = is_creased(tracer.body)
         self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.creased else cell
         self.far = FAR_ON_PIECES if self.creased else FAR
@@ -133,9 +135,11 @@ class _Search:
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
             rows = directions[active], self.starts[active], self.tangents[active], self.times[active]
-            now = tracer.at(*rows, long=long).rays
-            self.lanes[active], self.first[active] = now.lanes, now.starts
-            residual = _apart(now, observers[active])
+            if self.creased:
+                self.ends[active] = tracer.ends(rows[0], rows[1], rows[3])
+            else:
+                self.ends[active] = tracer.at(*rows, long=long).rays.lanes[:, :8]
+            residual = _apart(self.ends[active, P], observers[active])
             self.wanted[active] = residual <= max(CLOSE, nearly)
             idle[active] = np.where(residual <= SLOW * best[active], 0, idle[active] + 1)
             best[active] = np.fmin(residual, best[active])
@@ -153,44 +157,60 @@ class _Search:
     def result(self) -> tuple[SingleRays, IntArray]:
         """Exact rays that have been found, and their rows."""
         kept = np.flatnonzero(self.wanted & self._within())
-        found = self._exact(kept)
-        off = _apart(found.rays, self.observers[kept])
-        for _ in range(EXACT if self.creased else 0):
+        if self.creased:
+            kept = self._close(kept)
+        rows = self.directions[kept], self.starts[kept], self.tangents[kept], self.times[kept]
+        found = self.tracer.at(*rows, observers=self.observers[kept])
+        if self.creased:
+            self._ended(kept, found.rays.lanes)
+        good = (_apart(found.rays.directions, self.observers[kept]) < ACCEPTED) & self._within(kept)
+        return found[good], kept[good]
+
+    def _close(self, some: IntArray) -> IntArray:
+        """Those of some searches whose last steps have brought them to p = r, with more such steps where they lack."""
+        off = self._off(some)
+        for _ in range(EXACT):
             beside = np.flatnonzero((off >= ACCEPTED) & (off < HOPE))
             if not len(beside):
                 break
-            some, place = kept[beside], np.arange(len(kept))
-            self.lanes[some], self.first[some] = found.rays.lanes[beside], found.rays.starts[beside]
-            self._step(some)
-            better = self._exact(some)
-            place[beside] = len(kept) + np.arange(len(beside))
-            found = SingleRays.joined([found, better])[place]
-            now = _apart(better.rays, self.observers[some])
+            self._step(some[beside])
+            now = self._off(some[beside])
             # those that come no nearer are given up
             off[beside] = np.where(now < SLOW * off[beside], now, np.inf)
-        good = (off < ACCEPTED) & self._within(kept)
-        return found[good], kept[good]
+        return some[off < ACCEPTED]
+
+    def _off(self, some: IntArray) -> FloatArray:
+        """|r - p| (n,) where some searches are now."""
+        self.ends[some] = self.tracer.ends(self.directions[some], self.starts[some], self.times[some])
+        return _apart(self.ends[some, P], self.observers[some])
+
+    def _ended(self, some: IntArray, lanes: FloatArray) -> None:
+        """Put into lanes (n, LANES) what is known of the ends: next to a tip no polynomial through steps tells it."""
+        lanes[:, :8] = self.ends[some]
+        x, p = lanes[:, X], lanes[:, P]
+        gradient = self.tracer.body.gradient(x)
+        g = np.linalg.norm(gradient, axis=1)
+        hessian = self.tracer.body.hessian(x) / g[:, None, None]
+        lanes[:, 9], lanes[:, 12] = (second_form(v, hessian) for v in (p, np.cross(gradient / g[:, None], p)))
 
     def _within(self, some: IntArray | slice = slice(None)) -> BoolArray:
         """Which of some searches are in their neighbourhoods."""
         along, late = np.abs(self.moved[some] * self.cell[some, 0]), np.abs(self.times[some] - self.begin[some])
         return np.asarray((along <= self.far * self.wide[some, 0]) & (late <= self.far * self.wide[some, 1]))
 
-    def _exact(self, some: IntArray) -> SingleRays:
-        rows = self.directions[some], self.starts[some], self.tangents[some], self.times[some]
-        return self.tracer.at(*rows, observers=self.observers[some])
-
     def _step(self, some: IntArray) -> FloatArray:
         """Move some starts along their lines and times along their rays, by no more than a cell; steps wanted (n,)."""
-        x, p, J, rate, kappa = (self.lanes[some, part] for part in (slice(0, 3), slice(3, 6), 6, 7, 9))
+        x, p, J, rate = (self.ends[some, part] for part in (X, P, 6, 7))
         gap = self.observers[some] - p / np.linalg.norm(p, axis=1, keepdims=True)
         gradient = self.tracer.body.gradient(x)
         g = np.linalg.norm(gradient, axis=1)
         n = gradient / g[:, None]
         b = np.cross(n, p)
-        torsion = np.einsum("ni,nij,nj->n", b, self.tracer.body.hessian(x), p) / g
+        bend = np.einsum("nij,nj->ni", self.tracer.body.hessian(x), p) / g[:, None]
+        torsion, kappa = (np.sum(v * bend, axis=1) for v in (b, p))
         directions, cell = self.directions[some], self.cell[some]
-        facing = np.sum(np.cross(self.first[some, 6:9], directions) * self.tangents[some], axis=1)
+        first = normal(self.tracer.body, self.starts[some])
+        facing = np.sum(np.cross(first, directions) * self.tangents[some], axis=1)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             along_line = np.nan_to_num(np.sum(b * gap, axis=1) / rate / facing)
             wanted = np.abs(along_line) / self.wide[some, 0]
@@ -207,9 +227,9 @@ class _Search:
         return np.asarray(wanted)
 
 
-def _apart(rays: RayPoints, observers: FloatArray) -> FloatArray:
-    """|r - p| (n,)."""
-    p = rays.directions / np.linalg.norm(rays.directions, axis=1, keepdims=True)
+def _apart(p: FloatArray, observers: FloatArray) -> FloatArray:
+    """|r - p| (n,), p (n, 3) made unit."""
+    p = p / np.linalg.norm(p, axis=1, keepdims=True)
     return np.asarray(np.linalg.norm(observers - p, axis=1))
 
 

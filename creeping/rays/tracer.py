@@ -2,8 +2,9 @@
 
     F(x0) = 0,  grad F(x0).d = 0;   dσ⊥ = b0.dx0,  b0 = n0 x d;   J(0) = 1,  J'(0) = 1/R
 
-Rays go by equal steps, in which the most curved part of the body turns them by TURN: what comes out of one does not
-depend on the others that are traced with it.
+Rays are known at equal steps, in which the most curved part of the body turns them by TURN. On a smooth body these are
+the steps of the integration: what comes out of one ray does not depend on the others that are traced with it. On one
+with creases, where curvatures grow like 1/r at a tip, steps are as short as RTOL demands.
 
 R is the distance from a point source, inf of a plane wave.
 
@@ -16,7 +17,7 @@ from creeping._typing import FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.pieces import trace_pieces
+from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
 from creeping.geometry.evaluators import evaluators
@@ -29,6 +30,8 @@ from creeping.shadow.moving import moved_onto_lines
 
 TURN = 0.12
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 1e-9."""
+RTOL = 1e-10
+"""Relative tolerance of rays on bodies with creases."""
 TOGETHER, TOGETHER_ON_PIECES = 192, 2048
 """Rays traced in one call, and on a body with creases, where a call has more to do beside them."""
 
@@ -200,10 +203,15 @@ class RayTracer:
             alive &= times < ends_of[owner]
         return SingleRays(directions, starts, tangents, RayPoints(lanes, first, times, alive, scale), risen)
 
+    def ends(self, directions: FloatArray, starts: FloatArray, times: FloatArray) -> FloatArray:
+        """x, p, J, J' (n, 8) of rays on a body with creases, each at its time (n,); where it ended, if before."""
+        found, _ = trace_to(self.body, pack(starts, directions, jacobi=True), times, rtol=RTOL)
+        return found[:, :8]
+
     def _traced(self, states: FloatArray, times: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-        """Rays by equal steps, beyond an edge or tip as if their piece went on, for the polynomials' sake; and ends."""
+        """Rays at equal steps, beyond an edge or tip as if their piece went on, for the polynomials' sake; and ends."""
         if is_creased(self.body):
-            found = trace_pieces(self.body, states, times, rtol=0.0, step=step, beyond=(GUARD + 2) * step)
+            found = trace_pieces(self.body, states, times, rtol=RTOL, beyond=(GUARD + 2) * step)
             return found.states, found.end
         return trace_states(self.body, states, times, rtol=0.0, step=step), np.full(len(states), np.inf)
 

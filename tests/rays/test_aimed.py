@@ -6,6 +6,8 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.far_geometry import far_geometry
+from creeping.geodesics.pieces import trace_to
+from creeping.geodesics.states import P, pack
 from creeping.rays import aimed
 
 OGIVE = sc.Ogive(1.0, 10.0)
@@ -60,6 +62,23 @@ def test_what_passes_by_a_tip_is_found_however_rays_lie(n_rays, angle):
     assert np.bincount(found.observer, minlength=4).tolist() == [1, 2, 1, 1]
     from_tip = np.linalg.norm(found.rays.points[beside] - [0, 0, -5.0], axis=1)
     assert np.all(from_tip < 0.02 * np.ptp(OGIVE.bounds[:, 2]))
+
+
+@pytest.mark.parametrize("body, incidence", [(sc.Ogive(0.5, 1.5), (0.1, 0.2, -0.97)), (sc.Almond(1.0), (-1, 0.3, 0.2))])
+def test_rays_that_are_found_go_back_to_the_wave(body, incidence):
+    """Reversed from where it leaves along r, a ray comes to its launch along -d, by whatever tip it has passed."""
+    d = np.array(incidence) / np.linalg.norm(incidence)
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, d), wavenumber=40.0, n_rays=256)
+    directions = cr.fibonacci_directions(24)
+    found = far_geometry(fan, directions).shed
+    r, times = directions[found.observer], found.rays.time
+    assert len(times) > 20
+    np.testing.assert_allclose(found.rays.directions, r, atol=2 * aimed.ACCEPTED)
+    back, end = trace_to(body, pack(found.rays.points, -found.rays.directions), times, rtol=1e-12)
+    # one that comes within reach of a tip again ends there
+    on = times < end
+    assert np.mean(on) > 0.95
+    np.testing.assert_allclose(back[on, P], np.broadcast_to(-d, (on.sum(), 3)), atol=1e-5)
 
 
 def test_rays_of_a_thin_body_do_not_hang_on_the_number_that_a_fan_has():
