@@ -45,14 +45,12 @@ MOST_NOISE = 5e-3
 OF_SOURCE, NARROWEST, SMOOTHED = (1.3, 1.0, 0.65), 0.45, 1e-3
 """Spacings for a subdivided mesh, in edges of its source where it curves, these no less than so much of the mean edge;
 and smoothing: finer grids and less of it leave ripples."""
-UNCERTAIN_SUBDIVIDED = 0.5
-"""And of a subdivided mesh, of which more is counted."""
 MOST_SUBDIVISIONS, FEWEST_SUBDIVIDED = 3, 300
 """With "auto" a coarse mesh is subdivided once: its vertices hold no more; again while it has fewer than so many."""
 FEW_BAD = 0.05
 """Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
-UNCERTAIN = 0.25
-"""by how far its curvatures depend on the grid, relative to their rms."""
+UNCERTAIN, UNCERTAIN_SUBDIVIDED = 0.25, 0.5
+"""by how far its curvatures depend on the grid, relative to their rms; of a subdivided mesh more is counted."""
 
 
 class Mesh(FittedBody):
@@ -75,7 +73,7 @@ class Mesh(FittedBody):
         Take the outer surface of all parts, which may cross each other; needs the library manifold3d.
     subdivide : {"auto", 1, 2, 3}, optional
         Loop's subdivision of a coarse mesh of a smooth body, whose surface passes by its vertices; "auto" where the
-        mesh is too coarse. `repairs` tell by how much vertices moved.
+        mesh is too coarse. `repairs` tell by how much vertices moved. Meshes with edges or joints are not subdivided.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -235,7 +233,8 @@ def examined_mesh(
     Raises
     ------
     ValueError
-        If the source is not one closed body.
+        If the source is not one closed body, or is to be subdivided a number of times though it has edges or joints,
+        or to more vertices than are allowed.
 
     Examples
     --------
@@ -264,14 +263,15 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
     progress("reading the mesh")
     mesh, times = read_mesh(source, units, choice, progress=progress), choice.subdivide
     progress(f"normals of {len(mesh.vertices)} vertices")
-    jets, quality, joints = _judged(mesh)
+    jets = osculating_jets(mesh.vertices, mesh.triangles)
+    quality, joints = _with_joints(assess(mesh, jets), mesh, jets)
     pieces = _pieces(mesh, quality, joints, source_name(source))
     if times is None or (times == "auto" and (quality.verdict != "too coarse" or pieces is not None)):
         return _Examined(mesh, jets, quality, pieces)
     if pieces is not None:
         raise ValueError(
-            f"the mesh has {pieces.regions.count} smooth pieces ({quality.verdict}), between which subdivide = {times} "
-            "would round it off; leave it out: the pieces are taken as they are, up to their edges"
+            f"the mesh has edges or joints ({quality.verdict}), which subdivide = {times} would round off; leave it "
+            "out: its smooth pieces are taken as they are; or give more vertices where it is to be smooth"
         )
     found = mesh
     for count in range(1, MOST_SUBDIVISIONS + 1) if times == "auto" else (int(times),):
@@ -281,17 +281,13 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
         loop = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
         found = TriangleMesh(loop.vertices, loop.triangles, (*mesh.repairs, *notes), loop)
         progress(f"normals of {len(found.vertices)} vertices")
-        jets, quality, _ = _judged(found)
+        jets = osculating_jets(found.vertices, found.triangles)
+        quality = assess(found, jets)
         if quality.verdict != "too coarse" or len(found.vertices) >= FEWEST_SUBDIVIDED:
             break
     for line in found.repairs[len(mesh.repairs) :]:
         progress(line)
     return _Examined(found, jets, quality, None)
-
-
-def _judged(mesh: TriangleMesh) -> tuple[Jets, MeshQuality, Jointed | None]:
-    jets = osculating_jets(mesh.vertices, mesh.triangles)
-    return jets, *_with_joints(assess(mesh, jets), mesh, jets)
 
 
 def _pieces(mesh: TriangleMesh, quality: MeshQuality, joints: Jointed | None, name: str) -> PieceCloud | None:

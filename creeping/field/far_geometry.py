@@ -200,8 +200,8 @@ class FarGeometry:
         self._chi, self._roots = np.zeros((n, many)), np.ones(n)
         back = np.ascontiguousarray((self.angle > np.pi / 2).reshape(n, many))
         # a ray crosses about once in every half turn; at worst each sample is a cell and a crossing
-        cells, crossings = CELLS[is_creased(self.body)], 2 + int(self.tracer.steps * TURN / np.pi)
         most = len(times) * PARTS
+        cells, crossings = min(CELLS[is_creased(self.body)], most * rays), 2 + int(self.tracer.steps * TURN / np.pi)
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
         self.ends = RayEnds(self.tracer, launch, states, times)
         pieces = [(np.empty((0, 4), np.int64), np.empty((0, 2)), np.empty((0, 4)))]

@@ -45,9 +45,6 @@ ROUNDS = 400
 STEPS = 1000
 """Between outputs, after which rays are given up that are traced together: where a piece is known some tens do, far
 beyond its borders F may be anything."""
-ALONE, WHOLE_WINDOW = -1, 30
-"""Numbers of groups of rays: those that go by themselves, and from which on they go to the end of a window; below it to
-two to that many stops."""
 EVEN = 1e-12
 """Difference of gaps between stops, in body sizes, up to which they are alike."""
 OWN = 1e-12
@@ -80,10 +77,10 @@ class Walk:
         out = np.repeat(self.states[:, None], len(stops), axis=1)
         if len(stops) == 1:
             return out
-        self._untrusted(stops[0])
-        loose = np.flatnonzero((self.end <= stops[0]) & (self.end + beyond > stops[0]) & ~self.stuck)
         self.now[:], self.longest[:], self.crossed[:] = np.maximum(self.begin, stops[0]), np.inf, 0
         self.place[:] = np.searchsorted(stops, self.now, side="right") - 1
+        self._untrusted(stops)
+        loose = np.flatnonzero((self.end <= stops[0]) & (self.end + beyond > stops[0]) & ~self.stuck)
         for _ in range(ROUNDS):
             rows = np.flatnonzero(np.isinf(self.end) & (self.place < len(stops) - 1))
             if not len(rows):
@@ -96,13 +93,13 @@ class Walk:
         self.states = out[:, -1].copy()
         return out
 
-    def _untrusted(self, begin: float) -> None:
+    def _untrusted(self, stops: FloatArray) -> None:
         """End rays, without a crease, that begin a window where the body is not trusted: of them nothing is known."""
         if not hasattr(self.body, "non_smooth"):
             return
-        rows = np.flatnonzero(np.isinf(self.end) & (self.begin <= begin))
+        rows = np.flatnonzero(np.isinf(self.end) & (self.begin < stops[-1]))
         lost = rows[np.asarray(self.body.non_smooth(self.states[rows, X]), dtype=bool)]
-        self.end[lost] = begin
+        self.end[lost] = self.now[lost]
 
     def _round(self, rows: IntArray, stops: FloatArray, out: FloatArray) -> None:
         """Take each ray on by one step of its own, or all the way to the last stop with the others."""
@@ -111,17 +108,17 @@ class Walk:
         # between stops as far apart as all others, rays that are at different ones go together
         gaps = np.diff(stops)
         even = np.ptp(gaps) <= EVEN * self.size
-        how_far = np.where(even, WHOLE_WINDOW, WHOLE_WINDOW + 1 + self.place[rows])
-        # on the way to a tip, those that are about as many stops from it
         free = (self.exits.to_tips(self.states[rows]) - NEXT * self.size) / gaps[0]
-        how_far = np.where(near, np.floor(np.log2(np.clip(free, 0.5, 2.0**20))) if even else ALONE, how_far)
-        groups = np.stack([self.on[rows], np.where(alone, ALONE, how_far)], axis=1).astype(np.int64)
-        for number, far in np.unique(groups, axis=0):
-            mine = rows[(groups[:, 0] == number) & (groups[:, 1] == far)]
-            if far == ALONE:
-                self._alone(int(number), mine, stops, out)
+        # rays on their way to a tip go as many stops as they are from it, to a power of two so that groups are few
+        before = 2 ** np.floor(np.log2(np.clip(free, 1.0, len(stops)))) * (free >= 1) * even
+        many = np.where(alone, 0, np.where(near, before, len(stops)))
+        groups = np.stack([self.on[rows], many, np.where(even | (many == 0), 0, self.place[rows])], axis=1)
+        for group in np.unique(groups.astype(np.int64), axis=0):
+            mine, (number, count, _) = rows[np.all(groups == group, axis=1)], group.tolist()
+            if count == 0:
+                self._alone(number, mine, stops, out)
             else:
-                self._together(int(number), mine, stops, out, 2**far if far < WHOLE_WINDOW else len(stops))
+                self._together(number, mine, stops, out, count)
 
     def _together(self, number: int, mine: IntArray, stops: FloatArray, out: FloatArray, many: int) -> None:
         """Go on with rays on one piece through as many stops, as far as the window has them and it is wide."""

@@ -12,12 +12,12 @@ Sources: Derivations, R12.
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geodesics.states import P, X
 from creeping.geometry.creased import is_creased
 from creeping.geometry.curvature import second_form
 from creeping.geometry.surface import normal, size
-from creeping.rays.quantities import RayPoints
+from creeping.rays.quantities import STRAIGHT, RayPoints
 from creeping.rays.single_rays import SingleRays
 from creeping.rays.tracer import RayTracer
 
@@ -41,7 +41,7 @@ LONG = (2, 1)
 do."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
-EXACT, HOPE = 3, 0.25
+MORE, HOPE = 3, 0.25
 """Rounds more on bodies with creases, and residuals up to which they are taken."""
 
 
@@ -122,6 +122,7 @@ class _Search:
         nearly: float,
     ) -> None:
         n = len(times)
+        body: Any = tracer.body
         self.tracer, self.directions, self.observers, self.cell = tracer, directions, observers, cell
         self.starts, self.tangents = tracer.onto_line(near, directions)
         self.times, self.begin, self.moved = times.copy(), times, np.zeros(n)
@@ -131,7 +132,7 @@ class _Search:
         self.far = FAR_ON_PIECES if self.creased else FAR
         trusted = np.isinf(longest)
         patience = np.where(trusted, ROUNDS, IDLE_ON_PIECES if self.creased else IDLE)
-        idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
+        idle, best, on = np.zeros(n, dtype=np.int64), np.full(n, np.inf), np.full(n, -1)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
             rows = directions[active], self.starts[active], self.tangents[active], self.times[active]
@@ -141,7 +142,13 @@ class _Search:
                 self.ends[active] = tracer.at(*rows, long=long).rays.lanes[:, :8]
             residual = _apart(self.ends[active, P], observers[active])
             self.wanted[active] = residual <= max(CLOSE, nearly)
-            idle[active] = np.where(residual <= SLOW * best[active], 0, idle[active] + 1)
+            nearer = residual <= SLOW * best[active]
+            if self.creased:
+                # curvature jumps at a joint: the first step across it may go too far
+                piece = np.asarray(body.piece(self.ends[active, X]))
+                nearer |= (piece != on[active]) & (on[active] >= 0)
+                on[active] = piece
+            idle[active] = np.where(nearer, 0, idle[active] + 1)
             best[active] = np.fmin(residual, best[active])
             last = active[(residual > CLOSE) & self._within(active) & (idle[active] < patience[active])]
             if not len(last):
@@ -162,14 +169,14 @@ class _Search:
         rows = self.directions[kept], self.starts[kept], self.tangents[kept], self.times[kept]
         found = self.tracer.at(*rows, observers=self.observers[kept])
         if self.creased:
-            self._ended(kept, found.rays.lanes)
+            self._ended(kept, found.rays)
         good = (_apart(found.rays.directions, self.observers[kept]) < ACCEPTED) & self._within(kept)
         return found[good], kept[good]
 
     def _close(self, some: IntArray) -> IntArray:
         """Those of some searches whose last steps have brought them to p = r, with more such steps where they lack."""
         off = self._off(some)
-        for _ in range(EXACT):
+        for _ in range(MORE):
             beside = np.flatnonzero((off >= ACCEPTED) & (off < HOPE))
             if not len(beside):
                 break
@@ -184,14 +191,19 @@ class _Search:
         self.ends[some] = self.tracer.ends(self.directions[some], self.starts[some], self.times[some])
         return _apart(self.ends[some, P], self.observers[some])
 
-    def _ended(self, some: IntArray, lanes: FloatArray) -> None:
-        """Put into lanes (n, LANES) what is known of the ends: next to a tip no polynomial through steps tells it."""
+    def _ended(self, some: IntArray, rays: RayPoints) -> None:
+        """Put into rays (n,) what is known of their ends: next to a tip no polynomial through steps tells it."""
+        lanes = rays.lanes
         lanes[:, :8] = self.ends[some]
-        x, p = lanes[:, X], lanes[:, P]
+        x, p, J, rate = lanes[:, X], lanes[:, P], lanes[:, 6], lanes[:, 7]
         gradient = self.tracer.body.gradient(x)
         g = np.linalg.norm(gradient, axis=1)
         hessian = self.tracer.body.hessian(x) / g[:, None, None]
         lanes[:, 9], lanes[:, 12] = (second_form(v, hessian) for v in (p, np.cross(gradient / g[:, None], p)))
+        # the angle of these J and J', on the branch that the ray has come to
+        angle = np.arctan2(-rays.scale * rate, J)
+        lanes[:, 8] = angle + 2 * np.pi * np.round((lanes[:, 8] - angle) / (2 * np.pi))
+        rays.alive[lanes[:, 9] <= STRAIGHT / rays.scale] = False
 
     def _within(self, some: IntArray | slice = slice(None)) -> BoolArray:
         """Which of some searches are in their neighbourhoods."""

@@ -27,6 +27,8 @@ GAUSS = 4
 """Gauss points of a step."""
 GUARD = 5
 """Steps traced beyond both ends, so that derivatives are central there too."""
+STRAIGHT = 1e-6
+"""Curvature, in inverse body sizes, up to which a ray goes straight, on a body with joints."""
 STEEPEST, SHARPEST = 4.0, 20.0
 """Bounds of |ρ'| and of |ρρ''|, |ρρ'' - (2/3) ρ'²|: where curvature varies faster, as it does before a ray detaches,
 the expansion that uses them has no meaning."""

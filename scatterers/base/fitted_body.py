@@ -153,7 +153,7 @@ class FittedBody(SplineBody):
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
         super().__init__(known[0], key, speed)
         self._no_charts = str(text.get(NO_CHARTS, ""))
-        self.coarse_fit = SplineBody(known[1], f"{key}, coarser", speed)
+        self.coarse_fit = SplineBody(known[1], f"{key}, second", speed)
         self.coarse_fit._non_smooth, self.coarse_fit._reach = self._non_smooth, self._reach
         self._kept: Kept | None = None
         if folder is not None:

@@ -8,13 +8,14 @@ Sources: Derivations, B6.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.base.clouds import Nearer, PointCloud
-from scatterers.spline.compared import curvatures, left_at, principal_curvatures, tangents
+from scatterers.spline.compared import curvatures, left_at, normal_curvatures, principal_curvatures, tangents
 from scatterers.spline.fitting import MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
 from scatterers.spline.report import FitReport
 from scatterers.spline.samples import Samples
@@ -72,19 +73,20 @@ def good_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
         try:
             return _checked_fit(replace(cloud, spacing=spacing), progress)
         except NoBodyError as error:
-            progress(str(error))
+            progress(f"on a grid of {spacing:.3g} m {error}; a narrower one is tried")
     return _checked_fit(replace(cloud, spacing=spacings[-1]), progress)
 
 
 def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     fine, coarse, smoothing = fits(cloud, progress)
-    non_smooth = cloud.non_smooth if cloud.nearer is None else _blind(cloud, cloud.nearer.source, fine)
-    report, doubt = compared(replace(cloud, non_smooth=non_smooth), fine, coarse, smoothing)
-    if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
+    slope = _slopes(cloud, fine)
+    if not SLOPES[0] <= slope[0] <= slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
         raise NoBodyError(
-            f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
+            f"the fit has failed: |grad F| is {slope[0]:.2g} to {slope[1]:.2g} on the body instead "
             f"of 1; it is too thin or too curved for the distance of its points: refine the mesh there" + _remedy(cloud)
         )
+    non_smooth = cloud.non_smooth if cloud.nearer is None else _blind(cloud.nearer.source, fine)
+    report, doubt = compared(replace(cloud, non_smooth=non_smooth), fine, coarse, smoothing)
     if doubt > cloud.uncertain:
         raise ValueError(
             f"the mesh is too coarse: its curvatures are uncertain by {100 * doubt:.0f} %; "
@@ -93,15 +95,25 @@ def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     return TwoFits(fine, coarse, report, non_smooth)
 
 
-def _blind(cloud: PointCloud, source: Source, fine: Fitted) -> FloatArray:
+def _slopes(cloud: PointCloud, fine: Fitted) -> tuple[float, float]:
+    """Least and largest |grad F| at the points of a cloud."""
+    _, _, slope = curvatures(fine.spline, cloud.points)
+    return float(slope.min()), float(slope.max())
+
+
+def _turns(source: Source, fine: Fitted) -> FloatArray:
+    return turns(source, partial(normal_curvatures, fine.spline))
+
+
+def _blind(source: Source, fine: Fitted) -> FloatArray:
     """Vertices (m, 3) of the mesh that was subdivided about which it shows no curvature; ValueError if many."""
-    turn = turns(source, principal_curvatures(fine.spline, source.vertices)[0])
+    turn = _turns(source, fine)
     blind = turn > BLIND
     if np.mean(blind) > MOST_BLIND:
         raise ValueError(
             f"the mesh is too coarse: at {np.sum(blind)} of {len(turn)} vertices its body turns by more than "
-            f"{np.degrees(BLIND):.0f} degrees over an edge (up to {np.degrees(turn.max()):.0f}); give more "
-            "vertices there"
+            f"{np.degrees(BLIND):.0f} degrees within an edge (up to {np.degrees(turn.max()):.0f}); give more vertices "
+            "there"
         )
     return source.vertices[blind]
 
@@ -196,7 +208,7 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
         gaussian_curvature_error=float(np.hypot(_rms(gauss - other_gauss), shared_gauss)),
         noise=cloud.noise,
         smoothing=smoothing,
-        factor=1.0 if cloud.nearer is None else error / difference,
+        factor=error / difference if cloud.nearer is not None and difference > 0 else 1.0,
     )
     return report, error / report.normal_curvature
 
@@ -209,7 +221,7 @@ def _shared(cloud: PointCloud, fine: Fitted, rms_kappa: float) -> tuple[float, f
     """
     if cloud.nearer is not None:
         source = cloud.nearer.source
-        return unseen(source, *principal_curvatures(fine.spline, source.vertices))
+        return unseen(source, _turns(source, fine), *principal_curvatures(fine.spline, source.vertices))
     if cloud.noise or np.isfinite(cloud.uncertain):
         return 0.0, 0.0
     shared = fine.turn / fine.spacing

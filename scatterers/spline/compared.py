@@ -38,6 +38,11 @@ def principal_curvatures(spline: TensorSpline, points: FloatArray) -> tuple[Floa
     return np.stack([mean - half, mean + half], axis=1), gauss
 
 
+def normal_curvatures(spline: TensorSpline, points: FloatArray, along: FloatArray) -> FloatArray:
+    """kappa_n (n,) at points brought onto the spline, along directions (n, 3) that lie nearly on it."""
+    return curvatures(spline, points, along)[0][: len(points)]
+
+
 def left_at(spline: TensorSpline, points: FloatArray, normals: FloatArray | None = None) -> tuple[float, float]:
     """Rms of F/|grad F| at points (n, 3), L, and rms angle between grad F and unit normals (n, 3) there, radians."""
     value, gradient, _ = evaluated(spline.compiled, points)

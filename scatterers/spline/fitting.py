@@ -140,7 +140,7 @@ def fit(
     watch = _Watch(equations, mean_curvature)
     r = equations.residual(c, targets=True, rough=not keep_start)
     z = equations.preconditioned(r)
-    p, rz = z.copy(), float(np.vdot(r, z))
+    p, rz = z.copy(), _product(r, z)
     q, part = np.empty_like(r), np.empty_like(r)
     before, change, done = watch.curvatures(c), np.inf, 0
     best, kept = watch.off(before), c.copy()
@@ -148,11 +148,11 @@ def fit(
     while done < iterations and rz > 0:
         # without new arrays: memory that is fresh at every step takes as long as the sums
         equations.residual(p, targets=False, out=q)
-        step = -rz / float(np.vdot(p, q))
+        step = -rz / _product(p, q)
         c += np.multiply(p, step, out=part)
         r += np.multiply(q, step, out=part)
         equations.preconditioned(r, out=z)
-        last, rz = rz, float(np.vdot(r, z))
+        last, rz = rz, _product(r, z)
         p *= rz / last
         p += z
         done += 1
@@ -172,6 +172,11 @@ def fit(
             break
         changes.append(change)
     return equations.result(kept if watch.guided else c, done, change / spacing)
+
+
+def _product(a: FloatArray, b: FloatArray) -> float:
+    """a.b, on this thread: those of BLAS wait for each other, twenty times as long where another process has a core."""
+    return float(np.einsum("i,i->", a, b))
 
 
 def spacing_of(points: FloatArray, nodes: float) -> float:

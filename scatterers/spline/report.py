@@ -73,6 +73,6 @@ class FitReport:
                 f"  points off the body by {self.misfit:.1e} m rms, normals by {self.turn:.1e} rad",
                 f"  |grad F| {self.slope[0]:.3f} to {self.slope[1]:.3f} (1 for a distance)",
                 f"  curvatures against a grid of spacing {self.coarser_spacing:.3g} m: kappa_n {kappa:.1e}, "
-                f"K {gauss:.1e} of their rms",
+                f"K {gauss:.1e} of their rms" + ("" if self.factor == 1 else ", what the source cannot show included"),
             ]
         )

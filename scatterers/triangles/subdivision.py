@@ -7,11 +7,11 @@ more than half of a cube.
 
 Curvature that changes within an edge is not in a mesh. A fit to it has of a curvature kappa about
 
-    kappa(v) - mean over the neighbours of v of kappa,   times max(1, (kappa e)^2),
+    kappa(v) - mean over the neighbours of v of kappa,   times max(1, turn^2),
 
-wrong at a vertex v with edges e: half of the first by the interpolation, all of it where the fit is the smoother for
-its grid; and over edges that turn by more than a radian it is less than that of the body, by about that factor. Where
-they turn by more than `BLIND` nothing is known.
+wrong at a vertex v with edges e, turn the largest of kappa_n(e) e: half of the first by the interpolation, all of it
+where the fit is the smoother for its grid; and over edges that turn by more than a radian it is less than that of the
+body, by about that factor. Where they turn by more than `BLIND` nothing is known.
 
 Sources: [L87] Loop, Smooth subdivision surfaces based on triangles, University of Utah 1987; Derivations, B6.
 """
@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 BLIND = 1.5
-"""kappa e beyond which a mesh shows nothing of the curvature, radians."""
+"""kappa_n(e) e beyond which a mesh shows nothing of the curvature, radians."""
 MOST_SUBDIVIDED, MOST = 60_000, 250_000
 """Vertices beyond which "auto" does not subdivide a mesh, and beyond which nothing is subdivided."""
 
@@ -114,18 +114,21 @@ def edges_where_curved(vertices: FloatArray, triangles: IntArray, curvature: Flo
     return float(np.average(_mean_edges(vertices, ends), weights=weight))
 
 
-def turns(source: Source, principal: FloatArray) -> FloatArray:
-    """kappa e at the vertices (n,), kappa the larger of principal curvatures (n, 2), 1/L, and e the mean edge."""
-    largest: FloatArray = np.max(np.abs(principal), axis=1)
-    return largest * _mean_edges(source.vertices, source.edges)
+def turns(source: Source, along: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
+    """Largest kappa_n(e) e of the edges at each vertex (n,), by curvatures at points along directions, 1/L."""
+    ends = source.edges.T.ravel()
+    edges = np.tile(source.vertices[source.edges[:, 1]] - source.vertices[source.edges[:, 0]], (2, 1))
+    length = np.linalg.norm(edges, axis=1)
+    found = np.zeros(len(source.vertices))
+    np.maximum.at(found, ends, np.abs(along(source.vertices[ends], edges / length[:, None])) * length)
+    return found
 
 
-def unseen(source: Source, principal: FloatArray, gauss: FloatArray) -> tuple[float, float]:
+def unseen(source: Source, turn: FloatArray, principal: FloatArray, gauss: FloatArray) -> tuple[float, float]:
     """Rms of what a mesh cannot show of principal curvatures (n, 2), 1/L, and of K (n,), 1/L^2, by those of its fit.
 
     Vertices at which it shows nothing at all are left out.
     """
-    turn = turns(source, principal)
     values = np.column_stack([principal, gauss])
     left = np.maximum(1.0, turn**2)[:, None] * (values - _mean_of_neighbours(values, source.edges))
     left = left[turn <= BLIND]

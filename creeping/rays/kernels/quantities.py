@@ -17,11 +17,9 @@ from creeping.kernels.block import strict_options as options
 from creeping.kernels.cube_root import cube_root
 from creeping.kernels.curvature import second_form
 from creeping.kernels.turns import turns
-from creeping.rays.quantities import GAUSS, GUARD, SHARPEST
+from creeping.rays.quantities import GAUSS, GUARD, SHARPEST, STRAIGHT
 
 WIDTH = 2 * GUARD
-STRAIGHT = 1e-6
-"""Curvature, in inverse body sizes, up to which a ray goes straight."""
 
 
 def polynomial_matrix() -> np.ndarray:
