@@ -79,14 +79,23 @@ def good_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
 
 def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     fine, coarse, smoothing = fits(cloud, progress)
-    slope = _slopes(cloud, fine)
-    if not SLOPES[0] <= slope[0] <= slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
+    turn = np.zeros(0) if cloud.nearer is None else _turns(cloud.nearer.source, fine)
+    blind = turn > BLIND
+    seen = not len(turn) or np.mean(blind) <= MOST_BLIND
+    # of a mesh that shows too little the fit is to be a body all the same, or a narrower grid is tried
+    non_smooth = cloud.non_smooth if cloud.nearer is None or not seen else cloud.nearer.source.vertices[blind]
+    report, doubt = compared(replace(cloud, non_smooth=non_smooth), fine, coarse, smoothing)
+    if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
         raise NoBodyError(
-            f"the fit has failed: |grad F| is {slope[0]:.2g} to {slope[1]:.2g} on the body instead "
+            f"the fit has failed: |grad F| is {report.slope[0]:.2g} to {report.slope[1]:.2g} on the body instead "
             f"of 1; it is too thin or too curved for the distance of its points: refine the mesh there" + _remedy(cloud)
         )
-    non_smooth = cloud.non_smooth if cloud.nearer is None else _blind(cloud.nearer.source, fine)
-    report, doubt = compared(replace(cloud, non_smooth=non_smooth), fine, coarse, smoothing)
+    if not seen:
+        raise ValueError(
+            f"the mesh is too coarse: at {np.sum(blind)} of {len(turn)} vertices its body turns by more than "
+            f"{np.degrees(BLIND):.0f} degrees within an edge (up to {np.degrees(turn.max()):.0f}); give more vertices "
+            "there"
+        )
     if doubt > cloud.uncertain:
         raise ValueError(
             f"the mesh is too coarse: its curvatures are uncertain by {100 * doubt:.0f} %; "
@@ -95,27 +104,8 @@ def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     return TwoFits(fine, coarse, report, non_smooth)
 
 
-def _slopes(cloud: PointCloud, fine: Fitted) -> tuple[float, float]:
-    """Least and largest |grad F| at the points of a cloud."""
-    _, _, slope = curvatures(fine.spline, cloud.points)
-    return float(slope.min()), float(slope.max())
-
-
 def _turns(source: Source, fine: Fitted) -> FloatArray:
     return turns(source, partial(normal_curvatures, fine.spline))
-
-
-def _blind(source: Source, fine: Fitted) -> FloatArray:
-    """Vertices (m, 3) of the mesh that was subdivided about which it shows no curvature; ValueError if many."""
-    turn = _turns(source, fine)
-    blind = turn > BLIND
-    if np.mean(blind) > MOST_BLIND:
-        raise ValueError(
-            f"the mesh is too coarse: at {np.sum(blind)} of {len(turn)} vertices its body turns by more than "
-            f"{np.degrees(BLIND):.0f} degrees within an edge (up to {np.degrees(turn.max()):.0f}); give more vertices "
-            "there"
-        )
-    return source.vertices[blind]
 
 
 def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:

@@ -29,7 +29,7 @@ IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 BLIND = 1.5
 """kappa_n(e) e beyond which a mesh shows nothing of the curvature, radians."""
-MOST_SUBDIVIDED, MOST = 60_000, 250_000
+MOST_SUBDIVIDED, MOST = 60_000, 300_000
 """Vertices beyond which "auto" does not subdivide a mesh, and beyond which nothing is subdivided."""
 
 

@@ -209,7 +209,7 @@ def test_bodies_of_pieces_are_not_subdivided(make):
 
 def test_what_a_subdivision_makes_is_bounded():
     with pytest.raises(
-        ValueError, match="subdivide = 3 makes 655488 vertices of 10242, more than 250000; subdivide fewer"
+        ValueError, match="subdivide = 3 makes 655488 vertices of 10242, more than 300000; subdivide fewer"
     ):
         sc.examined_mesh(ball(times=5), subdivide=3)
 
