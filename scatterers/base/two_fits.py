@@ -79,8 +79,7 @@ def good_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
 
 def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     fine, coarse, smoothing = fits(cloud, progress)
-    turn = np.zeros(0) if cloud.nearer is None else _turns(cloud.nearer.source, fine)
-    blind = turn > BLIND
+    turn, blind = (np.zeros(0), np.zeros(0, bool)) if cloud.nearer is None else _blind(cloud.nearer.source, fine)
     seen = not len(turn) or np.mean(blind) <= MOST_BLIND
     # of a mesh that shows too little the fit is to be a body all the same, or a narrower grid is tried
     non_smooth = cloud.non_smooth if cloud.nearer is None or not seen else cloud.nearer.source.vertices[blind]
@@ -92,9 +91,8 @@ def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
         )
     if not seen:
         raise ValueError(
-            f"the mesh is too coarse: at {np.sum(blind)} of {len(turn)} vertices its body turns by more than "
-            f"{np.degrees(BLIND):.0f} degrees within an edge (up to {np.degrees(turn.max()):.0f}); give more vertices "
-            "there"
+            f"the mesh is too coarse: at {np.sum(blind)} of {len(turn)} vertices it does not show how its body curves, "
+            f"which turns by up to {np.degrees(turn.max()):.0f} degrees within an edge; give more vertices there"
         )
     if doubt > cloud.uncertain:
         raise ValueError(
@@ -106,6 +104,13 @@ def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
 
 def _turns(source: Source, fine: Fitted) -> FloatArray:
     return turns(source, partial(normal_curvatures, fine.spline))
+
+
+def _blind(source: Source, fine: Fitted) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """By what the body turns within an edge at each vertex of a source, and where the fit is not to be trusted."""
+    turn = _turns(source, fine)
+    slope = curvatures(fine.spline, source.vertices)[2]
+    return turn, (turn > BLIND) | (slope < SLOPES[0]) | (slope > SLOPES[1])
 
 
 def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:

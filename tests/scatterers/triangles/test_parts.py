@@ -192,7 +192,7 @@ def test_a_mesh_whose_curvature_is_within_its_edges_is_refused():
     """At the rim of a flat ellipsoid, not at the ends of a long one, whose long edges lie along it."""
     flat, long = ball(times=1), ball(times=1)
     flat.apply_scale((1, 1, 0.3))
-    with pytest.raises(ValueError, match=r"at 8 of 42 vertices its body turns by more than 86 degrees within an edge"):
+    with pytest.raises(ValueError, match=r"at \d+ of 42 vertices it does not show how its body curves"):
         sc.Mesh(flat, subdivide=1, cache=False)
     long.apply_scale((4, 1, 1))
     body = sc.Mesh(long, subdivide=1, cache=False)
