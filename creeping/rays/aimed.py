@@ -122,33 +122,22 @@ class _Search:
         nearly: float,
     ) -> None:
         n = len(times)
-        body: Any = tracer.body
         self.tracer, self.directions, self.observers, self.cell = tracer, directions, observers, cell
         self.starts, self.tangents = tracer.onto_line(near, directions)
         self.times, self.begin, self.moved = times.copy(), times, np.zeros(n)
-        self.ends = np.empty((n, 8))
+        self.ends, self.on = np.empty((n, 8)), np.full(n, -1)
         self.creased = is_creased(tracer.body)
         self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.creased else cell
         self.far = FAR_ON_PIECES if self.creased else FAR
         trusted = np.isinf(longest)
         patience = np.where(trusted, ROUNDS, IDLE_ON_PIECES if self.creased else IDLE)
-        idle, best, on = np.zeros(n, dtype=np.int64), np.full(n, np.inf), np.full(n, -1)
+        idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
-            rows = directions[active], self.starts[active], self.tangents[active], self.times[active]
-            if self.creased:
-                self.ends[active] = tracer.ends(rows[0], rows[1], rows[3])
-            else:
-                self.ends[active] = tracer.at(*rows, long=long).rays.lanes[:, :8]
-            residual = _apart(self.ends[active, P], observers[active])
+            residual, crossed = self._off(active, long), self._crossed(active)
             self.wanted[active] = residual <= max(CLOSE, nearly)
-            nearer = residual <= SLOW * best[active]
-            if self.creased:
-                # curvature jumps at a joint: the first step across it may go too far
-                piece = np.asarray(body.piece(self.ends[active, X]))
-                nearer |= (piece != on[active]) & (on[active] >= 0)
-                on[active] = piece
-            idle[active] = np.where(nearer, 0, idle[active] + 1)
+            # curvature jumps at a joint: the first step across it may go too far
+            idle[active] = np.where((residual <= SLOW * best[active]) | crossed, 0, idle[active] + 1)
             best[active] = np.fmin(residual, best[active])
             last = active[(residual > CLOSE) & self._within(active) & (idle[active] < patience[active])]
             if not len(last):
@@ -186,10 +175,22 @@ class _Search:
             off[beside] = np.where(now < SLOW * off[beside], now, np.inf)
         return some[off < ACCEPTED]
 
-    def _off(self, some: IntArray) -> FloatArray:
-        """|r - p| (n,) where some searches are now."""
-        self.ends[some] = self.tracer.ends(self.directions[some], self.starts[some], self.times[some])
+    def _off(self, some: IntArray, long: int = 1) -> FloatArray:
+        """|r - p| (n,) where some searches are now, on a smooth body with steps of so many."""
+        rows = self.directions[some], self.starts[some], self.tangents[some], self.times[some]
+        if self.creased:
+            self.ends[some] = self.tracer.ends(rows[0], rows[1], rows[3])
+        else:
+            self.ends[some] = self.tracer.at(*rows, long=long).rays.lanes[:, :8]
         return _apart(self.ends[some, P], self.observers[some])
+
+    def _crossed(self, some: IntArray) -> BoolArray:
+        """Which of some searches have come to another piece since they were asked last."""
+        if not self.creased:
+            return np.zeros(len(some), dtype=bool)
+        body: Any = self.tracer.body
+        before, self.on[some] = self.on[some], body.piece(self.ends[some, X])
+        return np.asarray((self.on[some] != before) & (before >= 0))
 
     def _ended(self, some: IntArray, rays: RayPoints) -> None:
         """Put into rays (n,) what is known of their ends: next to a tip no polynomial through steps tells it."""
