@@ -33,8 +33,8 @@ MAKING = 2700.0
 """What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
 SECONDS = 3.3e-9
 """Of one node at one place."""
-SOLVING, SOLVING_VECTORS = 3.5e-8, 1e-7
-"""Of one pair of nodes between which the body's equation is solved; of a conductor, both polarisations."""
+SOLVING, SOLVING_VECTORS = 3e-4, 9e-4
+"""Of one node of those between which the body's equation is solved; of a conductor, both polarisations."""
 LIT = 0.6
 """Share of a body's nodes that are lit or in the penumbra."""
 KEPT = 2
@@ -59,7 +59,7 @@ def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boun
     known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
     plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
     solving = SOLVING_VECTORS if boundary == "pec" else SOLVING
-    return plain + solving * sum(expected_pairs(fan, k, boundary) for k in known)
+    return plain + solving * float(sum(np.sqrt(expected_pairs(fan, k, boundary)) for k in known))
 
 
 def expected_pairs(fan: RayFan, wavenumber: float, boundary: BoundaryLike = "soft") -> int:

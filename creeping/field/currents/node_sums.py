@@ -14,14 +14,18 @@ are taken off from the sums over nodes, with the current at x, and put back.
 Source: Derivations, F30 and F32.
 """
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.field.currents.smooth_kernel import SmoothKernel
+from creeping.field.currents.split_sums import SplitSums, best_split, cells_of
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.geometry.kept import kept
 from creeping.geometry.quadrature import SYMMETRIC
-from creeping.kernels.threads import in_threads
+from creeping.kernels.threads import in_threads, thread_count
 
 NEIGHBOURS = 4.5
 """Distance, over a, of nodes that are next to a point: chi is 1e-9 there."""
@@ -31,6 +35,8 @@ VECTOR = 2.8
 """What a pair of a conductor takes of that, both polarisations."""
 PATCH = 5e-10
 """Seconds of a pair when what is next to points is found."""
+WHOLE = 3.4
+"""Distance, over 1/k, from which 1 - e^{-(kR)^2} is 1 to 1e-5."""
 TOUCHING = 1e-6
 """Distance, over 1/k, below which a node is the point itself."""
 
@@ -45,12 +51,31 @@ class Sums(Protocol):
         """The points' own current (m, ...) that is ``wave`` (m, ...) and what they receive of values at the nodes."""
 
 
-def sums_at(
-    currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float | None
-) -> Sums:
+def sums_at(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float) -> Sums:
     """The sums over the nodes of currents, of any boundary; parameters as of `NodeSums`."""
     of = currents, points, normals, window
     return VectorSums(*of) if currents.boundary.kind == "conductor" else NodeSums(*of)
+
+
+def _split_sums(
+    currents: SurfaceCurrents, places: tuple[FloatArray, FloatArray], near: FloatArray, transforms: int, each: float
+) -> SplitSums | None:
+    """The sums at points with normals (m, 3) by their split, if all pairs of ``each`` seconds take longer."""
+    points, normals = places
+    seconds = each * len(points) * len(currents.points) / thread_count()
+    k, body = currents.wavenumber, currents.body
+    low, high = body.bounds
+
+    def make(split: float) -> SmoothKernel:
+        return kept(body, f"smooth kernel {k!r} {split}", lambda: SmoothKernel(k, high - low, split))
+
+    # of nodes that are not alike what is left out is near
+    least = 0.0 if currents.even.all() else min(float(np.max(near, initial=0.0)), WHOLE / k)
+    best = best_split(make, points, currents.points, transforms, seconds, least)
+    if best is None:
+        return None
+    of_nodes = currents.points, currents.normals, currents.weights / (4 * np.pi), currents.even
+    return SplitSums(best, points, normals, *of_nodes, near)
 
 
 def _each(window: FloatArray | float, points: FloatArray) -> FloatArray:
@@ -66,49 +91,85 @@ class NodeSums:
     currents : SurfaceCurrents
         Whose nodes, not values, are taken.
     points, normals : (m, 3), L and 1
-    window : (m,) or float or None, L
-        The width a; None where the points are so far inside the body that nothing stands next to them.
+    window : (m,) or float, L
+        The width a; 0 where points are so far inside the body that nothing stands next to them.
     """
 
     def __init__(
-        self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float | None
+        self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float
     ) -> None:
         self.k, kind = currents.wavenumber, currents.boundary
-        self.window = None if window is None else _each(window, points)
+        self._currents, self._places, self.window = currents, (points, normals), _each(window, points)
         self.soft = kind.kind == "soft"
-        self._eta, ours = (
+        self._eta, self._ours = (
             np.zeros(len(x)) if self.soft else np.broadcast_to(kind.at(x).admittance, (len(x),))
             for x in (points, currents.points)
         )
-        self._double = currents.weights / (4 * np.pi)
-        self._single = 1j * self.k * ours * self._double
         self._points = [np.ascontiguousarray(part.T) for part in (points, normals)]
-        places = [np.ascontiguousarray(part.T) for part in (currents.points, currents.normals)]
-        self._nodes = *places, currents.weights, currents.mean_curvature, currents.even
+        self._nodes = [np.ascontiguousarray(part.T) for part in (currents.points, currents.normals)]
+
+    @cached_property
+    def _split(self) -> SplitSums | None:
+        # of a soft body along the normals of points, of others along those of nodes; an impedance has values too
+        transforms = 4 if self.soft or not self._ours.any() else 6
+        return _split_sums(self._currents, self._places, NEIGHBOURS * self.window, transforms, EACH)
 
     def of(self, values: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """What the points receive of values (n,) at the nodes, but for a share of their own; and that share: (m,)."""
+        single = 1j * self.k * self._ours
+        if self._split is None:
+            return 2 * self._of_pairs(single * values, values), self.own
+        if self.soft:
+            return 2 * self._split.tilted_at_points(values), self.own
+        rest = self._split.tilted_at_nodes(values)
+        return 2 * (rest + self._split.values(single * values) if single.any() else rest), self.own
+
+    def _of_pairs(self, single: ComplexArray, double: ComplexArray) -> ComplexArray:
+        """Sum of a G and b dG/dn over all pairs (m,), of a and b (n,)."""
         from creeping.field.kernels.second_kind import from_nodes
 
-        k, soft = self.k, self.soft
-        far = np.zeros(len(self._eta))
-        a, near = (1 / k + far, far) if self.window is None else (self.window, NEIGHBOURS * self.window)
-        both = [
-            np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (self._single * values, self._double * values)
-        ]
-        out = np.empty((len(self._eta), 6))
+        weights = self._currents.weights / (4 * np.pi)
+        both = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (weights * single, weights * double)]
+        out = np.empty((len(self._eta), 2))
 
         def work(part: slice) -> None:
-            given = (*self._points, *self._nodes, *both, k, a, near, soft)
+            given = (
+                *self._points,
+                *self._nodes,
+                self._currents.even,
+                *both,
+                self.k,
+                NEIGHBOURS * self.window,
+                self.soft,
+            )
             from_nodes(*given, part.start, part.stop, out)
 
-        in_threads(work, len(out), least=16, multiple=1, seconds=EACH * len(values))
-        real, imaginary, area, bent, still, tilted = out.T
+        in_threads(work, len(out), least=16, multiple=1, seconds=EACH * len(double))
+        return np.asarray(out[:, 0] + 1j * out[:, 1])
+
+    @cached_property
+    def own(self) -> ComplexArray:
+        """What multiplies the points' own current (m,): put back and taken off in the windows."""
+        from creeping.field.kernels.near_pairs import window_sums
+
+        currents, k = self._currents, self.k
+        a = np.where(self.window > 0, self.window, 1 / k)
+        cells = cells_of(currents.points, float(np.median(a)) * NEIGHBOURS / 2)
+        y, sides = (np.ascontiguousarray(part[:, cells.order]) for part in self._nodes)
+        of_nodes = (part[cells.order] for part in (currents.weights, currents.mean_curvature, currents.even))
+        out = np.zeros((len(a), 4))
+        given = *self._points, y, sides, *of_nodes, *cells.grid, a, NEIGHBOURS * self.window, k, self.soft
+
+        def work(part: slice) -> None:
+            window_sums(*given, part.start, part.stop, out)
+
+        in_threads(work, len(out), least=64, multiple=1, seconds=PATCH * y.shape[1])
+        area, bent, still, tilted = out.T
         cover, bend = area / (np.pi * a**2), bent / (np.pi * a**2)
-        sign, root = 1 if soft else -1, np.sqrt(np.pi) * a
+        sign, root = 1 if self.soft else -1, np.sqrt(np.pi) * a
         taken_off = (1j * k * self._eta * still + tilted) / (4 * np.pi)
         put_back = 1j * k * self._eta * cover * root / 4 + sign * bend * root / 8
-        return 2 * (real + 1j * imaginary), np.asarray(2 * (put_back - taken_off))
+        return np.asarray(2 * (put_back - taken_off))
 
     def total(self, values: ComplexArray, mine: ComplexArray) -> ComplexArray:
         """What the points, whose own current is ``mine`` (m,), receive of values (n,) at the nodes."""
@@ -131,34 +192,40 @@ class VectorSums:
     """
 
     def __init__(
-        self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float | None
+        self, currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, window: FloatArray | float
     ) -> None:
-        windows = _each(0.0 if window is None else window, points)
+        windows = _each(window, points)
         self.k, self._near = currents.wavenumber, NEIGHBOURS * windows
+        self._currents, self._places = currents, (points, normals)
         self._points = [np.ascontiguousarray(part.T) for part in (points, normals)]
         self._nodes = np.ascontiguousarray(currents.points.T)
         self._alike = currents.even
         self._strength = (currents.weights / (4 * np.pi))[:, None, None]
         self.own = np.zeros((len(points), 3, 3))
-        if window is None:
+        at = np.flatnonzero(windows > 0)
+        if not len(at):
             return
-        shape, static = self._patches(currents, windows)
-        across = np.eye(3) - normals[:, :, None] * normals[:, None]
+        shape, static = self._patches(currents, windows, at)
+        across = np.eye(3) - normals[at, :, None] * normals[at, None]
         shape = across @ shape @ across
         mean = 0.5 * np.trace(shape, axis1=1, axis2=2)[:, None, None]
-        put_back = (mean * across - shape) / (8 * np.sqrt(np.pi) * windows[:, None, None])
-        self.own = 2 * (put_back + across @ static @ across / (4 * np.pi))
+        put_back = (mean * across - shape) / (8 * np.sqrt(np.pi) * windows[at, None, None])
+        self.own[at] = 2 * (put_back + across @ static @ across / (4 * np.pi))
 
-    def _patches(self, currents: SurfaceCurrents, window: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Sums S and T (m, 3, 3) of `creeping.field.kernels.vector_sums`."""
+    @cached_property
+    def _split(self) -> SplitSums | None:
+        return _split_sums(self._currents, self._places, self._near, 12, EACH * VECTOR)
+
+    def _patches(self, currents: SurfaceCurrents, windows: FloatArray, at: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Sums S and T (m, 3, 3) of `creeping.field.kernels.vector_sums` at some of the points (m,)."""
         from creeping.field.kernels.vector_sums import patches
 
         sides = np.ascontiguousarray(currents.normals.T)
-        out = np.empty((self._points[0].shape[1], 15))
+        out, mine = np.empty((len(at), 15)), [np.ascontiguousarray(part[:, at]) for part in self._points]
 
         def work(part: slice) -> None:
-            given = (*self._points, self._nodes, sides, currents.weights, currents.shapes, self._alike)
-            patches(*given, window, TOUCHING / self.k, self._near, part.start, part.stop, out)
+            given = (*mine, self._nodes, sides, currents.weights, currents.shapes, self._alike)
+            patches(*given, windows[at], TOUCHING / self.k, self._near[at], part.start, part.stop, out)
 
         in_threads(work, len(out), least=16, multiple=1, seconds=PATCH * len(sides.T))
         return out[:, SYMMETRIC], out[:, 6:].reshape(-1, 3, 3)
@@ -173,6 +240,8 @@ class VectorSums:
 
     def _rest(self, values: ComplexArray) -> ComplexArray:
         """What the points receive of values (n, 3, p) at the nodes, but for a share of their own: (m, 3, p)."""
+        if self._split is not None:
+            return 2 * np.cross(self._places[1][:, :, None], self._split.curl(values), axis=1)
         from creeping.field.kernels.vector_sums import vectors_from_nodes
 
         turned = np.moveaxis(values * self._strength, 0, 2)

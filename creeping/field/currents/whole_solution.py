@@ -43,8 +43,8 @@ ON_BODY = 5.0
 """Error of solved currents at a point, in what they leave inside."""
 RATE, FINE_RATE = 1.5, 2.0
 """Of nodes between which it is solved, over k, and of those where these leave more than WELL; the kernels ask for 2."""
-WELL = 3e-3
-"""What solved currents may leave inside before nodes are taken closer together."""
+WELL, MORE = 3e-3, 1.25
+"""What solved currents may leave inside before nodes are taken closer together, and how many more these must be."""
 SHARP = 1.0
 """Kappa_1 + kappa_2, times the spacing of nodes, from which the equation is not that of a smooth place."""
 MOST, ASKED = 1e9, 2e10
@@ -94,8 +94,9 @@ def solved_on_whole_body(currents: SurfaceCurrents, most: float) -> SurfaceCurre
     Their change is what a step would add, of what is left of the equation. ``most`` is what pairs of nodes it may take.
     """
     found = _solved(currents, RATE)
-    # between nodes so far apart some incidences are not resolved
-    if found.extinction > WELL and node_count(currents.body, FINE_RATE * currents.wavenumber) ** 2 <= most:
+    # between nodes so far apart some incidences are not resolved, unless it is the body that asks for as many
+    coarse, fine = (node_count(currents.body, rate * currents.wavenumber) for rate in (RATE, FINE_RATE))
+    if found.extinction > WELL and fine > MORE * coarse and fine**2 <= most:
         found = _solved(found, FINE_RATE)
     return found
 
@@ -108,15 +109,17 @@ def _solved(currents: SurfaceCurrents, rate: float) -> SurfaceCurrents:
     x, n, nothing = coarse.points, coarse.normals, coarse.values
     window = windows_of(nodes, k, x)
     at, inner = second_surface(body, nodes, k)
-    on, under = sums_at(coarse, x, n, window), sums_at(coarse, inner, n[at], None)
+    # one sum over the nodes for both surfaces
+    both = sums_at(coarse, *(np.concatenate(part) for part in ((x, inner), (n, n[at]), (window, np.zeros(len(at))))))
     wave = twice_incident(coarse, x, n)
     start = sums_at(currents, x, n, window).closed(currents.values, wave).ravel()
     wave[at] -= 1j * twice_incident(coarse, inner, n[at])
 
     def left_side(values: ComplexArray) -> ComplexArray:
         u = values.reshape(nothing.shape)
-        out = u - on.total(u, u)
-        out[at] += 1j * under.total(u, nothing[at])
+        on, under = np.split(both.total(u, np.concatenate([u, nothing[at]])), [len(u)])
+        out = u - on
+        out[at] += 1j * under
         return out.ravel()
 
     right = wave.ravel()

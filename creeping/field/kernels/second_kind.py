@@ -1,11 +1,10 @@
 """Compiled sums over currents at nodes y of what the rest of a body sends to points x of its surface.
 
-    u(x) = sum_y h [a_y + b_y n.(x - y) (1/R - ik)/R] e^{ikR}/R - chi w_y [a + b n.(x - y)/R^2]/R,   R = |x - y|
+    u(x) = sum_y h [a_y + b_y n.(x - y) (1/R - ik)/R] e^{ikR}/R,   R = |x - y|
 
-with n that of y, or of x for du/dn of a soft body, which asks for -dG/dn_x. chi = e^{-(R/a)^2} takes off the static
-part of what stands next to x, as if the current there were that of x, over nodes that share its phase; of others
-h = 1 - e^{-(kR)^2} leaves out those that x stands on. What is taken off is put back in closed form: sums of chi w and
-chi w kappa_y tell how much of the surface there it was.
+with n that of y, or of x for du/dn of a soft body, which asks for -dG/dn_x. h is 1 for nodes that share the phase of
+x; of others h = 1 - e^{-(kR)^2} leaves out those that x stands on. Of a node that is x itself the static part, 1/R, is
+left out.
 
 Source: Derivations, F30.
 """
@@ -22,16 +21,15 @@ TOUCHING = 1e-6
 
 
 @njit(**entry_options)
-def from_nodes(x, normals, y, sides, weights, bends, alike, single, double, k, reach, near, soft, first, last, out):
-    """Fill rows first..last of out (m, 6): u, and the sums of chi w, chi w kappa and what a and b of x itself multiply.
+def from_nodes(x, normals, y, sides, alike, single, double, k, near, soft, first, last, out):
+    """Fill rows first..last of out (m, 2): the real and imaginary part of u.
 
     Points x and their normals (3, m), nodes y and theirs ``sides`` (3, n), single and double (2, n) the weights a and
-    b, real before imaginary parts. chi, of width ``reach`` (m,), counts up to the distances ``near`` (m,), with w and
-    kappa (n,) of the nodes that are ``alike`` (n,) the points in phase.
+    b, real before imaginary parts; ``alike`` (n,) matters up to the distances ``near`` (m,).
     """
     per, touching = k / (2 * math.pi), (TOUCHING / k) ** 2
     for j in range(first, last):
-        wide, close = 1.0 / reach[j] ** 2, near[j] ** 2
+        close = near[j] ** 2
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
         p, q = 0.0, 0.0
@@ -47,15 +45,11 @@ def from_nodes(x, normals, y, sides, weights, bends, alike, single, double, k, r
             b = single[1, i] + lean * (double[1, i] * inverse - double[0, i] * k)
             p += w * (a * c - b * s)
             q += w * (a * s + b * c)
-        area, bent, still, tilted = 0.0, 0.0, 0.0, 0.0
         for i in range(y.shape[1]):
             dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
             square = dx * dx + dy * dy + dz * dz
             if square > close:
                 continue
-            chi = math.exp(-square * wide) * weights[i] if alike[i] else 0.0
-            area += chi
-            bent += chi * bends[i]
             if square < touching:
                 # (e^{ikR} - 1)/R is ik there
                 if alike[i]:
@@ -71,6 +65,4 @@ def from_nodes(x, normals, y, sides, weights, bends, alike, single, double, k, r
             h = inverse * (1.0 if alike[i] else 1.0 - math.exp(-square * k * k))
             p += h * (a * c - b * s)
             q += h * (a * s + b * c)
-            still += chi * inverse
-            tilted += chi * inverse * inverse * lean
-        out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4], out[j, 5] = p, q, area, bent, still, tilted
+        out[j, 0], out[j, 1] = p, q

@@ -45,7 +45,7 @@ def test_exact_currents_satisfy_the_equation_on_both_surfaces(kind):
     at, inner = second_surface(ball, nodes, k)
     assert len(at) == len(exact) and np.allclose(np.linalg.norm(inner, axis=1), 1 - np.pi / (2 * k), atol=1e-6)
     unit, none = np.abs(exact).max(), np.zeros(len(at), dtype=complex)
-    received = sums_at(known, inner, nodes.normals, None).total(exact, none)
+    received = sums_at(known, inner, nodes.normals, 0.0).total(exact, none)
     assert np.abs(twice_incident(known, inner, nodes.normals) + received).max() < 1e-4 * unit
     gap = solved_at(known, nodes.points, nodes.normals) - exact
     assert np.sqrt(np.mean(np.abs(gap) ** 2)) < 0.003 * unit
@@ -139,7 +139,7 @@ def test_a_thin_body_has_its_second_surface_inside():
     assert len(at) > 0.5 * len(nodes.points) and depth.min() < 0.7 * np.pi / (2 * k)
     currents = cr.surface_currents(fan_on(disc, OBLIQUE, k), wavenumber=k, boundary="soft", solve=True)
     rest = twice_incident(currents, inner, nodes.normals[at])
-    rest += sums_at(currents, inner, nodes.normals[at], None).total(currents.values, 0j * rest)
+    rest += sums_at(currents, inner, nodes.normals[at], 0.0).total(currents.values, 0j * rest)
     assert np.sqrt(np.mean(np.abs(rest) ** 2)) < 0.02 * k
 
 

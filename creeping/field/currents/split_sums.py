@@ -1,0 +1,267 @@
+"""Sums of G = e^{ikR}/R over n nodes at m points, in fewer steps than n m: near pairs one by one, the rest by a series.
+
+    sum_y w_y (a + b n_y.grad_y) G(|x - y|),   sum_y w_y b n_x.grad_x G,   sum_y w_y grad_x G x J
+
+G = S + D: D ends within a reach, and its pairs make a sparse matrix; S is a Fourier series, and its sums are two
+nonuniform transforms, from the nodes to the series and from there to the points [BMK19], with a derivative for each
+is. Between them the sums are within 3e-5, rms, of those over all pairs.
+
+Sources: [E21], [BMK19]; Derivations, F35.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.field.currents.smooth_kernel import SmoothKernel
+from creeping.kernels.threads import in_threads
+from creeping.storage.memory import budget
+
+SPLITS = (3.0, 2.2, 1.6, 1.2, 0.9, 0.75, 0.62, 0.5, 0.4, 0.33, 0.27)
+"""a/k: the larger, the fewer pairs are near, and the more waves the series has."""
+TRANSFORM = 2e-5
+"""Tolerance of a transform, in single precision."""
+PER_MODE, PER_POINT, PER_PAIR, FOR_PAIR = 5e-8, 4e-7, 4e-9, 4e-8
+"""Seconds of a transform, for each wave and for each node or point; and of a near pair, in a sum, and to be made."""
+USES = 4
+"""Sums for which it is reckoned whether splitting pays."""
+MODE_BYTES, PAIR_BYTES = 40, 12
+"""Memory of a wave, with its transform's, and of a pair."""
+SHARE, TRIED = 0.25, 256
+"""Of the memory's budget that may be taken, and points by which near pairs are counted."""
+
+
+class Cells(NamedTuple):
+    """Nodes (n,) ordered by cells of a side: where cells begin, how many along each axis, and the nodes' numbers."""
+
+    origin: FloatArray
+    side: float
+    counts: IntArray
+    begins: IntArray
+    order: IntArray
+
+    @property
+    def grid(self) -> tuple[Any, ...]:
+        """What kernels are told of the cells."""
+        return self.origin, self.side, self.counts, self.begins
+
+
+def cells_of(nodes: FloatArray, side: float) -> Cells:
+    """Cells of a side, L, for nodes (n, 3), no more than 64 along an axis."""
+    origin = nodes.min(axis=0)
+    side = max(side, float(np.ptp(nodes, axis=0).max()) / 64, 1e-300)
+    places = np.floor((nodes - origin) / side).astype(np.int64)
+    counts = places.max(axis=0) + 1
+    number = np.ravel_multi_index(tuple(places.T), tuple(counts))
+    order = np.argsort(number, kind="stable")
+    begins = np.searchsorted(number[order], np.arange(np.prod(counts) + 1))
+    return Cells(origin, side, counts, begins, order)
+
+
+class SplitSums:
+    """Sums over nodes (n, 3) at points (m, 3), L, for any values at the nodes.
+
+    Parameters
+    ----------
+    kernel : SmoothKernel
+    points, normals : (m, 3), L and 1
+    nodes, sides : (n, 3), L and 1
+        Places of the nodes, and their normals.
+    weights : (n,)
+    alike : (n,) of bool
+        Nodes that share the phase of the points.
+    near : (m,), L
+        Distances up to which others have but 1 - e^{-(kR)^2} of G.
+    """
+
+    def __init__(
+        self,
+        kernel: SmoothKernel,
+        points: FloatArray,
+        normals: FloatArray,
+        nodes: FloatArray,
+        sides: FloatArray,
+        weights: FloatArray,
+        alike: BoolArray,
+        near: FloatArray,
+    ) -> None:
+        self.kernel, self._points, self._normals, self._sides = kernel, points, normals, sides
+        self._nodes, self._weights, self._alike, self._far = nodes, weights, alike, near
+        self._near: dict[str, tuple[Any, ...]] = {}
+
+    def values(self, a: ComplexArray) -> ComplexArray:
+        """Sum of w a G (m,), of values (n,)."""
+        series = self._to_series(a * self._weights) * self.kernel.series
+        return np.asarray(self._from_series(series) + self._pairs("values", a))
+
+    def tilted_at_nodes(self, b: ComplexArray) -> ComplexArray:
+        """Sum of w b n_y.grad_y G (m,), of values (n,)."""
+        dipoles = (b * self._weights)[:, None] * self._sides
+        series: Any = 0.0
+        for axis, s in self._waves():
+            series = series + s * self._to_series(dipoles[:, axis])
+        return np.asarray(self._from_series(-1j * self.kernel.series * series) + self._pairs("tilted at nodes", b))
+
+    def tilted_at_points(self, b: ComplexArray) -> ComplexArray:
+        """Sum of w b (-n_x.grad_x) G (m,), of values (n,)."""
+        series = -1j * self._to_series(b * self._weights) * self.kernel.series
+        smooth = sum(self._normals[:, axis] * self._from_series(s * series) for axis, s in self._waves())
+        return np.asarray(smooth + self._pairs("tilted at points", b))
+
+    def curl(self, J: ComplexArray) -> ComplexArray:
+        """Sum of w grad_x G x J (m, 3, p), of vectors (n, 3, p)."""
+        out = np.empty((len(self._points), *J.shape[1:]), dtype=complex)
+        for column in range(J.shape[2]):
+            mine = J[:, :, column] * self._weights[:, None]
+            series = [1j * self._to_series(mine[:, axis]) * self.kernel.series for axis in range(3)]
+            for axis in range(3):
+                one, two = (axis + 1) % 3, (axis + 2) % 3
+                waves = dict(self._waves())
+                out[:, axis, column] = self._from_series(waves[one] * series[two] - waves[two] * series[one])
+        return out + self._near_curl(J)
+
+    def _near_curl(self, J: ComplexArray) -> ComplexArray:
+        """What near pairs give of it, in double precision: their terms are large, and what is left of them is not."""
+        from creeping.field.kernels.near_pairs import near_vectors
+
+        cells, kernel, m = self._cells, self.kernel, len(self._points)
+        mine = np.moveaxis(J * self._weights[:, None, None], 2, 1)[cells.order]
+        mine = np.ascontiguousarray(np.concatenate([mine.real, mine.imag], axis=2))
+        x, y = np.ascontiguousarray(self._points.T), np.ascontiguousarray(self._nodes[cells.order].T)
+        given = x, y, self._alike[cells.order], mine, *cells.grid
+        table = kernel.reach, self._far, kernel.k, kernel.table, kernel.at_zero
+        out = np.empty((m, mine.shape[1], 6))
+
+        def work(part: slice) -> None:
+            near_vectors(*given, *table, part.start, part.stop, out)
+
+        in_threads(work, m, least=64, multiple=1, seconds=1e-8 * len(J))
+        return np.asarray(np.moveaxis(out[..., :3] + 1j * out[..., 3:], 1, 2))
+
+    def _waves(self) -> Iterator[tuple[int, Any]]:
+        """Each axis with the s of the series along it."""
+        for axis, s in enumerate(self.kernel.waves):
+            yield axis, s.astype(np.float32).reshape([-1 if k == axis else 1 for k in range(3)])
+
+    @cached_property
+    def _plans(self) -> tuple[Any, Any]:
+        return self._plan(1, self._nodes, -1), self._plan(2, self._points, 1)
+
+    def _plan(self, kind: int, places: FloatArray, sign: int) -> Any:
+        """Transform between places (n, 3) and the series; one thread adds in one order."""
+        import finufft
+
+        plan = finufft.Plan(
+            kind,
+            tuple(int(n) for n in self.kernel.modes),
+            eps=TRANSFORM,
+            isign=sign,
+            dtype="complex64",
+            nthreads=1,
+            upsampfac=1.25,
+        )
+        plan.setpts(*np.ascontiguousarray((2 * np.pi * places / self.kernel.period).T, dtype=np.float32))
+        return plan
+
+    def _to_series(self, values: ComplexArray) -> np.ndarray:
+        return np.asarray(self._plans[0].execute(np.ascontiguousarray(values, dtype=np.complex64)))
+
+    def _from_series(self, series: np.ndarray) -> ComplexArray:
+        return np.asarray(self._plans[1].execute(np.ascontiguousarray(series, dtype=np.complex64)), dtype=complex)
+
+    def _pairs(self, kind: str, values: ComplexArray) -> ComplexArray:
+        """What near pairs give of values (n,) or (n, columns): (m, ...)."""
+        real, imaginary = self._matrices(kind)
+        columns = np.ascontiguousarray(values.reshape(len(values), -1), dtype=np.complex64).view(np.float32)
+        out = (real @ columns).view(np.complex64).astype(complex)
+        if imaginary is not None:
+            out += 1j * (imaginary @ columns).view(np.complex64)
+        return np.asarray(out.reshape(len(self._points), *values.shape[1:]))
+
+    @cached_property
+    def _cells(self) -> Cells:
+        return cells_of(self._nodes, 0.5 * self.kernel.reach)
+
+    def _matrices(self, kind: str) -> tuple[Any, ...]:
+        """Real and imaginary part of the sparse matrix of near pairs; no imaginary one if all nodes are alike."""
+        from scipy.sparse import csr_array
+
+        from creeping.field.kernels.near_pairs import count_near, fill_near
+
+        if kind in self._near:
+            return self._near[kind]
+        cells, kernel, m = self._cells, self.kernel, len(self._points)
+        x, normals = (np.ascontiguousarray(part.T) for part in (self._points, self._normals))
+        y, sides = (np.ascontiguousarray(part[cells.order].T) for part in (self._nodes, self._sides))
+        weights, alike = self._weights[cells.order], self._alike[cells.order]
+        counts = np.zeros(m + 1, dtype=np.int64)
+        seconds = 1e-8 * len(self._nodes)
+
+        def count(part: slice) -> None:
+            count_near(x, y, *cells.grid, kernel.reach, part.start, part.stop, counts[1:])
+
+        in_threads(count, m, least=64, multiple=1, seconds=seconds)
+        starts = np.cumsum(counts)
+        columns, real = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1], dtype=np.float32)
+        imaginary = np.empty(0 if alike.all() else starts[-1], dtype=np.float32)
+        given = x, normals, y, sides, weights, alike, *cells.grid, cells.order
+        table = kernel.reach, self._far, kernel.k, kernel.table, kernel.at_zero
+        tilt = kind != "values", kind == "tilted at points"
+
+        def fill(part: slice) -> None:
+            fill_near(*given, *table, *tilt, starts, part.start, part.stop, columns, real, imaginary)
+
+        in_threads(fill, m, least=64, multiple=1, seconds=seconds)
+        small = starts.astype(np.int32) if starts[-1] < 2**31 else starts
+        shape = m, len(weights)
+        self._near[kind] = found = tuple(
+            csr_array((data, columns, small), shape) if len(data) == len(columns) else None
+            for data in (real, imaginary)
+        )
+        return found
+
+
+def best_split(
+    make: Callable[[float], SmoothKernel],
+    points: FloatArray,
+    nodes: FloatArray,
+    transforms: int,
+    seconds: float,
+    least_reach: float = 0.0,
+) -> SmoothKernel | None:
+    """The kernel that splits sums over nodes (n, 3) at points (m, 3) best, or None where all pairs are done sooner.
+
+    Parameters
+    ----------
+    make : callable
+        Gives the kernel of a split a/k.
+    points, nodes : (m, 3), (n, 3), L
+    transforms : int
+        How many a sum takes.
+    seconds : float
+        What a sum over all pairs takes.
+    least_reach : float, L
+        Distance up to which pairs are to be near.
+    """
+    from scipy.spatial import cKDTree
+
+    if not len(points) or not len(nodes) or seconds < 0.02:
+        return None
+    tree, some = cKDTree(nodes), points[:: max(1, len(points) // TRIED)]
+    best, least, room = None, USES * seconds, SHARE * budget()
+    for split in SPLITS:
+        kernel = make(split)
+        modes = float(np.prod(kernel.modes.astype(float)))
+        if kernel.reach < least_reach or least <= USES * transforms * PER_MODE * modes or MODE_BYTES * modes > room:
+            continue
+        pairs = float(np.mean(tree.query_ball_point(some, kernel.reach, return_length=True))) * len(points)
+        if MODE_BYTES * modes + PAIR_BYTES * pairs > room:
+            break
+        each = transforms * (PER_MODE * modes + PER_POINT * 0.5 * (len(points) + len(nodes))) + PER_PAIR * pairs
+        whole = USES * each + FOR_PAIR * pairs + 4 * PER_MODE * modes
+        if whole < least:
+            best, least = kernel, whole
+    return best
