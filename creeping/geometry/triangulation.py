@@ -152,10 +152,17 @@ def quadrilaterals(
         values = _grid_values(level, axes)
         vertices, number = _cell_vertices(values, values < 0, axes)
         tiles = _around_edges(values < 0, number)
-        if _closed(tiles):
+        open_at = _unclosed(tiles)
+        if not len(open_at):
             break
     else:
-        raise SurfaceError(f"{values.size} grid points do not resolve the surface; it is too thin, or crosses itself")
+        places = vertices[open_at]
+        first, apart = ", ".join(f"{x:.4g}" for x in places[0]), np.ptp(places, axis=0).max()
+        raise SurfaceError(
+            f"{values.size} grid points do not resolve the surface at {len(open_at)} places, the first near "
+            f"({first}), the others within {apart:.3g} of each other: it is too thin there, or crosses itself; a mesh "
+            "is to be refined or smoothed there"
+        )
     reach = max(float(axis[1] - axis[0]) for axis in axes)
     return _onto_surface(level, gradient, vertices, reach), tiles
 
@@ -258,14 +265,14 @@ def _around_edges(inside: BoolArray, number: IntArray) -> IntArray:
     return np.concatenate(tiles)
 
 
-def _closed(tiles: IntArray) -> bool:
-    """Whether every directed edge occurs once and its reverse once."""
+def _unclosed(tiles: IntArray) -> IntArray:
+    """Vertices of directed edges that do not occur once, and their reverse once; none of a closed surface."""
     edges = np.stack([tiles, np.roll(tiles, -1, axis=1)], axis=-1).reshape(-1, 2)
     code = edges.min(axis=1) * (tiles.max() + 1) + edges.max(axis=1)
-    forward = edges[:, 0] < edges[:, 1]
-    keys, counts = np.unique(code[forward], return_counts=True)
-    reverse_keys, reverse_counts = np.unique(code[~forward], return_counts=True)
-    return bool(np.array_equal(keys, reverse_keys) and np.all(counts == 1) and np.all(reverse_counts == 1))
+    sign = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    keys, place, counts = np.unique(code, return_inverse=True, return_counts=True)
+    wrong = (counts != 2) | (np.bincount(place, weights=sign, minlength=len(keys)) != 0)
+    return np.unique(keys[wrong] // (tiles.max() + 1))
 
 
 def _onto_surface(

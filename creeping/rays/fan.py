@@ -28,7 +28,7 @@ from creeping.geodesics.piece_trace import Passages
 from creeping.geodesics.pieces import passages, trace_pieces
 from creeping.geodesics.states import ATTENUATION, P, X, known_steps, pack, whole_lanes
 from creeping.geometry.arguments import flag, one_of, real_number, whole_number
-from creeping.geometry.creased import is_creased
+from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.kept import kept
 from creeping.geometry.speed import speed_of, speed_values
@@ -46,8 +46,8 @@ from creeping.shadow.line import ShadowLine, checked_launch_from
 from creeping.shadow.status import NO_RAY
 from creeping.storage.memory import within_budget
 
-MAX_RAYS, GROWTH, FEW_RAYS = 200_000, 32, 4096
-"""Rays beyond which refinement stops, also in units of those asked for, unless they are few."""
+MAX_RAYS, GROWTH, FEW_RAYS, HALVED = 200_000, 32, 4096, 4
+"""Rays beyond which refinement stops, also in units of those asked for, unless few; halvings of gaps at edges."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
 
@@ -216,15 +216,15 @@ def launch(
     wavenumber : float, optional, 1/L
         Lowest that "auto" is to serve; where the median k rho at the launch points is 10 if not given.
     n_rays : int, optional
-        Rays, shared among the arcs by length; if not given one per point of the line, at most 8192, or 32 an arc, where
+        Rays, shared among the arcs by length; if not given one per point of the line, at most 4096, or 32 an arc, where
         it has several.
     n_steps : int, optional
         Equal steps of travel time; 64 or more, enough to count caustics, if not given.
     launch_from : {"attached", "all"}
         "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
-        Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none. Where
-        rays part without end, past many caustics, it stops at 32 times as many; `RayFan.largest_gap` tells.
+        Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none. Past
+        many caustics it stops at 32 times as many, at edges at a 16th of a gap; `RayFan.largest_gap` tells.
     measured : bool
         Whether the error at the end is measured.
 
@@ -269,7 +269,7 @@ def launch(
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
     most = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS))
-    while np.isfinite(gap):
+    for _ in range(0 if np.isinf(gap) else HALVED if has_edges(body) else MAX_RAYS):
         arc, position = parting_positions(
             states[..., X], starts.arcs, starts.arc, starts.position, gap, known_steps(states, times)
         )

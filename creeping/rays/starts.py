@@ -13,7 +13,7 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.line import ShadowLine
 
-MANY, FEW = 8192, 32
+MANY, FEW = 4096, 32
 """Rays that are enough for a line of several arcs to begin with, or so many for each in the mean: of many holes and
 fillets each has as many points as a body's only curve."""
 

@@ -20,6 +20,7 @@ from scatterers.triangles.choice import Choice, silent, whole_body
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.cutting import uncrossed
 from scatterers.triangles.form import check_whole
+from scatterers.triangles.off import with_triangles
 from scatterers.triangles.subdivision import Subdivision
 from scatterers.triangles.threemf import read_3mf
 from scatterers.triangles.topology import cleaned, oriented
@@ -256,7 +257,7 @@ def _loaded(
         # older numpy only warns where it stops reading a text in the middle
         warnings.filterwarnings("error", category=DeprecationWarning, message=".*could not be read to its end")
         scene = trimesh.load(
-            io.BytesIO(data),
+            io.BytesIO(with_triangles(data, MOST_TRIANGLES) if suffix == ".off" else data),
             file_type=suffix[1:],
             force="scene",
             process=False,
