@@ -49,8 +49,8 @@ def surface_currents(
         Whether the equation is solved. By default it is where expansions are known to fail, on a body that may reflect
         onto itself, hides part of its shadow line or has an admittance that steps, or where they leave more than 2 % of
         the incident wave inside or cannot be judged, or where there are none, as on a conductor with joints, and it
-        costs less than about half a minute (a minute and a half of a conductor). True is for as much as ten minutes,
-        half an hour of a conductor.
+        costs less than about 20 seconds (half a minute of a conductor). True is for as much as one minute, three of a
+        conductor.
 
     Returns
     -------
