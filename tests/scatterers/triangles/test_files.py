@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 import struct
 import zipfile
 
@@ -13,7 +12,6 @@ import trimesh
 import scatterers as sc
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.files import TriangleMesh, read_mesh
-from scatterers.triangles.off import with_triangles
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES, FACES = np.array(BALL.vertices), np.array(BALL.faces)
@@ -231,24 +229,6 @@ def test_bad_files_are_named(tmp_path, name):
     source = make(tmp_path)
     with pytest.raises(ValueError, match=message):
         read(source, None if str(source).endswith((".glb", ".3mf")) else "m")
-
-
-@pytest.mark.parametrize("header", ["OFF\n{} {} 0", "OFF {} {} 0", "# by hand\nOFF\n{} {} 0\n# corners"])
-def test_faces_of_many_corners_in_off_files_are_triangles(tmp_path, header):
-    """2026-11: faces of five corners and more ended in a message of numpy's."""
-    angles = (2 * np.pi * np.arange(6) / 6).tolist()
-    hexagon = [(math.cos(a), math.sin(a)) for a in angles]
-    corners = [f"{x!r} {y!r} {z}" for z in (0, 2) for x, y in hexagon]
-    sides = [f"4 {k} {(k + 1) % 6} {6 + (k + 1) % 6} {6 + k}  0 255 0" for k in range(6)]
-    faces = ["6 5 4 3 2 1 0", "6 6 7 8 9 10 11", *sides]
-    path = tmp_path / "prism.off"
-    path.write_text("\n".join([header.format(12, len(faces)), *corners, *faces]) + "\n", encoding="ascii")
-    mesh = read_mesh(path, "m", progress=str)
-    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
-    assert len(mesh.triangles) == 2 * 4 + 6 * 2
-    assert np.sum(np.einsum("nc,nc->n", a, np.cross(b, c))) / 6 == pytest.approx(2 * 1.5 * np.sqrt(3))
-    with pytest.raises(ValueError, match="its faces are 20 triangles, more than 19"):
-        with_triangles(path.read_bytes(), 19)
 
 
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off"])

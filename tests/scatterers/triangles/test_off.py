@@ -1,0 +1,34 @@
+"""OFF files: faces of many corners, which the loader does not read, and files that are none."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scatterers.triangles.files import read_mesh
+from scatterers.triangles.off import with_triangles
+
+
+@pytest.mark.parametrize("header", ["OFF\n{} {} 0", "OFF {} {} 0", "# by hand\nOFF\n{} {} 0\n# corners"])
+def test_faces_of_many_corners_in_off_files_are_triangles(tmp_path, header):
+    """2026-11: faces of five corners and more ended in a message of numpy's."""
+    angles = (2 * np.pi * np.arange(6) / 6).tolist()
+    hexagon = [(math.cos(a), math.sin(a)) for a in angles]
+    corners = [f"{x!r} {y!r} {z}" for z in (0, 2) for x, y in hexagon]
+    sides = [f"4 {k} {(k + 1) % 6} {6 + (k + 1) % 6} {6 + k}  0 255 0" for k in range(6)]
+    faces = ["6 5 4 3 2 1 0", "6 6 7 8 9 10 11", *sides]
+    path = tmp_path / "prism.off"
+    path.write_text("\n".join([header.format(12, len(faces)), *corners, *faces]) + "\n", encoding="ascii")
+    mesh = read_mesh(path, "m", progress=str)
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    assert len(mesh.triangles) == 2 * 4 + 6 * 2
+    assert np.sum(np.einsum("nc,nc->n", a, np.cross(b, c))) / 6 == pytest.approx(2 * 1.5 * np.sqrt(3))
+    with pytest.raises(ValueError, match="its faces are 20 triangles, more than 19"):
+        with_triangles(path.read_bytes(), 19)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"OFF", b"OFF\n-3 9 0\n", b"OFF\n3 99999999999 0\n0 0 0", b"\x00OFF 1 1\n7", b"OFF\n1 1 0\n0 0 0\nx"]
+)
+def test_what_is_no_such_file_is_left_as_it_is(data):
+    assert with_triangles(data, 10) == data
