@@ -48,8 +48,8 @@ WELL, MORE = 3e-3, 1.25
 SHARP = 1.0
 """Kappa_1 + kappa_2, times the spacing of nodes, from which the equation is not that of a smooth place."""
 MOST, ASKED = 1e9, 2e10
-"""Pairs of nodes up to which the equation is solved, ten seconds of a core or half a minute of a conductor, next to tips
-twice that; and those up to which it is if it is asked for, one minute or three."""
+"""Pairs of nodes up to which the equation is solved, ten seconds of a core or half a minute of a conductor, twice that
+next to tips; and those up to which it is if it is asked for, one minute or three."""
 ENOUGH, STEPS = 1e-3, 30
 """What is left of the equation, as a share of its right side, and steps at most."""
 
