@@ -36,6 +36,8 @@ OPTIONS: dict[str, Any] = {
 ACROSS = 10.0
 """Wavelengths across a body."""
 INCIDENT = (1.0, 0.4, 0.7)
+BESIDE = (0.9, 0.5, 0.7)
+"""Another incidence, where the first one is singular."""
 SEEN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.8, 0.0))
 
 Row = dict[str, Any]
@@ -49,7 +51,7 @@ def far_field_of(path: Path, options: dict[str, Any]) -> Row:
         body: Any = (sc.Cad if path.suffix.lower() in CAD else sc.Mesh)(path, cache=False, **options)
         row |= {"body, s": time.process_time() - began, "stage": "fan"}
         k = 2 * np.pi * ACROSS / float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
-        fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, INCIDENT), wavenumber=k)
+        fan = cr.launch(cr.DirectFlow(body), _line(body), wavenumber=k)
         losses = fan.losses()
         row |= {"fan, s": time.process_time() - began, "stage": "field", "rays": len(fan.points)}
         row["lost"] = None if losses is None else [float(share) for share in losses]
@@ -65,6 +67,14 @@ def far_field_of(path: Path, options: dict[str, Any]) -> Row:
         "error": float(far.error[largest]),
         "unresolved": int(np.sum(far.unresolved)),
     }
+
+
+def _line(body: Any) -> cr.ShadowLine:
+    """Shadow line of an incidence, or of another one if that is singular."""
+    try:
+        return cr.shadow_line(body, INCIDENT)
+    except cr.SingularIncidenceError:
+        return cr.shadow_line(body, BESIDE)
 
 
 def named_option(refusal: str, given: dict[str, Any]) -> dict[str, Any]:

@@ -160,7 +160,7 @@ def quadrilaterals(
         first, apart = ", ".join(f"{x:.4g}" for x in places[0]), np.ptp(places, axis=0).max()
         raise SurfaceError(
             f"{values.size} grid points do not resolve the surface at {len(open_at)} places, the first near "
-            f"({first}), the others within {apart:.3g} of each other: it is too thin there, or crosses itself; a mesh "
+            f"({first}), all within {apart:.3g} of each other: it is too thin there, or crosses itself; a mesh "
             "is to be refined or smoothed there"
         )
     reach = max(float(axis[1] - axis[0]) for axis in axes)
@@ -266,7 +266,7 @@ def _around_edges(inside: BoolArray, number: IntArray) -> IntArray:
 
 
 def _unclosed(tiles: IntArray) -> IntArray:
-    """Vertices of directed edges that do not occur once, and their reverse once; none of a closed surface."""
+    """First vertices of edges that are not once there and once reversed; none of a closed surface."""
     edges = np.stack([tiles, np.roll(tiles, -1, axis=1)], axis=-1).reshape(-1, 2)
     code = edges.min(axis=1) * (tiles.max() + 1) + edges.max(axis=1)
     sign = np.where(edges[:, 0] < edges[:, 1], 1, -1)

@@ -224,7 +224,7 @@ def launch(
         "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
         Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none. Past
-        many caustics it stops at 32 times as many, at edges at a 16th of a gap; `RayFan.largest_gap` tells.
+        many caustics it stops at 32 times as many, with edges at a 16th of a gap; `RayFan.largest_gap` tells.
     measured : bool
         Whether the error at the end is measured.
 
@@ -268,8 +268,8 @@ def launch(
     times = np.linspace(0.0, length, steps + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
-    most = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS))
-    for _ in range(0 if np.isinf(gap) else HALVED if has_edges(body) else MAX_RAYS):
+    most, passes = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS)), HALVED if has_edges(body) else MAX_RAYS
+    for _ in range(0 if np.isinf(gap) else passes):
         arc, position = parting_positions(
             states[..., X], starts.arcs, starts.arc, starts.position, gap, known_steps(states, times)
         )

@@ -21,7 +21,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.currents.smooth_kernel import SmoothKernel
-from creeping.field.currents.split_sums import SplitSums, best_split, cells_of
+from creeping.field.currents.split_sums import CURL, ONE_LAYER, TWO_LAYERS, Load, SplitSums, best_split, cells_of
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.geometry.kept import kept
 from creeping.geometry.quadrature import SYMMETRIC
@@ -35,6 +35,8 @@ VECTOR = 2.8
 """What a pair of a conductor takes of that, both polarisations."""
 PATCH = 5e-10
 """Seconds of a pair when what is next to points is found."""
+KEPT = 3
+"""Series kept with a body, of so many wavenumbers and splits."""
 WHOLE = 3.4
 """Distance, over 1/k, from which 1 - e^{-(kR)^2} is 1 to 1e-5."""
 TOUCHING = 1e-6
@@ -58,7 +60,7 @@ def sums_at(currents: SurfaceCurrents, points: FloatArray, normals: FloatArray, 
 
 
 def _split_sums(
-    currents: SurfaceCurrents, places: tuple[FloatArray, FloatArray], near: FloatArray, transforms: int, each: float
+    currents: SurfaceCurrents, places: tuple[FloatArray, FloatArray], near: FloatArray, load: Load, each: float
 ) -> SplitSums | None:
     """The sums at points with normals (m, 3) by their split, if all pairs of ``each`` seconds take longer."""
     points, normals = places
@@ -66,14 +68,19 @@ def _split_sums(
     k, body = currents.wavenumber, currents.body
     low, high = body.bounds
 
+    known: dict[tuple[float, float], SmoothKernel] = kept(body, "smooth kernels", dict)
+
     def make(split: float) -> SmoothKernel:
-        return kept(body, f"smooth kernel {k!r} {split}", lambda: SmoothKernel(k, high - low, split))
+        return known.get((k, split)) or SmoothKernel(k, high - low, split)
 
     # of nodes that are not alike what is left out is near
     least = 0.0 if currents.even.all() else min(float(np.max(near, initial=0.0)), WHOLE / k)
-    best = best_split(make, points, currents.points, transforms, seconds, least)
+    best = best_split(make, points, currents.points, load, seconds, least)
     if best is None:
         return None
+    while len(known) >= KEPT:
+        known.pop(next(iter(known)))
+    known[k, best.split] = best
     of_nodes = currents.points, currents.normals, currents.weights / (4 * np.pi), currents.even
     return SplitSums(best, points, normals, *of_nodes, near)
 
@@ -111,8 +118,8 @@ class NodeSums:
     @cached_property
     def _split(self) -> SplitSums | None:
         # of a soft body along the normals of points, of others along those of nodes; an impedance has values too
-        transforms = 4 if self.soft or not self._ours.any() else 6
-        return _split_sums(self._currents, self._places, NEIGHBOURS * self.window, transforms, EACH)
+        load = ONE_LAYER if self.soft or not self._ours.any() else TWO_LAYERS
+        return _split_sums(self._currents, self._places, NEIGHBOURS * self.window, load, EACH)
 
     def of(self, values: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """What the points receive of values (n,) at the nodes, but for a share of their own; and that share: (m,)."""
@@ -154,6 +161,8 @@ class NodeSums:
 
         currents, k = self._currents, self.k
         a = np.where(self.window > 0, self.window, 1 / k)
+        if not len(a):
+            return np.zeros(0, dtype=complex)
         cells = cells_of(currents.points, float(np.median(a)) * NEIGHBOURS / 2)
         y, sides = (np.ascontiguousarray(part[:, cells.order]) for part in self._nodes)
         of_nodes = (part[cells.order] for part in (currents.weights, currents.mean_curvature, currents.even))
@@ -214,7 +223,7 @@ class VectorSums:
 
     @cached_property
     def _split(self) -> SplitSums | None:
-        return _split_sums(self._currents, self._places, self._near, 12, EACH * VECTOR)
+        return _split_sums(self._currents, self._places, self._near, CURL, EACH * VECTOR)
 
     def _patches(self, currents: SurfaceCurrents, windows: FloatArray, at: IntArray) -> tuple[FloatArray, FloatArray]:
         """Sums S and T (m, 3, 3) of `creeping.field.kernels.vector_sums` at some of the points (m,)."""

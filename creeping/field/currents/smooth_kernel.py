@@ -43,7 +43,8 @@ class SmoothKernel:
     """
 
     def __init__(self, wavenumber: float, widths: FloatArray, split: float) -> None:
-        self.k, self.a, self._widths = wavenumber, split * wavenumber, ASKED * np.asarray(widths, dtype=float)
+        self.k, self.split, self.a = wavenumber, split, split * wavenumber
+        self._widths = ASKED * np.asarray(widths, dtype=float)
         self._b, enough = 0.5 / split, -np.log(TOLERANCE)
         self.reach = float(np.sqrt(enough + self._b**2) / self.a)
         highest = np.sqrt(self.k**2 + 4 * self.a**2 * enough)

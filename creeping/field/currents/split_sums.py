@@ -22,16 +22,30 @@ from creeping.storage.memory import budget
 
 SPLITS = (3.0, 2.2, 1.6, 1.2, 0.9, 0.75, 0.62, 0.5, 0.4, 0.33, 0.27)
 """a/k: the larger, the fewer pairs are near, and the more waves the series has."""
+LONGEST = 2000.0
+"""Period, over 1/k, beyond which places in single precision err by more than the series."""
 TRANSFORM = 2e-5
 """Tolerance of a transform, in single precision."""
-PER_MODE, PER_POINT, PER_PAIR, FOR_PAIR = 5e-8, 4e-7, 4e-9, 4e-8
-"""Seconds of a transform, for each wave and for each node or point; and of a near pair, in a sum, and to be made."""
+PER_MODE, PER_POINT = 5e-8, 4e-7
+"""Seconds of a transform, for each wave and for each node or point."""
 USES = 4
 """Sums for which it is reckoned whether splitting pays."""
-MODE_BYTES, PAIR_BYTES = 40, 12
-"""Memory of a wave, with its transform's, and of a pair."""
-SHARE, TRIED = 0.25, 256
+SHARE, TRIED = 0.5, 256
 """Of the memory's budget that may be taken, and points by which near pairs are counted."""
+
+
+class Load(NamedTuple):
+    """What a sum takes: transforms, seconds of a near pair, in it and to be made, and bytes of a wave and of a pair."""
+
+    transforms: int
+    per_pair: float
+    for_pair: float
+    mode_bytes: float
+    pair_bytes: float
+
+
+ONE_LAYER, TWO_LAYERS, CURL = Load(4, 4e-9, 4e-8, 40, 12), Load(6, 8e-9, 8e-8, 40, 24), Load(12, 2e-8, 0.0, 75, 0)
+"""Of a soft or hard body, of an impedance, and of a conductor's two waves, whose pairs are summed anew each time."""
 
 
 class Cells(NamedTuple):
@@ -51,10 +65,10 @@ class Cells(NamedTuple):
 
 def cells_of(nodes: FloatArray, side: float) -> Cells:
     """Cells of a side, L, for nodes (n, 3), no more than 64 along an axis."""
-    origin = nodes.min(axis=0)
-    side = max(side, float(np.ptp(nodes, axis=0).max()) / 64, 1e-300)
+    origin = nodes.min(axis=0, initial=np.inf) if len(nodes) else np.zeros(3)
+    side = max(side, float(np.max(nodes - origin, initial=0.0)) / 64, 1e-300)
     places = np.floor((nodes - origin) / side).astype(np.int64)
-    counts = places.max(axis=0) + 1
+    counts = places.max(axis=0, initial=0) + 1
     number = np.ravel_multi_index(tuple(places.T), tuple(counts))
     order = np.argsort(number, kind="stable")
     begins = np.searchsorted(number[order], np.arange(np.prod(counts) + 1))
@@ -89,8 +103,8 @@ class SplitSums:
         near: FloatArray,
     ) -> None:
         self.kernel, self._points, self._normals, self._sides = kernel, points, normals, sides
-        self._nodes, self._weights, self._alike, self._far = nodes, weights, alike, near
-        self._near: dict[str, tuple[Any, ...]] = {}
+        self._nodes, self._weights, self._alike, self._part_of_others = nodes, weights, alike, near
+        self._made: dict[str, tuple[Any, ...]] = {}
 
     def values(self, a: ComplexArray) -> ComplexArray:
         """Sum of w a G (m,), of values (n,)."""
@@ -113,13 +127,12 @@ class SplitSums:
 
     def curl(self, J: ComplexArray) -> ComplexArray:
         """Sum of w grad_x G x J (m, 3, p), of vectors (n, 3, p)."""
-        out = np.empty((len(self._points), *J.shape[1:]), dtype=complex)
+        out, waves = np.empty((len(self._points), *J.shape[1:]), dtype=complex), dict(self._waves())
         for column in range(J.shape[2]):
             mine = J[:, :, column] * self._weights[:, None]
             series = [1j * self._to_series(mine[:, axis]) * self.kernel.series for axis in range(3)]
             for axis in range(3):
                 one, two = (axis + 1) % 3, (axis + 2) % 3
-                waves = dict(self._waves())
                 out[:, axis, column] = self._from_series(waves[one] * series[two] - waves[two] * series[one])
         return out + self._near_curl(J)
 
@@ -132,7 +145,7 @@ class SplitSums:
         mine = np.ascontiguousarray(np.concatenate([mine.real, mine.imag], axis=2))
         x, y = np.ascontiguousarray(self._points.T), np.ascontiguousarray(self._nodes[cells.order].T)
         given = x, y, self._alike[cells.order], mine, *cells.grid
-        table = kernel.reach, self._far, kernel.k, kernel.table, kernel.at_zero
+        table = kernel.reach, self._part_of_others, kernel.k, kernel.table, kernel.at_zero
         out = np.empty((m, mine.shape[1], 6))
 
         def work(part: slice) -> None:
@@ -151,8 +164,13 @@ class SplitSums:
         return self._plan(1, self._nodes, -1), self._plan(2, self._points, 1)
 
     def _plan(self, kind: int, places: FloatArray, sign: int) -> Any:
-        """Transform between places (n, 3) and the series; one thread adds in one order."""
+        """Transform between places (n, 3) and the series; one thread adds in one order.
+
+        Places are counted from the middle of the nodes, or single precision knows less of those far from the origin.
+        """
         import finufft
+
+        middle = 0.5 * (self._nodes.max(axis=0) + self._nodes.min(axis=0))
 
         plan = finufft.Plan(
             kind,
@@ -163,7 +181,7 @@ class SplitSums:
             nthreads=1,
             upsampfac=1.25,
         )
-        plan.setpts(*np.ascontiguousarray((2 * np.pi * places / self.kernel.period).T, dtype=np.float32))
+        plan.setpts(*np.ascontiguousarray((2 * np.pi * (places - middle) / self.kernel.period).T, dtype=np.float32))
         return plan
 
     def _to_series(self, values: ComplexArray) -> np.ndarray:
@@ -191,8 +209,8 @@ class SplitSums:
 
         from creeping.field.kernels.near_pairs import count_near, fill_near
 
-        if kind in self._near:
-            return self._near[kind]
+        if kind in self._made:
+            return self._made[kind]
         cells, kernel, m = self._cells, self.kernel, len(self._points)
         x, normals = (np.ascontiguousarray(part.T) for part in (self._points, self._normals))
         y, sides = (np.ascontiguousarray(part[cells.order].T) for part in (self._nodes, self._sides))
@@ -208,7 +226,7 @@ class SplitSums:
         columns, real = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1], dtype=np.float32)
         imaginary = np.empty(0 if alike.all() else starts[-1], dtype=np.float32)
         given = x, normals, y, sides, weights, alike, *cells.grid, cells.order
-        table = kernel.reach, self._far, kernel.k, kernel.table, kernel.at_zero
+        table = kernel.reach, self._part_of_others, kernel.k, kernel.table, kernel.at_zero
         tilt = kind != "values", kind == "tilted at points"
 
         def fill(part: slice) -> None:
@@ -217,7 +235,7 @@ class SplitSums:
         in_threads(fill, m, least=64, multiple=1, seconds=seconds)
         small = starts.astype(np.int32) if starts[-1] < 2**31 else starts
         shape = m, len(weights)
-        self._near[kind] = found = tuple(
+        self._made[kind] = found = tuple(
             csr_array((data, columns, small), shape) if len(data) == len(columns) else None
             for data in (real, imaginary)
         )
@@ -228,7 +246,7 @@ def best_split(
     make: Callable[[float], SmoothKernel],
     points: FloatArray,
     nodes: FloatArray,
-    transforms: int,
+    load: Load,
     seconds: float,
     least_reach: float = 0.0,
 ) -> SmoothKernel | None:
@@ -239,8 +257,7 @@ def best_split(
     make : callable
         Gives the kernel of a split a/k.
     points, nodes : (m, 3), (n, 3), L
-    transforms : int
-        How many a sum takes.
+    load : Load
     seconds : float
         What a sum over all pairs takes.
     least_reach : float, L
@@ -255,13 +272,16 @@ def best_split(
     for split in SPLITS:
         kernel = make(split)
         modes = float(np.prod(kernel.modes.astype(float)))
-        if kernel.reach < least_reach or least <= USES * transforms * PER_MODE * modes or MODE_BYTES * modes > room:
+        if kernel.reach < least_reach or kernel.k * kernel.period.max() > LONGEST:
+            continue
+        if least <= USES * load.transforms * PER_MODE * modes or load.mode_bytes * modes > room:
             continue
         pairs = float(np.mean(tree.query_ball_point(some, kernel.reach, return_length=True))) * len(points)
-        if MODE_BYTES * modes + PAIR_BYTES * pairs > room:
+        if load.mode_bytes * modes + load.pair_bytes * pairs > room:
             break
-        each = transforms * (PER_MODE * modes + PER_POINT * 0.5 * (len(points) + len(nodes))) + PER_PAIR * pairs
-        whole = USES * each + FOR_PAIR * pairs + 4 * PER_MODE * modes
+        places = PER_MODE * modes + PER_POINT * 0.5 * (len(points) + len(nodes))
+        each = load.transforms * places + load.per_pair * pairs
+        whole = USES * each + load.for_pair * pairs + 4 * PER_MODE * modes
         if whole < least:
             best, least = kernel, whole
     return best

@@ -29,7 +29,7 @@ def from_nodes(x, normals, y, sides, alike, single, double, k, near, soft, first
     """
     per, touching = k / (2 * math.pi), (TOUCHING / k) ** 2
     for j in range(first, last):
-        close = near[j] ** 2
+        close = max(near[j] ** 2, touching)
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
         p, q = 0.0, 0.0
@@ -50,7 +50,7 @@ def from_nodes(x, normals, y, sides, alike, single, double, k, near, soft, first
             square = dx * dx + dy * dy + dz * dz
             if square > close:
                 continue
-            if square < touching:
+            if square <= touching:
                 # (e^{ikR} - 1)/R is ik there
                 if alike[i]:
                     p -= k * single[1, i]

@@ -8,7 +8,7 @@ import scatterers as sc
 from creeping.field.currents import node_sums
 from creeping.field.currents.node_sums import sums_at
 from creeping.field.currents.smooth_kernel import SmoothKernel
-from creeping.field.currents.split_sums import SPLITS, SplitSums, best_split, cells_of
+from creeping.field.currents.split_sums import CURL, ONE_LAYER, SPLITS, SplitSums, best_split, cells_of
 from creeping.field.currents.whole_solution import second_surface, windows_of
 from creeping.field.kernels import near_pairs
 from creeping.geometry.quadrature import body_nodes
@@ -97,6 +97,38 @@ def test_points_may_be_anywhere_in_the_box(rng):
     np.testing.assert_allclose(sums.values(np.ones(50, dtype=complex)), exact, rtol=5e-5)
 
 
+def test_sums_do_not_depend_on_where_the_body_is(rng):
+    """2026-11: far from the origin single precision knew too little of places."""
+    y, x, far = rng.random((300, 3)), rng.random((40, 3)), np.array([1e4, -3e3, 0.0])
+    one, kernel = np.ones((300, 3)) / np.sqrt(3), SmoothKernel(8.0, np.ones(3), 0.75)
+    exact = green(8.0, x, y)[0] @ np.ones(300)
+    sums = SplitSums(kernel, x + far, one[:40], y + far, one, np.ones(300), np.ones(300, dtype=bool), np.zeros(40))
+    assert rms(sums.values(np.ones(300, dtype=complex)) - exact) < SPLIT * rms(exact)
+
+
+@pytest.mark.parametrize("kind", ["soft", "hard", "pec"])
+def test_nothing_is_summed_of_no_nodes_and_at_no_points(kind):
+    """2026-11: along the axis of a capsule, where there are no expansions, the start is that of no nodes."""
+    body = sc.Sphere()
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (0, 0, 1)), wavenumber=5.0, n_rays=16)
+    currents = cr.surface_currents(fan, wavenumber=5.0, boundary=kind, solve=False)
+    x, nobody = body_nodes(body, 5.0).points[:9], currents.part(np.zeros(len(currents.points), dtype=bool))
+    zero = np.zeros((9, *currents.values.shape[1:]), dtype=complex)
+    np.testing.assert_array_equal(sums_at(nobody, x, x, 0.1).total(nobody.values, zero), 0)
+    assert len(sums_at(currents, x[:0], x[:0], 0.1).total(currents.values, zero[:0])) == 0
+
+
+def test_both_ways_agree_at_a_point_that_is_a_node(monkeypatch):
+    k, body = 6.0, sc.Sphere()
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (0, 0, 1)), wavenumber=k, n_rays=16)
+    currents = cr.surface_currents(fan, wavenumber=k, boundary=cr.ImpedanceBoundary(0.3), solve=True)
+    x, found = currents.points[::50], []
+    for take in (lambda *_: None, lambda make, *_: make(0.75)):
+        monkeypatch.setattr(node_sums, "best_split", take)
+        found.append(sums_at(currents, x, x, 0.0).total(currents.values, np.zeros(len(x), dtype=complex)))
+    assert rms(found[1] - found[0]) < SPLIT * rms(found[0])
+
+
 @pytest.mark.parametrize("kind", ["soft", "hard", cr.ImpedanceBoundary(0.4 - 0.2j), "pec"])
 def test_what_nodes_of_a_body_send_it_is_what_all_pairs_do(kind, monkeypatch):
     """Of the expansions' currents, whose nodes on rays are not alike, on the body and beneath it."""
@@ -148,12 +180,15 @@ def test_splitting_is_left_where_all_pairs_are_sooner_or_memory_is_short(rng, mo
     def make(split):
         return SmoothKernel(30.0, np.ones(3), split)
 
-    assert best_split(make, y, y, 4, 1e-3) is None
-    plain = best_split(make, y, y, 4, 100.0)
-    assert best_split(make, y, y, 4, 100.0, plain.reach).reach >= plain.reach
-    assert best_split(make, y, y, 4, 100.0, 2 * make(SPLITS[-1]).reach) is None
+    assert best_split(make, y, y, ONE_LAYER, 1e-3) is None
+    plain = best_split(make, y, y, ONE_LAYER, 100.0)
+    assert best_split(make, y, y, ONE_LAYER, 100.0, plain.reach).reach >= plain.reach
+    assert best_split(make, y, y, ONE_LAYER, 100.0, 2 * make(SPLITS[-1]).reach) is None
+    # pairs of conductors are not kept
+    monkeypatch.setenv("CREEPING_MEMORY", "80M")
+    assert best_split(make, y, y, CURL, 100.0) is not None
     monkeypatch.setenv("CREEPING_MEMORY", "1M")
-    assert best_split(make, y, y, 4, 100.0) is None
+    assert best_split(make, y, y, ONE_LAYER, 100.0) is None
 
 
 @pytest.mark.slow

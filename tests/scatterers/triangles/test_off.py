@@ -28,7 +28,36 @@ def test_faces_of_many_corners_in_off_files_are_triangles(tmp_path, header):
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"OFF", b"OFF\n-3 9 0\n", b"OFF\n3 99999999999 0\n0 0 0", b"\x00OFF 1 1\n7", b"OFF\n1 1 0\n0 0 0\nx"]
+    "data",
+    [
+        b"",
+        b"OFF",
+        b"OFF\n-3 9 0\n",
+        b"OFF\n3 99999999999 0\n0 0 0",
+        b"\x00OFF 1 1\n7",
+        b"OFF\n1 1 0\n0 0 0\nx",
+        b"5 1 0\n" + b"0 0 0\n" * 5 + b"5 0 1 2 3 4\n",
+    ],
 )
 def test_what_is_no_such_file_is_left_as_it_is(data):
     assert with_triangles(data, 10) == data
+
+
+def test_a_face_that_is_not_convex_is_no_fan_about_its_first_corner():
+    """An arrow's: about two of its corners it is one, a U's about none."""
+    arrow = [(0, 0), (3, 1), (0, 2), (1, 1.2), (1, 0.8)]
+    letter = [(0, 0), (3, 0), (3, 2), (2, 2), (2, 1), (1, 1), (1, 2), (0, 2)]
+
+    def file(corners):
+        rows = [f"{x} {y} 0" for x, y in corners]
+        return "\n".join(
+            ["OFF", f"{len(rows)} 1 0", *rows, f"{len(rows)} " + " ".join(map(str, range(len(rows))))]
+        ).encode()
+
+    split = np.array([row.split()[1:] for row in with_triangles(file(arrow), 9).splitlines()[-3:]], dtype=int)
+    a, b, c = np.array(arrow)[split].swapaxes(0, 1)
+    areas = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    x, y = np.array(arrow).T
+    assert np.all(areas >= 0) and areas.sum() == pytest.approx(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+    with pytest.raises(ValueError, match=r"face 0 of 8 corners is no fan about any of them; triangulate the mesh"):
+        with_triangles(file(letter), 99)
