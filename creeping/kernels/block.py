@@ -29,6 +29,8 @@ options = entry_options | {"forceinline": True}
 # For kernels too large to be inlined whole: they keep to the letter of floating-point arithmetic, so that results are
 # the same however the compiler has cut the calls. Said even so: what a callee leaves open numba takes from its caller.
 strict_options = _common | {"fastmath": False}
+# of what is inlined into several kernels that are to agree to the last digit
+strict_inlined = strict_options | {"forceinline": True}
 
 
 # numba would compile it for each pair of constants

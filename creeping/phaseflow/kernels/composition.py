@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.attenuation import SAMPLES, extend
-from creeping.kernels.block import BLOCK, aligned, entry_options, options
+from creeping.kernels.block import BLOCK, aligned, entry_options, options, strict_inlined
 from creeping.kernels.splines import cells_and_fractions, weights
 from creeping.phaseflow.kernels import angles as _angles
 from creeping.phaseflow.kernels import meridian as _meridian
@@ -149,7 +149,7 @@ def extend_some(values, rules, time, now, m, mine, some, a, sampled):
         m[4, mine[j]], m[5, mine[j]] = a[0, j], a[1, j]
 
 
-@njit(**options)
+@njit(**strict_inlined)
 def _unpack(kind, packed, mean, centre, d, e):
     """Displacements less ``centre``, d (BLOCK, 4), and matrices, e (BLOCK, 4), of packed lanes (BLOCK, 8); all flat."""
     for i in range(BLOCK):
