@@ -13,10 +13,8 @@ import math
 
 from numba import njit
 
-from creeping.kernels.block import entry_options, options
-
-TOUCHING = 1e-6
-"""Distance, over 1/k, below which a node is the point itself."""
+from creeping.field.kernels.second_kind import TOUCHING
+from creeping.kernels.block import entry_options, options, strict_inlined
 
 
 @njit(**options)
@@ -26,6 +24,21 @@ def _span(place, origin, side, cells, reach):
     last = math.floor((place + reach - origin) / side)
     # a place that is far off all cells has the next one, whose nodes are too far
     return min(max(first, 0), cells - 1), min(max(last, 0), cells - 1)
+
+
+@njit(**options)
+def _spans(x, j, origin, side, cells, reach):
+    """`_span` along all axes, of point number j."""
+    a0, b0 = _span(x[0, j], origin[0], side, cells[0], reach)
+    a1, b1 = _span(x[1, j], origin[1], side, cells[1], reach)
+    a2, b2 = _span(x[2, j], origin[2], side, cells[2], reach)
+    return a0, b0, a1, b1, a2, b2
+
+
+@njit(**strict_inlined)
+def _squared(dx, dy, dz):
+    """R^2, the same in whatever kernel: those that are counted as near are those that are filled in."""
+    return dx * dx + dy * dy + dz * dz
 
 
 @njit(**entry_options)
@@ -38,16 +51,14 @@ def count_near(x, y, origin, side, cells, begins, reach, first, last, out):
     close = reach * reach
     for j in range(first, last):
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
-        a0, b0 = _span(x0, origin[0], side, cells[0], reach)
-        a1, b1 = _span(x1, origin[1], side, cells[1], reach)
-        a2, b2 = _span(x2, origin[2], side, cells[2], reach)
+        a0, b0, a1, b1, a2, b2 = _spans(x, j, origin, side, cells, reach)
         count = 0
         for c0 in range(a0, b0 + 1):
             for c1 in range(a1, b1 + 1):
                 row = (c0 * cells[1] + c1) * cells[2]
                 for i in range(begins[row + a2], begins[row + b2 + 1]):
                     dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
-                    count += 1 if dx * dx + dy * dy + dz * dz < close else 0
+                    count += 1 if _squared(dx, dy, dz) < close else 0
         out[j] = count
 
 
@@ -90,16 +101,14 @@ def fill_near(
     for j in range(first, last):
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
-        a0, b0 = _span(x0, origin[0], side, cells[0], reach)
-        a1, b1 = _span(x1, origin[1], side, cells[1], reach)
-        a2, b2 = _span(x2, origin[2], side, cells[2], reach)
+        a0, b0, a1, b1, a2, b2 = _spans(x, j, origin, side, cells, reach)
         place = starts[j]
         for c0 in range(a0, b0 + 1):
             for c1 in range(a1, b1 + 1):
                 row = (c0 * cells[1] + c1) * cells[2]
                 for i in range(begins[row + a2], begins[row + b2 + 1]):
                     dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
-                    square = dx * dx + dy * dy + dz * dz
+                    square = _squared(dx, dy, dz)
                     if not square < close:
                         continue
                     value, slope, value_i, slope_i = _pair(
@@ -129,16 +138,14 @@ def near_vectors(
     close, step = reach * reach, reach / (table.shape[0] - 1)
     for j in range(first, last):
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
-        a0, b0 = _span(x0, origin[0], side, cells[0], reach)
-        a1, b1 = _span(x1, origin[1], side, cells[1], reach)
-        a2, b2 = _span(x2, origin[2], side, cells[2], reach)
+        a0, b0, a1, b1, a2, b2 = _spans(x, j, origin, side, cells, reach)
         out[j] = 0.0
         for c0 in range(a0, b0 + 1):
             for c1 in range(a1, b1 + 1):
                 row = (c0 * cells[1] + c1) * cells[2]
                 for i in range(begins[row + a2], begins[row + b2 + 1]):
                     dx, dy, dz = y[0, i] - x0, y[1, i] - x1, y[2, i] - x2
-                    square = dx * dx + dy * dy + dz * dz
+                    square = _squared(dx, dy, dz)
                     if not square < close or square < (TOUCHING / k) ** 2:
                         continue
                     whole = alike[i] or square > near[j] ** 2
@@ -172,16 +179,14 @@ def window_sums(
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
         wide, close = 1.0 / reach[j] ** 2, near[j] ** 2
-        a0, b0 = _span(x0, origin[0], side, cells[0], near[j])
-        a1, b1 = _span(x1, origin[1], side, cells[1], near[j])
-        a2, b2 = _span(x2, origin[2], side, cells[2], near[j])
+        a0, b0, a1, b1, a2, b2 = _spans(x, j, origin, side, cells, near[j])
         area, bent, still, tilted = 0.0, 0.0, 0.0, 0.0
         for c0 in range(a0, b0 + 1):
             for c1 in range(a1, b1 + 1):
                 row = (c0 * cells[1] + c1) * cells[2]
                 for i in range(begins[row + a2], begins[row + b2 + 1]):
                     dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
-                    square = dx * dx + dy * dy + dz * dz
+                    square = _squared(dx, dy, dz)
                     if square > close or not alike[i]:
                         continue
                     chi = math.exp(-square * wide) * weights[i]
