@@ -1,0 +1,23 @@
+"""Stored references: a file for each case and none besides; computed anew they are the same."""
+
+import numpy as np
+import pytest
+
+from studies.reference import stored
+
+
+def test_every_case_has_its_file_and_every_file_its_case():
+    files = {path.stem: path.stat().st_size for path in stored.FOLDER.iterdir()}
+    assert set(files) == set(stored.cases())
+    assert max(files.values()) < 200_000 and sum(files.values()) < 2_000_000
+    assert all(np.all(np.isfinite(array)) for name in files for array in stored.read(name).values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", stored.cases())
+def test_computed_anew_they_are_the_same(name):
+    now, then = stored.cases()[name](), stored.read(name)
+    assert set(now) == set(then)
+    for key, values in now.items():
+        # least squares of ill-conditioned sources: another LAPACK differs by more than rounding
+        np.testing.assert_allclose(then[key], values, rtol=0, atol=1e-6 * np.abs(values).max())
