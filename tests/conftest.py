@@ -1,6 +1,7 @@
 """Bodies and phase maps shared by the tests; no test touches the user's cache; how long a run may go on."""
 
 import os
+import signal
 import time
 from itertools import groupby
 
@@ -9,6 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
+from processor_time import ProcessorTime
 from results_to_show import (  # noqa: F401
     ball_cut,
     ball_fan,
@@ -26,23 +28,43 @@ import creeping as cr
 import scatterers as sc
 
 
+FIRST = ("README.md", "tests/studies/reference/", "tests/dumb_inputs/test_bad_arguments.py", "tests/scatterers/")
+"""Files that a run begins with, for the two workers in turn: one compiles kernels while the other needs few of them."""
+
+
 def pytest_addoption(parser):
     about = "start no test later than this, in seconds since 1970; those left are skipped, and told"
     parser.addoption("--until", type=float, default=float("inf"), help=about)
     about = "begin with the file of this number, from the first again after the last"
     parser.addoption("--turn", type=int, default=0, help=about)
+    parser.addoption("--guard", action="store_true", help="fail if too many tests take too long")
+
+
+def pytest_configure(config):
+    config.pluginmanager.register(ProcessorTime())
 
 
 def pytest_collection_modifyitems(config, items):
     files = [list(of) for _, of in groupby(items, key=lambda item: item.path)]
     turn = config.getoption("--turn") % max(len(files), 1)
-    items[:] = [item for of in files[turn:] + files[:turn] for item in of]
+    files = files[turn:] + files[:turn]
+    if not turn:
+        files.sort(key=lambda of: next((i for i, first in enumerate(FIRST) if of[0].nodeid.startswith(first)), 9))
+    items[:] = [item for of in files for item in of]
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
     if time.time() > item.config.getoption("--until"):
         pytest.skip("no time was left for it")
+
+
+@pytest.fixture
+def interruptible():
+    """Ctrl-C raises KeyboardInterrupt here, though a shell had this process ignore it, as for jobs in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -91,7 +91,7 @@ def interrupted(command, folder, wait, *, again=False):
         time.sleep(0.01)
 
 
-def test_an_interrupt_meets_a_callback_before_it_catches(monkeypatch):
+def test_an_interrupt_meets_a_callback_before_it_catches(monkeypatch, interruptible):
     class Plain(sc.Ellipsoid):
         compiled = None
 

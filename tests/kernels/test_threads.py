@@ -103,7 +103,7 @@ def test_an_error_in_one_thread_ends_the_others(monkeypatch):
     assert len(done) < 100
 
 
-def test_an_interrupt_waits_for_the_slices_and_takes_no_more(monkeypatch):
+def test_an_interrupt_waits_for_the_slices_and_takes_no_more(monkeypatch, interruptible):
     monkeypatch.setenv("CREEPING_THREADS", "2")
     begun, ended = [], []
 
