@@ -27,7 +27,6 @@ from results_to_show import (  # noqa: F401
 import creeping as cr
 import scatterers as sc
 
-
 FIRST = ("README.md", "tests/studies/reference/", "tests/dumb_inputs/test_bad_arguments.py", "tests/scatterers/")
 """Files that a run begins with, for the two workers in turn: one compiles kernels while the other needs few of them."""
 
@@ -61,7 +60,7 @@ def pytest_runtest_setup(item):
 
 @pytest.fixture
 def interruptible():
-    """Ctrl-C raises KeyboardInterrupt here, though a shell had this process ignore it, as for jobs in the background."""
+    """Ctrl-C raises KeyboardInterrupt here, though shells have jobs in the background ignore it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

@@ -1,6 +1,5 @@
 """The command line as a user meets it: outputs, exit codes, messages."""
 
-import csv
 import json
 import os
 import subprocess
@@ -8,29 +7,13 @@ import sys
 
 import numpy as np
 import pytest
+from command_line import creeping, table
 
-from creeping.commands import main as cli
+import creeping as cr
+import scatterers as sc
 from creeping.commands import run_field as _field_run
 from creeping.field.boundary import parse_boundary
 from studies.reference import sphere
-
-
-def creeping(*arguments, capsys=None):
-    """Run in this process and return (exit code, stdout, stderr)."""
-    with pytest.raises(SystemExit) as caught:
-        cli.main([str(argument) for argument in arguments])
-    out = capsys.readouterr()
-    return caught.value.code, out.out, out.err
-
-
-def test_few_rays_are_integrated_directly_unless_a_map_is_asked_for(tmp_path, capsys):
-    options = ["--direction", 0, 0, 1, "--length", 0.5, "--rays", 16, "--backend", "matplotlib"]
-    code, out, _ = creeping("run", "sphere", *options, "-o", tmp_path / "out", capsys=capsys)
-    assert code == 0
-    assert "direct integration of order 8" in out
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["flow"] == "direct"
-    assert summary["error_of_rays"]["rms"] <= 1e-6
 
 
 def test_run_writes_everything_it_names(tmp_path, capsys):
@@ -50,14 +33,13 @@ def test_run_writes_everything_it_names(tmp_path, capsys):
     assert (folder / "rays.png").stat().st_size > 20_000
 
 
-def test_run_prints_json_only(tmp_path, capsys):
-    options = ["--direction", 0, 0, 1, "--length", 0.5, "--rays", 16, "--flow", "direct", "--of", "eikonal", "--json"]
-    code, out, err = creeping("run", "torus", *options, "--backend", "matplotlib", "-o", tmp_path, capsys=capsys)
-    assert code == 0
-    assert err == ""
+def test_few_rays_are_integrated_directly_and_json_is_all_that_is_printed(tmp_path, capsys):
+    options = ["--direction", 0, 0, 1, "--length", 0.5, "--rays", 16, "--of", "eikonal", "--json", "--no-pictures"]
+    code, out, err = creeping("run", "torus", *options, "-o", tmp_path, capsys=capsys)
+    assert code == 0 and err == ""
     summary = json.loads(out)
     assert [round(c["length"], 8) for c in summary["shadow_line"]] == [9.42477796, 3.14159265]
-    assert "phase_map" not in summary
+    assert "phase_map" not in summary and summary["flow"] == "direct" and summary["error_of_rays"]["rms"] <= 1e-6
 
 
 def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
@@ -66,7 +48,7 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     field = ["--wavenumber", 20, "--boundary", "hard", "--observe", "cut:30", "--observe", "grid:45"]
     code, out, _ = creeping("run", "sphere", *options, *field, "--observe", "150,20", "-o", tmp_path, capsys=capsys)
     assert code == 0
-    assert "field: k = 20, hard" in out
+    assert "field: k = 20, hard" in out and "direct integration of order 8" in out
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert {"far.csv", "far.png", "far.ffe", "field.png"} <= set(summary["files"])
     assert sorted(summary["files"]) == sorted(f.name for f in tmp_path.iterdir())
@@ -80,35 +62,19 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     # the forward lobe of the hard sphere from its series; the cut passes a quarter of a degree from its top
     forward = abs(sphere.far_field(20.0, 1.0, [1.0], "hard")[0])
     assert entry["largest"] == pytest.approx(forward, rel=0.02)
-    rows = list(csv.DictReader(x for x in (tmp_path / "far.csv").read_text().splitlines() if x[0] != "#"))
+    rows = table(tmp_path / "far.csv")
     assert len(rows) == entry["directions"]
     assert (round(float(rows[-1]["theta"])), round(float(rows[-1]["phi"]))) == (150, 20)
 
 
 def test_run_of_a_conductor_shows_its_currents(tmp_path, capsys):
     options = ["--direction", 1, 1, 0, "--flow", "direct", "--rays", 32, "--length", 3.2, "--backend", "matplotlib"]
-    field = ["--wavenumber", 10, "--boundary", "pec", "--observe", "backscatter"]
+    field = ["--wavenumber", 30, "--boundary", "pec", "--observe", "backscatter"]
     code, out, _ = creeping("run", "sphere", *options, *field, "--json", "-o", tmp_path, capsys=capsys)
     assert code == 0
     summary = json.loads(out)
     assert set(summary["files"]) & {"far.csv", "far.png", "far.ffe", "field.png"} == {"far.csv", "field.png"}
     assert summary["field"]["boundary"] == "pec"
-
-
-def test_a_cut_of_a_conductor_passes_the_poles_smoothly():
-    # at the poles the components are those of the cut, not those of phi = 0
-    import creeping as cr
-    import scatterers as sc
-
-    body = sc.Ellipsoid(1.0, 0.8, 0.6)
-    job = _field_run.job(10.0, "pec", ["cut:90"], (1.0, 0.1, 0.4))
-    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (1.0, 0.1, 0.4)), n_rays=32)
-    far, _ = job.far_field(fan)
-    size = np.abs(far.total)
-    plain = np.abs(cr.far_field(fan, [(0, 0, 1)], wavenumber=10.0, boundary="pec").total[0])
-    near = 0.06 * size.max()
-    np.testing.assert_allclose(size[[0, 180, 180, 360]], size[[1, 179, 181, 359]], atol=near)
-    assert np.max(np.abs(plain - size[181])) > near
 
 
 def test_a_field_needs_a_good_request():
@@ -170,9 +136,7 @@ _FIELD = [*_SPHERE, "--wavenumber", 20]
 def test_bad_input_is_exit_code_3_and_one_line(arguments, match, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, _, err = creeping(*arguments, capsys=capsys)
-    assert code == 3
-    assert match in err
-    assert "Traceback" not in err
+    assert code == 3 and match in err and "Traceback" not in err
     assert not (tmp_path / "x").exists()
 
 
@@ -201,16 +165,15 @@ def test_interrupt_is_exit_code_130(capsys, monkeypatch):
 
 def test_check(capsys):
     code, out, _ = creeping("check", "torus", capsys=capsys)
-    assert code == 0
-    assert "genus 1" in out
+    assert code == 0 and "genus 1" in out
     code, out, _ = creeping("check", "torus", "--json", capsys=capsys)
-    assert json.loads(out)["ok"] is True
+    assert code == 0 and json.loads(out)["ok"] is True
 
 
 def test_cache_commands(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "maps"))
     assert "0 maps" in creeping("cache", "ls", capsys=capsys)[1]
-    options = ["--direction", 1, 0, 0, "--length", 0.2, "--rays", 8, "--tolerance", 1e-2, "--backend", "matplotlib"]
+    options = ["--direction", 1, 0, 0, "--length", 0.2, "--rays", 8, "--tolerance", 1e-2, "--no-pictures"]
     assert creeping("run", "sphere", *options, "--flow", "map", "-o", tmp_path / "o", capsys=capsys)[0] == 0
     assert "1 maps" in creeping("cache", "ls", capsys=capsys)[1]
     assert len(json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])) == 1
@@ -225,13 +188,10 @@ def test_cache_commands(tmp_path, capsys, monkeypatch):
 
 
 def test_cache_clear_leaves_what_is_not_ours(tmp_path, capsys, monkeypatch):
-    # a folder with a file manifest.json was removed whatever was in it, and a link ended in a traceback
-    import scatterers as sc
-    from creeping import build_phase_map
-
+    """Neither folders with a file manifest.json, nor what a link leads to."""
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "maps"))
-    build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), degree=3, cache=True)
-    build_phase_map(sc.Sphere(radius=2.0), horizon=0.5, grid=(16, 16), degree=3, cache=True)
+    cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(16, 16), degree=3, cache=True)
+    cr.build_phase_map(sc.Sphere(radius=2.0), horizon=0.5, grid=(16, 16), degree=3, cache=True)
     first, second = sorted(folder for folder in (tmp_path / "maps").iterdir() if folder.is_dir())
     (second / "notes.txt").write_text("mine")
     foreign = tmp_path / "maps" / "project"
@@ -255,16 +215,13 @@ def test_cache_clear_leaves_what_is_not_ours(tmp_path, capsys, monkeypatch):
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
 def test_a_cache_that_others_can_write_is_not_used(tmp_path, monkeypatch):
-    import scatterers as sc
-    from creeping import build_phase_map
-
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "new" / "maps"))
     asked = {"horizon": 0.5, "grid": (16, 16), "degree": 3, "cache": True}
-    build_phase_map(sc.Sphere(), **asked)
+    cr.build_phase_map(sc.Sphere(), **asked)
     assert (tmp_path / "new" / "maps").stat().st_mode & 0o777 == 0o700
     (tmp_path / "new" / "maps").chmod(0o777)
     said = []
-    build_phase_map(sc.Sphere(), **asked, progress=said.append)
+    cr.build_phase_map(sc.Sphere(), **asked, progress=said.append)
     assert any("can be written by other users" in text for text in said)
 
 

@@ -1,26 +1,19 @@
 """``creeping run --plane``: what is asked for, and what the files hold."""
 
-import csv
 import json
 import re
 
 import numpy as np
 import pytest
 import scipy.io
+from command_line import ran, table
 
 import creeping as cr
 import scatterers as sc
 from creeping.commands import run_field, run_plane
-from creeping.commands.main import main
 from creeping.commands.run_plane import parse_plane
 from creeping.errors import InvalidInputError
 from studies.reference import sphere
-
-
-def ran(*words):
-    with pytest.raises(SystemExit) as end:
-        main([str(word) for word in words])
-    return end.value.code
 
 
 def test_planes_are_written(tmp_path, capsys):
@@ -40,7 +33,7 @@ def test_planes_are_written(tmp_path, capsys):
     for plane in summary["planes"]:
         outside = np.prod(plane["points"]) - plane["inside"]
         assert f"field on the plane {plane['plane']}: {outside} points ...\n" in told
-    rows = list(csv.DictReader(line for line in (tmp_path / "plane.csv").read_text().splitlines() if line[0] != "#"))
+    rows = table(tmp_path / "plane.csv")
     points = np.array([[float(row[name]) for name in "xyz"] for row in rows])
     values = np.array([complex(float(row["re_u"]), float(row["im_u"])) for row in rows])
     np.testing.assert_allclose([float(row["across"]) for row in rows], points[:, 2], atol=1e-12)
@@ -55,7 +48,7 @@ def test_a_frequency_makes_the_lengths_of_a_plane_metres(tmp_path, monkeypatch):
     body = sc.Sphere()
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, (1, 0, 0)), length=2.0, n_rays=24)
     for asked, unit in (({"frequency": "0.3GHz"}, "m"), ({}, "L")):
-        job = run_field.job(None if asked else 6.0, "hard", None, (1, 0, 0), **asked)
+        job = run_field.job(None if asked else cr.wavenumber(0.3e9), "hard", None, (1, 0, 0), **asked)
         planes = run_plane.asked_planes(["xy:0.4"], job, body)
         run_plane.write_planes(planes, job, fan, tmp_path, "ball", lambda _: None, pictures=True)
         cut, words = drawn.pop()
@@ -114,8 +107,7 @@ def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):
     assert sorted(summary["files"]) == sorted(file.name for file in tmp_path.iterdir())
     tables = {}
     for stem in ("line", "rays", "curves", "far", "plane"):
-        text = (tmp_path / f"{stem}.csv").read_text().splitlines()
-        rows = list(csv.DictReader(line for line in text if line[0] != "#"))
+        rows = table(tmp_path / f"{stem}.csv")
         tables[stem] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     back = {stem: scipy.io.loadmat(tmp_path / f"{stem}.mat", simplify_cells=True) for stem in tables}
     rows = tables["far"]

@@ -4,14 +4,7 @@ import json
 
 import numpy as np
 import pytest
-
-from creeping.commands.main import main
-
-
-def ran(*words):
-    with pytest.raises(SystemExit) as end:
-        main([str(word) for word in words])
-    return end.value.code
+from command_line import ran, table
 
 
 def test_source_of_a_run(tmp_path, capsys):
@@ -22,16 +15,14 @@ def test_source_of_a_run(tmp_path, capsys):
     assert summary["source"] == [0, 0, -2] and "direction" not in summary
     assert summary["shadow_line"][0]["length"] == pytest.approx(2 * np.pi * np.sqrt(0.75))
     assert {"rays.png", "parameters.png", "rays.vtp", "curves.vtp", "rays.csv", "rays.mat"} <= set(summary["files"])
-    rows = [row for row in (tmp_path / "curves.csv").read_text().splitlines() if row[0] != "#"]
-    names, values = rows[0].split(","), np.array([row.split(",") for row in rows[1:]])
-    level = values[:, names.index("level")].astype(float)
+    rows = table(tmp_path / "curves.csv")
+    level, z = (np.array([float(row[name]) for row in rows]) for name in ("level", "z"))
     # counted from the source: the line is sqrt(3) away from it
     assert level.min() >= np.sqrt(3) - 1e-9 and level.max() <= np.sqrt(3) + 1 + 1e-9
-    z = values[:, names.index("z")].astype(float)
     np.testing.assert_allclose(-z, np.cos(np.pi / 3 + level - np.sqrt(3)), atol=1e-6)
 
 
-def test_travel_time_if_asked_for(tmp_path, capsys):
+def test_travel_time_if_asked_for(tmp_path):
     options = ["--flow", "direct", "--rays", 8, "--length", 1, "--no-pictures", "--of", "travel_time"]
     assert ran("run", "sphere", "--source", 0, 0, -2, *options, "-o", tmp_path) == 0
     assert json.loads((tmp_path / "summary.json").read_text())["iso_phase_curves"] == 17

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 import xarray
+from command_line import creeping
 from filelock import FileLock
 
-from creeping.commands import main as cli
 from creeping.commands import sweep as _sweep_command
 from creeping.sweeping import run as running
 from creeping.sweeping.cluster import driver as cluster
@@ -37,10 +37,7 @@ def sweep(tmp_path, capsys):
 
     def run(*arguments, study=STUDY):
         (tmp_path / "a.toml").write_text(study)
-        with pytest.raises(SystemExit) as caught:
-            cli.main(["sweep", str(tmp_path / "a.toml"), *map(str, arguments)])
-        out = capsys.readouterr()
-        return caught.value.code, out.out, out.err
+        return creeping("sweep", tmp_path / "a.toml", *arguments, capsys=capsys)
 
     return run
 
@@ -174,10 +171,8 @@ def test_an_interrupt_at_once_tells_how_to_go_on_with_json_too(sweep, monkeypatc
 
 def test_without_a_study_the_command_tells_where_to_start(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as caught:
-        cli.main(["sweep"])
-    err = capsys.readouterr().err
-    assert caught.value.code == 3 and "study.toml" in err and "creeping sweep --example > study.toml" in err
+    code, _, err = creeping("sweep", capsys=capsys)
+    assert code == 3 and "study.toml" in err and "creeping sweep --example > study.toml" in err
 
 
 def test_mistakes_of_a_study_and_of_options(sweep, tmp_path, capsys):
@@ -188,6 +183,4 @@ def test_mistakes_of_a_study_and_of_options(sweep, tmp_path, capsys):
     assert "give one" in sweep("--workers", 2, "--scheduler", "tcp://a:1")[2]
     assert "--workers 0" in sweep("--workers", 0)[2]
     assert not (tmp_path / "out").exists()
-    with pytest.raises(SystemExit) as caught:
-        cli.main(["sweep", "--example"])
-    assert caught.value.code == 0 and capsys.readouterr().out == EXAMPLE
+    assert creeping("sweep", "--example", capsys=capsys)[:2] == (0, EXAMPLE)

@@ -7,18 +7,16 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from command_line import creeping
 
 import creeping as cr
 import scatterers as sc
-from creeping.commands.main import main
 from creeping.commands.upkeep import plain_numbers
 from studies._meshes import geodesic_sphere
 
 
 def said(capsys, *words):
-    with pytest.raises(SystemExit) as end:
-        main(list(words))
-    return end.value.code, capsys.readouterr().out
+    return creeping(*words, capsys=capsys)[:2]
 
 
 def test_version_as_json(capsys):

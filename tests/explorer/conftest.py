@@ -44,7 +44,7 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
     "--disable-dev-shm-usage",
-    "--window-size=1200,800",
+    "--window-size=480,360",
 )
 
 

@@ -1,5 +1,6 @@
 """The page in a real browser: it loads, a slider moves the rays, nothing leaves the machine."""
 
+from contextlib import ExitStack, contextmanager
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -12,27 +13,32 @@ from creeping.explorer.request import ViewRequest
 from tests.patience import HANGS, until
 
 pytest.importorskip("viser")
-BODY = sc.TwistedEllipsoid()
-REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
+BODY = sc.Ellipsoid(1.2, 0.8, 0.6)
+REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=10.0, boundary="hard")
+
+
+@contextmanager
+def explorer(body=BODY, request=REQUEST, port=8123, **more):
+    from creeping.explorer.page import Explorer
+
+    made = Explorer(cr.DirectFlow(body, rtol=1e-9), request, port=port, **more)
+    try:
+        yield made
+    finally:
+        made.close()
 
 
 @pytest.fixture
 def page():
-    from creeping.explorer.page import Explorer
-
-    made = Explorer(cr.DirectFlow(BODY, rtol=1e-9), REQUEST, port=8123)
-    yield made
-    made.close()
+    with explorer() as made:
+        yield made
 
 
 @pytest.fixture(scope="module")
 def guarded():
     """A page that stays as it is: only its door is tried."""
-    from creeping.explorer.page import Explorer
-
-    made = Explorer(cr.DirectFlow(BODY, rtol=1e-9), REQUEST, port=8123)
-    yield made
-    made.close()
+    with explorer() as made:
+        yield made
 
 
 def rays_of(page, **values):
@@ -68,6 +74,10 @@ def test_rays_on_the_page_are_those_of_the_engine(page, browser):
 
     until(turned, lambda: page.status.content)
     assert 50.0 < page.request.theta < 50.6
+    page.player.show.value = "wave"
+    until(lambda: "crest" in page.bar.content, lambda: page.status.content)
+    wave = page._drawn[0].wave.segments
+    np.testing.assert_allclose(browser.segments(len(wave)), wave, rtol=0, atol=1e-6)
     assert browser.errors() == []
     assert browser.requests_outside(urlsplit(page.address).netloc) == []
 
@@ -109,19 +119,14 @@ def test_the_wave_and_the_boundary_are_set_by_hand(page):
 
 @pytest.mark.slow
 def test_the_title_is_that_of_the_body(browser):
-    from creeping.explorer.page import Explorer
-
     request = REQUEST.changed(metres=True, wavenumber=41.9)
-    made = Explorer(cr.DirectFlow(sc.Sphere()), request, port=8160, name="hull <1>.stl")
-    try:
+    with explorer(sc.Sphere(), request, 8160, name="hull <1>.stl") as made:
         browser.open(made.address)
         assert browser.driver.title == "hull <1>.stl"
         assert made.sliders["wavenumber"].label == "frequency (GHz)"
         assert made.sliders["wavenumber"].value == pytest.approx(2.0, abs=0.01)
         browser.segments(64 * round(REQUEST.length / made.step))
         assert browser.errors() == []
-    finally:
-        made.close()
 
 
 def test_the_arrow_turns_the_sliders_and_the_program_turns_nothing(page):
@@ -149,13 +154,10 @@ def test_what_cannot_be_shown_is_told_and_the_page_lives_on(page):
 
 
 def test_a_singular_incidence_is_named():
-    from creeping.explorer.page import Explorer
-
-    made = Explorer(cr.DirectFlow(sc.Torus()), REQUEST.changed(theta=90.0, phi=0.0), port=8140)
-    try:
+    with explorer(sc.Torus(), REQUEST.changed(theta=90.0, phi=0.0), 8140) as made:
         until(lambda: "crosses itself" in made.status.content, lambda: made.status.content)
-    finally:
-        made.close()
+    # nothing works on after the end
+    assert not any(worker.is_alive() for worker in made._workers) and not made.player.is_alive()
 
 
 def opened(page, *, origin=None, cookie=True, host=None):
@@ -236,8 +238,6 @@ def test_a_server_that_is_not_guarded_is_refused():
 
 
 def test_only_so_many_pages_are_let_in(page):
-    from contextlib import ExitStack
-
     from websockets.exceptions import InvalidStatus
 
     from creeping.explorer.door import CLIENTS
@@ -294,11 +294,3 @@ def test_iso_phase_curves_can_be_turned_off_and_a_refusal_resets_the_slider(page
     slider.value = 0.0
     page._slid("spacing", Event)
     assert page.request.spacing == 0.0
-
-
-def test_nothing_works_on_after_the_end():
-    from creeping.explorer.page import Explorer
-
-    made = Explorer(cr.DirectFlow(BODY, rtol=1e-6), REQUEST, port=8150)
-    made.close()
-    assert not any(worker.is_alive() for worker in made._workers) and not made.player.is_alive()
