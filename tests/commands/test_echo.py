@@ -151,6 +151,7 @@ def test_what_may_take_minutes_is_told_before():
     assert _cost(fish, few, *few.angles(fish), "auto") == ""
 
 
+@pytest.mark.slow
 def test_band_of_a_capsule(tmp_path, capsys, monkeypatch):
     """Of a body with joints by currents, which table and text say."""
     # twelve incidences would be asked for it

@@ -8,13 +8,13 @@ import scatterers as sc
 
 def test_impedances_know_nothing_of_their_company():
     flow = cr.DirectFlow(sc.TwistedEllipsoid(), rtol=1e-8)
-    d = np.random.default_rng(3).normal(size=(12, 3))
+    d = np.random.default_rng(3).normal(size=(8, 3))
     options = {
         "quantity": "bistatic",
         "observation": [[0, 0, 1], [0.6, 0, 0.8]],
         "wavenumbers": [15.0, 30.0],
         "boundary": [cr.ImpedanceBoundary(0.5 - 0.2j), "hard"],
-        "n_rays": 96,
+        "n_rays": 48,
     }
     together = cr.sweep_directions(flow, d, **options)
     for some in (slice(7, 8), slice(None, None, 3)):

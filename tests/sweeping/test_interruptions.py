@@ -46,6 +46,8 @@ def started(*arguments, **environment):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # what is started in the background of a shell ignores the signal, and so would its children
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 
@@ -60,7 +62,7 @@ def wait_for_tasks(folder, number, process):
     until(marked, lambda: f"{number} tasks were not done", pause=0.02)
 
 
-@pytest.mark.parametrize(("workers", "after", "seconds"), [(0, 3, 0.004), (0, 7, 0.011), (2, 5, 0.02)])
+@pytest.mark.parametrize(("workers", "after", "seconds"), [(0, 7, 0.011), (2, 5, 0.02)])
 def test_kill_9_of_the_driver(tmp_path, monkeypatch, workers, after, seconds):
     folder, diary = tmp_path / "s.zarr", tmp_path / "diary"
     code = f"import fake_sweeps; fake_sweeps.drive({str(folder)!r}, 60, 3, {workers})"
@@ -125,7 +127,7 @@ def test_one_interrupt_ends_the_command_with_4_and_tells_how_to_go_on(tmp_path):
     assert times == {name: (folder / "points/c" / name / "0/0/0").stat().st_mtime_ns for name in done}
 
 
-def test_interrupts_are_counted():
+def test_interrupts_are_counted(interruptible):
     meter = _sweep_command._Meter(quiet=True)
     before = signal.getsignal(signal.SIGINT)
     with _sweep_command._stopping(meter) as asked:

@@ -44,8 +44,8 @@ def test_a_body_with_numpy_methods_only_sweeps(rng):
     for name in names:
         setattr(plain, name, getattr(exact, name))
     plain.atlas = type("Atlas", (), {"charts": exact.atlas.charts, "locate": exact.atlas.locate})()
-    request = sweep_request("monostatic", length=3.0, n_rays=64, wavenumbers=[20.0], boundary="hard")
-    one, other = (Sweeper(cr.DirectFlow(body, rtol=1e-8), request)(DIRECTIONS) for body in (exact, plain))
+    request = sweep_request("monostatic", length=3.0, n_rays=32, wavenumbers=[20.0], boundary="hard")
+    one, other = (Sweeper(cr.DirectFlow(body, rtol=1e-8), request)(DIRECTIONS[:1]) for body in (exact, plain))
     np.testing.assert_allclose(one["line_length"], other["line_length"], rtol=1e-11)
     for name in ("creeping", "reflected"):
         np.testing.assert_allclose(one[name], other[name], rtol=1e-4)
@@ -100,14 +100,13 @@ def test_a_body_smaller_than_a_wavelength_has_its_forward_lobe_all_round():
 
 @pytest.mark.parametrize("semiaxes", [(1.2, 0.8, 0.8), (1.0, 0.7, 0.5)])
 def test_no_ray_is_counted_twice_or_lost(semiaxes):
-    # found 2026-11-21: two searches for one ray, 1e-6 apart, made two; rays next to the box's faces counted as hidden
     body = sc.Ellipsoid(*semiaxes)
-    d = np.concatenate([cr.fibonacci_directions(200), np.eye(3)])
+    d = np.concatenate([cr.fibonacci_directions(60), np.eye(3)])
     for flow in (cr.DirectFlow(body, rtol=1e-8), cr.build_phase_map(body, tolerance=3e-5, length=4.5, n_steps=9)):
         geometry = geometry_of(flow, d, 128, 4.5)
         shed = geometry.shed
         assert np.all(geometry.leaves)
-        for row in range(200):
+        for row in range(60):
             mine = np.flatnonzero(shed.observer == row)
             # a way there and its way back
             assert len(mine) % 2 == 0
@@ -117,7 +116,6 @@ def test_no_ray_is_counted_twice_or_lost(semiaxes):
 
 
 def test_backscatter_has_no_plane_of_incidence():
-    # found 2026-11-21: any tangent was taken, and which one depended on rounding
     body = sc.Ellipsoid(1, 0.7, 0.5)
     d = np.array([[0.5 - 1e-7, 0.5, 0.9], [0.5 + 1e-7, 0.5, 0.9]])
     request = sweep_request("monostatic", length=4.0, n_rays=64, wavenumbers=[20.0], boundary=["soft", "hard", "pec"])
@@ -137,7 +135,6 @@ def test_flat_ground_is_unresolved_not_nan():
 
 
 def test_very_long_rays_of_a_sphere():
-    # found 2026-11-21: each crossing of the horizon wants room
     request = sweep_request("monostatic", length=60.0, n_rays=16, wavenumbers=[20.0], boundary="soft")
     found = Sweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-8), request)(DIRECTIONS[:1])
     short = sweep_request("monostatic", length=4.5, n_rays=64, wavenumbers=[20.0], boundary="soft")

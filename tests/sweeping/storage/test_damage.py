@@ -80,7 +80,7 @@ def attacks(whole, tmp_path, names, kinds, count, seed):
     return found
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(400, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4, pytest.param(400, marks=pytest.mark.slow)])
 def test_flips_in_descriptions(whole, tmp_path, count):
     names = files_of(whole[0], "zarr.json")
     assert {"zarr.json", "study/zarr.json", "creeping/zarr.json", "task_status/zarr.json"} < set(names)
@@ -90,7 +90,7 @@ def test_flips_in_descriptions(whole, tmp_path, count):
     assert all(mended for name, _, mended in found if name != "study/zarr.json")
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(400, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4, pytest.param(400, marks=pytest.mark.slow)])
 def test_harm_to_chunks_and_descriptions(whole, tmp_path, count):
     names = [name for name in files_of(whole[0], "*") if not name.startswith("study")]
     kinds = ["flip", "cut", "empty", "gone"]
