@@ -31,7 +31,8 @@ def test_spline_order(order, nodes):
     assert slope(1 / np.array(nodes), errors) == pytest.approx(order + 1, abs=ORDER)
 
 
-@pytest.mark.parametrize("degree", [3, pytest.param(5, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [3, 5])
 def test_spline_order_on_six_charts(degree):
     # no body of revolution: its map has two axes; nor the sphere, whose displacement is one rotation everywhere
     body = sc.Ellipsoid(1.2, 0.8, 0.85)

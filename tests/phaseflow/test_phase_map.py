@@ -21,9 +21,9 @@ def rms(a, b):
 
 
 def test_composed_map_follows_the_tracer(body, rng):
-    flow = cr.build_phase_map(body, tolerance=COMPOSED / 4, length=8.0)
+    flow = cr.build_phase_map(body, tolerance=COMPOSED / 4, length=4.0)
     states = pack(*random_bundle_points(body, 60, rng=rng), jacobi=True)
-    times = np.sort([0.0, 0.3, flow.horizon, 1.7, 4.0, 8.0])
+    times = np.sort([0.0, 0.3, flow.horizon, 1.7, 4.0])
     exact = trace_states(body, states, times, rtol=1e-12)
     got = flow.transport(states, times)
     assert rms(got[..., :6][:, 0], exact[..., :6][:, 0]) < 1e-14
@@ -243,16 +243,19 @@ def test_maps_in_space_carry_what_others_do(rng):
         np.testing.assert_allclose(got[..., :11], exact[..., :11], atol=2e-4)
 
 
+@pytest.fixture(scope="module")
+def coarse():
+    return cr.build_phase_map(sc.TwistedEllipsoid(), horizon=0.25, grid=(32, 32, 40), degree=5, cache=False)
+
+
 @pytest.mark.parametrize("times", [[0.3, 1.17], [1.17, 2.95], np.linspace(0.06, 2.94, 49)])
-def test_attenuation_at_times_between_leaps(times, rng):
+def test_attenuation_at_times_between_leaps(coarse, times, rng):
     """Leaps and short traces from their ends, or one trace where times are many: either way as direct integration."""
-    body = sc.TwistedEllipsoid()
-    flow = cr.build_phase_map(body, horizon=0.25, grid=(32, 32, 40), degree=5, cache=False)
-    states = pack(*random_bundle_points(body, 300, rng=rng), lanes=12)
-    got, exact = (f.transport(states, np.asarray(times)) for f in (flow, cr.DirectFlow(body, rtol=1e-12)))
-    assert rms(got[..., :6], exact[..., :6]) < 20 * flow.error.rms
+    states = pack(*random_bundle_points(coarse.body, 200, rng=rng), lanes=12)
+    got, exact = (f.transport(states, np.asarray(times)) for f in (coarse, cr.DirectFlow(coarse.body, rtol=1e-12)))
+    assert rms(got[..., :6], exact[..., :6]) < 20 * coarse.error.rms
     np.testing.assert_allclose(got[..., 10], exact[..., 10], atol=1e-3)
     # some detach within a leap, some within what is left of one
     ended = np.isfinite(exact[..., 11]) & np.isfinite(got[..., 11])
-    assert ended[:, -1].sum() > 30 and np.mean(np.isfinite(exact[..., 11]) == np.isfinite(got[..., 11])) > 0.99
+    assert ended[:, -1].sum() > 20 and np.mean(np.isfinite(exact[..., 11]) == np.isfinite(got[..., 11])) > 0.99
     assert np.median(np.abs(got[..., 11][ended] - exact[..., 11][ended])) < 1e-4

@@ -60,7 +60,7 @@ def test_it_depends_neither_on_the_number_of_rays_nor_on_the_flow():
 @pytest.mark.parametrize("body", [sc.TwistedEllipsoid(), sc.Ellipsoid(1.0, 0.6, 0.4), sc.Torus()], ids=repr)
 def test_the_wave_has_died_away_on_all_but_a_tenth_of_the_rays(body):
     k, line = 40.0, cr.shadow_line(body, (1, 1, 1))
-    fan = cr.launch(cr.DirectFlow(body), line, wavenumber=k, n_rays=400, max_gap=np.inf)
+    fan = cr.launch(cr.DirectFlow(body), line, wavenumber=k, n_rays=200, max_gap=np.inf)
     died = (np.cbrt(k / 2) * HARD_DECAY * fan.attenuation[:, -1] >= DECAY) | (fan.detachment <= fan.length)
     assert abs(np.mean(died) - (1 - SPARED)) < 0.04
 
@@ -73,7 +73,7 @@ def test_at_most_four_sizes():
 def test_the_length_of_a_body_serves_all_incidences():
     body = sc.Ellipsoid(1.0, 0.6, 0.4)
     whole = body_length(body, 25.0)
-    each = [ray_length(cr.shadow_line(body, d), wavenumber=25.0) for d in cr.fibonacci_directions(40)]
+    each = [ray_length(cr.shadow_line(body, d), wavenumber=25.0) for d in cr.fibonacci_directions(24)]
     assert max(each) < 1.1 * whole
     assert whole <= 1.02 * max(each)
 
@@ -86,18 +86,17 @@ def test_a_weighted_body_has_a_travel_time():
         cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, (0, 0, 1)), wavenumber=3.0)
 
 
-@pytest.mark.parametrize("length", ["long", -1.0, 0.0, np.nan, np.inf, None, True])
-def test_bad_lengths_are_named(length):
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        *(("length", v) for v in ("long", -1.0, 0.0, np.nan, np.inf, None, True)),
+        *(("wavenumber", v) for v in (0.0, -2.0, np.nan, np.inf, "30")),
+    ],
+)
+def test_bad_numbers_are_named(name, value):
     ball = sc.Sphere()
-    with pytest.raises(cr.InvalidInputError, match=r"length = .* is not a positive finite number, nor 'auto'"):
-        cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, (0, 0, 1)), length=length)
-
-
-@pytest.mark.parametrize("wavenumber", [0.0, -2.0, np.nan, np.inf, "30"])
-def test_bad_wavenumbers_are_named(wavenumber):
-    ball = sc.Sphere()
-    with pytest.raises(cr.InvalidInputError, match=r"wavenumber = .* is not a positive finite number"):
-        cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, (0, 0, 1)), wavenumber=wavenumber)
+    with pytest.raises(cr.InvalidInputError, match=rf"{name} = .* is not a positive finite number"):
+        cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, (0, 0, 1), n_points=64), **{name: value})
 
 
 def test_an_incidence_that_launches_nothing_has_a_length():

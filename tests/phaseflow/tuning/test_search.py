@@ -22,7 +22,10 @@ def rms_at_end(flow, body, length, rng, rays=1000):
     return float(np.sqrt(np.mean(np.sum((flow.transport(states, times) - exact) ** 2, axis=2))))
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-6, 1e-7])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, pytest.param(1e-6, marks=SLOW), pytest.param(1e-7, marks=SLOW)])
 def test_tolerance_is_met_after_the_whole_length(body, tolerance, rng):
     flow = cr.build_phase_map(body, tolerance=tolerance, length=4.0, carry_jacobi=False, cache=False)
     assert flow.growth.lengths[-1] == 4.0
@@ -38,14 +41,14 @@ def test_horizon_divides_the_distance_of_outputs():
 
 def test_chaos_is_said(rng):
     body = sc.TwistedEllipsoid()
-    flow = cr.build_phase_map(body, tolerance=1e-5, length=8.0, carry_jacobi=False, cache=False)
+    flow = cr.build_phase_map(body, tolerance=1e-4, length=8.0, carry_jacobi=False, cache=False)
     growth = flow.growth
     assert growth.rms_after(8.0) == pytest.approx(growth.rms[-1])
     assert growth.rms_after(0.5 * growth.lengths[0]) == growth.rms[0]
     assert growth.rms_after(16.0) > 5 * growth.rms_after(8.0)
-    trusted = growth.trusted_length(1e-5)
+    trusted = growth.trusted_length(1e-4)
     assert 7.9 <= trusted < 16.0
-    assert rms_at_end(flow, body, trusted, rng, 400) < 5e-5
+    assert rms_at_end(flow, body, trusted, rng, 400) < 5e-4
     assert growth.trusted_length(1e-12) == 0.0
 
 
