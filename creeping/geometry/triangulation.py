@@ -210,35 +210,34 @@ def _grid_values(level: Callable[[FloatArray], FloatArray], axes: list[FloatArra
 def _cell_vertices(values: FloatArray, inside: BoolArray, axes: list[FloatArray]) -> tuple[FloatArray, IntArray]:
     """One vertex in each cell of mixed sign: the mean of the sign changes on its edges."""
     n = [len(axis) - 1 for axis in axes]
-    total = np.zeros((*n, 3))
-    count = np.zeros(n)
+    cells, offsets = [], []
     for axis in range(3):
-        start = [slice(None)] * 3
-        stop = [slice(None)] * 3
+        start, stop = [slice(None)] * 3, [slice(None)] * 3
         start[axis], stop[axis] = slice(None, -1), slice(1, None)
-        first, last = values[tuple(start)], values[tuple(stop)]
         crossed = inside[tuple(start)] != inside[tuple(stop)]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            fraction = np.where(crossed, first / (first - last), 0.0)
+        first, last = values[tuple(start)][crossed], values[tuple(stop)][crossed]
+        edge, offset = np.argwhere(crossed), np.zeros((len(first), 3))
+        offset[:, axis] = first / (first - last)
         b, c = (axis + 1) % 3, (axis + 2) % 3
-        for corner_b in (0, 1):
-            for corner_c in (0, 1):
-                part = [slice(None)] * 3
-                part[b] = slice(corner_b, corner_b + n[b])
-                part[c] = slice(corner_c, corner_c + n[c])
-                mask = crossed[tuple(part)]
-                count += mask
-                total[..., axis] += np.where(mask, fraction[tuple(part)], 0.0)
-                total[..., b] += mask * corner_b
-                total[..., c] += mask * corner_c
-    mixed = count > 0
-    number = np.full(mixed.shape, -1, dtype=np.int64)
-    number[mixed] = np.arange(int(mixed.sum()))
-    cell = np.argwhere(mixed)
-    offset = total[mixed] / count[mixed][:, None]
+        # the four cells around each edge
+        for corner_b, corner_c in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            cell, own = edge.copy(), offset.copy()
+            cell[:, b] -= corner_b
+            cell[:, c] -= corner_c
+            own[:, b], own[:, c] = corner_b, corner_c
+            cells.append(cell)
+            offsets.append(own)
+    # F > 0 on the faces of the box: no crossed edge lies there, and all four cells are within
+    flat, offset = np.ravel_multi_index(np.concatenate(cells).T, n), np.concatenate(offsets)
+    count = np.bincount(flat, minlength=int(np.prod(n)))
+    mixed = np.flatnonzero(count)
+    number = np.full(n, -1, dtype=np.int64)
+    number.ravel()[mixed] = np.arange(len(mixed))
+    total = np.stack([np.bincount(flat, own, len(count))[mixed] for own in offset.T], axis=1)
     origin = np.array([axis[0] for axis in axes])
     spacing = np.array([axis[1] - axis[0] for axis in axes])
-    return origin + (cell + offset) * spacing, number
+    cell = np.stack(np.unravel_index(mixed, n), axis=1)
+    return origin + (cell + total / count[mixed][:, None]) * spacing, number
 
 
 def _around_edges(inside: BoolArray, number: IntArray) -> IntArray:
