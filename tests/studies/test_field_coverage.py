@@ -38,9 +38,12 @@ def test_reciprocity_on_the_torus(rng):
     assert abs(there - back) < 3 * solution.residual.max() * abs(there)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "pec"])
-def test_row_of_the_triaxial_ellipsoid(boundary):
-    rows = np.array(coverage.row("triaxial", 8.0, boundary, 108))
+@pytest.mark.parametrize(
+    "name, boundary",
+    [("sphere", "soft"), *(pytest.param("triaxial", kind, marks=pytest.mark.slow) for kind in ("soft", "pec"))],
+)
+def test_row_of_the_table(name, boundary):
+    rows = np.array(coverage.row(name, 8.0, boundary, 108))
     assert rows.shape == (3, 10)
     extinction, true, cover = rows[:, :3].T
     assert np.all((true / extinction < 2.5) & (extinction / true < 2.5))

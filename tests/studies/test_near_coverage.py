@@ -16,6 +16,7 @@ def test_errors_are_covered_on_the_sphere(boundary):
     assert found["off"] < 3 and found["on"] < 5
 
 
+@pytest.mark.slow
 def test_it_prints_a_row_for_each_case(capsys, monkeypatch):
     monkeypatch.setattr(near_coverage, "BOUNDARIES", ("hard",))
     near_coverage.main(["--quick"])

@@ -5,13 +5,12 @@ import pytest
 from studies.port_coverage import ellipsoid_rows, sphere_row
 
 
-@pytest.mark.parametrize(("ka", "most"), [(30.0, 0.006), (100.0, 0.003)])
-def test_sphere(ka, most):
-    row = sphere_row(ka)
-    assert row.worst < most
-    assert row.covered > 0.95
+def test_sphere():
+    row = sphere_row(30.0)
+    assert row.worst < 0.006 and row.covered > 0.95
 
 
+@pytest.mark.slow
 def test_ellipsoid_is_covered():
     rows = ellipsoid_rows((0.9, 0.8, 1.0), 10.0, 0.25, 3, sources=2, points=40)
     assert {row.part for row in rows} <= {"rays", "beams"}
