@@ -35,7 +35,7 @@ def known(fan, k, points, normals, weights, values, lit=None):
     """Currents of a fan with other nodes and values."""
     every = np.ones(len(points), dtype=bool)
     places = {"points": points, "normals": normals, "weights": weights, "travel": normals}
-    currents = cr.surface_currents(fan, wavenumber=k, boundary="pec")
+    currents = cr.surface_currents(fan, wavenumber=k, boundary="pec", solve=False)
     return replace(currents, **places, values=values, change=values, lit=every if lit is None else lit)
 
 
@@ -46,7 +46,7 @@ def gap(currents, at, window):
     return np.linalg.norm(twice_incident(currents, points, normals) + received - values, axis=1)
 
 
-@pytest.mark.parametrize("k", [10.0, 20.0])
+@pytest.mark.parametrize("k", [10.0])
 def test_exact_currents_of_a_sphere_satisfy_the_equation(ball, k):
     nodes = body_nodes(ball.body, 2 * k)
     currents = known(ball, k, nodes.points, nodes.normals, nodes.weights, mie(k, nodes.points))
@@ -59,13 +59,13 @@ def test_those_of_an_ellipsoid_do_whatever_the_window():
     body, k = sc.Ellipsoid(1.0, 0.8, 0.6), 8.0
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, OBLIQUE), length=3.0, n_rays=16)
     exact = dipoles.scatter(clouds.ellipsoid(1.0, 0.8, 0.6), k, OBLIQUE[None], depth=0.2)
-    count, axes = 6000, np.array([1.0, 0.8, 0.6])
+    count, axes = 3000, np.array([1.0, 0.8, 0.6])
     s = fibonacci_directions(count)
     stretch = np.linalg.norm(s / axes, axis=1)
     points, normals, weights = s * axes, s / axes / stretch[:, None], 4 * np.pi / count * np.prod(axes) * stretch
     J = np.cross(normals[:, :, None], exact.total(points)[1][:, :, 0], axis=1)
     currents = known(fan, k, points, normals, weights, J)
-    at = np.arange(0, count, 11)
+    at = np.arange(0, count, 61)
     assert max(np.sqrt(np.mean(gap(currents, at, a / k) ** 2)) for a in (0.8, 1.2, 1.6)) < 4e-3
 
 
