@@ -100,6 +100,17 @@ def test_ahead_and_back_to_the_last_digit(method, boundary, rng):
     assert np.all(gap < 40 * angle * np.abs(f).max() + 1e-5 * np.abs(f).max())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("boundary", ["soft", "pec"])
+@pytest.mark.parametrize(("name", "method"), [("twisted", "currents"), ("triaxial", "rays")])
+def test_a_hundred_thousand_observers(name, method, boundary, rng):
+    for _ in range(10):
+        r = rng.normal(size=(10_000, 3))
+        far = cr.far_field(fan_of(name), r, wavenumber=20.0, boundary=boundary, method=method)
+        finite = np.isfinite(far.total).reshape(len(r), -1).all(axis=1)
+        assert np.all(finite | far.unresolved) and np.mean(finite) > 0.999
+
+
 @pytest.mark.parametrize("boundary", ["soft", "hard", "pec"])
 def test_a_body_within_a_wavelength_is_unresolved_by_rays(boundary):
     fan = cr.launch(cr.DirectFlow(sc.Sphere(1.0)), cr.shadow_line(sc.Sphere(1.0), D), length=4.0, n_rays=64)

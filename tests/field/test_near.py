@@ -101,7 +101,8 @@ def test_a_fan_that_is_too_short_says_so():
     assert cr.near_field(short, 1.3 * y, wavenumber=20.0, boundary="hard").status_counts == {"OK": 1}
 
 
-def test_where_rays_have_ended_is_named():
+@pytest.mark.parametrize("farther", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_where_rays_have_ended_is_named(farther):
     body = sc.TwistedEllipsoid()
     fan = fan_of(body, d=(1.0, 1.0, 1.0), length=3.0)
     ray, step = np.nonzero(fan.travel_time > fan.detachment[:, None] + 0.05)
@@ -109,6 +110,10 @@ def test_where_rays_have_ended_is_named():
     y = y[(body.level(y) > 0.05) & occluded(body, y, fan.line.direction)]
     u = cr.near_field(fan, y, wavenumber=15.0, boundary="hard", method="rays")
     assert u.status_counts["DETACHED"] > 0.9 * len(y) > 20
+    if farther:
+        # off the body currents serve
+        y = y + 0.5 * fan.line.direction
+        assert np.all(cr.near_field(fan, y, wavenumber=15.0, boundary="hard").ok)
 
 
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.7])

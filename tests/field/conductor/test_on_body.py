@@ -93,7 +93,7 @@ def test_the_focus_behind_a_sphere(ball, mie):
 def test_triaxial(triaxial, rng):
     fan, k, solution = triaxial
     nodes = body_nodes(fan.body, 20.0)
-    at = rng.choice(len(nodes.points), 400, p=nodes.weights / nodes.weights.sum())
+    at = rng.choice(len(nodes.points), 150, p=nodes.weights / nodes.weights.sum())
     x, n = nodes.points[at], nodes.normals[at]
     E, H = (part[:, :, 0] for part in solution.total(x))
     found = cr.conductor_current(fan, x, wavenumber=k)
@@ -107,7 +107,7 @@ def test_triaxial(triaxial, rng):
 
 
 def test_polarisations(ball, rng):
-    x = vectors(rng, 20)
+    x = vectors(rng, 8)
     both = cr.conductor_current(ball, x, wavenumber=30.0)
     theta, phi = spherical_frame(OBLIQUE)
     left = (theta + 1j * phi) / np.sqrt(2)
@@ -118,7 +118,7 @@ def test_polarisations(ball, rng):
         (left, (np.sqrt(0.5), 1j * np.sqrt(0.5))),
     ):
         one = cr.conductor_current(ball, x, wavenumber=30.0, polarisation=given)
-        assert one.shape == (20, 3) and one.error.shape == one.charge.shape == one.status.shape == (20,)
+        assert one.shape == (8, 3) and one.error.shape == one.charge.shape == one.status.shape == (8,)
         np.testing.assert_allclose(np.linalg.norm(one.incident_electric), 1.0)
         # rays and beams are chosen by their error, which is the polarisation's own
         off = np.linalg.norm(one - both @ np.array(mix), axis=1)

@@ -54,12 +54,13 @@ def test_exact_currents_of_a_sphere_satisfy_the_equation(ball, k):
     assert np.sqrt(np.mean(off**2)) < 1e-3 and np.max(off) < 5e-3
 
 
+@pytest.mark.slow
 def test_those_of_an_ellipsoid_do_whatever_the_window():
     """Its curvatures differ along and across: what is put back turns the current."""
     body, k = sc.Ellipsoid(1.0, 0.8, 0.6), 8.0
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, OBLIQUE), length=3.0, n_rays=16)
     exact = dipoles.scatter(clouds.ellipsoid(1.0, 0.8, 0.6), k, OBLIQUE[None], depth=0.2)
-    count, axes = 3000, np.array([1.0, 0.8, 0.6])
+    count, axes = 6000, np.array([1.0, 0.8, 0.6])
     s = fibonacci_directions(count)
     stretch = np.linalg.norm(s / axes, axis=1)
     points, normals, weights = s * axes, s / axes / stretch[:, None], 4 * np.pi / count * np.prod(axes) * stretch
