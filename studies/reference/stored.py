@@ -20,7 +20,8 @@ def cases() -> dict[str, Callable[[], Arrays]]:
     """All cases by their names."""
     from studies.reference import cases as module
 
-    return {name: made for name, made in vars(module).items() if getattr(made, "__module__", "") == module.__name__}
+    own = {name: made for name, made in vars(module).items() if getattr(made, "__module__", "") == module.__name__}
+    return {name: made for name, made in own.items() if not name.startswith("_")}
 
 
 def read(name: str) -> Arrays:

@@ -6,6 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError
+from creeping.field import on_body
 from creeping.field.currents import whole_solution
 from studies import joints
 
@@ -34,6 +35,7 @@ def test_errors_and_what_is_stated(name, boundary, theta):
         assert usual < 0.75 * most and covered > 88, part
 
 
+@pytest.mark.slow
 def test_far_field_is_by_currents_and_better_than_rays():
     d = np.array([np.sin(1.1), 0, np.cos(1.1)])
     exact = joints.scatter_by_rings(joints.CASES["capsule 4"][1], 12.0, [1.1], "soft")
@@ -64,13 +66,15 @@ def test_each_ray_crosses_joints():
         cr.surface_field(fan, wavenumber=20.0, boundary="hard", order=1)
 
 
-def test_the_unit_of_length_is_no_matter():
+def test_the_unit_of_length_is_no_matter(monkeypatch):
+    monkeypatch.setattr(on_body, "affordable", lambda *_: False)
+    monkeypatch.setattr(whole_solution, "MOST", 1.0)
     points = np.array([[1.0, 0.0, 0.3], [-1.0, 0.0, 0.2], [0.0, 0.6, 1.8], [0.0, -1.0, -0.4]])
     d = (0.9, 0.0, 0.4)
     small, large = (
         cr.surface_field(
-            fan_of(sc.Capsule(1.0 * scale, 4.0 * scale), d, length=4.0 * scale),
-            points * scale, wavenumber=12.0 / scale, boundary="hard",
+            fan_of(sc.Capsule(1.0 * scale, 4.0 * scale), d, n_rays=16, length=4.0 * scale),
+            points * scale, wavenumber=5.0 / scale, boundary="hard",
         )
         for scale in (1.0, 1024.0)
     )  # fmt: skip
@@ -91,43 +95,53 @@ def test_what_has_no_march_is_refused_where_the_equation_is_too_large(monkeypatc
     assert far.method.tolist() == ["rays+optics"]
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard"])
-def test_along_the_axis_the_equation_starts_from_nothing(boundary):
+# share of the largest |f|
+FROM_NOTHING = [
+    ("soft", 4.0, 2.5e-3),
+    *(pytest.param(kind, 8.0, 2e-3, marks=pytest.mark.slow) for kind in ("soft", "hard")),
+]
+
+
+@pytest.mark.parametrize(("boundary", "k", "most"), FROM_NOTHING)
+def test_along_the_axis_the_equation_starts_from_nothing(boundary, k, most):
     """The line is a joint: there are no tubes of rays, and no expansion's currents."""
-    profile, fan = joints.CASES["capsule 4"][1], fan_of(PILL, (0, 0, 1))
-    exact, r = joints.scatter_by_rings(profile, 8.0, [0.0], boundary), np.random.default_rng(5).normal(size=(60, 3))
+    profile, fan = joints.CASES["capsule 4"][1], fan_of(PILL, (0, 0, 1), n_rays=16)
+    exact, r = joints.scatter_by_rings(profile, k, [0.0], boundary), np.random.default_rng(5).normal(size=(30, 3))
     r /= np.linalg.norm(r, axis=1, keepdims=True)
     f = exact.far_field(r)[:, 0]
-    far = cr.far_field(fan, r, wavenumber=8.0, boundary=boundary)
-    assert set(far.method) == {"equation"} and np.abs(far.total - f).max() < 2e-3 * np.abs(f).max()
+    far = cr.far_field(fan, r, wavenumber=k, boundary=boundary)
+    assert set(far.method) == {"equation"} and np.abs(far.total - f).max() < most * np.abs(f).max()
     assert np.mean(np.abs(far.total - f) <= far.error) > 0.95
-    x, n = joints.spread(profile, np.random.default_rng(6), 100)
-    u = cr.surface_field(fan, x, wavenumber=8.0, boundary=boundary)
+    x, n = joints.spread(profile, np.random.default_rng(6), 30)
+    u = cr.surface_field(fan, x, wavenumber=k, boundary=boundary)
     true = (exact.normal_derivative(x, n) if boundary == "soft" else exact.total(x))[:, 0]
-    unit = 8.0 if boundary == "soft" else 1.0
+    unit = k if boundary == "soft" else 1.0
     assert np.all(u.ok) and np.quantile(np.abs(u.values - true), 0.95) < 0.01 * unit
 
 
 def test_along_the_axis_where_the_equation_is_too_large(monkeypatch):
     """Rays and optics far away, and elsewhere words or a status, no foreign error."""
+    monkeypatch.setattr(on_body, "affordable", lambda *_: False)
     monkeypatch.setattr(whole_solution, "MOST", 1e6)
-    fan = fan_of(PILL, (0, 0, 1))
-    far = cr.far_field(fan, [(0, 0, 1.0)], wavenumber=12.0, boundary="hard")
+    fan = fan_of(PILL, (0, 0, 1), n_rays=16)
+    far = cr.far_field(fan, [(0, 0, 1.0)], wavenumber=5.0, boundary="hard")
     assert far.method.tolist() == ["rays+optics"] and np.all(np.isfinite(far.total))
-    u = cr.surface_field(fan, [(1.0, 0, 0), (0, 0, -2.0)], wavenumber=12.0, boundary="hard")
+    u = cr.surface_field(fan, [(1.0, 0, 0), (0, 0, -2.0)], wavenumber=5.0, boundary="hard")
     assert not np.any(u.ok) and np.all(np.isfinite(u.values))
     with pytest.raises(InvalidInputError, match="more rays"):
-        cr.surface_field(fan, wavenumber=12.0, boundary="hard")
-    nearly = cr.surface_field(fan_of(PILL, (1e-6, 0, 1)), [(1.0, 0, 0)], wavenumber=12.0, boundary="hard")
+        cr.surface_field(fan, wavenumber=5.0, boundary="hard")
+    nearly = cr.surface_field(fan_of(PILL, (1e-6, 0, 1), n_rays=16), [(1.0, 0, 0)], wavenumber=5.0, boundary="hard")
     assert np.isfinite(nearly.values[0]) and nearly.error[0] > 0
 
 
-def test_a_tip_has_no_value():
+def test_a_tip_has_no_value(monkeypatch):
+    monkeypatch.setattr(whole_solution, "MOST", 1.0)
     cone = sc.ConeSphere(1.0, 4.0)
-    u = cr.surface_field(fan_of(cone, (0.3, 0, -1)), [(0, 0, 3.0)], wavenumber=12.0, boundary="soft")
+    u = cr.surface_field(fan_of(cone, (0.3, 0, -1), n_rays=16), [(0, 0, 3.0)], wavenumber=12.0, boundary="soft")
     assert u.values[0] == 0 and np.isinf(u.error[0]) and not u.ok[0]
 
 
+@pytest.mark.slow
 def test_beams_of_the_other_side_of_a_thin_body_do_not_count():
     """A prolate spheroid met almost along its axis: dark ground all round, thinner than beams reach."""
     body, k, d = sc.Ellipsoid(0.7, 0.7, 2.5), 12.0, np.array([np.sin(0.1), 0, np.cos(0.1)])

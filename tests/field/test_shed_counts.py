@@ -14,5 +14,4 @@ def test_rays_on_flat_ground_that_two_cells_find_are_one():
     flow = cr.DirectFlow(body, rtol=1e-9)
     asked = {"wavenumbers": [18.0], "boundary": "hard", "length": 6.0}
     few, many = (cr.sweep_directions(flow, directions, n_rays=n, **asked).creeping.values for n in (96, 400))
-    # found 2026-11-22: four of these eight had one ray twice, 30 % of the creeping part
     np.testing.assert_allclose(few, many, atol=1e-3 * np.abs(many).max())

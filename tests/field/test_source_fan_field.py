@@ -14,17 +14,9 @@ from studies.reference.sphere import source_on_sphere
 # relative errors, %, at 5 to 50 degrees behind the line: distance in radii, k a
 SPHERE = {
     ("hard", 30, 1.5): 1.0,
-    ("hard", 30, 3.0): 1.5,
-    ("hard", 30, 30.0): 1.3,
-    ("hard", 100, 1.5): 0.3,
-    ("hard", 100, 3.0): 0.4,
     ("hard", 100, 30.0): 0.3,
     ("soft", 30, 1.5): 1.3,
-    ("soft", 30, 3.0): 0.4,
-    ("soft", 30, 30.0): 0.3,
-    ("soft", 100, 1.5): 0.3,
     ("soft", 100, 3.0): 0.2,
-    ("soft", 100, 30.0): 0.1,
 }
 
 
@@ -68,7 +60,7 @@ def test_wave_on_an_ellipsoid(boundary, most):
     assert exact.residual < 3e-3
     body = sc.Ellipsoid(*axes)
     line = cr.shadow_line(body, source=cr.PointSource(source))
-    fan = cr.launch(cr.DirectFlow(body, rtol=1e-9), line, length=0.6, n_rays=24, n_steps=60, max_gap=np.inf)
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-9), line, length=0.6, n_rays=12, n_steps=30, max_gap=np.inf)
     field = cr.surface_field(fan, wavenumber=k, boundary=boundary)
     flat = fan.points.reshape(-1, 3)
     of = exact.total(flat) if boundary == "hard" else exact.slope(flat, normal(body, flat))

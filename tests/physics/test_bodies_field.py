@@ -1,10 +1,11 @@
-"""The field on bodies with no series, against fundamental solutions, and reciprocity; the long rows are slow tests."""
+"""The field on bodies with no series, against fundamental solutions, and reciprocity: slow tests."""
 
 import numpy as np
 import pytest
 
 from studies import field_bodies as bodies
 
+pytestmark = pytest.mark.slow
 FACTOR = 1.5
 SURFACE = {("soft", 20.0): 7.0, ("soft", 40.0): 6.0, ("hard", 20.0): 7.0, ("hard", 40.0): 3.0}
 """Largest of the prototype's medians on the surface at second order, per cent."""
@@ -16,14 +17,9 @@ LARGEST = {("soft", 20.0): 1.0, ("soft", 40.0): 1.0, ("hard", 20.0): 1.3, ("hard
 BEHIND = {("hard", 20.0): 6}
 """Unresolved directions of 600 at most, 2 if nothing is said: where soft waves and short ones have died out."""
 
-CASES = [
-    pytest.param(boundary, k, incidence, marks=[] if (k, incidence) == (20.0, 0) else [pytest.mark.slow])
-    for boundary, k in bodies.PROTOTYPE
-    for incidence in range(3)
-]
+CASES = [(*which, incidence) for which in bodies.PROTOTYPE for incidence in range(3)]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("boundary", "k", "incidence"), CASES)
 def test_far_field_of_the_triaxial_ellipsoid(boundary, k, incidence):
     assert bodies.reference("triaxial", boundary, k).residual.max() < 4e-5
@@ -51,7 +47,7 @@ def test_surface_field_of_the_triaxial_ellipsoid(boundary, k, incidence):
 
 @pytest.mark.parametrize(
     ("boundary", "k", "incidence"),
-    [pytest.param("soft", 20.0, 0, marks=pytest.mark.slow), *(c for c in CASES[1:] if c.values[2] == 0)],
+    [case for case in CASES if case[2] == 0],
 )
 def test_near_field_of_the_triaxial_ellipsoid(boundary, k, incidence):
     _, (every, _, tube) = bodies.near_errors("triaxial", boundary, k, incidence)
@@ -59,7 +55,6 @@ def test_near_field_of_the_triaxial_ellipsoid(boundary, k, incidence):
     assert tube < 1.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_twisted_ellipsoid_is_bounded_and_says_where_it_fails(boundary):
     far = bodies.far_errors("twisted", boundary, 40.0, 0)
@@ -68,8 +63,8 @@ def test_twisted_ellipsoid_is_bounded_and_says_where_it_fails(boundary):
     assert far["unresolved"] > 10
 
 
-@pytest.mark.parametrize("name", ["triaxial", pytest.param("twisted", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("boundary", [pytest.param("soft", marks=pytest.mark.slow), "hard"])
+@pytest.mark.parametrize("name", ["triaxial", "twisted"])
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_reciprocity(name, boundary):
     """Within the error of the field itself: 1 per cent, 2 on the body that is not convex."""
     assert bodies.reciprocity(name, boundary, 20.0) < (1.0 if name == "triaxial" else 2.0)

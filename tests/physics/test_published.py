@@ -33,6 +33,7 @@ THIN = 0.8
 """ka up to which a body is nowhere thick enough for currents to be judged inside it."""
 
 
+@pytest.mark.slow
 def test_bistatic_conducting_sphere():
     angle, *published = np.loadtxt(TABLES / "austin_IA_s7f6_bistatic.csv", delimiter=",", comments="#").T
     angle, k = np.radians(angle), 2 * np.pi * 320e6 / 299792458.0
@@ -128,6 +129,12 @@ def test_errors_stated_for_backscatter(shape, kind):
     assert np.mean(shares <= 1) > 0.9 and shares.max() < 1.5
 
 
+def test_a_low_frequency_is_covered():
+    off, share, unresolved = back("sphere", "hard", 120.0)
+    assert abs(off) < 2.5 and share < 1.5 and not unresolved
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["sphere", "spheroid"])
 @pytest.mark.parametrize("kind", ["hard", "soft"])
 def test_low_frequencies_are_covered_or_unknown(shape, kind):

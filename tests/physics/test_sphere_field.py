@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import creeping as cr
+import scatterers as sc
 from studies import field_sphere
 from studies.reference import sphere
 
@@ -12,11 +13,15 @@ FACTOR = 1.5
 
 @pytest.fixture(scope="module")
 def fan():
-    return field_sphere.sphere_fan()
+    return cr.launch(
+        cr.DirectFlow(sc.Sphere(), rtol=1e-10), cr.shadow_line(sc.Sphere(), (0, 0, 1)), length=6.2, n_rays=128
+    )
 
 
-@pytest.mark.parametrize("k", field_sphere.KA)
-@pytest.mark.parametrize("row", field_sphere.LIMITS)
+@pytest.mark.parametrize("k", [k if k == 30.0 else pytest.param(k, marks=pytest.mark.slow) for k in field_sphere.KA])
+@pytest.mark.parametrize(
+    "row", [pytest.param(row, marks=pytest.mark.slow) if "first order" in row else row for row in field_sphere.LIMITS]
+)
 def test_errors_have_not_grown(fan, row, k):
     """A regression, no law: errors against the series stay within 1.5 times those of a prototype of the formulas."""
     limit = field_sphere.LIMITS[row][field_sphere.KA.index(k)]
@@ -25,6 +30,7 @@ def test_errors_have_not_grown(fan, row, k):
     assert field_sphere.row_functions()[row](fan, k) <= FACTOR * limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_total_over_all_angles(boundary):
     shares, jump = field_sphere.sectors(field_sphere.sphere_fan(6.6), 100.0, boundary)
@@ -35,18 +41,18 @@ def test_total_over_all_angles(boundary):
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_second_order_falls_with_frequency(fan, boundary):
     """The error of creeping rays falls at least like 1/ka."""
-    errors = [field_sphere.creeping_rays(fan, k, boundary, 2) for k in (30.0, 300.0)]
-    assert errors[1] < errors[0] / 9
+    errors = [field_sphere.creeping_rays(fan, k, boundary, 2) for k in (30.0, 100.0)]
+    assert errors[1] < errors[0] * 0.3
 
 
-@pytest.mark.parametrize("eta", [1.0, 0.3 - 0.2j])
+@pytest.mark.parametrize("eta", [0.3 - 0.2j])
 def test_impedance_on_the_body(fan, eta):
     theta = np.radians(np.array([20.0, 40, 60, 80, 88]))
-    found = cr.surface_field(fan, field_sphere.observers(theta), wavenumber=100.0, boundary=cr.ImpedanceBoundary(eta))
-    assert found == pytest.approx(sphere.surface_field(100.0, 1.0, np.cos(theta), eta), rel=5e-3)
+    found = cr.surface_field(fan, field_sphere.observers(theta), wavenumber=30.0, boundary=cr.ImpedanceBoundary(eta))
+    assert found == pytest.approx(sphere.surface_field(30.0, 1.0, np.cos(theta), eta), rel=5e-3)
 
 
-@pytest.mark.parametrize(("method", "k"), [("rays", 30.0), ("currents", 10.0)])
+@pytest.mark.parametrize(("method", "k"), [("rays", 30.0), pytest.param("currents", 10.0, marks=pytest.mark.slow)])
 def test_impedance_passes_to_hard(fan, method, k):
     r = field_sphere.observers(np.radians(np.arange(0, 181, 10.0)))
     hard = cr.far_field(fan, r, wavenumber=k, boundary="hard", method=method).total

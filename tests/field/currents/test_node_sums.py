@@ -35,7 +35,7 @@ def known(fan, k, points, normals, weights, values, lit=None):
     """Currents of a fan with other nodes and values."""
     every = np.ones(len(points), dtype=bool)
     places = {"points": points, "normals": normals, "weights": weights, "travel": normals}
-    currents = cr.surface_currents(fan, wavenumber=k, boundary="pec")
+    currents = cr.surface_currents(fan, wavenumber=k, boundary="pec", solve=False)
     return replace(currents, **places, values=values, change=values, lit=every if lit is None else lit)
 
 
@@ -46,7 +46,7 @@ def gap(currents, at, window):
     return np.linalg.norm(twice_incident(currents, points, normals) + received - values, axis=1)
 
 
-@pytest.mark.parametrize("k", [10.0, 20.0])
+@pytest.mark.parametrize("k", [10.0])
 def test_exact_currents_of_a_sphere_satisfy_the_equation(ball, k):
     nodes = body_nodes(ball.body, 2 * k)
     currents = known(ball, k, nodes.points, nodes.normals, nodes.weights, mie(k, nodes.points))
@@ -54,6 +54,7 @@ def test_exact_currents_of_a_sphere_satisfy_the_equation(ball, k):
     assert np.sqrt(np.mean(off**2)) < 1e-3 and np.max(off) < 5e-3
 
 
+@pytest.mark.slow
 def test_those_of_an_ellipsoid_do_whatever_the_window():
     """Its curvatures differ along and across: what is put back turns the current."""
     body, k = sc.Ellipsoid(1.0, 0.8, 0.6), 8.0
@@ -65,7 +66,7 @@ def test_those_of_an_ellipsoid_do_whatever_the_window():
     points, normals, weights = s * axes, s / axes / stretch[:, None], 4 * np.pi / count * np.prod(axes) * stretch
     J = np.cross(normals[:, :, None], exact.total(points)[1][:, :, 0], axis=1)
     currents = known(fan, k, points, normals, weights, J)
-    at = np.arange(0, count, 11)
+    at = np.arange(0, count, 61)
     assert max(np.sqrt(np.mean(gap(currents, at, a / k) ** 2)) for a in (0.8, 1.2, 1.6)) < 4e-3
 
 

@@ -34,7 +34,7 @@ def known(fan, boundary, change):
     nodes = body_nodes(fan.body, 2 * K)
     values = exact(nodes.points, boundary) * change(nodes.points)
     return replace(
-        cr.surface_currents(fan, wavenumber=K, boundary=kind),
+        cr.surface_currents(fan, wavenumber=K, boundary=kind, solve=False),
         points=nodes.points,
         normals=nodes.normals,
         weights=nodes.weights,

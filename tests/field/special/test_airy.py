@@ -122,7 +122,6 @@ def test_roots_stay_apart_beside_a_branch_point(degrees, amount):
 
 @pytest.mark.parametrize("eta", [0.7, 0.3 - 0.4j, 0.1 + 0.3j, 0.05])
 def test_constants_depend_on_their_own_q_alone(eta):
-    """2026-11: tables spanned all q of a call, and Newton stopped for all roots together: the last digits differed."""
     m = np.exp(np.random.default_rng(4).uniform(np.log(0.05), np.log(60), 700))
     q = 1j * eta * m
     together = impedance_modes(q)

@@ -111,7 +111,7 @@ def test_powers_are_derivatives(name, q, power):
 
 
 @pytest.mark.parametrize("name", ["pekeris", "surface"])
-@pytest.mark.parametrize("q", [0.0, 1j, 2 + 1j])
+@pytest.mark.parametrize("q", [0.0, 2 + 1j])
 @pytest.mark.parametrize("power", [0, 1])
 def test_slopes_are_differences_in_q(name, q, power):
     whole = fock.pekeris_star if name == "pekeris" else fock.surface_function
