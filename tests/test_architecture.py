@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,14 +17,29 @@ import scatterers
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("creeping", "scatterers", "studies", "tests")
-TEXTS = {
-    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
-    for folder in FOLDERS
-    for path in sorted((ROOT / folder).rglob("*.py"))
-}
-TREES = {name: ast.parse(text) for name, text in TEXTS.items()}
-PRODUCT = {name: tree for name, tree in TREES.items() if name.startswith(("creeping/", "scatterers/"))}
-KERNELS = {name: tree for name, tree in PRODUCT.items() if Path(name).parent.name == "kernels"}
+
+
+@cache
+def texts():
+    files = (path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py")))
+    return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in files}
+
+
+@cache
+def trees():
+    return {name: ast.parse(text) for name, text in texts().items()}
+
+
+@cache
+def product():
+    return {name: tree for name, tree in trees().items() if name.startswith(("creeping/", "scatterers/"))}
+
+
+@cache
+def kernels():
+    return {name: tree for name, tree in product().items() if Path(name).parent.name == "kernels"}
+
+
 PACKAGES = (creeping, creeping.files, creeping.plotting, scatterers)
 COMPILERS = ("numba", "llvmlite")
 CAP = 400
@@ -66,23 +82,23 @@ def imports(tree, *, inside_functions=True):
 
 
 def test_there_are_modules():
-    assert len(TEXTS) > 20
-    assert len(KERNELS) > 5
+    assert len(texts()) > 20
+    assert len(kernels()) > 5
 
 
 def test_files_are_short():
-    lengths = {name: len(text.splitlines()) for name, text in TEXTS.items()}
+    lengths = {name: len(text.splitlines()) for name, text in texts().items()}
     assert not {name: lines for name, lines in lengths.items() if lines > CAP}, (
         f"more than {CAP} lines: split by subject"
     )
 
 
 def test_no_module_is_a_drawer_for_everything():
-    assert not [name for name in TEXTS if Path(name).stem.strip("_") in ("utils", "util", "helpers", "misc")]
+    assert not [name for name in texts() if Path(name).stem.strip("_") in ("utils", "util", "helpers", "misc")]
 
 
 def test_modules_say_what_they_are():
-    assert not [name for name, tree in TREES.items() if TEXTS[name].strip() and not ast.get_docstring(tree)]
+    assert not [name for name, tree in trees().items() if texts()[name].strip() and not ast.get_docstring(tree)]
 
 
 def test_no_module_has_the_name_of_a_public_function_of_its_own():
@@ -90,7 +106,7 @@ def test_no_module_has_the_name_of_a_public_function_of_its_own():
     public = {name for package in PACKAGES for name in package.__all__}
     assert not [
         name
-        for name, tree in PRODUCT.items()
+        for name, tree in product().items()
         for node in tree.body
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == Path(name).stem and node.name in public
     ]
@@ -99,8 +115,8 @@ def test_no_module_has_the_name_of_a_public_function_of_its_own():
 def test_only_kernels_import_a_compiler():
     assert not [
         name
-        for name, tree in PRODUCT.items()
-        if name not in KERNELS
+        for name, tree in product().items()
+        if name not in kernels()
         for module, _ in imports(tree, inside_functions=False)
         if module.split(".")[0] in COMPILERS
     ]
@@ -114,7 +130,7 @@ def test_kernels_import_what_their_cache_watches():
             return True
         return "kernels" in module.split(".") or (module in SHARED_CONSTANTS and name.isupper())
 
-    strangers = [(name, *found) for name, tree in KERNELS.items() for found in imports(tree) if not allowed(*found)]
+    strangers = [(name, *found) for name, tree in kernels().items() for found in imports(tree) if not allowed(*found)]
     assert not strangers
 
 
@@ -122,20 +138,20 @@ def test_kernels_that_python_calls_are_not_inlined():
     """Into the wrapper that numba makes of them: they would be compiled twice."""
     called = {
         (module.replace(".", "/") + ".py", name)
-        for file, tree in PRODUCT.items()
-        if file not in KERNELS
+        for file, tree in product().items()
+        if file not in kernels()
         for module, name in imports(tree)
     }
     inlined = {
         (file, node.name)
-        for file, tree in KERNELS.items()
+        for file, tree in kernels().items()
         for node in tree.body
         if isinstance(node, ast.FunctionDef)
         and "njit(**options)" in map(ast.unparse, node.decorator_list)
-        and "strict_options as options" not in TEXTS[file]
+        and "strict_options as options" not in texts()[file]
     }
     # the integrators would compile no sooner, and are slower by some per cent
-    integrators = {file for file in KERNELS if Path(file).stem in ("integrator", "own_times")}
+    integrators = {file for file in kernels() if Path(file).stem in ("integrator", "own_times")}
     assert not {(file, name) for file, name in called & inlined if file not in integrators}
 
 
@@ -166,7 +182,7 @@ def test_public_names_are_there_and_say_what_they_are(package):
 
 def test_cited_keys_are_in_the_bibliography():
     known = set(re.findall(r"@\w+\{(\w+),", (ROOT / "creeping" / "references.bib").read_text(encoding="utf-8")))
-    cited = {name: set(re.findall(r"\[([A-Z]{1,4}\d{2}[a-z]?)(?:, [^\]]*)?\]", text)) for name, text in TEXTS.items()}
+    cited = {name: set(re.findall(r"\[([A-Z]{1,4}\d{2}[a-z]?)(?:, [^\]]*)?\]", text)) for name, text in texts().items()}
     assert not {name: sorted(keys - known) for name, keys in cited.items() if keys - known}
 
 

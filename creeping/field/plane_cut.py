@@ -90,9 +90,9 @@ def field_cut(
     --------
     >>> import creeping as cr
     >>> import scatterers as sc
-    >>> egg = sc.Ellipsoid(1.0, 0.8, 0.6)
-    >>> fan = cr.launch(cr.DirectFlow(egg, rtol=1e-8), cr.shadow_line(egg, (1, 0, 0)), length=3.0, n_rays=24)
-    >>> cut = cr.field_cut(fan, wavenumber=8.0, boundary="pec", extent=(3.0, 2.5), step=0.4, polarisation=(0, 0, 1))
+    >>> ball = sc.Sphere()
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, (1, 0, 0)), length=3.0, n_rays=24)
+    >>> cut = cr.field_cut(fan, wavenumber=30.0, boundary="pec", extent=(3.0, 2.5), step=0.4, polarisation=(0, 0, 1))
     >>> cut.quantities, cut.magnitude("H").shape, cut.to_xarray()["E"].dims
     (('E', 'H'), (9, 9), ('up', 'across', 'component'))
     """
