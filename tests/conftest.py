@@ -34,8 +34,8 @@ FIRST = ("README.md", "tests/studies/reference/", "tests/dumb_inputs/test_bad_ar
 def pytest_addoption(parser):
     about = "start no test later than this, in seconds since 1970; those left are skipped, and told"
     parser.addoption("--until", type=float, default=float("inf"), help=about)
-    about = "begin with the file of this number, from the first again after the last"
-    parser.addoption("--turn", type=int, default=0, help=about)
+    about = "take one file in N, from the I-th on: I/N"
+    parser.addoption("--share", default="0/1", help=about)
     parser.addoption("--guard", action="store_true", help="fail if too many tests take too long")
 
 
@@ -45,10 +45,9 @@ def pytest_configure(config):
 
 def pytest_collection_modifyitems(config, items):
     files = [list(of) for _, of in groupby(items, key=lambda item: item.path)]
-    turn = config.getoption("--turn") % max(len(files), 1)
-    files = files[turn:] + files[:turn]
-    if not turn:
-        files.sort(key=lambda of: next((i for i, first in enumerate(FIRST) if of[0].nodeid.startswith(first)), 9))
+    first, step = map(int, config.getoption("--share").split("/"))
+    files = files[first::step]
+    files.sort(key=lambda of: next((i for i, begin in enumerate(FIRST) if of[0].nodeid.startswith(begin)), len(FIRST)))
     items[:] = [item for of in files for item in of]
 
 
