@@ -10,6 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from processor_time import ProcessorTime
 from results_to_show import (  # noqa: F401
     ball_cut,
@@ -25,7 +26,6 @@ from results_to_show import (  # noqa: F401
 )
 
 import creeping as cr
-import scatterers as sc
 
 FIRST = ("README.md", "tests/studies/reference/", "tests/dumb_inputs/test_bad_arguments.py", "tests/scatterers/")
 """Files that a run begins with, for the two workers in turn: one compiles kernels while the other needs few of them."""

@@ -6,9 +6,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.directions import fibonacci_directions
 from creeping.shadow.status import OK
 from creeping.sweeping.plan import SweepPlan

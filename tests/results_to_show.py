@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.incident import PlaneWave
 
 

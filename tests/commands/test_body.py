@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 import trimesh
 from command_line import creeping
 
 import creeping as cr
-import scatterers as sc
 
 
 @pytest.fixture(scope="module")

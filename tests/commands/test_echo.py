@@ -5,9 +5,9 @@ import re
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from command_line import ran, table
 
-import scatterers as sc
 from creeping.commands.echo import _cost
 from creeping.commands.echo_request import echo_request
 from creeping.errors import InvalidInputError

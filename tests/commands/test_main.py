@@ -7,10 +7,10 @@ import sys
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from command_line import creeping, table
 
 import creeping as cr
-import scatterers as sc
 from creeping.commands import run_field as _field_run
 from creeping.field.boundary import parse_boundary
 from studies.reference import sphere

@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from command_line import ran, table
 
 import creeping as cr
-import scatterers as sc
 from creeping.commands import run_field
 from creeping.commands.body import title_of
 from creeping.errors import InvalidInputError

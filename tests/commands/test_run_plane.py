@@ -6,10 +6,10 @@ import re
 import numpy as np
 import pytest
 import scipy.io
+import shared_bodies as sc
 from command_line import ran, table
 
 import creeping as cr
-import scatterers as sc
 from creeping.commands import run_field, run_plane
 from creeping.commands.run_plane import parse_plane
 from creeping.errors import InvalidInputError

@@ -6,11 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 import trimesh
 from command_line import creeping
 
 import creeping as cr
-import scatterers as sc
 from creeping.commands.upkeep import plain_numbers
 from studies._meshes import geodesic_sphere
 

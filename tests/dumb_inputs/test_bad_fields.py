@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 
 D = (0.0, 0.0, 1.0)
 SPHERE = sc.Sphere()

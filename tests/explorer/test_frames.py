@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.explorer.colours import ENDED, FIELD_COLOURS, LINEAR, field_colours, fitted_span
 from creeping.explorer.preview import outline, preview_of, step_of, steps_of
 from creeping.explorer.refined import cut_directions, refined_view

@@ -5,9 +5,9 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.explorer.preview import preview_of
 from creeping.explorer.request import ViewRequest
 from tests.patience import HANGS, until

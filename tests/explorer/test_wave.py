@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.explorer.colours import ENDED, WAVE_COLOURS
 from creeping.explorer.preview import preview_of, step_of
 from creeping.explorer.refined import refined_view

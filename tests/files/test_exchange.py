@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.io
+import shared_bodies as sc
 from fake_fields import echo_of, far_of
 
 import creeping as cr
-import scatterers as sc
 from creeping.files import read_ffe, write_ffe, write_mat, write_stk
 from creeping.files.ffe import grid_directions
 from creeping.sweeping.echoes import echo_of as echo_from

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from oracles.attenuation import extend, extend_along, first_zero
 from oracles.leaps import leap as oracle
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import creeping as cr
-import scatterers as sc
 from creeping.geodesics import attenuation
 from creeping.geodesics.attenuation import (
     NODES,

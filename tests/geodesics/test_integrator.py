@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from oracles.tracer import trace as oracle
 from scipy.integrate import solve_ivp
 from tolerances import JACOBI_DIFFERENCE, TRACE, TWIN
 
 import creeping as cr
-import scatterers as sc
 from creeping.geodesics import integrator
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import vector_field

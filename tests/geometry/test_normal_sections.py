@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
-import scatterers as sc
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.kernels.normal_sections import normal_sections

@@ -1,8 +1,8 @@
 """Parabolic points: none on convex bodies, circles on the torus, K = 0 on others."""
 
 import numpy as np
+import shared_bodies as sc
 
-import scatterers as sc
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.parabolic import parabolic_points
 from creeping.geometry.surface import normal

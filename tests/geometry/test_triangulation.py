@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
-import scatterers as sc
 from creeping.errors import SurfaceError
 from creeping.geometry import triangulation
 from creeping.geometry.triangulation import triangulate

@@ -7,9 +7,9 @@ import sys
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.surface import fingerprint
 from creeping.storage.folder import MANIFEST
 from tests.patience import HANGS

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.phaseflow.building import Plan
 from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.tuning.search import _scaled

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.creased import drawn_mesh
 from creeping.plotting import coupling_picture, surface_field_picture
 from creeping.plotting.body_fronts import chains, front_strokes

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.plotting import currents_picture, decay_picture, field_pictures, surface_field_picture
 from creeping.plotting.display import GLProbe

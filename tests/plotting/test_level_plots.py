@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from fake_fields import far_of
 
 import creeping as cr
-import scatterers as sc
 from creeping.plotting.pictures import new_figure
 from studies.reference import sphere
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
 from creeping.plotting._drawing import compose

@@ -9,10 +9,10 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from fake_fields import HOSTILE, Awkward, far_of
 
 import creeping as cr
-import scatterers as sc
 from creeping._presenting import brief
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.far_geometry import far_geometry
 from creeping.geodesics.pieces import trace_to
 from creeping.geodesics.states import P, pack

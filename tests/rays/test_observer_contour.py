@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.surface import normal
 from creeping.rays.observer_contour import forward_nodes, line_crossings
 from creeping.rays.strips import strips_of

@@ -1,8 +1,8 @@
 """Geodesics between ports: great circles, a count by shooting, Clairaut on a spheroid, symmetry of the second order."""
 
 import numpy as np
+import shared_bodies as sc
 
-import scatterers as sc
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import project

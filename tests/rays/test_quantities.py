@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from oracles.quantities import ray_points as oracle
 from scipy.integrate import solve_ivp
 from tolerances import ALONG_RAY, CURVATURE_BEND
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.surface import normal
 from creeping.rays.fan_points import ray_points as points_of

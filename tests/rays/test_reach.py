@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from scipy.special import ai_zeros
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import HARD
 from creeping.field.creeping_modes import modes_of
 from creeping.geometry.surface import size

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from oracles.shedding import shed_far
 from tolerances import SHED
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.surface import project
 from creeping.rays.shedding import shed_near, shed_on
 from creeping.rays.strips import strips_of

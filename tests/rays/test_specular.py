@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from tolerances import SHAPE_TERM, SPECULAR
 
-import scatterers as sc
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.surface import normal, project
 from creeping.rays.specular import specular_points

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from tolerances import STRIP, STRIP_SLOPE
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.surface import normal
 from creeping.rays.strips import gather, strips_of
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from oracles.plain_sweep import PlainSweeper
 
 import creeping as cr
-import scatterers as sc
 from creeping.rays.status import RayStatus
 from creeping.shadow.status import FAILED, NO_RAY, OK, SINGULAR
 from creeping.sweeping.request import sweep_request

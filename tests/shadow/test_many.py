@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from tolerances import FRACTION, LINE_LENGTH
 
 import creeping as cr
-import scatterers as sc
 from creeping.shadow.following import followed
 from creeping.shadow.many import shadow_lines
 from creeping.shadow.meshes import LineMeshes, neighbours_of

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.incident import rows_of
 from creeping.geometry.surface import size
 from creeping.shadow.many import shadow_lines

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
-import scatterers as sc
 from creeping.geometry.surface import normal, project
 from creeping.shadow.occlusion import occluded
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.surface import size
 from creeping.geometry.triangulation import triangulate
 

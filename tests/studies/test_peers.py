@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
-import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack

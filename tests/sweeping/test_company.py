@@ -1,9 +1,9 @@
 """What an incidence has does not depend on its company, with an impedance neither: by direct rays to rounding."""
 
 import numpy as np
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 
 
 def test_impedances_know_nothing_of_their_company():

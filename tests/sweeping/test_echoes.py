@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.labelled import power
 from creeping.field.lobes import lobe_step
 from creeping.sweeping.echoes import echo_of

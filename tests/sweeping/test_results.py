@@ -5,10 +5,10 @@ import itertools
 import fake_sweeps as fake
 import numpy as np
 import pytest
+import shared_bodies as sc
 import xarray
 
 import creeping as cr
-import scatterers as sc
 from creeping.storage import extras
 from creeping.sweeping import results as dataset
 from creeping.sweeping import run

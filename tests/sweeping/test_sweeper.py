@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from oracles.plain_sweep import PlainSweeper
 
 import creeping as cr
-import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.field.far_geometry import FarGeometry
 from creeping.rays.tracer import RayTracer

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geodesics.states import pack
 from creeping.shadow.panels import onto_line
 from creeping.sweeping.lattice import lattice_of

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.sweeping.between.worth import first_level, representatives, with_paying_lattice
 from creeping.sweeping.lattice import Lattice, lattice_of
 from creeping.sweeping.request import sweep_request

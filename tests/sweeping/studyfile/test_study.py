@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping import InvalidInputError
 from creeping.geometry.directions import angles_of, azimuth_elevation_of
 from creeping.rays.reach import ray_length
