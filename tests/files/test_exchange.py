@@ -165,7 +165,7 @@ def test_matlab_of_a_line_rays_and_curves(ball_fan, tmp_path):
 @pytest.mark.parametrize("boundary", ["hard", "pec"])
 def test_matlab_of_a_plane(ball_fan, tmp_path, boundary):
     chosen = {"polarisation": "theta"} if boundary == "pec" else {}
-    cut = cr.field_cut(ball_fan, wavenumber=6.0, boundary=boundary, extent=(3.0, 4.0), step=0.8, **chosen)
+    cut = cr.field_cut(ball_fan, wavenumber=30.0, boundary=boundary, extent=(3.0, 4.0), step=0.8, **chosen)
     back = loaded(tmp_path, cut)
     inside = np.linalg.norm(back["points"], axis=-1) < 1
     assert inside.any() and np.array_equal(inside, back["outside"] == 0)

@@ -47,7 +47,7 @@ LONG = {
     "direct, s = cr.DirectFlow(Plain(1.0, 0.8, 0.6)), rays(20_000, 12); direct.transport(s[:64], np.ones(1)); ready()\n"
     "direct.transport(s, np.array([99.0]))",
 }
-QUICK = ("flow of one block", "trace", "numpy methods")
+QUICK = (("flow of one block", 2), ("numpy methods", 1))
 
 
 def seconds_of(process):
@@ -111,11 +111,11 @@ def test_an_interrupt_meets_a_callback_before_it_catches(monkeypatch, interrupti
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processor time is read from /proc")
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("what", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in LONG])
+@pytest.mark.parametrize(
+    "what, threads",
+    [pytest.param(w, n, marks=[pytest.mark.slow] * ((w, n) not in QUICK)) for w in LONG for n in (1, 2)],
+)
 def test_long_calls_are_interrupted(what, threads, tmp_path, monkeypatch):
-    if threads == 2 and what in QUICK[1:]:
-        pytest.skip("one thread does it")
     monkeypatch.setenv("CREEPING_THREADS", str(threads))
 
     def wait(process):
