@@ -71,12 +71,16 @@ def test_ray_over_a_capsule(start, step):
 def test_fan_of_a_capsule_tells_its_crossings():
     body = CAPSULE
     line = cr.shadow_line(body, (1, 0, 0.5))
-    fan = cr.launch(cr.DirectFlow(body), line, length=1.5, n_rays=24)
+    fan = cr.launch(cr.DirectFlow(body), line, length=1.5, n_rays=16, max_gap=np.inf)
     assert set(fan.status_counts) == {"OK"} and fan.error.max < 1e-9
     rays, times, creases = fan.crossings
     assert set(creases) == {0, 1} and np.all(np.diff(rays) >= 0)
     flow = cr.DirectFlow(body)
-    for ray, time in list(zip(rays, times, strict=True))[::9][:6]:
+    np.testing.assert_allclose(np.linalg.norm(fan.directions, axis=-1), 1, atol=1e-12)
+    states = pack(fan.points[:, 0], fan.directions[:, 0])
+    again = trace_pieces(body, states, np.array([1.5]), rtol=1e-12).states[:, 0]
+    np.testing.assert_allclose(again[:, P], fan.directions[:, -1], atol=1e-9)
+    for ray, time in list(zip(rays, times, strict=True))[::4]:
         assert abs(flow.flow(fan.points[ray, 0], line.direction, time)[0][2]) == pytest.approx(1.0, abs=1e-9)
 
 
@@ -166,12 +170,3 @@ def test_maps_are_refused_and_the_choice_is_direct():
     with pytest.raises(InvalidInputError, match="DirectFlow"):
         cr.trace(body, (0, 0, -1), (1, 0, 0), 1.0)
     assert isinstance(cr.choose_flow(body, n_rays=10, length=1.0, tolerance=1e-6, cache=False), cr.DirectFlow)
-
-
-def test_directions_stay_unit():
-    body = CAPSULE
-    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 1, 3)), length=4.0, n_rays=16, max_gap=np.inf)
-    np.testing.assert_allclose(np.linalg.norm(fan.directions, axis=-1), 1, atol=1e-12)
-    states = pack(fan.points[:, 0], fan.directions[:, 0])
-    again = trace_pieces(body, states, np.array([4.0]), rtol=1e-12).states[:, 0]
-    np.testing.assert_allclose(again[:, P], fan.directions[:, -1], atol=1e-9)

@@ -18,18 +18,13 @@ write("filleted_box.step")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture(scope="module")
 def filleted(tmp_path_factory):
     return made(tmp_path_factory.mktemp("cad"), MAKER) / "filleted_box.step"
 
 
 @pytest.fixture(scope="module")
-def body(filleted, folder):
-    return sc.Cad(filleted, cache=folder / "fits")
+def body(filleted):
+    return sc.Cad(filleted, points=1500, cache=False)
 
 
 def test_a_box_with_all_edges_filleted_is_told_by_its_joints(body):
@@ -39,6 +34,8 @@ def test_a_box_with_all_edges_filleted_is_told_by_its_joints(body):
     half, inner = np.array([30e-3, 20e-3, 15e-3]), np.array([24e-3, 14e-3, 9e-3])
     straight = [round(2 * side, 6) for side in inner for _ in range(8)]
     assert len(body.pieces) == 26 and {crease.kind for crease in body.creases} == {"joint"}
+    assert body.quality.verdict == "curvature jumps"
+    assert body.quality.jumps == pytest.approx((sum(straight) + 24 * np.pi / 2 * r) / body.quality.edge_mean, rel=0.15)
     lengths = np.sort([crease.length for crease in body.creases])
     np.testing.assert_allclose(lengths, np.sort([*straight, *24 * [np.pi / 2 * r]]), rtol=5e-3)
 
@@ -61,10 +58,10 @@ def test_a_filleted_box_is_refused_as_strict(filleted):
         sc.Cad(filleted, strict=True, cache=False)
 
 
-@pytest.mark.usefixtures("body")
-def test_check_tells_of_joints_that_jets_do_not_see(filleted, capsys, folder, monkeypatch):
+@pytest.mark.slow
+def test_check_tells_of_joints_that_jets_do_not_see(filleted, capsys, tmp_path, monkeypatch):
     """Verdict, vertices on joints and the pieces' kinds are those of the faces, whatever polynomials make of points."""
-    monkeypatch.setenv("CREEPING_CACHE", str(folder))
+    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))
     texts = {}
     for form in ([], ["--json"]):
         with pytest.raises(SystemExit) as ended:

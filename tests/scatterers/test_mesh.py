@@ -148,7 +148,8 @@ def test_order_of_the_curvature(name):
     assert np.log(off[0] / off[1]) / np.log(edges[0] / edges[1]) > 3
 
 
-@pytest.mark.parametrize("name", [NAMES[0], *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES[1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
 def test_slivers_are_as_good(name):
     # as many vertices as the even mesh or more, of all shapes
     assert opened(name, 2000, "slivers").quality.verdict == "smooth"
