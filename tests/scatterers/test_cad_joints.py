@@ -24,7 +24,7 @@ def filleted(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def body(filleted):
-    return sc.Cad(filleted, points=1500, cache=False)
+    return sc.Cad(filleted, points=1000, cache=False)
 
 
 def test_a_box_with_all_edges_filleted_is_told_by_its_joints(body):

@@ -1,16 +1,14 @@
-"""Bodies given by an expression: F and its derivatives, the box found, the sphere map and its compiled twins, rays."""
+"""Bodies given by an expression: F and its derivatives, the box found, rays."""
 
 from functools import cache
 
 import numpy as np
 import pytest
-from numba import njit
-from tolerances import FRACTION, MAP, TRACE
+from tolerances import MAP, TRACE
 
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import project
 from scatterers.implicit import Implicit
 from scatterers.spline.cloud import body_cloud
@@ -48,7 +46,6 @@ def slow_if_large(names):
 
 
 every = pytest.mark.parametrize("name", slow_if_large(TEXTS))
-stars = pytest.mark.parametrize("name", slow_if_large(STARS))
 
 
 @cache
@@ -60,16 +57,6 @@ def body_of(name):
 def points_of(name):
     body = body_of(name)
     return body_cloud(body.level, body.gradient, body.bounds, 2000)
-
-
-@njit
-def call(function, *arguments):
-    function(*arguments)
-
-
-def directions(rng, n):
-    s = rng.normal(size=(n, 3))
-    return s / np.linalg.norm(s, axis=-1, keepdims=True)
 
 
 @pytest.mark.slow
@@ -99,40 +86,28 @@ def test_derivatives_of_the_exact_bodies(name, rng):
 
 
 @every
-def test_values_are_those_of_the_text(name, rng):
-    points = points_of(name) + 0.1 * rng.normal(size=points_of(name).shape)
+def test_level_and_derivatives_are_those_of_the_text(name, rng):
+    body, functions = body_of(name), body_of(name)._space.functions
+    points = points_of(name) + 0.05 * rng.normal(size=points_of(name).shape)
     names = {name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "pi")}
     expected = eval(TEXTS[name], names | dict(zip("xyz", points.T, strict=True)))
-    scale = np.max(np.abs(body_of(name).gradient(points)))
-    np.testing.assert_allclose(body_of(name).level(points), expected, atol=1e-13 * scale)
-
-
-@every
-def test_derivatives_are_those_of_differences(name, rng):
-    body = body_of(name)
-    points = points_of(name)[::7] + 0.05 * rng.normal(size=points_of(name)[::7].shape)
-    steps = STEP * np.eye(3)
-    scale = np.max(np.abs(body.hessian(points)))
-    slopes = [(body.level(points + h) - body.level(points - h)) / (2 * STEP) for h in steps]
-    np.testing.assert_allclose(body.gradient(points), np.stack(slopes, axis=-1), atol=1e-8 * scale)
-    bends = [(body.gradient(points + h) - body.gradient(points - h)) / (2 * STEP) for h in steps]
-    np.testing.assert_allclose(body.hessian(points), np.stack(bends, axis=-1), atol=1e-7 * scale)
-
-
-@every
-def test_compiled_level_equals_numpy(name, rng):
-    body = body_of(name)
-    functions, points = body._space.functions, points_of(name) + 0.05 * rng.normal(size=points_of(name).shape)
-    value, gradient, hessian = (
+    value, gradient, hessian = body.level(points), body.gradient(points), body.hessian(points)
+    np.testing.assert_allclose(value, expected, atol=1e-13 * np.max(np.abs(gradient)))
+    scale = np.max(np.abs(hessian))
+    # the compiled ones against those of numpy
+    plain = [
         np.stack([np.broadcast_to(part, len(points)) for part in f(*points.T)], axis=-1)
         for f in (functions.value, functions.gradient, functions.hessian)
-    )
-    scale = np.max(np.abs(hessian))
-    np.testing.assert_allclose(body.level(points), value[:, 0], atol=1e-13 * scale)
-    np.testing.assert_allclose(body.gradient(points), gradient, atol=1e-13 * scale)
-    np.testing.assert_allclose(
-        np.stack([body.hessian(points)[:, i, j] for i, j in COLUMNS], axis=-1), hessian, atol=1e-12 * scale
-    )
+    ]
+    np.testing.assert_allclose(value, plain[0][:, 0], atol=1e-13 * scale)
+    np.testing.assert_allclose(gradient, plain[1], atol=1e-13 * scale)
+    np.testing.assert_allclose(np.stack([hessian[:, i, j] for i, j in COLUMNS], axis=-1), plain[2], atol=1e-12 * scale)
+    # and both against differences
+    points, steps = points[::7], STEP * np.eye(3)
+    slopes = [(body.level(points + h) - body.level(points - h)) / (2 * STEP) for h in steps]
+    np.testing.assert_allclose(gradient[::7], np.stack(slopes, axis=-1), atol=1e-8 * scale)
+    bends = [(body.gradient(points + h) - body.gradient(points - h)) / (2 * STEP) for h in steps]
+    np.testing.assert_allclose(hessian[::7], np.stack(bends, axis=-1), atol=1e-7 * scale)
 
 
 @pytest.mark.parametrize("shape", [(4, 25), (0,), ()])
@@ -144,59 +119,12 @@ def test_any_shape_of_points(shape, rng):
     np.testing.assert_allclose(body.hessian(points), exact.hessian(points), atol=1e-12)
 
 
-@stars
-def test_sphere_map_and_its_compiled_twins(name, rng):
-    body, s = body_of(name), directions(rng, 200)
-    sphere_map = body.atlas.sphere_map
-    points, derivative = sphere_map.forward(s), sphere_map.derivative(s)
-    np.testing.assert_allclose(body.level(points), 0, atol=1e-13)
-    np.testing.assert_allclose(sphere_map.inverse(points), s, atol=1e-14)
-    # along the sphere only: psi is given there
-    t = np.cross(s, directions(rng, 200))
-    ahead, back = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (s + 1e-6 * t, s - 1e-6 * t))
-    difference = (sphere_map.forward(ahead) - sphere_map.forward(back)) / 2e-6
-    np.testing.assert_allclose((derivative @ t[..., None])[..., 0], difference, atol=1e-8)
-
-    forward, inverse = sphere_map.compiled_forward, sphere_map.compiled_inverse
-    x, d, back = np.empty((3, 200)), np.empty((9, 200)), np.empty((3, 200))
-    call(forward.function, np.ascontiguousarray(s.T), x, d, forward.parameters)
-    np.testing.assert_allclose(x.T, points, atol=1e-14)
-    np.testing.assert_allclose(d.T.reshape(-1, 3, 3), derivative, atol=1e-12)
-    call(inverse.function, x, back, inverse.parameters)
-    np.testing.assert_allclose(back.T, s, atol=1e-14)
-
-
-@every
-def test_compiled_locator_equals_numpy(name):
-    body, points = body_of(name), points_of(name)
-    locator, n = body.atlas.compiled, len(points_of(name))
-    found, uv, frame = np.empty(n, np.int64), np.empty((2, n)), np.empty((6, n))
-    rows = np.ascontiguousarray(points.T), np.ascontiguousarray(body.gradient(points).T)
-    call(locator.function, *rows, found, uv, frame, locator.parameters)
-    expected, expected_uv = body.atlas.locate(points)
-    np.testing.assert_array_equal(found, expected)
-    np.testing.assert_allclose(uv.T, expected_uv, atol=1e-13)
-    for number in np.unique(found)[::20]:
-        mine, chart = found == number, body.atlas.charts[number]
-        np.testing.assert_allclose(chart.point(uv.T[mine]), points[mine], atol=1e-12)
-        frames = np.moveaxis(polar_frame(chart.tangents(uv.T[mine])), 0, -1).swapaxes(0, 1)
-        np.testing.assert_allclose(frame.reshape(2, 3, n)[..., mine], frames, atol=1e-11)
-
-
 @every
 def test_bounds_contain_the_body_closely(name):
     low, high = points_of(name).min(0), points_of(name).max(0)
     below, above = low - body_of(name).bounds[0], body_of(name).bounds[1] - high
     assert np.all(below > 0) and np.all(above > 0)
     assert np.all(np.maximum(below, above) < 0.1 * (high - low))
-
-
-@stars
-def test_parameters_are_angles_of_the_sphere(name, rng):
-    body, s = body_of(name), directions(rng, 500)
-    theta, phi = np.moveaxis(body.parameters(body.atlas.sphere_map.forward(s)), -1, 0)
-    found = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-    np.testing.assert_allclose(found, s, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", slow_if_large(GENUS))
@@ -356,32 +284,6 @@ def test_map_of_an_ellipsoid(rng):
 def test_shadow_lines_of_published_length(name, direction, lengths):
     line = cr.shadow_line(body_of(name), direction)
     np.testing.assert_allclose([curve.length for curve in line.curves], lengths, atol=LENGTH)
-
-
-@pytest.mark.parametrize(
-    "name, direction, curve, shares",
-    [
-        ("torus", (1, 1, 1), 1, (0.55740772, 0.15522848, 0.28736380)),
-        ("peanut", (1, 0.5, 0.2), 0, (0.78261705, 0.05494849, 0.16243446)),
-    ],
-)
-def test_shares_of_shadow_lines(name, direction, curve, shares):
-    found = cr.shadow_line(body_of(name), direction).curves[curve].fractions
-    expected = dict(zip(("attached", "occluded", "concave"), shares, strict=True))
-    assert found == pytest.approx(expected, abs=FRACTION)
-
-
-def test_three_curves_on_the_peanut_along_its_axis():
-    # circles where the profile y(x) has y' = 0: the waist, and x^2 = c^2 - b^4/(4 c^2) twice
-    c, b = 0.8, 0.9
-    bulge, waist = b**2 / (2 * c), np.sqrt(b**2 - c**2)
-    along = cr.shadow_line(body_of("peanut"), (1, 0, 0))
-    np.testing.assert_allclose(
-        [k.length for k in along.curves], 2 * np.pi * np.array([bulge, bulge, waist]), atol=LENGTH
-    )
-    near = cr.shadow_line(body_of("peanut"), (1, 0.05, 0.02))
-    assert len(near.curves) == 3
-    assert near.curves[2].fractions["concave"] == pytest.approx(1)
 
 
 def test_charts_that_cannot_be_are_sought_once(monkeypatch):

@@ -343,11 +343,6 @@ def test_a_coarse_mesh_is_judged_by_its_fit():
         sc.Mesh(trimesh.creation.icosphere(1), cache=False)
 
 
-def test_unknown_units_are_refused():
-    with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
-        sc.Mesh(BALL, "yard", cache=False)
-
-
 @pytest.mark.parametrize(
     "times, distance, bend", [(4, 2e-7, 4e-5), pytest.param(5, 4e-9, 2e-5, marks=pytest.mark.slow)]
 )
