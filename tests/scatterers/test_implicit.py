@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numba import njit
 from tolerances import MAP, TRACE
 
 import creeping as cr
@@ -117,6 +118,22 @@ def test_any_shape_of_points(shape, rng):
     np.testing.assert_allclose(body.level(points), exact.level(points), atol=1e-12)
     np.testing.assert_allclose(body.gradient(points), exact.gradient(points), atol=1e-12)
     np.testing.assert_allclose(body.hessian(points), exact.hessian(points), atol=1e-12)
+
+
+@njit
+def call(function, *arguments):
+    function(*arguments)
+
+
+@pytest.mark.parametrize("name", ["peanut", "bent"])
+def test_compiled_sphere_map_equals_numpy(name, rng):
+    sphere_map, s = body_of(name).atlas.sphere_map, rng.normal(size=(200, 3))
+    s /= np.linalg.norm(s, axis=-1, keepdims=True)
+    x, d, forward = np.empty((3, 200)), np.empty((9, 200)), sphere_map.compiled_forward
+    call(forward.function, np.ascontiguousarray(s.T), x, d, forward.parameters)
+    np.testing.assert_allclose(x.T, sphere_map.forward(s), atol=1e-14)
+    np.testing.assert_allclose(d.T.reshape(-1, 3, 3), sphere_map.derivative(s), atol=1e-12)
+    np.testing.assert_allclose(body_of(name).level(x.T), 0, atol=1e-13)
 
 
 @every
