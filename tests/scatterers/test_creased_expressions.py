@@ -86,7 +86,12 @@ def test_edges_of_the_cube():
 
 
 @pytest.mark.parametrize(
-    "name, length", [("capsule", 2 * np.pi), ("cone", 2 * np.pi), ("two balls", np.sqrt(3) * np.pi)]
+    "name, length",
+    [
+        ("capsule", 2 * np.pi),
+        ("cone", 2 * np.pi),
+        pytest.param("two balls", np.sqrt(3) * np.pi, marks=pytest.mark.slow),
+    ],
 )
 def test_circles(name, length):
     for crease in body_of(name).creases:
@@ -97,13 +102,19 @@ def test_circles(name, length):
 
 
 def test_angle_of_an_edge_and_place_of_a_joint():
-    np.testing.assert_allclose(body_of("two balls").creases[0].angle, 2 * np.arcsin(0.5), atol=1e-9)
+    (edge,) = (crease for crease in body_of("cone").creases if crease.kind == "edge")
+    np.testing.assert_allclose(edge.angle, 0.75 * np.pi, atol=1e-9)
     for crease in body_of("capsule").creases:
         np.testing.assert_allclose(np.abs(crease.points[:, 2]), 1, atol=JOINT_AT)
 
 
 @pytest.mark.parametrize(
-    "name, places", [("cone", [(0, 0, 1)]), ("ogive", [(0, 0, -1), (0, 0, 1)]), ("pear", [(0, 0, 0)])]
+    "name, places",
+    [
+        ("cone", [(0, 0, 1)]),
+        ("ogive", [(0, 0, -1), (0, 0, 1)]),
+        pytest.param("pear", [(0, 0, 0)], marks=pytest.mark.slow),
+    ],
 )
 def test_tips(name, places):
     found = [crease.points[0] for crease in body_of(name).creases if crease.kind == "tip"]
@@ -199,9 +210,8 @@ def test_only_joints_leave_charts():
 
 
 def test_pieces_that_join_smoothly_are_one_smooth_body():
-    for text in ("x**2 + y**2 + z**2 - 1 + where(z < 0, 0, z**4)", "x**2/1.44 + y**2 + z**2 - 1"):
-        body = sc.Implicit(text)
-        assert type(body) is sc.Implicit and not isinstance(body, CreasedSurface)
+    body = sc.Implicit("x**2 + y**2 + z**2 - 1 + where(z < 0, 0, z**4)")
+    assert type(body) is sc.Implicit and not isinstance(body, CreasedSurface)
 
 
 def test_strict_takes_joints_and_refuses_edges():

@@ -71,7 +71,7 @@ def test_check_passes_and_counts_handles(name):
 @every
 def test_only_bodies_with_a_sphere_map_are_star_shaped(name):
     body = body_of(name)
-    assert body.star_shaped == (name in STARS)
+    assert type(body) is Implicit and body.star_shaped == (name in STARS)
     assert hasattr(body.atlas, "sphere_map") == body.star_shaped
     if body.star_shaped:
         assert body.atlas.sphere_map.spine.upright == (name not in ("bent", "twisted"))
@@ -212,11 +212,11 @@ def test_bounds_leave_another_body_out():
 @pytest.mark.parametrize(
     "text",
     [
-        "x**2 + y**2 + 1e6*z**2 - 1",
+        pytest.param("x**2 + y**2 + 1e6*z**2 - 1", marks=pytest.mark.slow),
         "x**16 + y**16 + z**16 - 1",
         "(sqrt(x**2 + y**2) - 1)**2 + z**2 - 0.999**2",
-        "sqrt(x**2 + 4*y**2 + 9*z**2) - 1",
-        "(x**2 + y**2)**1.5 + z**2 - 1",
+        pytest.param("sqrt(x**2 + 4*y**2 + 9*z**2) - 1", marks=pytest.mark.slow),
+        pytest.param("(x**2 + y**2)**1.5 + z**2 - 1", marks=pytest.mark.slow),
         "sqrt(x**2 + y**2 + 1e-6) - (1 - z**2)/2",
     ],
 )
