@@ -212,7 +212,7 @@ def test_several_bodies_are_refused(files, name):
     "name, options, pieces",
     [
         # what the wall leaves of the larger face, and the wall
-        ("joined.brep", {"part": "largest"}, 7),
+        pytest.param("joined.brep", {"part": "largest"}, 7, marks=pytest.mark.slow),
         pytest.param("touching.brep", {"part": "largest"}, 6, marks=pytest.mark.slow),
         pytest.param("joined.brep", {"part": 2}, 6, marks=pytest.mark.slow),
         pytest.param("touching.brep", {"part": 2}, 6, marks=pytest.mark.slow),
