@@ -15,6 +15,9 @@ EXACT = 1e-12
 """Of rays by rtol = 1e-12, over four sizes of a body."""
 
 
+CUT, CAPSULE, CONE = cut_sphere(0.5), Capsule(0.5, 1.0), cone(0.5, 1.0)
+
+
 def unit(*v):
     return np.array(v) / np.linalg.norm(v)
 
@@ -45,10 +48,10 @@ def on_capsule(x, d, times, radius, half):
     return points, one, two, (joint, joint + np.pi * radius)
 
 
-@pytest.mark.parametrize("start", [0.2, -0.3, 0.9999, -0.9999])
+@pytest.mark.parametrize("start", [0.2, -0.9999])
 @pytest.mark.parametrize("step", [None, 0.05])
 def test_ray_over_a_capsule(start, step):
-    body, d = Capsule(0.5, 1.0), unit(1, 0, 1.5)
+    body, d = CAPSULE, unit(1, 0, 1.5)
     x, times = np.array([[0.0, -0.5, start]]), np.linspace(0, 2.6, 53)
     found = trace_pieces(body, pack(x, d[None], lanes=12), times, rtol=1e-12, step=step)
     points, one, two, joints = on_capsule(x[0], d, times, 0.5, 1.0)
@@ -66,22 +69,26 @@ def test_ray_over_a_capsule(start, step):
 
 
 def test_fan_of_a_capsule_tells_its_crossings():
-    body = Capsule(0.5, 1.0)
+    body = CAPSULE
     line = cr.shadow_line(body, (1, 0, 0.5))
-    fan = cr.launch(cr.DirectFlow(body), line, length=1.5, n_rays=64)
+    fan = cr.launch(cr.DirectFlow(body), line, length=1.5, n_rays=16, max_gap=np.inf)
     assert set(fan.status_counts) == {"OK"} and fan.error.max < 1e-9
     rays, times, creases = fan.crossings
     assert set(creases) == {0, 1} and np.all(np.diff(rays) >= 0)
     flow = cr.DirectFlow(body)
-    for ray, time in list(zip(rays, times, strict=True))[::9]:
+    np.testing.assert_allclose(np.linalg.norm(fan.directions, axis=-1), 1, atol=1e-12)
+    states = pack(fan.points[:, 0], fan.directions[:, 0])
+    again = trace_pieces(body, states, np.array([1.5]), rtol=1e-12).states[:, 0]
+    np.testing.assert_allclose(again[:, P], fan.directions[:, -1], atol=1e-9)
+    for ray, time in list(zip(rays, times, strict=True))[::4]:
         assert abs(flow.flow(fan.points[ray, 0], line.direction, time)[0][2]) == pytest.approx(1.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("direction", [(1, 0, 0.2), (1, 0.5, 0), (-1, 0, 2)])
+@pytest.mark.parametrize("direction", [(1, 0, 0.2), (-1, 0, 2)])
 def test_cut_sphere(direction):
-    body, times = cut_sphere(0.5), np.linspace(0, 4, 81)
+    body, times = CUT, np.linspace(0, 4, 81)
     line = cr.shadow_line(body, direction)
-    fan = cr.launch(cr.DirectFlow(body, rtol=1e-12), line, length=4.0, n_rays=48, n_steps=80, max_gap=np.inf)
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-12), line, length=4.0, n_rays=24, n_steps=80, max_gap=np.inf)
     z, up = fan.points[:, 0, 2], line.direction[2]
     # z cos t + up sin t = 1/2 for the first time
     far, when = np.hypot(z, up), np.arctan2(up, z)
@@ -104,25 +111,25 @@ def test_cylinder_and_cone():
     """Both unroll: straight lines, J = 1, up to the rim."""
     body = cylinder(0.5, 1.0)
     line = cr.shadow_line(body, (1, 0, 1))
-    fan = cr.launch(cr.DirectFlow(body), line, length=4.0, n_rays=32, max_gap=np.inf)
+    fan = cr.launch(cr.DirectFlow(body), line, length=4.0, n_rays=24, max_gap=np.inf)
     assert set(fan.status_counts) == {"EDGE"}
     np.testing.assert_allclose(fan.detachment, (1 - fan.points[:, 0, 2]) * np.sqrt(2), atol=EXACT)
     np.testing.assert_allclose(fan.spreading, 1, atol=EXACT)
-    body = cone(0.5, 1.0)
+    body = CONE
     line = cr.shadow_line(body, (1, 0, 0))
-    fan = cr.launch(cr.DirectFlow(body), line, length=1.5, n_rays=32, max_gap=np.inf)
+    fan = cr.launch(cr.DirectFlow(body), line, length=1.5, n_rays=24, max_gap=np.inf)
     apart = fan.points[:, 0] - [0, 0, 1.0]
     rho, slant = np.linalg.norm(apart, axis=1), np.hypot(0.5, 1.0)
     along = apart @ line.direction / rho
     end = -rho * along + np.sqrt(slant**2 - rho**2 * (1 - along**2))
     met = end < 1.5
-    assert met.sum() > 20 and np.all(fan.status[met] == cr.RayStatus.EDGE)
+    assert met.sum() > 14 and np.all(fan.status[met] == cr.RayStatus.EDGE)
     np.testing.assert_allclose(fan.detachment[met], end[met], atol=1e-8)
     np.testing.assert_allclose(fan.spreading, 1, atol=1e-8)
 
 
 def test_rays_into_a_tip_end_next_to_it():
-    body = cone(0.5, 1.0)
+    body = CONE
     near, slant = REACH * size(body), np.hypot(0.5, 1.0)
     x = np.array([[0.25, 0.0, 0.5], [0.25, 0.0, 0.5]])
     p = np.array([unit(-0.5, 0, 1.0), unit(-0.5, 1e-2, 1.0)])
@@ -139,7 +146,7 @@ def test_rays_into_a_tip_end_next_to_it():
 
 def test_concave_edge_ends_rays_too():
     body = TwoBalls(0.7)
-    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 0, 1)), length=3.0, n_rays=32, max_gap=np.inf)
+    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 0, 1)), length=3.0, n_rays=24, max_gap=np.inf)
     ended = fan.status == cr.RayStatus.EDGE
     assert ended.any()
     last = fan.points[ended, -1]
@@ -148,7 +155,7 @@ def test_concave_edge_ends_rays_too():
 
 
 def test_neighbours_that_end_apart_are_not_refined_for_ever():
-    body = cut_sphere(0.5)
+    body = CUT
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (1, 0, 0.2)), length=3.0, n_rays=16)
     assert 16 <= len(fan.points) < 200
     apart = np.linalg.norm(np.diff(fan.points, axis=0), axis=-1)
@@ -157,18 +164,9 @@ def test_neighbours_that_end_apart_are_not_refined_for_ever():
 
 
 def test_maps_are_refused_and_the_choice_is_direct():
-    body = cut_sphere(0.5)
+    body = CUT
     with pytest.raises(InvalidInputError, match="DirectFlow"):
         cr.build_phase_map(body)
     with pytest.raises(InvalidInputError, match="DirectFlow"):
         cr.trace(body, (0, 0, -1), (1, 0, 0), 1.0)
     assert isinstance(cr.choose_flow(body, n_rays=10, length=1.0, tolerance=1e-6, cache=False), cr.DirectFlow)
-
-
-def test_directions_stay_unit():
-    body = Capsule(0.5, 1.0)
-    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 1, 3)), length=4.0, n_rays=16, max_gap=np.inf)
-    np.testing.assert_allclose(np.linalg.norm(fan.directions, axis=-1), 1, atol=1e-12)
-    states = pack(fan.points[:, 0], fan.directions[:, 0])
-    again = trace_pieces(body, states, np.array([4.0]), rtol=1e-12).states[:, 0]
-    np.testing.assert_allclose(again[:, P], fan.directions[:, -1], atol=1e-9)

@@ -117,7 +117,7 @@ def test_rays_that_pass_by_a_tip_keep_their_invariant():
 def test_rays_do_not_depend_on_their_company_and_all_end_as_data():
     """On a cone unrolled a ray at a distance from the apex goes on straight; it ends at the rim or next to the apex."""
     body, slope = cone(0.5, 1.0), np.array([-0.5, 0.0, 1.0]) / np.hypot(0.5, 1.0)
-    aside = np.concatenate([[0.0, 1e-9], np.geomspace(1e-4, 1.0, 30)])
+    aside = np.concatenate([[0.0, 1e-9], np.geomspace(1e-4, 1.0, 14)])
     p = np.cos(aside)[:, None] * slope + np.sin(aside)[:, None] * np.array([0.0, 1.0, 0.0])
     first = pack(np.broadcast_to([0.25, 0.0, 0.5], p.shape), p, jacobi=True)
     found = trace_pieces(body, first, np.linspace(0, 2.0, 21), rtol=1e-10)
@@ -125,9 +125,9 @@ def test_rays_do_not_depend_on_their_company_and_all_end_as_data():
     half, whole = np.hypot(0.25, 0.5), np.hypot(0.5, 1.0)
     rim = half * np.cos(aside) + np.sqrt(whole**2 - (half * np.sin(aside)) ** 2)
     tip = found.crease == 1
-    assert tip[:2].all() and not tip[-20:].any()
+    assert tip[:2].all() and not tip[-9:].any()
     np.testing.assert_allclose(found.end[~tip], rim[~tip], atol=1e-8)
-    for ray in (0, 15, 31):
+    for ray in (0, 7, 15):
         alone = trace_pieces(body, first[ray : ray + 1], np.linspace(0, 2.0, 21), rtol=1e-10)
         np.testing.assert_allclose(alone.states[0], found.states[ray], atol=1e-8)
         assert abs(alone.end[0] - found.end[ray]) < 1e-8

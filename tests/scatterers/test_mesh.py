@@ -18,7 +18,7 @@ from scatterers.triangles.quality import MeshQuality
 from studies._meshes import capsule, on_body, scattered, slivers, torus_grid
 
 NAMES = ("ellipsoid", "torus", "twisted")
-POINTS, RAYS, LENGTH = 2000, 60, 2.0
+POINTS, RAYS, LENGTH = 1000, 40, 2.0
 QUANTITIES = ("position", "normals", "normal curvature", "geodesics", "attenuation")
 # twice what was measured at 2000 vertices; at 10000 what the method promises for bodies of size 1 to 3
 LIMITS = {
@@ -93,6 +93,12 @@ def traced(body, points, along):
     return x[:, -1], np.sum(rate[:, 1:] + rate[:, :-1], axis=1) * times[1] / 2
 
 
+def curvature_error(name, n, kind="even"):
+    points, along = cloud(name)
+    mesh = opened(name, n, kind)
+    return rms(curvature(mesh, project(mesh, points), along) - curvature(exact(name), points, along))
+
+
 @cache
 def errors(name, n, kind="even"):
     mesh, body = opened(name, n, kind), exact(name)
@@ -104,7 +110,7 @@ def errors(name, n, kind="even"):
     return (
         rms(np.linalg.norm(found - points, axis=1)),
         rms(np.linalg.norm(normal(mesh, found) - normal(body, points), axis=1)),
-        rms(curvature(mesh, found, along) - curvature(body, points, along)),
+        curvature_error(name, n, kind),
         float(np.median(np.linalg.norm(ends[1] - ends[0], axis=1))),
         rms(attenuation[1] - attenuation[0]),
     )
@@ -148,7 +154,8 @@ def test_order_of_the_curvature(name):
     assert np.log(off[0] / off[1]) / np.log(edges[0] / edges[1]) > 3
 
 
-@pytest.mark.parametrize("name", [NAMES[0], *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES[1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
 def test_slivers_are_as_good(name):
     # as many vertices as the even mesh or more, of all shapes
     assert opened(name, 2000, "slivers").quality.verdict == "smooth"
@@ -162,7 +169,7 @@ def test_noise_is_met_and_told(name):
     assert mesh.quality.noise == pytest.approx(1e-3, rel=0.3)
     assert mesh.fit.noise == pytest.approx(1e-3 * mesh.quality.edge_mean, rel=0.3)
     assert mesh.fit.smoothing > clean.fit.smoothing and mesh.fit.points == clean.quality.vertices
-    true = errors(name, 2000, "noisy")[2]
+    true = curvature_error(name, 2000, "noisy")
     assert true < 2 * mesh.fit.normal_curvature_error
     # twice what was measured
     assert true < 0.01 * mesh.fit.normal_curvature
@@ -295,11 +302,10 @@ def cube():
 REFUSED = {
     "cube": (cube, r"not smooth enough \(sharp\): .* lie on edges of more than 40 degrees .*; round the edges off"),
     "cube, bare": (trimesh.creation.box, r"not smooth enough \(sharp\)"),
-    "cylinder": (lambda: trimesh.creation.cylinder(0.5, 2, sections=64).subdivide_to_size(0.1), r"\(sharp\)"),
     "coarse torus": (lambda: Triangles(*torus_grid(444)), r"not smooth enough \(too coarse\): .*; halve the edges"),
     "few vertices": (lambda: trimesh.creation.icosphere(1), r"\(too coarse\): 42 vertices are too few"),
     "capsule": (
-        lambda: Triangles(*capsule(5000)),
+        lambda: Triangles(*capsule(3000)),
         r"\(curvature jumps\): the curvature jumps at \d+ of \d+ vertices, .*: blend the faces",
     ),
     "open": (lambda: Triangles(BALL.vertices, BALL.faces[1:]), "3 of 1920 edges of the mesh are open"),
@@ -324,7 +330,7 @@ def test_what_is_no_body_is_refused_by_default_too(name):
         sc.Mesh(make(), cache=False)
 
 
-@pytest.mark.parametrize("make", [trimesh.creation.box, cube])
+@pytest.mark.parametrize("make", [trimesh.creation.box, pytest.param(cube, marks=pytest.mark.slow)])
 def test_edges_are_taken_in_pieces(make):
     body = sc.Mesh(make(), cache=False)
     assert body.quality.verdict == "sharp" and len(body.pieces) == 6 and len(body.creases) == 12
@@ -343,18 +349,15 @@ def test_a_coarse_mesh_is_judged_by_its_fit():
         sc.Mesh(trimesh.creation.icosphere(1), cache=False)
 
 
-def test_unknown_units_are_refused():
-    with pytest.raises(ValueError, match="units = 'yard' is none of m, mm"):
-        sc.Mesh(BALL, "yard", cache=False)
-
-
-@pytest.mark.parametrize("sides", [(1.0, 0.8, 0.6), (1.3, 1.0, 0.9)])
-def test_ten_thousand_vertices_are_fitted_as_well_as_their_spline_can(sides):
+@pytest.mark.parametrize(
+    "times, distance, bend", [(4, 2e-7, 4e-5), pytest.param(5, 4e-9, 2e-5, marks=pytest.mark.slow)]
+)
+def test_vertices_are_fitted_as_well_as_their_spline_can(times, distance, bend):
     """What smooths F far from the body, where its distance has kinks, must not bend it on the body."""
-    ball = trimesh.creation.icosphere(subdivisions=5)
+    ball, sides = trimesh.creation.icosphere(subdivisions=times), (1.3, 1.0, 0.9)
     body = sc.Mesh(trimesh.Trimesh(ball.vertices * sides, ball.faces, process=False), cache=False)
     exact = sc.Ellipsoid(*sides)
-    x = np.random.default_rng(11).normal(size=(3000, 3))
+    x = np.random.default_rng(11).normal(size=(1000, 3))
     x = exact.forward(x / np.linalg.norm(x, axis=1, keepdims=True))
     n = exact.gradient(x)
     n /= np.linalg.norm(n, axis=1, keepdims=True)
@@ -365,9 +368,9 @@ def test_ten_thousand_vertices_are_fitted_as_well_as_their_spline_can(sides):
         return np.einsum("ni,nij,nj->n", e, shape.hessian(x), e) / np.linalg.norm(shape.gradient(x), axis=1)
 
     off = body.level(x) / np.linalg.norm(body.gradient(x), axis=1)
-    assert np.sqrt(np.mean(off**2)) < 4e-9
+    assert np.sqrt(np.mean(off**2)) < distance
     wanted = curvature(exact)
-    assert np.sqrt(np.mean((curvature(body) - wanted) ** 2)) < 2e-5 * np.sqrt(np.mean(wanted**2))
+    assert np.sqrt(np.mean((curvature(body) - wanted) ** 2)) < bend * np.sqrt(np.mean(wanted**2))
     # and the coarser fit tells it
     stated = np.sqrt(np.mean((curvature(body) - curvature(body.coarse_fit)) ** 2))
     assert stated > np.sqrt(np.mean((curvature(body) - wanted) ** 2))

@@ -61,22 +61,3 @@ def test_refusals_name_the_option_that_helps(name, message):
     """Several bodies, and holes."""
     with pytest.raises(ValueError, match=message):
         opened(name)
-
-
-@needs
-def test_a_coarse_torus_lies_on_the_exact_one():
-    """2304 vertices, kappa e = .31: refused before; the fit says what it is worth, and is as good as it says."""
-    body = opened("oded_torus.obj")
-    rng = np.random.default_rng(0)
-    u, v = rng.uniform(0, 2 * np.pi, (2, 2000))
-    vertices = sc.examined_mesh(FOLDER / "oded_torus.obj", "m")[0].vertices
-    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    # its axis is y, the radii 1 and 1/4
-    ring = np.stack([np.cos(u), 0 * u, np.sin(u)], axis=1)
-    normals = np.cos(v)[:, None] * ring + np.outer(np.sin(v), [0, 1, 0])
-    points = middle + ring + 0.25 * normals
-    gradient = body.gradient(points)
-    off = np.abs(body.level(points)) / np.linalg.norm(gradient, axis=1)
-    assert np.max(off) < 1e-3
-    doubt = body.fit.normal_curvature_error / body.fit.normal_curvature
-    assert 0 < doubt < 0.01

@@ -23,7 +23,10 @@ def angle_piece():
     return trimesh.creation.extrude_triangulation(corners, faces, 1.0)
 
 
-def half_torus(n=48, m=40):
+SIDES = 40
+
+
+def half_torus(n=48, m=SIDES):
     """The half x > 0 of a torus about z, its two ends flat discs, with vertices on the circles where they meet."""
     u, v = np.linspace(-np.pi / 2, np.pi / 2, n), np.linspace(0, 2 * np.pi, m, endpoint=False)
     out = R + TUBE * np.cos(v)
@@ -46,6 +49,7 @@ SOURCES = {
     "L": angle_piece,
     "plate": lambda: trimesh.creation.box(extents=(1.0, 0.8, 0.02)),
     "rod": lambda: trimesh.creation.cylinder(radius=0.5, height=2.0, sections=64),
+    "rod of few triangles": lambda: trimesh.creation.cylinder(radius=0.5, height=2.0, sections=24),
     "half torus": half_torus,
 }
 
@@ -89,7 +93,7 @@ def test_the_level_has_the_sign_of_the_body(name, pieces):
     assert np.array_equal(body.level(points)[asked] > 0, expected[asked] > 0)
 
 
-@pytest.mark.parametrize("name", ["box", "L", "plate"])
+@pytest.mark.parametrize("name", ["L", pytest.param("plate", marks=pytest.mark.slow)])
 def test_the_piece_is_that_of_the_face(name):
     body = opened(name)
     corners, normals, number = body.tiles(0.2)
@@ -104,7 +108,7 @@ def test_the_piece_is_that_of_the_face(name):
     )
     assert not body.non_smooth(middles).any()
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    assert area == pytest.approx({"box": 6, "L": 2 * 3 + 8, "plate": 1.6 + 3.6 * 0.02}[name])
+    assert area == pytest.approx({"L": 2 * 3 + 8, "plate": 1.6 + 3.6 * 0.02}[name])
 
 
 def curvatures(body, x):
@@ -117,7 +121,7 @@ def curvatures(body, x):
 
 
 def test_a_rod_is_a_cylinder_between_two_planes():
-    body = opened("rod")
+    body = opened("rod of few triangles")
     assert [(c.kind, c.closed) for c in body.creases] == [("edge", True)] * 2
     rng = np.random.default_rng(7)
     angle, z = rng.uniform(0, 2 * np.pi, 200), rng.uniform(-0.99, 0.99, 200)
@@ -134,14 +138,14 @@ def test_a_rod_is_a_cylinder_between_two_planes():
 def test_a_torus_cut_in_half_is_known_up_to_its_rims():
     body = opened("half torus")
     rims = [crease for crease in body.creases if crease.kind == "edge"]
-    assert sum(c.length for c in rims) == pytest.approx(2 * 40 * 2 * TUBE * np.sin(np.pi / 40))
+    assert sum(c.length for c in rims) == pytest.approx(2 * SIDES * 2 * TUBE * np.sin(np.pi / SIDES))
     rng = np.random.default_rng(9)
-    u, v = rng.uniform(-np.pi / 2, np.pi / 2, 2000), rng.uniform(0, 2 * np.pi, 2000)
+    u, v = rng.uniform(-np.pi / 2, np.pi / 2, 1000), rng.uniform(0, 2 * np.pi, 1000)
     along = np.stack([np.cos(u), np.sin(u), 0 * u], axis=1)
     exact = np.cos(v)[:, None] * along + np.outer(np.sin(v), [0, 0, 1])
     points = R * along + TUBE * exact
     off = points[:, 0]
-    edge = 2 * np.pi * TUBE / 40
+    edge = 2 * np.pi * TUBE / SIDES
     x = project(body, points[off > 3 * edge])
     assert np.linalg.norm(x - points[off > 3 * edge], axis=1).max() < 1e-4
     n, mean = curvatures(body, x)
@@ -191,17 +195,17 @@ DAMAGE = {
 
 @pytest.mark.parametrize("name", DAMAGE)
 def test_damaged_pieces_are_refused(name):
-    arrays = opened("box")._parts.arrays("fine")
+    arrays = opened("L")._parts.arrays("fine")
     plain = {key.removeprefix("fine-"): value for key, value in arrays.items()}
     SplinePieces.restored(arrays, "fine")
     with pytest.raises(ValueError, match="damaged"):
         SplinePieces.restored(arrays | {f"fine-{name}": DAMAGE[name](plain)}, "fine")
 
 
-@pytest.mark.parametrize("place, value", [(3, np.nan), (3, -1.0), (4, 0.0), (4, 1e9), (7, 3.0), (9, 1e12), (9, 0.0)])
-def test_damaged_tables_are_refused(place, value):
-    arrays = dict(opened("box")._parts.arrays("fine"))
-    arrays["fine-table"] = arrays["fine-table"].copy()
-    arrays["fine-table"][place] = value
-    with pytest.raises(ValueError, match="the table of the pieces is damaged"):
-        SplinePieces.restored(arrays, "fine")
+def test_damaged_tables_are_refused():
+    arrays = opened("L")._parts.arrays("fine")
+    for place, value in [(3, np.nan), (3, -1.0), (4, 0.0), (4, 1e9), (7, 3.0), (9, 1e12), (9, 0.0)]:
+        table = arrays["fine-table"].copy()
+        table[place] = value
+        with pytest.raises(ValueError, match="the table of the pieces is damaged"):
+            SplinePieces.restored(arrays | {"fine-table": table}, "fine")

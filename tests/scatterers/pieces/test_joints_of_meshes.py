@@ -22,7 +22,7 @@ from studies._meshes import capsule, geodesic_sphere, on_body, slivers, torus_gr
 PILL, SHORT, CONE = sc.Capsule(0.8, 3.1), sc.Capsule(1.0, 2.2), sc.ConeSphere(1.0, 3.3)
 MESHES = {
     # rings beside the joints, triangles of all shapes, a cylinder of long triangles, one of three rings
-    "even": (lambda: capsule(3000, 1.5, 0.8), PILL),
+    "even": (lambda: capsule(2000, 1.5, 0.8), PILL),
     "slivers": (lambda: slivers(PILL, 20), PILL),
     "long": (lambda: long_triangles(), PILL),
     "short": (lambda: capsule(4000, 0.2, 1.0), SHORT),
@@ -44,7 +44,9 @@ def opened(name):
     return sc.Mesh(SimpleNamespace(vertices=points @ turn.T, faces=triangles), cache=False), exact, turn
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize(
+    "name", ["even", "cone", *(pytest.param(name, marks=pytest.mark.slow) for name in ("slivers", "long", "short"))]
+)
 def test_joints_are_those_of_the_exact_body(name):
     body, exact, turn = opened(name)
     assert body.quality.verdict == "curvature jumps" and "on joints of planes and quadrics" in body.quality.reasons
@@ -76,7 +78,12 @@ def slope(body, points):
 
 
 @pytest.mark.parametrize(
-    ("name", "direction"), [("even", (0.3, 0.5, 0.8)), ("slivers", (-0.6, 0.1, 0.4)), ("cone", (0.2, 0.9, -0.5))]
+    ("name", "direction"),
+    [
+        ("even", (0.3, 0.5, 0.8)),
+        pytest.param("slivers", (-0.6, 0.1, 0.4), marks=pytest.mark.slow),
+        ("cone", (0.2, 0.9, -0.5)),
+    ],
 )
 def test_shadow_line_and_rays_are_those_of_the_exact_body(name, direction):
     body, exact, turn = opened(name)
@@ -101,7 +108,11 @@ def test_shadow_line_and_rays_are_those_of_the_exact_body(name, direction):
 
 
 @pytest.mark.parametrize(
-    ("name", "amount"), [("even", 1e-6), ("even", 1e-5), ("slivers", 1e-5), ("short", 1e-5), ("cone", 1e-6)]
+    ("name", "amount"),
+    [
+        ("even", 1e-5),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in (("slivers", 1e-5), ("short", 1e-5), ("cone", 1e-6))),
+    ],
 )
 def test_joints_are_found_within_the_noise_of_the_vertices(name, amount):
     (points, triangles), exact = MESHES[name][0](), MESHES[name][1]
@@ -134,20 +145,15 @@ SMOOTH = {
 }
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-7, 1e-5])
-@pytest.mark.parametrize("name", SMOOTH)
-def test_smooth_bodies_have_no_joints(name, noise):
-    not_split(name, noise, 2000)
+QUICK = [("ellipsoid", 0.0), ("torus", 1e-5), ("twisted, slivers", 1e-5), ("bumpy", 1e-7)]
+SLOW = [(name, noise, count) for name in SMOOTH for noise in (0.0, 1e-5) for count in (2000, 10_000)]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", [0.0, 1e-5])
-@pytest.mark.parametrize("name", SMOOTH)
-def test_finely_meshed_smooth_bodies_have_no_joints(name, noise):
-    not_split(name, noise, 10_000)
-
-
-def not_split(name, noise, count):
+@pytest.mark.parametrize(
+    "name, noise, count",
+    [*((*case, 800) for case in QUICK), *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW)],
+)
+def test_smooth_bodies_have_no_joints(name, noise, count):
     """Whatever jets say of the curvature there."""
     points, triangles = SMOOTH[name](count)
     rng = np.random.default_rng(11)
@@ -183,7 +189,7 @@ def test_lines_of_a_cone_come_to_its_tip_from_all_sides():
     """Next to the tip the slope of a quadric fades into rounding; no curve is lost for that."""
     body, exact, turn = opened("cone")
     rng = np.random.default_rng(4)
-    for d in rng.normal(size=(6, 3)):
+    for d in rng.normal(size=(2, 3)):
         found, wanted = cr.shadow_line(body, turn @ d / np.linalg.norm(d)), cr.shadow_line(exact, d / np.linalg.norm(d))
         assert len(found.curves) == len(wanted.curves)
         lengths = [sum(curve.length for curve in line.curves) for line in (found, wanted)]
@@ -191,6 +197,6 @@ def test_lines_of_a_cone_come_to_its_tip_from_all_sides():
 
 
 def test_strict_refuses_joints():
-    points, triangles = capsule(3000, 1.5, 0.8)
+    points, triangles = capsule(2000, 1.5, 0.8)
     with pytest.raises(ValueError, match=r"\(curvature jumps\): .* on joints of planes and quadrics"):
         sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), strict=True, cache=False)

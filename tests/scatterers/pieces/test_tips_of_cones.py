@@ -18,7 +18,7 @@ SLANT = np.hypot(RADIUS, HEIGHT)
 @cache
 def cone():
     """Rings with about as many vertices as their radii ask for, by the convex hull; a base of few triangles."""
-    step, points = 0.05, [[0.0, 0.0, HEIGHT]]
+    step, points = 0.1, [[0.0, 0.0, HEIGHT]]
     for k, up in enumerate(np.arange(0, SLANT - 0.5 * step, step)):
         r = RADIUS * (1 - up / SLANT)
         count = max(3, round(2 * np.pi * r / step))

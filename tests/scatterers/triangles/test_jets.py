@@ -57,7 +57,10 @@ EXPECTED = {
 }
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in ("ellipsoid 10k", "twisted 10k") else ()) for name in MESHES],
+)
 def test_normals_and_curvatures_are_exact_to_their_order(name):
     body, vertices, _, jets = made(name)
     assert jets.fitted.all()
