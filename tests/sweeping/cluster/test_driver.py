@@ -48,6 +48,7 @@ def test_one_and_two_workers_and_none_give_the_same_bytes(two, tmp_path):
     assert len(in_flight) == 14 and max(in_flight) <= 2 * cluster.AHEAD + 1
 
 
+@pytest.mark.slow
 def test_poison_costs_its_incidence_alone(two, tmp_path, monkeypatch):
     plan = fake.plan(40, 4)
     store = SweepStore.create(tmp_path / "s.zarr", plan)
@@ -163,4 +164,4 @@ def test_the_cluster_is_for_this_user_of_this_machine(two):
     address = two.scheduler.address
     for tried in (address, address.replace("tls", "tcp")):
         with pytest.raises((OSError, TypeError, AssertionError)):
-            distributed.Client(tried, timeout=3, set_as_default=False)
+            distributed.Client(tried, timeout=1, set_as_default=False)
