@@ -170,6 +170,7 @@ def test_fillets_are_joints(files):
     assert kinds(parted(files / "filleted.brep")) == [("edge", 3.14), ("joint", 1.88), ("joint", 3.14)]
 
 
+@pytest.mark.slow
 def test_halves_of_one_face_are_parted_by_seams(files):
     halves = parted(files / "halves.brep")
     # the halves of both lids and of the cylinder are parts of one surface, parted along lines of length 1

@@ -10,6 +10,7 @@ import scatterers as sc
 from creeping.commands import main as cli
 
 pytest.importorskip("gmsh", exc_type=ImportError)
+pytestmark = pytest.mark.slow
 
 MAKER = """
 make.fillet([make.addBox(0, 0, 0, 60, 40, 30)], list(range(1, 13)), [6.0])
@@ -52,13 +53,11 @@ def test_a_box_with_all_edges_filleted_is_told_by_its_joints(body):
     np.testing.assert_allclose(body.level(x[near]), away[near], atol=2e-6)
 
 
-@pytest.mark.slow
 def test_a_filleted_box_is_refused_as_strict(filleted):
     with pytest.raises(ValueError, match=r"not smooth enough \(curvature jumps\): the curvature jumps at \d+ of \d+ "):
         sc.Cad(filleted, strict=True, cache=False)
 
 
-@pytest.mark.slow
 def test_check_tells_of_joints_that_jets_do_not_see(filleted, capsys, tmp_path, monkeypatch):
     """Verdict, vertices on joints and the pieces' kinds are those of the faces, whatever polynomials make of points."""
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))

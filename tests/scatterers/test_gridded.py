@@ -272,10 +272,7 @@ def ring(nodes):
 
 
 def test_torus_is_not_star_shaped_and_known_by_its_samples():
-    body = ring(24)
-    assert not body.star_shaped
-    other = sc.Gridded.sampled(sc.Torus(1.0, 0.45), 24)
-    assert len({body.fingerprint, other.fingerprint, sc.Gridded.sampled(sc.Torus(), 20).fingerprint}) == 3
+    assert not ring(24).star_shaped and ring(24).fingerprint != ring(48).fingerprint
 
 
 @pytest.mark.slow
