@@ -90,6 +90,7 @@ def test_the_focus_behind_a_sphere(ball, mie):
     assert np.linalg.norm(H, axis=1).min() > 0.25 and off.max() < 2e-3
 
 
+@pytest.mark.slow
 def test_triaxial(triaxial, rng):
     fan, k, solution = triaxial
     nodes = body_nodes(fan.body, 20.0)
