@@ -67,6 +67,7 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     assert (round(float(rows[-1]["theta"])), round(float(rows[-1]["phi"]))) == (150, 20)
 
 
+@pytest.mark.slow
 def test_run_of_a_conductor_shows_its_currents(tmp_path, capsys):
     options = ["--direction", 1, 1, 0, "--flow", "direct", "--rays", 32, "--length", 3.2, "--backend", "matplotlib"]
     field = ["--wavenumber", 30, "--boundary", "pec", "--observe", "backscatter"]

@@ -42,6 +42,7 @@ def test_planes_are_written(tmp_path, capsys):
     assert np.median(np.abs(values[away] - exact)) < 0.03
 
 
+@pytest.mark.slow
 def test_a_frequency_makes_the_lengths_of_a_plane_metres(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr("creeping.plotting.field_cut_picture", lambda _, cut, **words: drawn.append((cut, words)))

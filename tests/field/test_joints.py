@@ -119,6 +119,7 @@ def test_along_the_axis_the_equation_starts_from_nothing(boundary, k, most):
     assert np.all(u.ok) and np.quantile(np.abs(u.values - true), 0.95) < 0.01 * unit
 
 
+@pytest.mark.slow
 def test_along_the_axis_where_the_equation_is_too_large(monkeypatch):
     """Rays and optics far away, and elsewhere words or a status, no foreign error."""
     monkeypatch.setattr(on_body, "affordable", lambda *_: False)

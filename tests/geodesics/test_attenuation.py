@@ -93,6 +93,7 @@ def test_weighted_rate_carries_the_speed():
         np.testing.assert_allclose(got[..., 10], 2 * 0.5, rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_times_between_leaps_agree_with_direct_flow(rng):
     body = sc.TwistedEllipsoid()
     flow = cr.build_phase_map(body, tolerance=1e-7)

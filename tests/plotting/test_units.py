@@ -81,6 +81,7 @@ def test_decay(fan, monkeypatch, tmp_path):
     assert drawn[0].get_title() == "Field of single rays, k = 12/m, hard boundary"
 
 
+@pytest.mark.slow
 def test_axes_of_a_plane_and_its_fronts(fan):
     cut = cr.field_cut(fan, wavenumber=6.0, boundary="hard", extent=(3.0, 3.0), step=0.15)
     ax = cut.plot()

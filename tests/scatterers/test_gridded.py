@@ -271,6 +271,7 @@ def ring(nodes):
     return sc.Gridded.sampled(sc.Torus(), nodes)
 
 
+@pytest.mark.slow
 def test_torus_is_not_star_shaped_and_known_by_its_samples():
     assert not ring(24).star_shaped and ring(24).fingerprint != ring(48).fingerprint
 

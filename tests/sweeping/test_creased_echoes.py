@@ -73,7 +73,7 @@ def test_ball_of_two_halves_against_mie():
     assert not bool(ds.field.unresolved.squeeze())
 
 
-@pytest.mark.parametrize("boundary", ["soft", "pec"])
+@pytest.mark.parametrize("boundary", ["soft", pytest.param("pec", marks=pytest.mark.slow)])
 def test_capsule_against_fundamental_solutions(boundary):
     """From broadside, where the cylinder has no specular point of its own, to next to the axis."""
     exact = stored.read("capsule_echoes")

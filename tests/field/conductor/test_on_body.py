@@ -41,6 +41,7 @@ def test_sphere_at_all_angles(ball, mie, rng, k, limit):
     assert np.median(found.error / off) < 10
 
 
+@pytest.mark.slow
 def test_charge_where_the_equation_is_solved(ball, mie, rng):
     """Anywhere, between nodes and on them: sums over nodes are rough from one point to the next."""
     nodes = body_nodes(ball.body, 1.5 * 8.0).points[::101]

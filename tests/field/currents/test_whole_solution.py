@@ -64,6 +64,7 @@ def test_against_the_series_of_a_sphere_at_its_resonance(kind):
     assert off.max() < 0.02 * (k if kind == "soft" else 1.0)
 
 
+@pytest.mark.slow
 def test_convex_bodies_are_solved_where_expansions_leave_much_and_others_always(monkeypatch):
     fan = fan_on(sc.Sphere(), (1, 2, 3), 10.0)
     assert not cr.surface_currents(fan, wavenumber=10.0).solved

@@ -105,6 +105,7 @@ def test_sparse_incidences_are_computed():
     assert computed.points.values.tobytes() == between.points.values.tobytes()
 
 
+@pytest.mark.slow
 def test_a_patch_of_the_sphere():
     rng = np.random.default_rng(5)
     near = np.array([0.6, 0.5, 0.62]) + 0.06 * rng.uniform(-1, 1, (1200, 3))
