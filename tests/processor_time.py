@@ -1,4 +1,4 @@
-"""Where a run's processor time goes: tests and fixtures above a limit are listed at its end; too many fail the gate.
+"""Where a run's processor time goes: tests and fixtures above a limit are listed; ``--guard`` fails on too many.
 
 Seconds are those of this process and of the children that have ended, without what numba compiled meanwhile, and
 without the fixtures of a module or session that a test happened to be the first to ask for: these are listed by name.
@@ -12,7 +12,7 @@ from numba.core import event
 LIMIT = 3.0
 """Seconds of a test that is not marked slow."""
 MOST = 10
-"""Tests and fixtures above the limit that `.ci/run` allows."""
+"""Tests and fixtures above the limit that `--guard` allows."""
 COSTS = "processor time"
 
 

@@ -41,8 +41,8 @@ def test_total_over_all_angles(boundary):
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_second_order_falls_with_frequency(fan, boundary):
     """The error of creeping rays falls at least like 1/ka."""
-    errors = [field_sphere.creeping_rays(fan, k, boundary, 2) for k in (30.0, 100.0)]
-    assert errors[1] < errors[0] * 0.3
+    errors = [field_sphere.creeping_rays(fan, k, boundary, 2) for k in (30.0, 300.0)]
+    assert errors[1] < errors[0] / 9
 
 
 @pytest.mark.parametrize("eta", [0.3 - 0.2j])
