@@ -22,6 +22,8 @@ from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.cut_result import FieldCut as FieldCut
 from .field.echo import Echo as Echo
+from .field.equation.solution import Solution as Solution
+from .field.equation.solution import solve as solve
 from .field.far import far_field as far_field
 from .field.far_result import FarField as FarField
 from .field.frequency import wavenumber as wavenumber

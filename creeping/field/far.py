@@ -23,6 +23,7 @@ from creeping.field.creased_far import creased_far_field, tip_waves
 from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.currents.whole_solution import pairs_of
+from creeping.field.equation.kept import asked_solution, solution_for
 from creeping.field.extrapolated import measured_level
 from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import field_of
@@ -58,9 +59,10 @@ def far_field(
     method : {"auto", "currents", "rays", "equation"}
         The currents of the whole body, or isolated rays. "auto" takes currents unless they cost more than some ten
         seconds or the order is 1; where they are known to fail the body's integral equation is solved
-        (`creeping.surface_currents`). "equation" solves it wherever it can, in minutes at high wavenumbers. A body
-        with edges, and a conductor with joints or tips whose equation is not solved, has isolated rays and physical
-        optics, whatever the method (`creeping.field.creased_far`): "rays+optics" in the result.
+        (`creeping.surface_currents`). "equation" solves it wherever it can, in minutes at high wavenumbers. The
+        equation of a body with edges is that between its tiles (`creeping.solve`), which "auto" takes up to half a
+        minute. A body with edges or a conductor with joints or tips whose equation is not solved has isolated rays and
+        physical optics (`creeping.field.creased_far`): "rays+optics" in the result.
 
     Returns
     -------
@@ -93,6 +95,12 @@ def far_field(
     checked_method(method, order)
     r = observers_of(observation)
     creased, solve = is_creased(fan.body), True if method == "equation" else None
+    if has_edges(fan.body) and order == 2 and method in ("auto", "equation") and len(r):
+        # edges diffract: the equation knows them, rays and optics do not
+        of = fan.body, fan.line.direction, k, boundary
+        solved = asked_solution(*of) if solve else solution_for(*of)
+        if solved:
+            return replace(solved.solution.far_field(r, solved.incidence), validity=validity(fan, wavenumber=k))
     # currents go across joints, by marching, not round edges; those of a conductor only if they are solved
     serve = not creased or (order == 2 and not has_edges(fan.body) and (len(kinds) == 1 or pairs_of(fan.body, k) > 0))
     # a conductor's sums are of six columns, those of one scalar problem of one to four

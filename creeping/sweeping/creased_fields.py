@@ -7,8 +7,10 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import SingularIncidenceError, SurfaceError
 from creeping.field.boundary import BoundaryLike, parse_boundary
+from creeping.field.equation.kept import solve_together
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
+from creeping.geometry.creased import has_edges
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.transport import Flow
@@ -42,6 +44,7 @@ def fill_creased(
     passed: Callable[[float], None] = lambda _: None,
 ) -> None:
     """Fields of incidences with these lines into arrays whose first axis is the incidence; ``passed`` of `Sweeper`."""
+    _solved(flow.body, request, lines)
     bistatic = request.quantity == "bistatic"
     each = len(request.problems) * len(request.wavenumbers)
     for row, line in enumerate(lines):
@@ -63,12 +66,23 @@ def fill_creased(
                 passed((row + (problem * len(request.wavenumbers) + k + 1) / each) / len(lines))
 
 
+def _solved(body: Surface, request: SweepRequest, lines: tuple[ShadowLine | None, ...]) -> None:
+    """Solve the equation of a body with edges for all incidences at once, where `far_field` will ask for each."""
+    d = np.array([line.direction for line in lines if line is not None])
+    if not has_edges(body) or not len(d) or request.order != 2 or request.method not in ("auto", "equation"):
+        return
+    for name, _, _ in request.problems:
+        for wavenumber in request.wavenumbers:
+            solve_together(body, d, wavenumber, parse_boundary(name))
+
+
 def _field(
     fan: RayFan, observers: FloatArray, wavenumber: float, boundary: BoundaryLike, request: SweepRequest
 ) -> FarField:
     """Far field of one incidence; by its equation a conductor has that of "auto" where rays do not resolve it."""
     asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "order": request.order}
-    by_rays = request.method == "rays" or (request.method == "auto" and boundary == "pec")
+    plain = boundary == "pec" and not has_edges(fan.body)
+    by_rays = request.method == "rays" or (request.method == "auto" and plain)
     if by_rays:
         field = far_field(fan, observers, method="rays", **asked)
         if request.method == "rays" or not len(FieldArrays.of(field, 1).unclear):

@@ -1,0 +1,112 @@
+"""Solutions of a body's equation, kept for the fields that are asked for next, and whether they cost little enough.
+
+Many incidences are solved together by `solve_together`; `solution_for` then finds each of them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.errors import InvalidInputError, SurfaceError
+from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
+from creeping.field.equation.solution import SECONDS, Solution, cost, solve
+from creeping.field.equation.tiles import tiles_for
+from creeping.geometry.kept import kept
+from creeping.geometry.patches import patches_of
+from creeping.geometry.surface import Surface
+from creeping.storage.memory import budget
+
+KEPT = 6
+"""Solutions kept with a body."""
+ASKED = 300.0
+"""Seconds that the equation may take if it is asked for."""
+POOR = 0.05
+"""What currents may leave of the incident wave inside: those that leave more have not been resolved."""
+SAME = 1e-14
+"""Difference of unit directions that are one."""
+
+
+class Solved(NamedTuple):
+    """A solution, and the number of the incidence in it."""
+
+    solution: Solution
+    incidence: int
+
+
+def solution_for(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
+    """The solution of an incidence, if the equation of the body costs less than SECONDS and resolves it, else None."""
+    found = _found(body, direction, wavenumber, boundary)
+    if found is None and not too_much(body, wavenumber, boundary, SECONDS):
+        solve_together(body, direction[None], wavenumber, boundary)
+        found = _found(body, direction, wavenumber, boundary)
+    if found is None or not found.solution.currents(found.incidence).extinction <= POOR:
+        return None
+    return found
+
+
+def asked_solution(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved:
+    """The same, if it costs less than ASKED.
+
+    Raises
+    ------
+    InvalidInputError, SurfaceError
+        If it costs more, or the body has no mesh.
+    """
+    found = _found(body, direction, wavenumber, boundary)
+    if found is None:
+        why = too_much(body, wavenumber, boundary, ASKED)
+        if why:
+            raise InvalidInputError(
+                f"the integral equation is not solved at wavenumber {wavenumber:g}: {why}; rays and optics serve "
+                "without method='equation'"
+            )
+        _keep(body, solve(body, direction, wavenumber=wavenumber, boundary=boundary, seconds=np.inf))
+        found = _found(body, direction, wavenumber, boundary)
+        assert found is not None
+    return found
+
+
+def solve_together(body: Surface, directions: FloatArray, wavenumber: float, boundary: BoundaryLike) -> None:
+    """Solve the equation for unit directions (m, 3) at once and keep it, if it costs less than SECONDS for one."""
+    if not too_much(body, wavenumber, boundary, SECONDS):
+        try:
+            _keep(body, solve(body, directions, wavenumber=wavenumber, boundary=boundary, seconds=np.inf))
+        except (InvalidInputError, SurfaceError):
+            return
+
+
+def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float) -> str:
+    """Why the equation of one incidence takes too much time or memory, or cannot be; nothing if it does not."""
+    kinds = scalar_boundaries(boundary)
+    try:
+        nodes = _nodes(body, wavenumber)
+    except SurfaceError as error:
+        return str(error)
+    takes, memory = cost(nodes, CONDUCTOR if len(kinds) == 2 else kinds[0], 1)
+    if takes > seconds:
+        return f"{nodes} nodes take about {takes:.2g} s, more than {seconds:g}"
+    return f"{nodes} nodes take {memory / 1e9:.2g} GB" if memory > budget() else ""
+
+
+def _nodes(body: Surface, wavenumber: float) -> int:
+    known: dict[float, int] = kept(body, "nodes of tiles", dict)
+    if wavenumber not in known:
+        known[wavenumber] = len(tiles_for(patches_of(body), wavenumber).points)
+    return known[wavenumber]
+
+
+def _found(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
+    known: list[Solution] = kept(body, "solutions", list)
+    for solution in known:
+        if solution.wavenumber == wavenumber and solution.boundary == boundary:
+            same = np.flatnonzero(np.max(np.abs(solution.directions - direction), axis=1) < SAME)
+            if len(same):
+                return Solved(solution, int(same[0]))
+    return None
+
+
+def _keep(body: Surface, solution: Solution) -> None:
+    known: list[Solution] = kept(body, "solutions", list)
+    known.append(solution)
+    del known[:-KEPT]

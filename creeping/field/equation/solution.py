@@ -1,0 +1,373 @@
+"""The field of a body by its integral equation alone: for as many incidences as there are, no creeping ray is needed.
+
+Tiles of the body (`creeping.field.equation.tiles`), the matrix of the equation on two surfaces
+(`creeping.field.equation.matrix`), GMRES for all incidences together, and what the currents radiate. Edges and tips
+diffract as they do: the equation knows them. What the currents leave of the incident wave inside the body is their
+error (`creeping.field.currents.whole_body`).
+
+Sources: [CK13, sec. 3.2 and 6.2], [SS86]; Derivations, F36.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import UNRESOLVED, checked, checked_plain, observers_of
+from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.currents.conductor import ConductorCurrents
+from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.equation.block_gmres import block_gmres
+from creeping.field.equation.matrix import EACH, VECTOR, Matrix, Places
+from creeping.field.equation.tiles import Tiles, tiles_for
+from creeping.field.far_result import FarField
+from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
+from creeping.field.polarisation import spherical_frame
+from creeping.geodesics.bundle import as_points
+from creeping.geometry.directions import unit_directions
+from creeping.geometry.patches import patches_of
+from creeping.geometry.surface import Surface, size
+from creeping.geometry.unit import unit_of
+from creeping.kernels.threads import thread_count
+from creeping.shadow.occlusion import occluded
+from creeping.storage.memory import within_budget
+
+TOLERANCE, STEPS = 1e-4, 80
+"""What is left of the equation, as a share of its right side, and steps at most."""
+TOGETHER = 2e8
+"""Bytes of what GMRES keeps of incidences that are solved together."""
+PER_NODE = 5e-4
+"""Seconds of a core that integrals over tiles near to a node take."""
+PER_ENTRY = 4e-10
+"""Seconds of an entry of the matrix in a product with one of several columns."""
+SECONDS = 30.0
+"""What the equation may take, unless the caller says."""
+ON_BODY = 5.0
+"""Error of currents at a point and of the field next to the body, in what they leave inside."""
+LEVEL = {"soft": 2.0}
+"""Error of the far field over that of `creeping.field.currents.whole_body`: soft edges leave less inside."""
+TOUCHING = 1e-6
+"""Distance from the body, in its sizes, up to which a point is on it."""
+
+
+def solve(
+    body: Surface,
+    directions: ArrayLike,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike,
+    seconds: float = SECONDS,
+    progress: Callable[[str], None] | None = None,
+) -> Solution:
+    """The field that a body scatters, by its integral equation: no shadow line and no rays are needed.
+
+    Parameters
+    ----------
+    body : Surface
+        Smooth, or of pieces with edges, joints and tips.
+    directions : (3,) or (m, 3)
+        Of incidence; need not be unit. All are solved together.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard", "pec" or ImpedanceBoundary
+    seconds : float
+        What it may take, about, with all cores; more is refused before it starts.
+    progress : callable, optional
+        Is told in words what is done, with the number of nodes, the time and the memory that it takes.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    InvalidInputError
+        On bad arguments, for a weighted body, and if it would take more time or memory than it may.
+    SurfaceError
+        If the body has no mesh.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> solution = cr.solve(sc.Cylinder(1.0, 2.0), (1, 0, 0), wavenumber=3.0, boundary="hard")
+    >>> far = solution.far_field([(1, 0, 0), (-1, 0, 0)])
+    >>> far.method.tolist(), bool(far.error.max() < 0.01 * abs(far.total).max())
+    (['equation', 'equation'], True)
+    """
+    checked_plain(body)
+    kinds = scalar_boundaries(boundary)
+    k = checked(wavenumber, 2)
+    d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
+    tell = progress or (lambda words: None)
+    tiles = tiles_for(patches_of(body), k)
+    kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
+    takes, memory = cost(len(tiles.points), kind, len(d))
+    told = f"{len(tiles.points)} nodes, about {takes:.2g} s and {memory / 1e9:.2g} GB"
+    if takes > seconds:
+        raise InvalidInputError(
+            f"the integral equation at wavenumber {k:g} has {told}, more than the {seconds:g} s that it may take; "
+            "give seconds=, or a lower wavenumber, or let rays serve (creeping.far_field)"
+        )
+    within_budget(memory, f"the integral equation between {len(tiles.points)} nodes", "lower the wavenumber")
+    tell(f"{told}: integrals between the nodes")
+    return Solution(body, d, k, boundary, kind, tiles, tell)
+
+
+def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]:
+    """Seconds and bytes, about, that the equation between nodes takes, of one incidence or of several."""
+    vector = boundary.kind == "conductor"
+    entries = float(nodes) ** 2 * (4 if vector else 1)
+    pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if vector else 1.0)
+    products = 25 * entries * PER_ENTRY * incidences * (2 if vector else 1)
+    return (pairs + 2 * nodes * PER_NODE + products) / thread_count(), 8 * entries + 4e8
+
+
+class Solution:
+    """What `solve` found: currents of the whole body for m incidences, and the fields that they give.
+
+    Attributes
+    ----------
+    body : Surface
+    directions : (m, 3)
+        Of incidence.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard", "pec" or ImpedanceBoundary
+    nodes : int
+    steps : int
+        Of GMRES.
+    left : (m,) or (m, 2)
+        What is left of the equation, as a share of its right side.
+    """
+
+    def __init__(
+        self,
+        body: Surface,
+        directions: FloatArray,
+        wavenumber: float,
+        boundary: BoundaryLike,
+        kind: Boundary,
+        tiles: Tiles,
+        tell: Callable[[str], None],
+    ) -> None:
+        self.body, self.directions, self.wavenumber, self.boundary = body, directions, wavenumber, boundary
+        self._kind, self._matrix = kind, Matrix(tiles, wavenumber, kind)
+        self.nodes = len(tiles.points)
+        matrix = self._matrix
+        right = self._incident(matrix.nodes)
+        right[matrix.at] -= 1j * self._incident(matrix.inner)
+        n, columns = len(right) * matrix.columns, right.shape[-1]
+        right = (right.reshape(self.nodes, -1) * matrix.root[:, None]).reshape(n, columns)
+        product, found, left = matrix.product, [], []
+        many = max(1, min(columns, int(TOGETHER / (16 * n * (STEPS + 1)))))
+        self.steps = 0
+        for first in range(0, columns, many):
+            if first:
+                tell(f"incidence {first // (2 if matrix.vector else 1)} of {len(directions)}")
+            part = right[:, first : first + many]
+            values, off, steps = block_gmres(product, part, TOLERANCE, STEPS)
+            found.append(np.stack([values, part - product(values)]))
+            left.append(off)
+            self.steps = max(self.steps, steps)
+        both = np.concatenate(found, axis=2).reshape(2, self.nodes, matrix.columns, columns)
+        both = both / matrix.root[:, None, None]
+        self.left = np.concatenate(left)
+        if matrix.vector:
+            a, b = matrix.nodes.a[:, :, None], matrix.nodes.b[:, :, None]
+            # (n, 3, m, 2)
+            J = a * both[:, :, 0, None] + b * both[:, :, 1, None]
+            both, self.left = J.reshape(2, self.nodes, 3, len(directions), 2), self.left.reshape(-1, 2)
+        else:
+            both = both[:, :, 0]
+        self._values: ComplexArray = both[0]
+        self._change: ComplexArray = both[1]
+        # fields at points make rows of their own
+        matrix.__dict__.pop("whole", None)
+
+    def __repr__(self) -> str:
+        worst = max(float(self.currents(number).extinction) for number in range(min(len(self.directions), 8)))
+        return (
+            f"Solution({len(self.directions)} incidences, k = {self.wavenumber:g}, {boundary_name(self.boundary)})\n"
+            f"  {self.nodes} nodes, {self.steps} steps; {100 * worst:.2g} % of the incident wave left inside"
+        )
+
+    def _incident(self, places: Places) -> ComplexArray:
+        """2 u_inc, 2 du_inc/dn or 2 n x H_inc at places (p,): (p, m), of a conductor (p, 2, 2 m)."""
+        k, d = self.wavenumber, self.directions
+        wave = 2 * np.exp(1j * k * (places.points @ d.T))
+        if self._kind.kind == "soft":
+            return np.asarray(1j * k * (places.normals @ d.T) * wave)
+        if self._kind.kind != "conductor":
+            return np.asarray(wave)
+        H = np.cross(d[:, None], spherical_frame(d))
+        # a.(n x H) = -b.H, b.(n x H) = a.H
+        rows = [-np.einsum("pc,mec->pme", places.b, H), np.einsum("pc,mec->pme", places.a, H)]
+        return np.asarray((np.stack(rows, axis=1) * wave[:, None, :, None]).reshape(len(wave), 2, -1))
+
+    def currents(self, incidence: int = 0) -> SurfaceCurrents:
+        """Currents of one incidence at the nodes."""
+        found = self._made.get(incidence)
+        if found is None:
+            tiles, d = self._matrix.tiles, self.directions[incidence]
+            vector = self._kind.kind == "conductor"
+            at = (slice(None),) * (2 if vector else 1) + (incidence,)
+            lit = np.asarray(tiles.normals @ d < 0)
+            lit[lit] = ~occluded(self.body, self._above[lit], d)
+            make = ConductorCurrents if vector else SurfaceCurrents
+            found = self._made[incidence] = make(
+                body=self.body,
+                direction=d,
+                points=tiles.points,
+                normals=tiles.normals,
+                weights=tiles.weights,
+                travel=np.broadcast_to(d, tiles.points.shape),
+                values=self._values[at],
+                change=self._change[at],
+                lit=lit,
+                rim=np.zeros((0, 3)),
+                rim_length=0.0,
+                unserved=0.0,
+                wavenumber=self.wavenumber,
+                boundary=self._kind,
+                solved=True,
+            )
+        return found
+
+    @cached_property
+    def _made(self) -> dict[int, SurfaceCurrents]:
+        return {}
+
+    @cached_property
+    def _above(self) -> FloatArray:
+        """Points just above the nodes: the polynomials of tiles may pass under the body."""
+        tiles = self._matrix.tiles
+        return np.asarray(tiles.points + 1e-5 * size(self.body) * tiles.normals)
+
+    def far_field(self, observation: ArrayLike, incidence: int = 0) -> FarField:
+        """Far field of one incidence in directions (..., 3), which need not be unit, with its error."""
+        return self._far(observers_of(observation), self.currents(incidence))
+
+    def _far(self, r: FloatArray, currents: SurfaceCurrents) -> FarField:
+        lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
+        error = LEVEL.get(self._kind.kind, 1.0) * currents.error(r)
+        largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
+        off = ~(error < UNRESOLVED * largest)
+        return FarField(
+            directions=r.copy(),
+            creeping=dark,
+            reflected=lit,
+            forward=np.zeros(lit.shape, dtype=complex),
+            method=np.full(len(r), "equation", dtype="<U16"),
+            unresolved=off.any(axis=tuple(range(1, off.ndim))),
+            error=error,
+            error_by="extinction",
+            wavenumber=self.wavenumber,
+            boundary=boundary_name(self.boundary),
+            order=2,
+            unit=unit_of(self.body),
+        )
+
+    def backscatter(self) -> FarField:
+        """Far field of each incidence back to where it comes from, in directions -d (m,)."""
+        each = [self._far(-d[None], self.currents(number)) for number, d in enumerate(self.directions)]
+        first = each[0]
+        lanes = ("directions", "creeping", "reflected", "forward", "method", "unresolved", "error")
+        joined: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in each]) for name in lanes}
+        return replace(first, **joined)
+
+    def near_field(self, points: ArrayLike, incidence: int = 0) -> NearField:
+        """Field u at points (..., 3), L, outside the body at any distance from it, of one incidence.
+
+        Raises
+        ------
+        InvalidInputError
+            If points are inside the body, and of a conductor.
+        """
+        self._scalar("near_field")
+        y = as_points(points)
+        x = y.reshape(-1, 3)
+        inside = np.flatnonzero(self.body.level(x) < 0)
+        k, values = self.wavenumber, self._values[:, incidence]
+        tile, u, v, off = self._matrix.tiles.located(x)
+        on = off < TOUCHING * size(self.body)
+        inside = inside[off[inside] > TOUCHING * size(self.body)]
+        if len(inside):
+            raise InvalidInputError(
+                f"{len(inside)} of {len(x)} points are inside the body (deepest: row "
+                f"{inside[np.argmax(off[inside])]}, {off[inside].max():.3g}); give points on it or outside"
+            )
+        incident, scattered = np.exp(1j * k * (x @ self.directions[incidence])), np.zeros(len(x), dtype=complex)
+        away = Places.at(x[~on], np.broadcast_to([0.0, 0.0, 1.0], x[~on].shape))
+        single = self._kind.kind == "soft"
+        sums = self._matrix.received(away, values[:, None], "single" if single else "double")[:, 0]
+        scattered[~on] = (-0.5 if single else 0.5) * sums
+        if np.any(on):
+            total = 0.0 if single else self._on(tile[on], u[on], v[on], incidence)
+            scattered[on] = total - incident[on]
+        error = np.full(len(x), ON_BODY * self.currents(incidence).extinction)
+        lanes = self._lanes(y, incident + scattered, error, 1.0)
+        shape = y.shape[:-1]
+        nothing = np.zeros(shape, dtype=complex)
+        return NearField(
+            **lanes, incident=incident.reshape(shape), scattered=scattered.reshape(shape), creeping=nothing
+        )
+
+    def surface_field(self, points: ArrayLike, incidence: int = 0) -> SurfaceField:
+        """Field u, or du/dn of a soft body, at the places of the body nearest to points (..., 3), L, of one incidence.
+
+        Raises
+        ------
+        InvalidInputError
+            Of a conductor.
+        """
+        self._scalar("surface_field")
+        y = as_points(points)
+        x = y.reshape(-1, 3)
+        tile, u, v, _ = self._matrix.tiles.located(x)
+        values, unit = self._on(tile, u, v, incidence), self.wavenumber if self._kind.kind == "soft" else 1.0
+        error = np.full(len(x), ON_BODY * unit * self.currents(incidence).extinction)
+        normals = self._matrix.tiles.on(tile, u, v)[1]
+        lit = (normals @ self.directions[incidence] < 0).reshape(y.shape[:-1])
+        lanes = self._lanes(y, values, error, unit)
+        nothing = np.zeros_like(lanes["values"])
+        return SurfaceField(
+            **lanes, lit=np.where(lit, lanes["values"], nothing), creeping=np.where(lit, nothing, lanes["values"])
+        )
+
+    def _scalar(self, name: str) -> None:
+        """Refuse a conductor."""
+        if self._kind.kind == "conductor":
+            other = "conductor_current" if name == "surface_field" else "conductor_field"
+            raise InvalidInputError(f"{name} is of scalar fields; a conductor's are by creeping.{other}")
+
+    def _on(self, tile: IntArray, u: FloatArray, v: FloatArray, incidence: int) -> ComplexArray:
+        """Field u or du/dn on tiles (p,) at u and v: what the equation gives there of that at the nodes."""
+        points, normals = self._matrix.tiles.on(tile, u, v)
+        places = Places.at(points, normals, (tile, u, v))
+        wave = self._incident(places)[:, incidence]
+        soft = self._kind.kind == "soft"
+        sums = self._matrix.received(places, self._values[:, incidence, None], "slope" if soft else "double")[:, 0]
+        return np.asarray(wave - sums if soft else wave + sums)
+
+    def _lanes(self, points: FloatArray, values: ComplexArray, error: FloatArray, unit: float) -> dict[str, Any]:
+        """What fields at points (..., 3) have in common."""
+        shape = points.shape[:-1]
+        by = np.full(len(values), "extinction")
+        status = judged(np.full(len(values), int(FieldStatus.OK)), values, error, by, unit)
+        return {
+            "points": points.copy(),
+            "values": values.reshape(shape),
+            "error": error.reshape(shape),
+            "error_by": by.reshape(shape),
+            "status": status.reshape(shape),
+            "method": np.full(shape, "equation"),
+            "wavenumber": self.wavenumber,
+            "boundary": boundary_name(self.boundary),
+            "order": 2,
+            "length_unit": unit_of(self.body),
+        }

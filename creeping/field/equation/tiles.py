@@ -1,0 +1,293 @@
+"""Tiles of a body for a wavenumber: parts of its squares, with p x p nodes each, and integrals next to them.
+
+Nodes are those of Gauss's product rule in u and v, x_u x x_v = n dS/(du dv). Squares are parted until their sides are
+no longer than SIDE wavelengths, and their normals turn by no more than TURN. Next to an edge, where currents go like a
+broken power of the distance, there is a strip of CUT of their width, parted along the edge at the same places on both
+faces; next to a tip they are cut twice.
+
+Sources: [DR84, sec. 2.7]; Derivations, F36.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.geometry.patches import DEGREE, Patches
+from creeping.geometry.squares import barycentric, lobatto, on_squares
+from creeping.kernels.threads import in_threads
+
+POINTS = 4
+"""p, nodes along a side of a tile."""
+SIDE = 0.8
+"""Longest sides of tiles, in wavelengths."""
+TURN = 0.5
+"""Angle by which the normal turns along a side, radians, at most: currents are no smoother than the body."""
+CUT = 0.2
+"""Width of the tile next to an edge or tip, over that of the one it is cut from."""
+NEAR = 1.7
+"""Distance of points from the middle of a tile, over its size, from which its nodes serve alone."""
+APART, RULE = 1.0, 5
+"""Distance of the middles of parts of a tile from a point, over their size, at least; and the points of their rule."""
+BESIDE, STEPS = 12, 8
+"""Nodes next to a point whose tiles may be its own, and Newton steps to its place there."""
+ANGLES, RADII = 8, 6
+"""Angles and radii of a quarter about a node of its own."""
+
+
+def gauss(points: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss's rule on 0 < u < 1."""
+    u, w = np.polynomial.legendre.leggauss(points)
+    return 0.5 * (1 + u), 0.5 * w
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """Tiles of a body.
+
+    Attributes
+    ----------
+    shapes : (t, DEGREE + 1, DEGREE + 1, 3), L
+        Points of each by u and v, at Lobatto's places.
+    points, normals : (t p p, 3), L and 1
+        Nodes, tile by tile.
+    weights : (t p p,), L^2
+    p : int
+    """
+
+    shapes: FloatArray
+    points: FloatArray
+    normals: FloatArray
+    weights: FloatArray
+    p: int
+
+    @property
+    def count(self) -> int:
+        """Number of tiles."""
+        return len(self.shapes)
+
+    @cached_property
+    def middles(self) -> FloatArray:
+        """Middles of the tiles (t, 3), L."""
+        half = DEGREE // 2
+        return np.ascontiguousarray(self.shapes[:, half, half])
+
+    @cached_property
+    def sizes(self) -> FloatArray:
+        """Longer sides of the tiles (t,), L."""
+        u, v = (np.linalg.norm(np.diff(self.shapes, axis=axis), axis=-1).sum(axis=axis) for axis in (1, 2))
+        return np.asarray(np.maximum(u.max(axis=1), v.max(axis=1)))
+
+    @cached_property
+    def _tables(self) -> FloatArray:
+        """x, x_u, x_v at the places of the shapes (t, n, n, 9)."""
+        from creeping.geometry.squares import differentiation
+
+        slope = differentiation(lobatto(DEGREE))
+        u, v = np.einsum("ai,tijx->tajx", slope, self.shapes), np.einsum("bj,tijx->tibx", slope, self.shapes)
+        return np.ascontiguousarray(np.concatenate([self.shapes, u, v], axis=-1))
+
+    def near(self, points: FloatArray) -> tuple[IntArray, IntArray]:
+        """Where the points (m, 3) near each tile stand (t + 1,), and their numbers (pairs,)."""
+        from scipy.spatial import cKDTree
+
+        lists = cKDTree(points).query_ball_point(self.middles, NEAR * self.sizes)
+        counts = np.array([len(one) for one in lists], dtype=np.int64)
+        targets = np.concatenate([np.sort(one) for one in lists]).astype(np.int64) if counts.any() else counts[:0]
+        return np.concatenate([[0], np.cumsum(counts)]), targets
+
+    def rows(
+        self,
+        points: FloatArray,
+        near: tuple[IntArray, IntArray],
+        wavenumber: float,
+        mode: int,
+        own: tuple[IntArray, FloatArray, FloatArray] | None = None,
+    ) -> ComplexArray:
+        """Integrals of modes of `creeping.field.kernels.tile_rows` over tiles near points: (pairs, 3, p p).
+
+        ``own`` is the tile that each point is on, and u and v there, as of `located` and `own_places`.
+        """
+        from creeping.field.kernels.tile_rows import tile_rows
+
+        starts, targets = near
+        nodes, grid = gauss(self.p)[0], lobatto(DEGREE)
+        rules = (*gauss(RULE), *gauss(ANGLES), *gauss(RADII))
+        nowhere = np.zeros(len(points))
+        places = own or (np.full(len(points), -1), nowhere, nowhere)
+        out = np.empty((len(targets), 6, self.p**2))
+        given = (np.ascontiguousarray(points), starts, targets, self._tables, grid, barycentric(grid))
+        rest = (nodes, barycentric(nodes), *rules, wavenumber, mode, APART, *places)
+
+        def work(part: slice) -> None:
+            tile_rows(*given, *rest, part.start, part.stop, out)
+
+        in_threads(work, self.count, least=4, multiple=1, seconds=1e-3)
+        return np.asarray(out[:, :3] + 1j * out[:, 3:])
+
+    @property
+    def own_places(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Tile of each node, and u and v there: (n,) each."""
+        u = gauss(self.p)[0]
+        at_u, at_v = (part.ravel() for part in np.meshgrid(u, u, indexing="ij"))
+        return np.repeat(np.arange(self.count), self.p**2), np.tile(at_u, self.count), np.tile(at_v, self.count)
+
+    def located(self, points: FloatArray) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+        """The tile nearest to points (m, 3), u and v there, and the distance, L: (m,) each."""
+        from scipy.spatial import cKDTree
+
+        beside = cKDTree(self.points).query(points, min(BESIDE, len(self.points)))[1] // self.p**2
+        best = [np.zeros(len(points), dtype=np.int64), *np.zeros((2, len(points))), np.full(len(points), np.inf)]
+        for column in beside.T:
+            shapes = self.shapes[column]
+            u, v = np.full((2, len(points)), 0.5)
+            for _ in range(STEPS):
+                x, along, across = (part[:, 0, 0] for part in on_squares(shapes, u[:, None], v[:, None]))
+                away = points - x
+                T = np.stack([along, across], axis=2)
+                A = np.swapaxes(T, 1, 2) @ T
+                # where a square is one point x_v is 0
+                A[:, [0, 1], [0, 1]] += 1e-12 * np.trace(A, axis1=1, axis2=2)[:, None]
+                step = np.linalg.solve(A, np.einsum("mxc,mx->mc", T, away)[..., None])[..., 0]
+                u, v = np.clip(u + step[:, 0], 0.0, 1.0), np.clip(v + step[:, 1], 0.0, 1.0)
+            x = on_squares(shapes, u[:, None], v[:, None])[0][:, 0, 0]
+            off = np.linalg.norm(points - x, axis=1)
+            closer = off < best[3]
+            for lane, values in zip(best, (column, u, v, off), strict=True):
+                lane[closer] = values[closer]
+        return best[0], best[1], best[2], best[3]
+
+    def on(self, tile: IntArray, u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Points of tiles (m,) at u and v, and unit normals there: (m, 3) each."""
+        x, along, across = (part[:, 0, 0] for part in on_squares(self.shapes[tile], u[:, None], v[:, None]))
+        n = np.cross(along, across)
+        return x, n / np.linalg.norm(n, axis=1, keepdims=True)
+
+
+def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, p: int = POINTS) -> Tiles:
+    """Tiles of a body's squares for a wavenumber, 1/L."""
+    longest = side * 2 * np.pi / wavenumber
+    steps = _parts(patches, longest)
+    along = _edge_breaks(patches, steps)
+    boxes = [_boxes(patches, number, [lane[number] for lane in steps], along) for number in range(len(patches.off))]
+    owner = np.repeat(np.arange(len(boxes)), [len(box) for box in boxes])
+    low, high = (np.concatenate([np.array(box)[:, side_of] for box in boxes]) for side_of in ([0, 2], [1, 3]))
+    places = patches.places[owner]
+
+    def at(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
+        return on_squares(places, u, v)
+
+    u, w = gauss(p)
+    shapes = at(lobatto(DEGREE))[0]
+    x, along_u, along_v = at(u)
+    area = np.cross(along_u, along_v) * np.prod(high - low, axis=1)[:, None, None, None]
+    scale = np.linalg.norm(area, axis=-1)
+    normals = (area / scale[..., None]).reshape(-1, 3)
+    weights = (scale * np.outer(w, w)).ravel()
+    return Tiles(shapes, np.ascontiguousarray(x.reshape(-1, 3)), normals, weights, p)
+
+
+NEXT = ((0, 2, 0), (0, 3, 1), (1, 2, 0), (1, 3, 1), (2, 0, 0), (2, 1, 1), (3, 0, 0), (3, 1, 1))
+"""Of sides, the sides that meet them, and at which of their ends."""
+
+
+def _parts(patches: Patches, longest: float) -> tuple[FloatArray, FloatArray]:
+    """How many tiles each step between Lobatto's places asks for, along u (m, q, q + 1) and along v (m, q + 1, q)."""
+    at = np.broadcast_to(lobatto(DEGREE), (len(patches.off), DEGREE + 1))
+    _, along, across = on_squares(patches.places, at, at)
+    n = np.cross(along, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        n /= np.linalg.norm(n, axis=-1, keepdims=True)
+    n[patches.pointed, 0] = n[patches.pointed, 1]
+    lanes = []
+    for axis in (1, 2):
+        step, turn = (np.linalg.norm(np.diff(part, axis=axis), axis=-1) for part in (patches.places, n))
+        lanes.append(np.hypot(step / longest, turn / TURN))
+    return lanes[0], lanes[1]
+
+
+def _edge_breaks(patches: Patches, steps: tuple[FloatArray, FloatArray]) -> dict[int, FloatArray]:
+    """Where tiles on both sides of each edge are parted along it, 0 to 1, and cut next to corners of either.
+
+    Were they not the same on both sides, what one side lacks of the broken power of the distance would not be what the
+    other one lacks, and the difference would be a line source on the edge.
+    """
+    ends: dict[int, list[float]] = {}
+    corners: dict[int, set[float]] = {}
+    lengths: dict[int, float] = {}
+    for number, side in np.argwhere(patches.edges).tolist():
+        key, span = int(patches.sides[number, side]), patches.spans[number, side]
+        ends.setdefault(key, []).extend(span)
+        lane = (steps[1][number, 0], steps[1][number, -1], steps[0][number, :, 0], steps[0][number, :, -1])[side]
+        lengths[key] = max(lengths.get(key, 0.0), float(lane.sum()) / abs(span[1] - span[0]))
+        for mine, other, end in NEXT:
+            if mine == side and patches.edges[number, other]:
+                corners.setdefault(key, set()).add(float(span[end]))
+    out = {}
+    for key, given in ends.items():
+        at = np.unique(np.round([0.0, 1.0, *given], 12))
+        counts = np.maximum(1, np.ceil(lengths[key] * np.diff(at) - 1e-9)).astype(int)
+        if len(counts) == 1 and counts[0] == 1 and len(corners.get(key, ())) == 2:
+            counts[0] = 2
+        parts = [np.linspace(a, b, n + 1) for a, b, n in zip(at[:-1], at[1:], counts, strict=True)]
+        breaks = np.unique(np.concatenate(parts))
+        for corner in corners.get(key, ()):
+            place = int(np.argmin(np.abs(breaks - corner)))
+            beside = [breaks[j] for j in (place - 1, place + 1) if 0 <= j < len(breaks)]
+            breaks = np.union1d(breaks, [corner + CUT * (one - corner) for one in beside])
+        out[key] = breaks
+    return out
+
+
+def _boxes(
+    patches: Patches, number: int, steps: list[FloatArray], along: dict[int, FloatArray]
+) -> list[tuple[float, float, float, float]]:
+    """Parts (u0, u1, v0, v1) of a square: next to each edge a strip that is parted as the edge is, and what is left."""
+    edges, t = patches.edges[number], lobatto(DEGREE)
+    counts = [max(1, int(np.ceil(float(steps[axis].sum(axis=axis).max()) - 1e-9))) for axis in (0, 1)]
+    breaks: dict[int, FloatArray] = {}
+    for side in range(4):
+        if not edges[side]:
+            continue
+        start, end = patches.spans[number, side]
+        local = (along[int(patches.sides[number, side])] - start) / (end - start)
+        breaks[side] = np.unique(np.clip(np.sort(local[(local > -1e-9) & (local < 1 + 1e-9)]), 0.0, 1.0))
+    # strips are as wide as the edges that they end at are cut
+    widths = np.zeros(4)
+    for side in breaks:
+        axis = 0 if side < 2 else 1
+        meeting = [other for other in breaks if (other < 2) != (side < 2)]
+        cut = CUT / max(counts[axis], 2 if edges[2 * axis] and edges[2 * axis + 1] else 1)
+        if meeting:
+            its = breaks[meeting[0]]
+            cut = float(its[1] if side % 2 == 0 else 1 - its[-2])
+        widths[side] = cut
+    a, b, c, d = widths[0], 1 - widths[1], widths[2], 1 - widths[3]
+    out = []
+    for side, v in breaks.items():
+        if side < 2:
+            u0, u1 = (0.0, a) if side == 0 else (b, 1.0)
+            out += [(u0, u1, v0, v1) for v0, v1 in pairwise(v)]
+        else:
+            v0, v1 = (0.0, c) if side == 2 else (d, 1.0)
+            u = np.concatenate([[a], v[(v > a + 1e-9) & (v < b - 1e-9)], [b]])
+            out += [(u0, u1, v0, v1) for u0, u1 in pairwise(u)]
+    u = _between(a, b, counts[0])
+    if patches.tips[number]:
+        u = np.union1d(u, u[1] * CUT ** np.arange(1.0, 3.0))
+    wide = steps[1].sum(axis=1)
+    for u0, u1 in pairwise(u):
+        inside = (t >= u0) & (t <= u1)
+        most = max(float(np.max(wide[inside], initial=0.0)), *np.interp([u0, u1], t, wide))
+        v = _between(c, d, max(1, int(np.ceil(most - 1e-9))))
+        out += [(u0, u1, v0, v1) for v0, v1 in pairwise(v)]
+    return out
+
+
+def _between(low: float, high: float, count: int) -> FloatArray:
+    """Places from low to high, with those of ``count`` equal parts of 0 to 1 between them."""
+    at = np.arange(1, count) / count
+    return np.concatenate([[low], at[(at > low + 1e-9) & (at < high - 1e-9)], [high]])

@@ -1,0 +1,261 @@
+"""Compiled integrals over tiles near to points x, with the polynomials l_j that are 1 at one node of a tile.
+
+    mode 0   I_j = int l_j dG/dn_y dS              mode 1   as well int l_j G dS
+    mode 2   I_j = int l_j grad_x G dS             G = e^{ikR}/R,   R = |x - y|
+
+A tile is a square of 0 <= u, v <= 1 on which x, x_u and x_v are polynomials. It is halved until its parts are no larger
+than their distance from x; each is integrated by Gauss's rule. Parts that have been halved up to KEPT times along u and
+v serve all points. About a node of its own, polar coordinates in the tangent plane take the singularity away, from the
+node to each of the four sides.
+
+Sources: [DR84]; Derivations, F36.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from creeping.kernels.block import entry_options, options, strict_options
+from creeping.kernels.turns import cosine_sine
+
+WAITING = 400
+"""Parts of a tile that wait, at most."""
+KEPT, SLOTS = 2, 49
+"""Halvings of parts that are kept, and how many such parts there are: (2^(KEPT + 1) - 1)^2."""
+DEEPEST = 12
+"""Halvings at most."""
+LONG = 1.6
+"""Ratio of the sides of a part from which only the longer one is halved."""
+
+
+@njit(**strict_options)
+def _cardinal(nodes, weights, at, out):
+    """Fill the polynomials (n,) of nodes (n,), with barycentric weights, at a place."""
+    total = 0.0
+    for j in range(nodes.shape[0]):
+        away = at - nodes[j]
+        out[j] = weights[j] / (away if away != 0.0 else 1e-300)
+        total += out[j]
+    for j in range(nodes.shape[0]):
+        out[j] /= total
+
+
+@njit(**strict_options)
+def _place(table, at_u, at_v, out):
+    """Fill x, x_u, x_v (9,) where the polynomials of the grid are at_u and at_v (n,)."""
+    out[:] = 0.0
+    for i in range(at_u.shape[0]):
+        for j in range(at_v.shape[0]):
+            e = at_u[i] * at_v[j]
+            for c in range(9):
+                out[c] += e * table[i, j, c]
+
+
+@njit(**options)
+def _set(q, scale, at, by):
+    """Put point number ``at`` and n dS there into places (6, ...), of x, x_u, x_v q and the weight of the rule."""
+    for c in range(3):
+        by[c, at] = q[c]
+    by[3, at] = scale * (q[4] * q[8] - q[5] * q[7])
+    by[4, at] = scale * (q[5] * q[6] - q[3] * q[8])
+    by[5, at] = scale * (q[3] * q[7] - q[4] * q[6])
+
+
+@njit(**strict_options)
+def _terms(x, by, count, k, mode, out):
+    """Fill out (6, count), real then imaginary parts of what a mode integrates at points and n dS ``by`` (6, count)."""
+    per = k / (2 * math.pi)
+    for i in range(count):
+        d0, d1, d2 = x[0] - by[0, i], x[1] - by[1, i], x[2] - by[2, i]
+        square = d0 * d0 + d1 * d1 + d2 * d2
+        there = 1.0 if square > 0.0 else 0.0
+        inverse = there / math.sqrt(square if square > 0.0 else 1.0)
+        c, s = cosine_sine(per * square * inverse)
+        c, s = c * inverse, s * inverse
+        # grad_x G = (ik - 1/R) G (x - y)/R
+        real, imaginary = (-c * inverse - k * s) * inverse, (k * c - s * inverse) * inverse
+        n0, n1, n2 = by[3, i], by[4, i], by[5, i]
+        if mode == 2:
+            area = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+            real, imaginary = real * area, imaginary * area
+            out[0, i], out[1, i], out[2, i] = real * d0, real * d1, real * d2
+            out[3, i], out[4, i], out[5, i] = imaginary * d0, imaginary * d1, imaginary * d2
+        else:
+            lean = -(n0 * d0 + n1 * d1 + n2 * d2)
+            out[0, i], out[3, i] = real * lean, imaginary * lean
+            if mode == 1:
+                area = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+                out[1, i], out[4, i] = c * area, s * area
+
+
+@njit(**strict_options)
+def _part(table, grid, bary, nodes, weights, rule, share, box, room, by, by_u, by_v, spot):
+    """Fill points and n dS (6, g g) of a part (u0, u1, v0, v1), the nodes' polynomials there, and its middle and sides.
+
+    ``spot`` (5,) is the middle and the lengths along u and v.
+    """
+    at_u, at_v, q = room
+    g = rule.shape[0]
+    width, height = box[1] - box[0], box[3] - box[2]
+    _cardinal(grid, bary, box[0] + 0.5 * width, at_u[0])
+    _cardinal(grid, bary, box[2] + 0.5 * height, at_v[0])
+    _place(table, at_u[0], at_v[0], q)
+    spot[0], spot[1], spot[2] = q[0], q[1], q[2]
+    spot[3] = width * math.sqrt(q[3] ** 2 + q[4] ** 2 + q[5] ** 2)
+    spot[4] = height * math.sqrt(q[6] ** 2 + q[7] ** 2 + q[8] ** 2)
+    for a in range(g):
+        u, v = box[0] + width * rule[a], box[2] + height * rule[a]
+        _cardinal(grid, bary, u, at_u[a])
+        _cardinal(grid, bary, v, at_v[a])
+        _cardinal(nodes, weights, u, by_u[a])
+        _cardinal(nodes, weights, v, by_v[a])
+    for a in range(g):
+        for b in range(g):
+            _place(table, at_u[a], at_v[b], q)
+            _set(q, width * height * share[a] * share[b], a * g + b, by)
+
+
+@njit(**strict_options)
+def _add_part(terms, by_u, by_v, first, total):
+    """Add the integrals over a part to total (6, p, p), of terms (6, g g) from ``first`` on by threes."""
+    g, p = by_u.shape
+    for c in range(6):
+        if c % 3 >= first:
+            continue
+        for a in range(g):
+            for j in range(p):
+                row = 0.0
+                for b in range(g):
+                    row += terms[c, a * g + b] * by_v[b, j]
+                for i in range(p):
+                    total[c, i, j] += by_u[a, i] * row
+
+
+@njit(**strict_options)
+def _around(table, grid, bary, u0, v0, angles, share, radii, weight, room, by, at):
+    """Fill points and n dS (6, ...) of the polar rules about (u0, v0), and their u and v ``at`` (2, ...)."""
+    at_u, at_v, q = room
+    _cardinal(grid, bary, u0, at_u[0])
+    _cardinal(grid, bary, v0, at_v[0])
+    _place(table, at_u[0], at_v[0], q)
+    # [x_u, x_v] = Q B, B = [[along, lean], [0, across]]: places in the tangent plane are B (u - u0, v - v0)
+    along = math.sqrt(q[3] ** 2 + q[4] ** 2 + q[5] ** 2)
+    lean = (q[3] * q[6] + q[4] * q[7] + q[5] * q[8]) / along
+    across = math.sqrt(max(q[6] ** 2 + q[7] ** 2 + q[8] ** 2 - lean * lean, 1e-300))
+    count = 0
+    for side in range(4):
+        # corners at the ends of the side, counter-clockwise
+        a0, b0 = (1.0 if side < 2 else 0.0) - u0, (1.0 if side == 1 or side == 2 else 0.0) - v0
+        a1, b1 = (1.0 if side == 0 or side == 3 else 0.0) - u0, (1.0 if side < 2 else 0.0) - v0
+        p0, q0 = along * a0 + lean * b0, across * b0
+        p1, q1 = along * a1 + lean * b1, across * b1
+        length = math.sqrt((p1 - p0) ** 2 + (q1 - q0) ** 2)
+        t0, t1 = (p1 - p0) / length, (q1 - q0) / length
+        low, high = p0 * t0 + q0 * t1, p1 * t0 + q1 * t1
+        far = p0 * t1 - q0 * t0
+        first, last = math.atan2(low, far), math.atan2(high, far)
+        for a in range(angles.shape[0]):
+            angle = first + (last - first) * angles[a]
+            c0, s0 = math.cos(angle), math.sin(angle)
+            reach = far / c0
+            dp, dq = c0 * t1 + s0 * t0, -c0 * t0 + s0 * t1
+            dv = dq / across
+            du = (dp - lean * dv) / along
+            for b in range(radii.shape[0]):
+                r = reach * radii[b]
+                at[0, count], at[1, count] = u0 + r * du, v0 + r * dv
+                _cardinal(grid, bary, at[0, count], at_u[0])
+                _cardinal(grid, bary, at[1, count], at_v[0])
+                _place(table, at_u[0], at_v[0], q)
+                _set(q, (last - first) * share[a] * reach * weight[b] * r / (along * across), count, by)
+                count += 1
+
+
+@njit(**entry_options)
+def tile_rows(
+    points, starts, targets, tables, grid, bary, nodes, weights, rule, share, angles, angle_share, radii, radius_share,
+    k, mode, apart, own, own_u, own_v, first, last, out,
+):  # fmt: skip
+    """Fill out (pairs, 6, p p) for the points that tiles first..last are near to.
+
+    Parameters
+    ----------
+    points : (m, 3)
+    starts : (t + 1,), targets : (pairs,)
+        Points near tile number t: targets[starts[t]:starts[t + 1]].
+    tables : (t, n, n, 9)
+        x, x_u, x_v at the places of the grid (n,), with barycentric weights; nodes (p,) and theirs.
+    rule, share : (g,)
+        Gauss's rule; likewise of angles and radii.
+    apart : float
+        Least distance of the middle of a part that is not halved again, over its size.
+    own : (m,)
+        Number of the tile that a point is on, at ``own_u`` and ``own_v`` (m,); -1 if it is on none.
+    """
+    n, p, g = grid.shape[0], nodes.shape[0], rule.shape[0]
+    polar = 4 * angles.shape[0] * radii.shape[0]
+    room = (np.empty((max(g, 1), n)), np.empty((max(g, 1), n)), np.empty(9))
+    made = np.zeros(SLOTS + 1, dtype=np.bool_)
+    by, spots = np.empty((SLOTS + 1, 6, g * g)), np.empty((SLOTS + 1, 5))
+    by_u, by_v = np.empty((SLOTS + 1, g, p)), np.empty((SLOTS + 1, g, p))
+    terms, total = np.empty((6, max(polar, g * g))), np.empty((6, p, p))
+    around, at, one_u, one_v = np.empty((6, polar)), np.empty((2, polar)), np.empty(p), np.empty(p)
+    stack = np.empty((WAITING, 4), dtype=np.int64)
+    kinds = 3 if mode == 2 else mode + 1
+    for t in range(first, last):
+        table = tables[t]
+        made[:] = False
+        for pair in range(starts[t], starts[t + 1]):
+            x = points[targets[pair]]
+            total[:] = 0.0
+            if own[targets[pair]] == t:
+                u, v = own_u[targets[pair]], own_v[targets[pair]]
+                _around(table, grid, bary, u, v, angles, angle_share, radii, radius_share, room, around, at)
+                _terms(x, around, polar, k, mode, terms)
+                for q in range(polar):
+                    _cardinal(nodes, weights, at[0, q], one_u)
+                    _cardinal(nodes, weights, at[1, q], one_v)
+                    for c in range(6):
+                        if c % 3 >= kinds:
+                            continue
+                        for i in range(p):
+                            e = terms[c, q] * one_u[i]
+                            for j in range(p):
+                                total[c, i, j] += e * one_v[j]
+            else:
+                stack[0, :] = 0
+                waiting = 1
+                while waiting > 0:
+                    waiting -= 1
+                    # halvings along u and v, and which of the parts it is
+                    lu, lv, iu, iv = stack[waiting, 0], stack[waiting, 1], stack[waiting, 2], stack[waiting, 3]
+                    slot = SLOTS
+                    if lu <= KEPT and lv <= KEPT:
+                        slot = ((1 << lu) - 1 + iu) * 7 + (1 << lv) - 1 + iv
+                    if slot == SLOTS or not made[slot]:
+                        width, height = 1.0 / (1 << lu), 1.0 / (1 << lv)
+                        box = (iu * width, (iu + 1) * width, iv * height, (iv + 1) * height)
+                        _part(
+                            table, grid, bary, nodes, weights, rule, share, box, room, by[slot], by_u[slot], by_v[slot],
+                            spots[slot],
+                        )  # fmt: skip
+                        made[slot] = slot < SLOTS
+                    spot = spots[slot]
+                    away = (x[0] - spot[0]) ** 2 + (x[1] - spot[1]) ** 2 + (x[2] - spot[2]) ** 2
+                    size = max(spot[3], spot[4])
+                    if away < (apart * size) ** 2 and max(lu, lv) < DEEPEST and waiting < WAITING - 4:
+                        by_both = spot[3] <= LONG * spot[4] and spot[4] <= LONG * spot[3]
+                        halve_u, halve_v = int(by_both or spot[3] > spot[4]), int(by_both or spot[4] > spot[3])
+                        for a in range(1 + halve_u):
+                            for b in range(1 + halve_v):
+                                stack[waiting, 0], stack[waiting, 1] = lu + halve_u, lv + halve_v
+                                stack[waiting, 2], stack[waiting, 3] = (iu << halve_u) + a, (iv << halve_v) + b
+                                waiting += 1
+                        continue
+                    _terms(x, by[slot], g * g, k, mode, terms)
+                    _add_part(terms, by_u[slot], by_v[slot], kinds, total)
+            for c in range(6):
+                for i in range(p):
+                    for j in range(p):
+                        out[pair, c, i * p + j] = total[c, i, j]

@@ -1,0 +1,440 @@
+"""A body as surfaces that polynomials on the unit square make: what the tiles of its integral equation are cut from.
+
+A coarse mesh of quadrilaterals and triangles is brought onto the body, Lobatto's points of each by each: those of a
+side first, onto the piece on both sides of it, or onto the crease between two pieces, once for both; then those inside,
+which start from Coons's surface through the sides,
+
+    x(u, v) = (1 - u) x(0, v) + u x(1, v) + (1 - v) x(u, 0) + v x(u, 1) - bilinear through the corners.
+
+So surfaces of neighbours meet without a gap. A triangle is a square whose side u = 0 is one point: its tip, where it
+has one. A square that is not the body to POSITION and NORMAL is halved.
+
+Sources: [C67], [BT04]; Derivations, B12.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.errors import SurfaceError
+from creeping.geometry.creased import is_creased, nearest_crease, pieces_of, tips_of
+from creeping.geometry.kept import kept
+from creeping.geometry.quadrature import nearest_points
+from creeping.geometry.squares import lobatto, on_squares
+from creeping.geometry.surface import Surface, normal, size
+from creeping.geometry.triangulation import quadrilaterals
+
+DEGREE = 6
+"""Degree of the polynomials along u and v."""
+POSITION, NORMAL = 2e-6, 3e-4
+"""What squares may be off the body, in its sizes, and their normals, radians."""
+WORST = 1e-3
+"""What the worst of them may be off the body, in its sizes."""
+ROUNDS, TURNS = 5, 2.0
+"""Times that a square is parted at most, and ratio of the turns of its normal from which it is along one side."""
+SIDES_OF_PIECES = (1.0, 0.7, 0.5, 0.3)
+"""Longest sides of the triangles of a body of pieces, in its sizes, of the meshes that are tried."""
+WELL, CLOSED = 1e-5, 1e-6
+"""What squares may be off the body, in its sizes, and the integral of n over them, as a share of the area: more counts
+against a mesh."""
+STEEP = 0.2
+"""Sine of the angle between x_u and x_v, at least: less counts against a mesh."""
+CELLS = (3, 4, 5, 6, 8, 12, 24)
+"""Cells of the meshes of a smooth body; the first that is of the kind of the last is taken."""
+SAME = 1e-9
+"""Distance of corners that are one, in body sizes."""
+SQUARE = 0.8
+"""Largest |cos| of a corner of the quadrilateral that two triangles make."""
+NEWTON = 20
+"""Steps onto a crease."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Squares that cover a body.
+
+    Attributes
+    ----------
+    places : (m, q + 1, q + 1, 3), L
+        Points by u and v; x_u x x_v points outward.
+    pieces : (m,)
+        The piece of each, 0 of a smooth body.
+    edges : (m, 4) of bool
+        Whether the normal jumps across the sides u = 0, u = 1, v = 0, v = 1.
+    sides : (m, 4)
+        Numbers of these sides: two squares that meet there have the same one.
+    spans : (m, 4, 2)
+        Where on a side, 0 to 1, each begins and ends, along u or v.
+    pointed : (m,) of bool
+        Whether the side u = 0 is one point.
+    tips : (m,) of bool
+        Whether that is a tip of the body.
+    off : (m,)
+        Distance from the body, L.
+    """
+
+    places: FloatArray
+    pieces: IntArray
+    edges: BoolArray
+    sides: IntArray
+    spans: FloatArray
+    pointed: BoolArray
+    tips: BoolArray
+    off: FloatArray
+
+    def __getitem__(self, at: Any) -> "Patches":
+        """Some of the squares."""
+        return Patches(*(getattr(self, one.name)[at] for one in fields(self)))
+
+    @property
+    def gap(self) -> float:
+        """Integral of the normal as a share of the area: 0 where the squares close."""
+        u, w = np.polynomial.legendre.leggauss(len(lobatto(DEGREE)))
+        at = np.broadcast_to(0.5 * (1 + u), (len(self.places), len(u)))
+        _, along, across = on_squares(self.places, at, at)
+        n, share = np.cross(along, across), np.outer(w, w)
+        area = float(np.sum(np.linalg.norm(n, axis=-1) * share))
+        return float(np.linalg.norm(np.einsum("muvx,uv->x", n, share))) / area
+
+    @property
+    def angle(self) -> float:
+        """Least sine of the angle between x_u and x_v, but where a square is one point."""
+        at = np.broadcast_to(lobatto(DEGREE), (len(self.places), DEGREE + 1))
+        _, along, across = on_squares(self.places, at, at)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sine = np.linalg.norm(np.cross(along, across), axis=-1)
+            sine /= np.linalg.norm(along, axis=-1) * np.linalg.norm(across, axis=-1)
+        sine[self.pointed, 0] = 1.0
+        return float(np.min(sine))
+
+    @staticmethod
+    def joined(parts: list["Patches"]) -> "Patches":
+        """Squares of several."""
+        return Patches(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Patches)))
+
+
+class _Mesh(NamedTuple):
+    """Corners of squares at (0, 0), (1, 0), (1, 1), (0, 1); the first is the last again of a triangle."""
+
+    vertices: FloatArray
+    corners: IntArray
+    pieces: IntArray
+
+
+def patches_of(body: Surface) -> Patches:
+    """Squares that cover a body, made once.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> patches = patches_of(sc.Cylinder(1.0, 2.0))
+    >>> bool(patches.off.max() < 1e-5), bool(patches.edges.any())
+    (True, True)
+    """
+    found: Patches = kept(body, "patches", lambda: _made(body))
+    return found
+
+
+def _made(body: Surface) -> Patches:
+    ground, best, least = _Ground(body), None, np.inf
+    failure: Exception | None = None
+    for share in SIDES_OF_PIECES if is_creased(body) else (0.0,):
+        try:
+            found = _refined(ground, _mesh_of(body, share))
+        except (SurfaceError, ValueError) as error:
+            failure = error
+            continue
+        # the fewest squares that are the body; where none are, those that are nearest to it
+        amiss = max(found.off.max() / (WELL * ground.size), found.gap / CLOSED, 1.0) / min(found.angle, STEEP)
+        if len(found.off) * amiss**2 < least:
+            best, least = found, len(found.off) * amiss**2
+    if best is None:
+        raise SurfaceError(f"no mesh of squares covers the body: {failure}")
+    return best
+
+
+def _refined(ground: "_Ground", mesh: "_Mesh") -> Patches:
+    """Squares of a mesh, parted until they are the body."""
+    current = _first(ground, mesh)
+    done = []
+    for turn in range(ROUNDS + 1):
+        off, turned = ground.misfit(current)
+        current = replace(current, off=off)
+        poor = ~((off < POSITION * ground.size) & (turned < NORMAL)) & (turn < ROUNDS)
+        done.append(current[~poor])
+        if not np.any(poor):
+            break
+        current = _parted(ground, current[poor])
+    made = Patches.joined(done)
+    wrong = np.flatnonzero(~(made.off < WORST * ground.size))
+    if len(wrong):
+        worst = wrong[np.argmax(np.nan_to_num(made.off[wrong], nan=np.inf))]
+        raise SurfaceError(
+            f"{len(wrong)} of {len(made.off)} squares of the body are not on it (worst near "
+            f"{np.array2string(made.places[worst].mean(axis=(0, 1)), precision=3)}): its integral equation has no mesh"
+        )
+    return made
+
+
+class _Ground:
+    """The pieces of a body, to bring points onto them."""
+
+    def __init__(self, body: Any) -> None:
+        self.body, self.size = body, size(body)
+        self.pieces = list(pieces_of(body)) if is_creased(body) else [body]
+
+    def onto(self, points: FloatArray, pieces: IntArray) -> FloatArray:
+        """The nearest points (n, 3) of the pieces with these numbers (n,)."""
+        out = np.array(points)
+        for number in np.unique(pieces):
+            mine = pieces == number
+            found = nearest_points(self.pieces[number], points[mine])[0]
+            # next to a tip the nearest point may be on another sheet
+            near = np.linalg.norm(found - points[mine], axis=1) < 0.25 * self.size
+            out[mine] = np.where(near[:, None], found, points[mine])
+        return out
+
+    def onto_both(self, points: FloatArray, first: int, second: int) -> FloatArray:
+        """Points (n, 3) brought onto two pieces at once, by least steps."""
+        x = np.array(points)
+        for _ in range(NEWTON):
+            rows, values = [], []
+            for number in (first, second):
+                gradient = self.pieces[number].gradient(x)
+                length = np.linalg.norm(gradient, axis=1)
+                rows.append(gradient / length[:, None])
+                values.append(self.pieces[number].level(x) / length)
+            J, F = np.stack(rows, axis=1), np.stack(values, axis=1)
+            if np.max(np.abs(F), initial=0.0) < 1e-14 * self.size:
+                break
+            step = np.linalg.solve(J @ np.swapaxes(J, 1, 2) + 1e-12 * np.eye(2), F[..., None])
+            x = x - (np.swapaxes(J, 1, 2) @ step)[..., 0]
+        return x
+
+    def misfit(self, patches: Patches) -> tuple[FloatArray, FloatArray]:
+        """Distance of squares from the body and angle of their normals to its own, at most (m,), L and radians."""
+        q = patches.places.shape[1] - 1
+        between = 0.5 * (lobatto(q)[1:] + lobatto(q)[:-1])[::2]
+        at = np.broadcast_to(between, (len(patches.places), len(between)))
+        x, along, across = on_squares(patches.places, at, at)
+        n = np.cross(along, across)
+        n /= np.linalg.norm(n, axis=-1, keepdims=True)
+        off, turned = np.zeros((2, *x.shape[:3]))
+        for number in np.unique(patches.pieces):
+            mine = patches.pieces == number
+            piece = self.pieces[number]
+            slope = piece.gradient(x[mine])
+            off[mine] = np.abs(piece.level(x[mine])) / np.linalg.norm(slope, axis=-1)
+            turned[mine] = np.linalg.norm(np.cross(n[mine], normal(piece, x[mine])), axis=-1)
+        return np.max(off, axis=(1, 2)), np.max(turned, axis=(1, 2))
+
+
+def _mesh_of(body: Any, share: float) -> _Mesh:
+    """A coarse mesh of a body, of pieces with sides of a share of its size."""
+    if not is_creased(body):
+        meshes = [quadrilaterals(body.level, body.gradient, body.bounds, cells=n, fewest=min(n, 24)) for n in CELLS]
+        kinds = [len(vertices) - len(tiles) for vertices, tiles in meshes]
+        vertices, tiles = meshes[kinds.index(kinds[-1])]
+        return _Mesh(vertices, tiles, np.zeros(len(tiles), dtype=np.int64))
+    corners, _, pieces = body.tiles(share * size(body))
+    grid = np.round(corners.reshape(-1, 3) / (SAME * size(body))).astype(np.int64)
+    _, first, numbers = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    vertices, triangles = corners.reshape(-1, 3)[first], numbers.reshape(-1, 3)
+    return _Mesh(vertices, *_paired(vertices, triangles, np.asarray(pieces), _tip_vertices(body, vertices)))
+
+
+def _tip_vertices(body: Any, vertices: FloatArray) -> BoolArray:
+    """Which vertices (n, 3) are tips (n,)."""
+    tips = tips_of(body)[1] if is_creased(body) else np.zeros((0, 3))
+    apart = np.linalg.norm(vertices[:, None] - tips, axis=2)
+    return np.asarray(np.min(apart, axis=1, initial=np.inf) < 1e-6 * size(body))
+
+
+def _paired(vertices: FloatArray, triangles: IntArray, pieces: IntArray, tip: BoolArray) -> tuple[IntArray, IntArray]:
+    """Corners of squares that two triangles of a piece make with each other, best first, and of those left alone."""
+    m = len(triangles)
+    # of each side the triangle, and its corners from the one opposite to it
+    turned = np.concatenate([np.roll(triangles, -shift, axis=1) for shift in range(3)])
+    owner = np.tile(np.arange(m), 3)
+    sides = np.sort(turned[:, 1:], axis=1)
+    order = np.lexsort(sides.T)
+    same = np.flatnonzero(np.all(sides[order][1:] == sides[order][:-1], axis=1))
+    one, two = order[same], order[same + 1]
+    fit = (pieces[owner[one]] == pieces[owner[two]]) & (turned[one, 1] == turned[two, 2])
+    one, two = one[fit], two[fit]
+    square = np.stack([turned[one, 0], turned[one, 1], turned[two, 0], turned[one, 2]], axis=1)
+    x = vertices[square]
+    ahead, behind = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine = np.sum(ahead * behind, axis=2) / np.linalg.norm(ahead, axis=2) / np.linalg.norm(behind, axis=2)
+    # convex where all corners turn the same way
+    around = np.cross(ahead, behind)
+    convex = np.all(np.sum(around * around.sum(axis=1, keepdims=True), axis=2) > 0, axis=1)
+    # two sides in a row along one crease have no corner between them
+    beyond = np.full(3 * m, -1)
+    fit = np.flatnonzero(pieces[owner[order[same]]] != pieces[owner[order[same + 1]]])
+    beyond[order[same][fit]], beyond[order[same + 1][fit]] = (
+        pieces[owner[order[same + 1]]][fit],
+        pieces[owner[order[same]]][fit],
+    )
+    around = np.stack([beyond[(row + shift * m) % (3 * m)] for row, shift in ((one, 2), (two, 1), (two, 2), (one, 1))])
+    ear = np.any((around >= 0) & (around == np.roll(around, 1, axis=0)), axis=0)
+    worst = np.where(convex & ~ear & ~np.any(tip[square], axis=1), np.max(np.abs(cosine), axis=1), np.inf)
+    taken, squares, owners = np.zeros(m, dtype=bool), [], []
+    for row in np.argsort(worst, kind="stable"):
+        a, b = owner[one[row]], owner[two[row]]
+        if worst[row] > SQUARE:
+            break
+        if not (taken[a] or taken[b]):
+            taken[a] = taken[b] = True
+            squares.append(square[row])
+            owners.append(pieces[a])
+    left = np.flatnonzero(~taken)
+    alone = triangles[left]
+    # the tip first, or the sharpest corner, which is where the square is drawn together
+    x = vertices[alone]
+    opposite = np.linalg.norm(np.roll(x, -1, axis=1) - np.roll(x, 1, axis=1), axis=2)
+    start = np.where(tip[alone].any(axis=1), np.argmax(tip[alone], axis=1), np.argmin(opposite, axis=1))
+    alone = np.take_along_axis(alone, (start[:, None] + np.arange(3)) % 3, axis=1)
+    corners = np.concatenate([np.array(squares, dtype=np.int64).reshape(-1, 4), alone[:, [0, 1, 2, 0]]])
+    return corners, np.concatenate([np.array(owners, dtype=np.int64), pieces[left]])
+
+
+SIDES = ((0, 3), (1, 2), (0, 1), (3, 2))
+"""Corners at the ends of the sides u = 0, u = 1, v = 0, v = 1."""
+
+
+def _first(ground: _Ground, mesh: _Mesh) -> Patches:
+    """Squares of a mesh."""
+    t = lobatto(DEGREE)
+    m = len(mesh.corners)
+    ends = np.stack([mesh.corners[:, side] for side in SIDES], axis=1)
+    low = np.sort(ends.reshape(-1, 2), axis=1)
+    pairs, numbers = np.unique(low, axis=0, return_inverse=True)
+    numbers = numbers.ravel()
+    owner = np.repeat(mesh.pieces, 4)
+    least, most = np.full(len(pairs), np.iinfo(np.int64).max), np.full(len(pairs), -1)
+    np.minimum.at(least, numbers, owner)
+    np.maximum.at(most, numbers, owner)
+    a, b = mesh.vertices[pairs[:, 0]], mesh.vertices[pairs[:, 1]]
+    lines = a[:, None] + t[:, None] * (b - a)[:, None]
+    inside = lines[:, 1:-1]
+    edge = np.zeros(len(pairs), dtype=bool)
+    long = pairs[:, 0] != pairs[:, 1]
+    plain = long & (least == most)
+    inside[plain] = ground.onto(inside[plain].reshape(-1, 3), np.repeat(least[plain], DEGREE - 1)).reshape(
+        -1, DEGREE - 1, 3
+    )
+    for one, two in np.unique(np.stack([least, most], axis=1)[long & (least != most)], axis=0):
+        mine = np.flatnonzero(long & (least == one) & (most == two))
+        sides = np.broadcast_to([one, two], (len(mine), 2))
+        crease = nearest_crease(ground.body, 0.5 * (a + b)[mine], sides)[0]
+        for number in np.unique(crease):
+            rows = mine[crease == number]
+            edge[rows] = ground.body.creases[number].kind == "edge"
+            inside[rows] = _on_crease(ground, ground.body.creases[number], lines[rows], int(one), int(two))[:, 1:-1]
+    lines[:, 1:-1] = inside
+    along = lines[numbers].reshape(m, 4, DEGREE + 1, 3)
+    backward = (ends[..., 0] > ends[..., 1])[..., None, None]
+    along = np.where(backward, along[:, :, ::-1], along)
+    places = _coons(along)
+    pointed = mesh.corners[:, 0] == mesh.corners[:, 3]
+    places[:, 1:-1, 1:-1] = _onto_within(ground, places, mesh.pieces)
+    tip = _tip_vertices(ground.body, mesh.vertices)[mesh.corners[:, 0]] & pointed
+    spans = np.where(backward[..., 0], [1.0, 0.0], [0.0, 1.0])
+    sides = numbers.reshape(m, 4)
+    return Patches(places, mesh.pieces, edge[sides], sides, spans, pointed, tip, np.zeros(m))
+
+
+def _coons(sides: FloatArray) -> FloatArray:
+    """Coons's surface (m, n, n, 3) through the sides u = 0, u = 1, v = 0, v = 1 (m, 4, n, 3)."""
+    t = lobatto(sides.shape[2] - 1)
+    u, v = t[:, None, None], t[None, :, None]
+    left, right, low, high = (sides[:, number] for number in range(4))
+    ruled = (1 - u) * left[:, None] + u * right[:, None] + (1 - v) * low[:, :, None] + v * high[:, :, None]
+    a, b, c, d = (part[:, None, None] for part in (low[:, 0], low[:, -1], high[:, -1], high[:, 0]))
+    return np.asarray(ruled - ((1 - u) * (1 - v) * a + u * (1 - v) * b + u * v * c + (1 - u) * v * d))
+
+
+def _onto_within(ground: _Ground, places: FloatArray, pieces: IntArray) -> FloatArray:
+    """Points inside squares, brought onto their pieces."""
+    inside = places[:, 1:-1, 1:-1]
+    numbers = np.repeat(pieces, inside.shape[1] * inside.shape[2])
+    return ground.onto(np.ascontiguousarray(inside).reshape(-1, 3), numbers).reshape(inside.shape)
+
+
+def _on_crease(ground: _Ground, crease: Any, lines: FloatArray, one: int, two: int) -> FloatArray:
+    """Points (m, n, 3) between the ends of chords of a crease between two pieces, on it."""
+    if crease.kind == "edge":
+        found = ground.onto_both(lines.reshape(-1, 3), one, two).reshape(lines.shape)
+        chord = np.linalg.norm(lines[:, -1] - lines[:, 0], axis=1)[:, None]
+        if np.all(np.linalg.norm(found - lines, axis=2) < 0.5 * chord):
+            return found
+    start = _along(np.asarray(crease.points, dtype=float), lines)
+    return ground.onto(start.reshape(-1, 3), np.full(start.shape[0] * start.shape[1], one)).reshape(lines.shape)
+
+
+def _along(points: FloatArray, lines: FloatArray) -> FloatArray:
+    """Points along a curve (n, 3) between the places next to the ends of chords (m, q + 1, 3)."""
+    from scipy.interpolate import CubicSpline
+    from scipy.spatial import cKDTree
+
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    closed = np.linalg.norm(points[-1] - points[0]) < 1e-9 * s[-1]
+    if closed:
+        points = np.concatenate([points[:-1], points[:1]])
+    curve = CubicSpline(s, points, bc_type="periodic" if closed else "not-a-knot")
+    tree, ends = cKDTree(points), []
+    for x in (lines[:, 0], lines[:, -1]):
+        at = s[tree.query(x)[1]]
+        for _ in range(8):
+            away, slope = x - curve(at), curve(at, 1)
+            at = at + np.sum(away * slope, axis=1) / np.sum(slope**2, axis=1)
+        ends.append(at)
+    start, along = ends[0], ends[1] - ends[0]
+    if closed:
+        along = along - s[-1] * np.round(along / s[-1])
+    return np.asarray(curve(start[:, None] + along[:, None] * lobatto(lines.shape[1] - 1)))
+
+
+def _parted(ground: _Ground, patches: Patches) -> Patches:
+    """Squares halved along the sides over which they turn more, or along both, and brought onto the body again."""
+    at = lobatto(DEGREE)
+    _, along, across = on_squares(patches.places, *(np.broadcast_to(at[1:-1], (len(patches.off), DEGREE - 1)),) * 2)
+    n = np.cross(along, across)
+    n /= np.linalg.norm(n, axis=-1, keepdims=True)
+    turns = [np.linalg.norm(np.diff(n, axis=axis), axis=-1).sum(axis=axis).max(axis=1) for axis in (1, 2)]
+    halves = [turns[axis] > TURNS * turns[1 - axis] for axis in (0, 1)]
+    parts = []
+    for which, mine in enumerate((halves[0], halves[1], ~(halves[0] | halves[1]))):
+        mine = np.flatnonzero(mine)
+        some = patches[mine]
+        for right in (None,) if which == 1 else (False, True):
+            for upper in (None,) if which == 0 else (False, True):
+                parts += [_half(ground, some, right, upper)] if len(mine) else []
+    return Patches.joined(parts)
+
+
+def _half(ground: _Ground, patches: Patches, right: bool | None, upper: bool | None) -> Patches:
+    """Halves of squares along u, u > 1/2 if ``right``, or whole if None; likewise along v."""
+    t, m = lobatto(DEGREE), len(patches.off)
+    u, v = (t if part is None else 0.5 * (t + part) for part in (right, upper))
+    x = on_squares(patches.places, *(np.broadcast_to(part, (m, len(t))) for part in (u, v)))[0]
+    pointed = patches.pointed & (right is not True)
+    x[pointed, 0] = patches.places[pointed, :1, 0]
+    inner = np.array([right is True, right is False, upper is True, upper is False])
+    edges = patches.edges & ~inner
+    for side in np.flatnonzero(inner if is_creased(ground.body) else np.ones(4, dtype=bool)):
+        free = np.flatnonzero(~(pointed & (side == 0)))
+        rows = (x[:, 0], x[:, -1], x[:, :, 0], x[:, :, -1])[side]
+        middle = rows[free][:, 1:-1]
+        numbers = np.repeat(patches.pieces[free], DEGREE - 1)
+        rows[free[:, None], np.arange(1, DEGREE)] = ground.onto(middle.reshape(-1, 3), numbers).reshape(middle.shape)
+    x[:, 1:-1, 1:-1] = _onto_within(ground, x, patches.pieces)
+    spans = patches.spans.copy()
+    for part, lanes in ((upper, [0, 1]), (right, [2, 3])):
+        if part is not None:
+            spans[:, lanes, 0 if part else 1] = patches.spans[:, lanes].mean(axis=2)
+    return Patches(x, patches.pieces, edges, patches.sides, spans, pointed, patches.tips & pointed, np.zeros(m))

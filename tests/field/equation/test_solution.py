@@ -1,0 +1,123 @@
+"""`creeping.solve`: against series of the sphere, and by what must hold of any body."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import creeping as cr
+import scatterers as sc
+from creeping.errors import InvalidInputError
+from creeping.field.equation import kept, solution
+from studies.reference import sphere
+
+D = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, -0.8]])
+R = cr.fibonacci_directions(60)
+CYLINDER = sc.Cylinder(1.0, 2.0)
+ETA = 0.5 + 0.2j
+
+
+@pytest.fixture(scope="module")
+def flat():
+    """Hard cylinder at three incidences and back: k = 3."""
+    d = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 6e-17], [0.0, 0.0, 1.0], [0.48, 0.6, -0.64]])
+    return cr.solve(CYLINDER, np.concatenate([d, -d]), wavenumber=3.0, boundary="hard")
+
+
+@pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(ETA)])
+def test_sphere_against_its_series_far_near_and_on_it(boundary):
+    k = 4.0
+    known = ETA if isinstance(boundary, cr.ImpedanceBoundary) else boundary
+    found = cr.solve(sc.Sphere(), D, wavenumber=k, boundary=boundary)
+    heights = np.array([0.0, 1e-4, 1e-2, 0.3, 2.0])
+    x = (1 + heights)[:, None] * R[: len(heights)]
+    for number, d in enumerate(D):
+        far, exact = found.far_field(R, number), sphere.far_field(k, 1.0, R @ d, known)
+        assert np.sqrt(np.mean(np.abs(far.total - exact) ** 2)) < 1e-3 * np.abs(exact).max()
+        assert np.mean(np.abs(far.total - exact) <= far.error) > 0.9
+        off = found.near_field(x[1:], number)
+        assert_allclose(off.values, sphere.total_field(k, 1.0, x[1:], d, known), atol=3e-3)
+        on = found.surface_field(R, number)
+        field = sphere.surface_derivative if boundary == "soft" else sphere.surface_field
+        assert_allclose(on.values, field(k, 1.0, R @ d, known), atol=3e-3 * (k if boundary == "soft" else 1))
+        assert np.all(off.ok) and np.all(on.ok)
+
+
+def test_conductor_against_its_series():
+    k, d = 4.0, D[0]
+    found = cr.solve(sc.Sphere(), D, wavenumber=k, boundary="pec")
+    meridian = np.array([[np.sin(t), 0.0, np.cos(t)] for t in np.linspace(0.3, 2.9, 12)])
+    across, along = sphere.pec_far_field(k, 1.0, meridian @ d)
+    f = found.far_field(meridian)
+    assert_allclose(f.total[:, 0, 0], along, atol=1.5e-3)
+    assert_allclose(f.total[:, 1, 1], across, atol=1.5e-3)
+    assert found.currents().extinction < 5e-3 and "2 incidences" in repr(found)
+
+
+def test_a_flat_ended_cylinder_broadside_and_end_on(flat):
+    # broken conditions at edges take many steps, and leave large fields there
+    assert flat.steps < 18 and np.abs(flat._values).max() < 3.2
+    assert_allclose(flat.far_field(R, 0).total, flat.far_field(R, 1).total, atol=1e-6)
+    assert max(flat.currents(number).extinction for number in range(8)) < 0.01
+
+
+def test_reciprocity_and_the_optical_theorem_of_a_body_with_edges(flat):
+    d = flat.directions
+    f = np.array([flat.far_field(-d, number).total for number in range(8)])
+    largest = np.abs([flat.far_field(d[n][None], n).total[0] for n in range(8)]).max()
+    assert_allclose(f, f.T, atol=1e-3 * largest)
+    u, w = np.polynomial.legendre.leggauss(14)
+    phi = np.arange(28) * np.pi / 14
+    s = np.sqrt(1 - u**2)[:, None]
+    r = np.stack([s * np.cos(phi), s * np.sin(phi), np.repeat(u[:, None], 28, 1)], axis=-1).reshape(-1, 3)
+    power = np.abs(flat.far_field(r, 3).total) ** 2 @ np.repeat(w * np.pi / 14, 28)
+    assert power == pytest.approx(4 * np.pi / 3.0 * flat.far_field(d[3][None], 3).total[0].imag, rel=3e-3)
+
+
+def test_far_field_of_a_fan_is_that_of_the_equation_where_edges_diffract(flat):
+    fan = cr.launch(cr.DirectFlow(CYLINDER, rtol=1e-8), cr.shadow_line(CYLINDER, (0.48, 0.6, -0.64)), length=2.0)
+    for method in ("auto", "equation"):
+        far = cr.far_field(fan, R, wavenumber=3.0, boundary="hard", method=method)
+        assert set(far.method) == {"equation"} and far.validity is not None and not far.unresolved.any()
+        assert_allclose(far.total, flat.far_field(R, 3).total, atol=1e-4)
+    # kept with the body: it is solved once
+    assert kept.solution_for(CYLINDER, fan.line.direction, 3.0, "hard") is not None
+    by_rays = cr.far_field(fan, R[:3], wavenumber=3.0, boundary="hard", method="rays")
+    assert set(by_rays.method) == {"rays+optics"}
+
+
+def test_units_scale(flat):
+    small = cr.solve(sc.Cylinder(1e-3, 2e-3), (0.48, 0.6, -0.64), wavenumber=3e3, boundary="hard")
+    assert_allclose(1e3 * small.far_field(R).total, flat.far_field(R, 3).total, atol=1e-5)
+
+
+def test_backscatter_is_the_far_field_of_each_incidence(flat):
+    back = flat.backscatter()
+    assert back.directions.shape == (8, 3)
+    for number in (2, 5):
+        one = flat.far_field(-flat.directions[number], number)
+        assert back.total[number] == one.total[0] and back.error[number] == one.error[0]
+
+
+def test_next_to_edges_and_faces_the_field_is_continuous(flat):
+    rim = np.array([1.0, 0.0, 1.0])
+    out = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
+    x = rim + np.array([1e-4, 3e-4, 1e-3])[:, None] * out
+    u = flat.near_field(x, 0).values
+    assert np.all(np.abs(np.diff(u)) < 0.05) and np.all(np.abs(u) < 2.5)
+    side, above = [(1.0, 0.0, 0.3)], [(1.0001, 0.0, 0.3)]
+    assert_allclose(flat.near_field(above, 0).values, flat.surface_field(side, 0).values, atol=5e-3)
+
+
+def test_what_cannot_be_solved_is_told(flat, monkeypatch):
+    with pytest.raises(InvalidInputError, match=r"nodes, about .* more than the 0.001 s"):
+        cr.solve(CYLINDER, (1, 0, 0), wavenumber=3.0, boundary="soft", seconds=1e-3)
+    with pytest.raises(InvalidInputError, match="1 of 2 points are inside the body"):
+        flat.near_field([(0, 0, 0.2), (0, 0, 2)])
+    with pytest.raises(InvalidInputError, match="boundary = 'rigid'"):
+        cr.solve(CYLINDER, (1, 0, 0), wavenumber=3.0, boundary="rigid")
+    told = []
+    cr.solve(CYLINDER, (1, 0, 0), wavenumber=1.0, boundary="soft", progress=told.append)
+    assert "nodes, about" in told[0]
+    monkeypatch.setattr(kept, "SECONDS", 1e-9)
+    assert kept.solution_for(CYLINDER, D[0], 2.9, "hard") is None
+    assert solution.cost(10_000, solution.CONDUCTOR, 1) > solution.cost(10_000, kept.scalar_boundaries("soft")[0], 1)
