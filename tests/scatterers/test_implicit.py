@@ -132,7 +132,7 @@ def test_scale_changes_nothing_but_lengths(name, scale):
 def test_off_the_origin():
     body = Implicit("(x-3)**2/1.44 + (y+2)**2/0.64 + (z-1.5)**2/0.64 - 1")
     assert cr.check_surface(body).ok and body.star_shaped
-    np.testing.assert_allclose(body.bounds, [3, -2, 1.5] + body_of("ellipsoid").bounds, atol=0.1)
+    np.testing.assert_allclose(body.bounds, np.array([3, -2, 1.5]) + body_of("ellipsoid").bounds, atol=0.1)
     assert cr.shadow_line(body, (1, 1, 1)).length == pytest.approx(6.1340508514, abs=LENGTH)
 
 
