@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 import shared_bodies as sc
-from oracles.attenuation import extend, extend_along, first_zero
-from oracles.leaps import leap as oracle
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -13,7 +11,6 @@ from creeping.geodesics import attenuation
 from creeping.geodesics.attenuation import (
     NODES,
     chebyshev_times,
-    fine_rules,
     gauss_rule,
     halves,
     lagrange,
@@ -23,57 +20,49 @@ from creeping.geodesics.hermite import sliding
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
+from creeping.geometry.speed import speed_values
 
-NON_CONVEX = {"torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}
+# unequal, repeated, with 0, and two that differ by rounding
+AWKWARD = np.array([0.0, 0.0, 0.3, 0.3, np.nextafter(0.3, 1), 0.31, 0.9, 0.9 + 1e-9, 2.0])
 
 
-def traced_curvature(body, state):
-    """kappa_n along one ray as a function of time, by direct integration."""
+def rate_along(body, state):
+    """c^(3/2) kappa_n along one ray as a function of time, by direct integration."""
 
-    def kappa(t):
-        end = trace_states(body, state[None, :6], np.array([t]), rtol=1e-13)[0, 0]
-        return float(normal_curvature(body, end[:3], end[3:]))
+    def rate(t):
+        ends = trace_states(body, state[None, :6], np.atleast_1d(t), rtol=1e-13)[0]
+        x, p = ends[:, :3], ends[:, 3:6]
+        return speed_values(body, x) ** 1.5 * normal_curvature(body, x, p)
 
-    return kappa
+    return rate
 
 
 def by_quadrature(body, state, length):
     """A and the time of detachment of one ray, by brentq and quad."""
-    kappa = traced_curvature(body, state)
+    rate = rate_along(body, state)
     grid = np.linspace(0, length, 161)
-    values = trace_states(body, state[None, :6], grid, rtol=1e-12)[0]
-    curved = normal_curvature(body, values[:, :3], values[:, 3:6])
-    below = np.flatnonzero(curved <= 0)
+    below = np.flatnonzero(rate(grid) <= 0)
     end = np.inf
     if len(below):
-        end = 0.0 if below[0] == 0 else brentq(kappa, grid[below[0] - 1], grid[below[0]], xtol=1e-13)
+        end = 0.0 if below[0] == 0 else brentq(lambda t: rate(t)[0], *grid[below[0] - 1 : below[0] + 1], xtol=1e-13)
     stop = min(end, length)
     # t = stop (1 - s^3) takes the root of the power out of the integrand's end
-    total = 3 * stop * quad(lambda s: s * s * max(kappa(stop * (1 - s**3)), 0) ** (2 / 3), 0, 1, epsabs=1e-10)[0]
+    total = 3 * stop * quad(lambda s: s * s * max(rate(stop * (1 - s**3))[0], 0) ** (2 / 3), 0, 1, epsabs=1e-10)[0]
     return total, end
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", NON_CONVEX)
-def test_carried_by_the_map_through_detachment(name, rng):
-    body = NON_CONVEX[name]
-    flow = cr.build_phase_map(body, tolerance=1e-7, length=2.0, n_steps=8)
-    states = pack(*random_bundle_points(body, 400, rng=rng), lanes=12)
-    times = np.arange(1, 9) / 4
-    got = flow.transport(states, times)
-    direct = cr.DirectFlow(body, rtol=1e-12).transport(states, times)
-    same = np.isinf(got[:, -1, 11]) == np.isinf(direct[:, -1, 11])
-    # a ray that touches kappa_n = 0 may detach for one and pass for the other
-    assert np.mean(same) > 0.98
-    assert np.sqrt(np.mean((got[same, :, 10] - direct[same, :, 10]) ** 2)) < 2e-5
-    ended = same & np.isfinite(direct[:, -1, 11])
-    assert ended.sum() > 50
-    assert np.median(np.abs(got[ended, -1, 11] - direct[ended, -1, 11])) < 1e-6
-    for row in np.flatnonzero(same)[:4]:
-        total, end = by_quadrature(body, states[row], 2.0)
-        assert direct[row, -1, 10] == pytest.approx(total, abs=1e-6)
-        assert got[row, -1, 10] == pytest.approx(total, abs=1e-5)
-        assert direct[row, -1, 11] == pytest.approx(end, abs=1e-8)
+@pytest.mark.parametrize("body", [sc.TwistedEllipsoid(), sc.Torus(speed="1 + 0.3*x + 0.2*z")], ids=repr)
+def test_attenuation_and_detachment_are_those_of_quadrature(body, rng):
+    states = pack(*random_bundle_points(body, 40, rng=rng), lanes=12)
+    states[:20, 11], states[:, 10] = 0.25, 7.0
+    got = cr.DirectFlow(body, rtol=1e-12).transport(states, AWKWARD)
+    # detached rays stay so
+    np.testing.assert_array_equal(got[:20, :, 10:], np.broadcast_to([7.0, 0.25], (20, len(AWKWARD), 2)))
+    ended = np.isfinite(got[:, -1, 11])
+    for row in (*(20 + np.flatnonzero(ended[20:])[:2]), *(20 + np.flatnonzero(~ended[20:])[:2])):
+        total, end = by_quadrature(body, states[row], AWKWARD[-1])
+        assert got[row, -1, 10] - 7 == pytest.approx(total, abs=1e-6)
+        assert got[row, -1, 11] == pytest.approx(end, abs=1e-8)
 
 
 def test_sphere_is_exact():
@@ -93,26 +82,6 @@ def test_weighted_rate_carries_the_speed():
         np.testing.assert_allclose(got[..., 10], 2 * 0.5, rtol=1e-10)
 
 
-@pytest.mark.slow
-def test_times_between_leaps_agree_with_direct_flow(rng):
-    body = sc.TwistedEllipsoid()
-    flow = cr.build_phase_map(body, tolerance=1e-7)
-    states = pack(*random_bundle_points(body, 50, rng=rng), lanes=12)
-    times = np.array([0.1, 0.33, 0.9])
-    got, direct = flow.transport(states, times), cr.DirectFlow(body, rtol=1e-12).transport(states, times)
-    np.testing.assert_allclose(got[..., :11], direct[..., :11], atol=3e-5)
-
-
-def test_kernel_equals_numpy_twin(rng):
-    body = sc.Torus()
-    flow = cr.build_phase_map(body, horizon=0.3, grid=(32, 24), precision="double")
-    states = pack(*random_bundle_points(body, 300, rng=rng), lanes=12)
-    one, other = flow.leap(states, 1), oracle(flow, states)
-    np.testing.assert_allclose(one[:, :11], other[:, :11], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(one[:, 11], other[:, 11], rtol=1e-9)
-    assert np.isfinite(one[:, 11]).sum() > 20
-
-
 def test_rules():
     times = chebyshev_times()
     coefficients = np.arange(1.0, NODES + 1)
@@ -122,19 +91,6 @@ def test_rules():
     both = np.concatenate([polynomial(times / 2), polynomial(0.5 + times / 2)])
     np.testing.assert_allclose(halves() @ both, polynomial(times), rtol=1e-12)
     assert np.sum(gauss_rule()[1]) == pytest.approx(1)
-    assert first_zero(0.3 - times) == pytest.approx(0.3, abs=1e-12)
-    assert first_zero(1 + times) == np.inf
-    assert first_zero(-times) == 0.0
-
-
-def test_a_detached_ray_stays_so():
-    total, end = np.array([1.0]), np.array([0.25])
-    extend(np.ones((1, NODES)), 0.5, np.array([0.5]), total, end)
-    assert (total[0], end[0]) == (1.0, 0.25)
-
-
-# unequal, repeated, with 0, and two that differ by rounding
-AWKWARD = np.array([0.0, 0.0, 0.3, 0.3, np.nextafter(0.3, 1), 0.31, 0.9, 0.9 + 1e-9, 2.0])
 
 
 class Uncompiled:
@@ -143,24 +99,6 @@ class Uncompiled:
     def __init__(self, body):
         for name in ("level", "gradient", "hessian", "bounds", "atlas", "parameters"):
             setattr(self, name, getattr(body, name))
-
-
-@pytest.mark.parametrize("body", [sc.Torus(), sc.TwistedEllipsoid(), sc.Torus(speed="1 + 0.3*x + 0.2*z")], ids=repr)
-def test_traced_kernel_equals_numpy_twin(body, rng):
-    states = pack(*random_bundle_points(body, 150, rng=rng), lanes=12)
-    states[:20, 11], states[:, 10] = 0.25, 7.0
-    got = cr.DirectFlow(body).transport(states, AWKWARD)
-    spacing = attenuation.fine_spacing(body, 1e-10)
-    fine = sliding(np.unique(AWKWARD[2:]), spacing, fine_rules()[0])
-    traced = trace_states(body, states[:, :10], fine.times)
-    out = np.empty_like(got)
-    out[:, 0, 10:] = states[:, 10:]
-    extend_along(body, traced, fine, np.searchsorted(fine.times, AWKWARD), out)
-    np.testing.assert_array_equal(got[..., :10], out[..., :10])
-    np.testing.assert_allclose(got[..., 10], out[..., 10], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(got[..., 11], out[..., 11], rtol=1e-9)
-    np.testing.assert_array_equal(got[:20, :, 10:], np.broadcast_to([7.0, 0.25], (20, len(AWKWARD), 2)))
-    assert 20 < np.isfinite(got[20:, -1, 11]).sum() < 130
 
 
 def test_body_without_kernels_attenuates_the_same(rng):
@@ -185,7 +123,7 @@ def test_output_times_change_nothing(rng):
         np.testing.assert_array_equal(other[:, 0], states)
 
 
-@pytest.mark.parametrize("time", [1e-320, 1e-150, 1e-14, 1e-9, 1e-5, 1e-3])
+@pytest.mark.parametrize("time", [1e-320, 1e-14, 1e-5])
 def test_short_times(time, rng):
     body = sc.Ellipsoid(1.0, 0.8, 0.6)
     states = pack(*random_bundle_points(body, 20, rng=rng), lanes=12)
