@@ -20,15 +20,19 @@ def arithmetic(a, b, out):
     x *= y
     x -= spread(1.0)
     store(out, 5 * LANES, x)
+    store(out, 6 * LANES, -y)
+    store(out, 7 * LANES, magnitude(-y))
+    store(out, 8 * LANES, larger(load(a, 0), y))
 
 
 def test_lanes_are_those_of_numpy():
     rng = np.random.default_rng(3)
-    a, b, out = rng.uniform(1, 2, 20), rng.uniform(1, 2, 20), np.zeros(7 * LANES)
+    a, b, out = rng.uniform(1, 2, 20), rng.uniform(1, 2, 20), np.zeros(9 * LANES)
+    a[0], b[4] = np.nan, np.nan
     arithmetic(a, b, out)
     x, y = a[:LANES], b[3 : 3 + LANES]
-    expected = [x + y, x - y, x * y, x / y, 2.5 * np.sqrt(x), (x + y) * y - 1, 0 * x]
-    np.testing.assert_allclose(out.reshape(7, LANES), expected, rtol=1e-15, atol=0)
+    expected = [x + y, x - y, x * y, x / y, 2.5 * np.sqrt(x), (x + y) * y - 1, -y, np.abs(y), np.where(x > y, x, y)]
+    np.testing.assert_allclose(out.reshape(9, LANES), expected, rtol=1e-15, atol=0)
 
 
 @njit
@@ -45,54 +49,25 @@ def _half(x):
     return x * spread(0.5)
 
 
-def test_vectors_live_through_loops_and_calls():
-    a = np.arange(1.0, LANES + 1)
-    recurrence(a, 3)
-    np.testing.assert_array_equal(a, np.arange(1, LANES + 1) / 8)
-
-
-@njit
-def compared(a, b, out):
-    x, y = load(a, 0), load(b, 0)
-    store(out, 0, -x)
-    store(out, LANES, magnitude(x))
-    store(out, 2 * LANES, larger(x, y))
-
-
-def test_signs_and_sizes_are_those_of_numpy():
-    rng = np.random.default_rng(5)
-    a, b, out = rng.normal(size=LANES), rng.normal(size=LANES), np.zeros(3 * LANES)
-    a[0], b[1] = np.nan, np.nan
-    compared(a, b, out)
-    expected = [-a, np.abs(a), np.where(a > b, a, b)]
-    np.testing.assert_array_equal(out.reshape(3, LANES), expected)
-
-
-@njit
-def by_address(a, out):
-    """The second of two vectors behind the third number, written one number on."""
-    store(pointer(out, 1), 0, load(pointer(pointer(a, 1), 2), LANES))
-
-
-def test_addresses_count_elements():
-    a, out = np.arange(30.0), np.zeros(LANES + 1)
-    by_address(a, out)
-    np.testing.assert_array_equal(out, np.r_[0.0, a[LANES + 3 : 2 * LANES + 3]])
-
-
 _pair = loads(2, 11)
 
 
 @njit
-def apart(a, out):
+def by_address(a, out):
+    """The second of two vectors behind the third number, written one number on; two vectors a stride apart."""
+    store(pointer(out, 1), 0, load(pointer(pointer(a, 1), 2), LANES))
     x, y = _pair(pointer(a, 1), 2)
-    store(out, 0, x - y)
+    store(out, LANES + 1, x - y)
 
 
-def test_vectors_of_one_call_are_a_stride_apart():
-    a, out = np.random.default_rng(7).normal(size=30), np.zeros(LANES)
-    apart(a, out)
-    np.testing.assert_array_equal(out, a[3 : 3 + LANES] - a[14 : 14 + LANES])
+def test_addresses_count_elements_and_vectors_live_through_loops_and_calls():
+    a, out = np.random.default_rng(7).normal(size=30), np.zeros(2 * LANES + 1)
+    by_address(a, out)
+    apart = a[3 : 3 + LANES] - a[14 : 14 + LANES]
+    np.testing.assert_array_equal(out, np.concatenate([[0.0], a[LANES + 3 : 2 * LANES + 3], apart]))
+    before = a[:LANES].copy()
+    recurrence(a, 3)
+    np.testing.assert_array_equal(a[:LANES], before / 8)
 
 
 _WEIGHTS = np.array([[0.0, 0, 0], [0.5, 0, -2], [0, 0, 0], [1, 2, 3]])

@@ -1,13 +1,10 @@
 """CAD bodies whose faces join smoothly while the curvature jumps: joints, and the side of each piece."""
 
-import json
-
 import numpy as np
 import pytest
 from cad_files import made
 
 import scatterers as sc
-from creeping.commands import main as cli
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 pytestmark = pytest.mark.slow
@@ -46,25 +43,3 @@ def test_a_box_with_all_edges_filleted_is_told_by_its_joints(filleted):
     assert near.sum() > 200
     np.testing.assert_array_equal(body.level(x[near]) > 0, away[near] > 0)
     np.testing.assert_allclose(body.level(x[near]), away[near], atol=2e-6)
-
-
-def test_check_tells_of_joints_that_jets_do_not_see(filleted, capsys, tmp_path, monkeypatch):
-    """Verdict, vertices on joints and the pieces' kinds are those of the faces, whatever polynomials make of points."""
-    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))
-    texts = {}
-    for form in ([], ["--json"]):
-        with pytest.raises(SystemExit) as ended:
-            cli.main(["check", str(filleted), *form])
-        texts[bool(form)] = capsys.readouterr().out
-        assert ended.value.code == 0, texts
-    answer, told = json.loads(texts[True]), texts[False]
-    jumps, edge = answer["quality"]["jumps"], answer["quality"]["edge_mean"]
-    # 24 straight joints and 24 quarters of circles, 0.98 m in all, with a vertex to each edge
-    straight = 8 * (48e-3 + 28e-3 + 18e-3)
-    assert jumps == pytest.approx((straight + 24 * np.pi / 2 * 6e-3) / edge, rel=0.15)
-    assert answer["quality"]["verdict"] == "curvature jumps" and answer["quality"]["bad_share"] == 0
-    assert answer["pieces"] == 26 and [crease["kind"] for crease in answer["creases"]] == 48 * ["joint"]
-    assert (
-        "verdict                    curvature jumps" in told and f"curvature jumps at         {jumps} vertices" in told
-    )
-    assert "26 smooth pieces, 48 joints, area" in told and "all of planes and quadrics" in told
