@@ -16,7 +16,6 @@ from creeping.geodesics.attenuation import (
     lagrange,
 )
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.hermite import sliding
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
@@ -140,31 +139,6 @@ def test_slices_of_rays_change_nothing(rng, monkeypatch):
     whole = flow.transport(states, times)
     monkeypatch.setattr(attenuation, "WORKSPACE", 1)
     np.testing.assert_array_equal(flow.transport(states, times), whole)
-
-
-@pytest.mark.parametrize("body", [sc.Ellipsoid(1.2, 1.0, 0.7), sc.Sphere(speed="1 + 0.3*x")], ids=repr)
-def test_weighted_or_not_as_integrated_with_the_ray(body, rng):
-    # the tracer's own lane of A, good where kappa_n has no zeros
-    states = pack(*random_bundle_points(body, 100, rng=rng), lanes=12)
-    times = np.array([1.0, 6.0])
-    exact = trace_states(body, states[:, :11], times, rtol=1e-13)[..., 10]
-    for rtol, step, bound in ((1e-12, None, 1e-8), (1e-8, None, 2e-6), (1e-8, 0.07, 2e-6)):
-        got = cr.DirectFlow(body, rtol=rtol, step=step).transport(states, times)
-        np.testing.assert_allclose(got[..., 10], exact, atol=bound)
-
-
-def test_sliding_polynomial_has_degree_11(rng):
-    outputs, points = np.array([0.2, 0.21, 1.0, 1.0 + 1e-13, 2.0]), gauss_rule(6)[0]
-    fine = sliding(outputs, 0.25, points)
-    polynomial = np.polynomial.Polynomial(rng.standard_normal(12), domain=[0, 2])
-    knots = fine.times[fine.knots]
-    assert np.all(np.diff(knots) >= 0.25 / 4) and np.all(np.diff(knots) <= 1.5 * 0.25) and knots[-1] == 2.0
-    assert set(outputs) <= set(fine.times)
-    data = np.stack([polynomial.deriv(d)(knots) if d else polynomial(knots) for d in range(3)], axis=1)
-    at = fine.times[:-1, None] + np.diff(fine.times)[:, None] * points
-    for weights, wanted, bound in ((fine.position, polynomial, 1e-12), (fine.velocity, polynomial.deriv(), 1e-10)):
-        got = [weights[k] @ data[fine.first[k] : fine.first[k] + 4].ravel() for k in range(len(fine.first))]
-        np.testing.assert_allclose(got, wanted(at), atol=bound)
 
 
 def test_rays_that_fail_are_numbered_through(rng, monkeypatch):

@@ -109,15 +109,6 @@ def test_error_is_what_a_fresh_sample_measures(body, phase_map, rng):
     assert 0.4 * flow.error.rms < fresh < 2.5 * flow.error.rms
 
 
-def test_points_at_the_edges_of_charts_are_no_worse(phase_map):
-    body, flow = sc.TwistedEllipsoid(), phase_map("twisted")
-    edge = np.stack([np.linspace(0, 1, 21), np.full(21, 1.0)], axis=-1)
-    x = np.concatenate([chart.point(edge) for chart in body.atlas.charts])
-    p = np.cross(body.gradient(x), [0.2, -0.5, 0.9])
-    exact = cr.trace(body, x, p, flow.horizon, rtol=1e-12)[0]
-    assert rms(flow.apply(x, p)[0], exact) < 5 * MAP
-
-
 @pytest.mark.parametrize("method", ["direct", "tower"])
 def test_any_time_between_the_maps(method, rng):
     body = sc.Ellipsoid(1.2, 0.8, 0.8)

@@ -163,14 +163,6 @@ def test_doubling_agrees_with_tracing(built):
     assert rms(one, other) < 1e-5
 
 
-def test_tuned_maps_keep_their_tolerance(built):
-    flow = cr.build_phase_map(built.body, tolerance=1e-6, length=4.0, cache=False)
-    assert flow.grid.is_flat and flow.growth.rms[-1] <= 1e-6
-    states = rays(built.body, 500, 6)
-    exact = cr.DirectFlow(built.body, rtol=1e-13).transport(states, np.array([4.0]))
-    assert np.sqrt(np.mean(np.sum((flow.transport(states, np.array([4.0])) - exact) ** 2, axis=2))) < 1.2e-6
-
-
 def test_grids_of_too_few_nodes_are_refused():
     with pytest.raises(cr.CreepingError, match=r"at least \[1, 6, 6\] for degree 5"):
         cr.build_phase_map(sc.Torus(), horizon=0.5, grid=(5, 8), cache=False)

@@ -66,21 +66,6 @@ def test_an_incidence_does_not_depend_on_its_company(quantity, rng):
             np.testing.assert_array_equal(values, whole[name], err_msg=name)
 
 
-def test_a_map_carries_what_direct_integration_does(rng):
-    body = BODIES["twisted"]
-    flow = cr.build_phase_map(body, tolerance=3e-5, length=4.0, n_steps=1, n_rays=10**8)
-    request = sweep_request("rays", length=4.0, n_rays=128)
-    d = directions(rng, 6)
-    found, exact = (Sweeper(f, request)(d) for f in (flow, cr.DirectFlow(body, rtol=1e-11)))
-    gap = np.linalg.norm(found["points"] - exact["points"], axis=-1)
-    assert np.sqrt(np.mean(gap**2)) < 3e-5
-    same = np.isinf(found["detachment"]) == np.isinf(exact["detachment"])
-    assert np.mean(same) > 0.99
-    assert np.sqrt(np.mean((found["attenuation"] - exact["attenuation"])[same] ** 2)) < 5e-5
-    relative = np.abs(found["spreading"] / exact["spreading"] - 1)
-    assert np.median(relative) < 1e-4
-
-
 def test_singular_incidences_give_nothing():
     body = BODIES["torus"]
     found = Sweeper(cr.DirectFlow(body), sweep_request("rays", length=1.0, n_rays=16))(np.eye(3))

@@ -10,7 +10,7 @@ from body_checks import assert_locator, assert_sphere_map, call, directions, eva
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import project_bundle, random_bundle_points
-from creeping.geometry.surface import normal, project
+from creeping.geometry.surface import normal
 from scatterers.sphere_map.radial import Spine
 from scatterers.spline.tensor import SYMMETRIC, TensorSpline, coefficients, interpolation_operator, weights
 
@@ -196,21 +196,6 @@ def test_points_off_the_grid_stay_bounded_and_nan_stays_nan():
 @cache
 def ring(nodes):
     return sc.Gridded.sampled(sc.Torus(), nodes)
-
-
-@pytest.mark.slow
-def test_torus_gets_charts_of_its_own():
-    body = ring(48)
-    assert not body.star_shaped and len(body.atlas.charts) > 6
-    report = cr.check_surface(body)
-    assert report.ok, report
-    assert report.genus == 1
-    assert report.area == pytest.approx(2 * np.pi**2, rel=4e-3)
-    points = project(body, sc.Torus().atlas.charts[0].point(np.random.default_rng(1).uniform(size=(200, 2))))
-    assert np.all(points > body.bounds[0]) and np.all(points < body.bounds[1])
-    number, uv = body.atlas.locate(points)
-    for k in np.unique(number):
-        np.testing.assert_allclose(body.atlas.charts[k].point(uv[number == k]), points[number == k], atol=1e-12)
 
 
 def test_rays_on_the_torus_converge_to_those_of_the_parent(rng):

@@ -1,7 +1,5 @@
 """Meshes with edges as bodies of pieces: sign, pieces, normals and curvatures against closed forms; what is stored."""
 
-import hashlib
-import io
 from functools import cache
 from types import SimpleNamespace
 
@@ -148,27 +146,13 @@ def test_a_torus_cut_in_half_is_known_up_to_its_rims():
     assert bool(body.non_smooth(points[0])) == bool(body.non_smooth(points)[0])
 
 
-@pytest.mark.slow
 def test_stored_pieces_are_the_same_to_the_bit(tmp_path):
-    made, messages = sc.Mesh(SOURCES["rod"](), cache=tmp_path), []
-    again = sc.Mesh(SOURCES["rod"](), cache=tmp_path, progress=messages.append)
+    made, messages = sc.Mesh(SOURCES["L"](), cache=tmp_path), []
+    again = sc.Mesh(SOURCES["L"](), cache=tmp_path, progress=messages.append)
     assert messages == [] and repr(again.creases) == repr(made.creases) and again.fingerprint == made.fingerprint
     x = np.random.default_rng(1).uniform(-1, 1, size=(500, 3))
     for name in ("level", "gradient", "hessian", "piece", "non_smooth"):
         np.testing.assert_array_equal(getattr(again, name)(x), getattr(made, name)(x))
-    (place,) = tmp_path.glob("*.npz")
-    content = place.read_bytes()[32:]
-    with np.load(io.BytesIO(content)) as held:
-        arrays = {name: held[name] for name in held.files}
-    # a program that names a piece there is not, signed as ours are
-    arrays["fine-table"] = np.concatenate([arrays["fine-table"][:-1], [99.0]])
-    packed = io.BytesIO()
-    np.savez(packed, **arrays)
-    place.write_bytes(hashlib.blake2b(packed.getvalue(), digest_size=32).digest() + packed.getvalue())
-    messages = []
-    mended = sc.Mesh(SOURCES["rod"](), cache=tmp_path, progress=messages.append)
-    assert "the stored fit is damaged: fitting again" in messages
-    np.testing.assert_array_equal(mended.level(x), made.level(x))
 
 
 DAMAGE = {

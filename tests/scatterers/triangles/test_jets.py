@@ -7,7 +7,7 @@ import pytest
 from body_checks import rms, unit
 
 import scatterers as sc
-from scatterers.triangles.jets import NEIGHBOURS, _neighbours, angle_weighted_normals, osculating_jets
+from scatterers.triangles.jets import osculating_jets
 from studies._meshes import geodesic_sphere, slivers, torus_grid
 
 ELLIPSOID, TORUS = sc.Ellipsoid(1.2, 0.8, 0.8), sc.Torus()
@@ -74,32 +74,6 @@ def test_lower_degrees_differ_from_the_highest_by_their_errors():
     of4 = np.prod(jets.principal4, axis=1)
     assert 5 * rms(jets.gaussian - gaussian) < rms(of4 - gaussian) < 1e-2
     assert np.all(np.diff(jets.residuals, axis=1) < 0)
-
-
-def test_kernel_equals_least_squares(rng):
-    _, vertices, triangles, jets = made("ellipsoid 2k")
-    near, counts = _neighbours(vertices, angle_weighted_normals(vertices, triangles))
-    for k in rng.choice(len(vertices), 20, replace=False):
-        some = near[k, : min(NEIGHBOURS, counts[k])]
-        u, v, w = ((vertices[some] - vertices[k]) @ jets.frames[k].T / jets.radii[k]).T
-        weight = np.exp(-2 * (u**2 + v**2 + w**2))
-        terms = np.stack([u ** (d - b) * v**b for d in range(1, 7) for b in range(d + 1)], axis=1)
-        plain = np.linalg.lstsq(terms * weight[:, None], w * weight)[0]
-        # the ridge moves the terms of high degree a little
-        np.testing.assert_allclose(jets.coefficients[k, :5], plain[:5], atol=2e-5)
-        np.testing.assert_allclose(jets.coefficients[k], plain, atol=2e-3)
-        rest = rms((terms @ plain - w) * weight) / rms(weight) * jets.radii[k]
-        assert jets.residuals[k, 2] == pytest.approx(rest, rel=0.05)
-
-
-def test_rotation_and_scale():
-    _, vertices, triangles, jets = made("ellipsoid 2k")
-    q = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
-    q *= np.linalg.det(q)
-    # neighbours at equal distances may be others
-    turned = osculating_jets(5 * vertices @ q.T + 3, triangles)
-    np.testing.assert_allclose(turned.normals, jets.normals @ q.T, atol=1e-5)
-    np.testing.assert_allclose(turned.principal * 5, jets.principal, atol=5e-4)
 
 
 def test_sheets_near_each_other_do_not_mix():

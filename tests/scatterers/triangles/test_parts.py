@@ -7,7 +7,6 @@ from body_checks import normal_curvature, rms, unit
 from body_checks import volume as volume_of
 
 import scatterers as sc
-from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.surface import project
 from scatterers.triangles.choice import Choice
 
@@ -131,20 +130,6 @@ def test_subdivision_of_a_coarse_mesh_is_told():
     assert "subdivided" in sc.examined_mesh(coarse, subdivide="auto")[0].repairs[0]
     # a mesh that is fine enough is left
     assert sc.examined_mesh(ball(times=3), subdivide="auto")[0].repairs == ()
-
-
-def test_a_coarse_ball_opens_when_subdivided():
-    body = sc.Mesh(ball(times=1), subdivide="auto", cache=False)
-    assert "subdivided" in body.repairs[0] and body.creases == ()
-    directions = fibonacci_directions(100)
-    # as large as Loop's surface, and as round
-    radius = 1 - body.level(directions)
-    assert 0.8 < radius.min() and radius.max() < 1 and np.ptp(radius) < 0.05
-    # and its distance from the ball is stated, with what that makes of curvatures, to first order
-    fit = body.fit
-    assert 1 - radius.mean() < 1.1 * fit.misfit
-    assert abs(fit.normal_curvature - 1) < 1.1 * fit.normal_curvature_error
-    assert abs(fit.gaussian_curvature - 1) < 1.1 * fit.gaussian_curvature_error
 
 
 def test_a_subdivided_mesh_passes_by_its_vertices_and_errs_about_as_stated():
