@@ -103,25 +103,14 @@ def test_cut_sphere(direction):
     assert not len(fan.crossings.ray)
 
 
-def test_cylinder_and_cone():
-    """Both unroll: straight lines, J = 1, up to the rim."""
+def test_cylinder():
+    """It unrolls: straight lines, J = 1, up to the rim."""
     body = cylinder(0.5, 1.0)
     line = cr.shadow_line(body, (1, 0, 1))
     fan = cr.launch(cr.DirectFlow(body), line, length=4.0, n_rays=24, max_gap=np.inf)
     assert set(fan.status_counts) == {"EDGE"}
     np.testing.assert_allclose(fan.detachment, (1 - fan.points[:, 0, 2]) * np.sqrt(2), atol=EXACT)
     np.testing.assert_allclose(fan.spreading, 1, atol=EXACT)
-    body = CONE
-    line = cr.shadow_line(body, (1, 0, 0))
-    fan = cr.launch(cr.DirectFlow(body), line, length=1.5, n_rays=24, max_gap=np.inf)
-    apart = fan.points[:, 0] - [0, 0, 1.0]
-    rho, slant = np.linalg.norm(apart, axis=1), np.hypot(0.5, 1.0)
-    along = apart @ line.direction / rho
-    end = -rho * along + np.sqrt(slant**2 - rho**2 * (1 - along**2))
-    met = end < 1.5
-    assert met.sum() > 14 and np.all(fan.status[met] == cr.RayStatus.EDGE)
-    np.testing.assert_allclose(fan.detachment[met], end[met], atol=1e-8)
-    np.testing.assert_allclose(fan.spreading, 1, atol=1e-8)
 
 
 def test_rays_into_a_tip_end_next_to_it():

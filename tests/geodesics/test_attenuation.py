@@ -60,7 +60,7 @@ def test_attenuation_and_detachment_are_those_of_quadrature(body, rng):
     ended = np.isfinite(got[:, -1, 11])
     for row in (*(20 + np.flatnonzero(ended[20:])[:2]), *(20 + np.flatnonzero(~ended[20:])[:2])):
         total, end = by_quadrature(body, states[row], AWKWARD[-1])
-        assert got[row, -1, 10] - 7 == pytest.approx(total, abs=1e-6)
+        assert got[row, -1, 10] - 7 == pytest.approx(total, abs=1e-8)
         assert got[row, -1, 11] == pytest.approx(end, abs=1e-8)
 
 

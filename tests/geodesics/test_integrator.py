@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 from tolerances import JACOBI_DIFFERENCE, TRACE
 
 import creeping as cr
-from creeping.geodesics import integrator
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import vector_field
 from creeping.geodesics.integrator import counted_states, trace_states
@@ -93,21 +92,6 @@ def test_shapes_follow_points_and_times():
     assert cr.trace(sc.Sphere(), points, [0, 1, 0], [0.0, 0.5])[1].shape == (2, 5, 2, 3)
     assert cr.trace(sc.Sphere(), [1, 0, 0], [0, 1, 0], 0.5)[0].shape == (3,)
     assert cr.trace(sc.Sphere(), np.zeros((0, 3)), np.zeros((0, 3)), 0.5)[0].shape == (0, 3)
-
-
-def test_no_bit_depends_on_where_the_kernel_comes_up(rng, monkeypatch):
-    body, times = sc.TwistedEllipsoid(), np.sort(np.r_[0.0, 0.0, rng.uniform(0, 2, 30), 5.0, 5.0])
-    states = pack(*random_bundle_points(body, 200, rng=rng), jacobi=True)
-    for options in ({"rtol": 1e-5}, {"rtol": 1e-9}, {"rtol": 0.0, "step": 0.07}):
-        whole = trace_states(body, states, times, **options)
-        # blocks of 64 rays are what a result depends on
-        np.testing.assert_array_equal(trace_states(body, states[64:128], times, **options), whole[64:128])
-        calls = []
-        with monkeypatch.context() as patch:
-            patch.setattr(integrator, "BUDGET", 3)
-            patch.setattr(integrator, "pause", lambda calls=calls: calls.append(1))
-            np.testing.assert_array_equal(trace_states(body, states, times, **options), whole)
-        assert len(calls) > 20
 
 
 def test_outputs_do_not_cost_steps():

@@ -30,10 +30,6 @@ def ready(): print("ready", flush=True)
 LONG = {
     "flow of one block": "f, s = small(), rays(64, 12); f.transport(s, np.ones(1)); ready()\n"
     "while True: f.transport(s, np.array([4e4]))",
-    "trace": "s = rays(64, 6); x = s[:, :3], s[:, 3:]; cr.trace(body, *x, np.ones(1)); ready()"
-    "\nwhile True: cr.trace(body, *x, np.linspace(1, 3e5, 500), rtol=1e-12)",
-    "attenuation": "s = rays(20_000, 12); direct.transport(s[:64], np.ones(1)); ready(); "
-    "direct.transport(s, np.array([9e3]))",
     "map build": "body = sc.TwistedEllipsoid(); ready()\n"
     "while True: cr.build_phase_map(body, tolerance=1e-7, length=8.0, cache=False)",
     "far field by rays": "a = fan(), cr.fibonacci_directions(100_000), 90.0; ready()\n"

@@ -109,20 +109,6 @@ def test_error_is_what_a_fresh_sample_measures(body, phase_map, rng):
     assert 0.4 * flow.error.rms < fresh < 2.5 * flow.error.rms
 
 
-@pytest.mark.parametrize("method", ["direct", "tower"])
-def test_any_time_between_the_maps(method, rng):
-    body = sc.Ellipsoid(1.2, 0.8, 0.8)
-    extra = {"time_step": 2**-6, "stages": 3} if method == "tower" else {}
-    flow = cr.build_phase_map(body, horizon=1 / 8, grid=(24, 48), degree=5, method=method, cache=False, **extra)
-    assert len(flow.leaps) == (4 if method == "tower" else 1)
-    x, p = random_bundle_points(body, 20, rng=rng)
-    times = np.sort(rng.uniform(0, 1, 40))
-    exact = cr.trace(body, x, p, times, rtol=1e-12)
-    got = flow.flow(x, p, times)
-    assert rms(got[0], exact[0]) < 2e-6
-    assert rms(got[1], exact[1]) < 2e-6
-
-
 def test_table_of_the_body_stands_in_for_a_dear_psi(rng):
     body = sc.Gridded.sampled(sc.Ellipsoid(1.2, 0.8, 0.8), 24)
     model = model_of(body)

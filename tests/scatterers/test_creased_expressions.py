@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from body_checks import shape_operator
 from tolerances import ORDER
 
 import creeping as cr
@@ -176,15 +175,6 @@ def test_strict_takes_joints_and_refuses_edges():
     assert [crease.kind for crease in sc.Implicit(TEXTS["capsule"], strict=True).creases] == ["joint", "joint"]
     with pytest.raises(ValueError, match="its normal jumps by up to"):
         sc.Implicit(TEXTS["can"], strict=True)
-
-
-def test_curvature_jumps_of_named_bodies_and_expressions_agree():
-    exact = sc.Capsule(1.0, 4.0)
-    points = body_of("capsule").tiles(0.2)[0].reshape(-1, 3)
-    points = points[np.abs(np.abs(points[:, 2]) - 1) > 1e-3]
-    for body in (exact, body_of("capsule")):
-        np.testing.assert_allclose(body.level(points), 0, atol=1e-12)
-    np.testing.assert_allclose(*(shape_operator(body, points) for body in (exact, body_of("capsule"))), atol=1e-12)
 
 
 def test_a_tip_belongs_to_the_piece_it_ends():

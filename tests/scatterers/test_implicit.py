@@ -204,26 +204,6 @@ def test_rays_are_those_of_the_exact_body(name, rng):
         np.testing.assert_allclose(found, exact, atol=TRACE)
 
 
-def test_speed_bends_rays(rng):
-    body, exact = (
-        make(speed="1 + x/4 + y*z/2")
-        for make in (lambda **k: Implicit(TEXTS["ellipsoid"], **k), lambda **k: sc.Ellipsoid(1.2, 0.8, 0.8, **k))
-    )
-    x, p = random_bundle_points(exact, 20, rng=rng)
-    found, expected = (cr.trace(b, x, p, 1.5, rtol=1e-12)[0] for b in (body, exact))
-    np.testing.assert_allclose(found, expected, atol=TRACE)
-    assert np.max(np.abs(expected - cr.trace(body_of("ellipsoid"), x, p, 1.5)[0])) > 0.1
-
-
-@pytest.mark.parametrize(
-    "name, direction, lengths",
-    [("torus", (1, 1, 1), [8.9274357171, 4.6171835804]), ("peanut", (1, 0.5, 0.2), [6.3744816923])],
-)
-def test_shadow_lines_of_published_length(name, direction, lengths):
-    line = cr.shadow_line(body_of(name), direction)
-    np.testing.assert_allclose([curve.length for curve in line.curves], lengths, atol=LENGTH)
-
-
 def test_charts_that_cannot_be_are_sought_once(monkeypatch):
     """To find that out takes as long as charts do."""
     from scatterers.atlas.monge.atlas import MongeAtlas
