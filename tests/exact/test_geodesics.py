@@ -20,18 +20,6 @@ def carriers(body, phase_map):
     return [(cr.DirectFlow(body, rtol=1e-12), INVARIANT), (flow, 200 * flow.error.rms)]
 
 
-def test_great_circles(phase_map, rng):
-    body = sc.Sphere()
-    x, p = random_bundle_points(body, 30, rng=rng)
-    cos, sin = np.cos(TIMES)[:, None], np.sin(TIMES)[:, None]
-    for flow, bound in carriers(body, phase_map):
-        got = flow.transport(pack(x, p, jacobi=True), TIMES)
-        np.testing.assert_allclose(got[..., :3], cos * x[:, None] + sin * p[:, None], atol=bound)
-        np.testing.assert_allclose(got[..., 3:6], cos * p[:, None] - sin * x[:, None], atol=bound)
-        np.testing.assert_allclose(got[..., 6], np.broadcast_to(np.cos(TIMES), got.shape[:2]), atol=bound)
-        np.testing.assert_allclose(got[..., 8], np.broadcast_to(np.sin(TIMES), got.shape[:2]), atol=bound)
-
-
 def test_clairaut_on_the_torus(phase_map, rng):
     body = sc.Torus()
     x, p = random_bundle_points(body, 30, rng=rng)

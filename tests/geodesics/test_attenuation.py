@@ -1,4 +1,4 @@
-"""The attenuation integral: against quadrature of traced curvature, its numpy twin, and the exact sphere."""
+"""The attenuation integral: against quadrature of traced curvature."""
 
 import numpy as np
 import pytest
@@ -62,15 +62,6 @@ def test_attenuation_and_detachment_are_those_of_quadrature(body, rng):
         total, end = by_quadrature(body, states[row], AWKWARD[-1])
         assert got[row, -1, 10] - 7 == pytest.approx(total, abs=1e-8)
         assert got[row, -1, 11] == pytest.approx(end, abs=1e-8)
-
-
-def test_sphere_is_exact():
-    body = sc.Sphere(radius=2.0)
-    flow = cr.build_phase_map(body, horizon=0.5, grid=(12, 16))
-    states = pack(*random_bundle_points(body, 10, rng=np.random.default_rng(0)), lanes=12)
-    got = flow.transport(states, np.array([0.5, 3.0]))
-    np.testing.assert_allclose(got[..., 10], 0.5 ** (2 / 3) * np.array([[0.5, 3.0]] * 10), rtol=1e-12)
-    assert np.all(np.isinf(got[..., 11]))
 
 
 def test_weighted_rate_carries_the_speed():

@@ -153,16 +153,6 @@ def test_stored_and_opened(name, precision, tmp_path):
     assert "1 x 1 x 24 x 28 nodes" in repr(again)
 
 
-def test_doubling_agrees_with_tracing(built):
-    grid = Grid((1, 48, 64), 5, built.model.periodic)
-    maps = [
-        build_direct(built.body, built.model, Plan(0.4, grid, doublings=d), lambda _: None, rtol=1e-11) for d in (0, 2)
-    ]
-    states = rays(built.body, 200, 10)
-    one, other = (flow.leap(states, 1) for flow in maps)
-    assert rms(one, other) < 1e-5
-
-
 def test_grids_of_too_few_nodes_are_refused():
     with pytest.raises(cr.CreepingError, match=r"at least \[1, 6, 6\] for degree 5"):
         cr.build_phase_map(sc.Torus(), horizon=0.5, grid=(5, 8), cache=False)

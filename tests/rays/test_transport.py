@@ -35,21 +35,6 @@ def test_agrees_with_launch(name, rng):
     assert np.all(found["incidence_status"] == OK)
 
 
-def test_a_sphere_is_exact(rng):
-    d = directions(rng, 5)
-    request = sweep_request("rays", length=3.0, n_rays=70, n_steps=4)
-    found = Sweeper(cr.DirectFlow(sc.Sphere(), rtol=1e-11), request)(d)
-    times = request.travel_times
-    np.testing.assert_allclose(found["spreading"], np.broadcast_to(np.cos(times), (5, 70, 4)), atol=1e-8)
-    np.testing.assert_allclose(found["attenuation"], np.broadcast_to(times, (5, 70, 4)), atol=1e-8)
-    np.testing.assert_allclose(found["line_length"], 2 * np.pi, rtol=1e-12)
-    np.testing.assert_allclose(found["launch_phase"], 0, atol=1e-12)
-    x0 = found["points"][:, :, 0] - np.sin(times[0]) * d[:, None]
-    expected = np.cos(times[3]) / np.cos(times[0]) * x0 + np.sin(times[3]) * d[:, None]
-    np.testing.assert_allclose(found["points"][:, :, 3], expected, atol=1e-8)
-    assert np.all(found["ray_status"] == RayStatus.OK) and np.all(np.isinf(found["detachment"]))
-
-
 @pytest.mark.parametrize("quantity", ["rays", "monostatic"])
 def test_an_incidence_does_not_depend_on_its_company(quantity, rng):
     body = BODIES["twisted"]

@@ -90,7 +90,7 @@ def test_singular_incidences_are_refused_and_those_near_reported():
 
 
 def test_what_the_meshes_do_not_resolve_is_followed():
-    # found 2026-11-21: a loop of length 0.2 next to a singular direction of the bumpy sphere
+    # a loop of length 0.2 next to a singular direction of the bumpy sphere
     body = BODIES["bumpy"]
     i = np.array([760])
     z, turn = 1 - (2 * i + 1) / 1000, i * np.pi * (3 - np.sqrt(5))

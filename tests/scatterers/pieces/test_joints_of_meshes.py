@@ -148,9 +148,3 @@ def test_a_cut_mesh_is_the_same_surface():
     x, t, _ = cut(points, triangles, np.zeros((len(points), 1), dtype=bool), cuts)
     assert len(x) == len(points) + len(some) and np.all(edges_of(t).faces == 2)
     assert volume(x, t) == pytest.approx(volume(points, triangles), rel=1e-13)
-
-
-def test_strict_refuses_joints():
-    points, triangles = capsule(2000, 1.5, 0.8)
-    with pytest.raises(ValueError, match=r"\(curvature jumps\): .* on joints of planes and quadrics"):
-        sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), strict=True, cache=False)
