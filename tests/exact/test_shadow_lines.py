@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from scipy.special import ellipe
 from tolerances import FRACTION, LINE_LENGTH
 
 import creeping as cr
-import scatterers as sc
 
 TORUS, TWISTED, ELLIPSOID = sc.Torus(), sc.TwistedEllipsoid(), sc.Ellipsoid(1.2, 0.8, 0.8)
 """What all lines of a body need of it is made once."""

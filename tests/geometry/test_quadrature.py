@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from body_checks import directions, normal_curvature, unit
 
-import scatterers as sc
 from creeping.errors import SurfaceError
 from creeping.geometry import quadrature, tile_rules
 from creeping.geometry.curvature import gaussian_curvature

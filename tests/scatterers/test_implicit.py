@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from body_checks import assert_derivatives, assert_sphere_map, directions
 from tolerances import TRACE
 
 import creeping as cr
-import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
 from scatterers.implicit import Implicit
 from scatterers.spline.cloud import body_cloud

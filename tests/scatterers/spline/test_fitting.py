@@ -8,12 +8,12 @@ from body_checks import directions, rms, unit
 
 import scatterers as sc
 from creeping.geometry.directions import fibonacci_directions
-from scatterers.kernels.normal_equations import accumulate
+from scatterers.kernels.normal_equations import accumulate, subtract_roughness
 from scatterers.kernels.spline_constants import OVERREAD
 from scatterers.spline import fitting as _fitting
 from scatterers.spline.cardinal import Cardinal
 from scatterers.spline.fitting import _Equations, fit
-from scatterers.spline.roughness import ranges
+from scatterers.spline.roughness import fourth_bands, ranges
 from scatterers.spline.tensor import TensorSpline, coefficients, evaluated
 
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
@@ -60,6 +60,30 @@ def system(rng):
     places[:20] = np.floor(places[:20])
     size = int(np.prod(shape))
     return places, shape, np.concatenate([rng.normal(size=size), np.zeros(OVERREAD)])
+
+
+def test_roughness_is_that_of_fourth_differences(rng):
+    shape = (9, 5, 4)
+    c = np.concatenate([rng.normal(size=np.prod(shape)), np.zeros(OVERREAD)])
+    out = np.zeros_like(c)
+    whole = np.tile([0, shape[2]], (shape[0] * shape[1], 1))
+    subtract_roughness(0.3, np.array(shape), whole, fourth_bands(shape), c, out)
+    expected = np.zeros(shape)
+    for axis in (0, 1):
+        fourth = np.diff(np.eye(shape[axis]), 4, axis=0)
+        along = np.tensordot(fourth.T @ fourth, c[:-OVERREAD].reshape(shape), axes=(1, axis))
+        expected -= 0.3 * np.moveaxis(along, 0, axis)
+    np.testing.assert_allclose(out[:-OVERREAD].reshape(shape), expected, atol=1e-13)
+    assert not out[-OVERREAD:].any()
+    # only where it is wanted
+    some, found = whole.copy(), np.zeros_like(c)
+    some[:, 0], some[:, 1] = 1, 3
+    some[7] = 0
+    subtract_roughness(0.3, np.array(shape), some, fourth_bands(shape), c, found)
+    wanted = np.zeros(shape, dtype=bool)
+    wanted[:, :, 1:3] = True
+    wanted[1, 2] = False
+    np.testing.assert_allclose(found[:-OVERREAD].reshape(shape), np.where(wanted, expected, 0), atol=1e-13)
 
 
 @pytest.mark.parametrize("shape", [(7, 20, 9), (5, 6, 130)])
