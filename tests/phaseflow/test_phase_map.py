@@ -39,12 +39,20 @@ def test_stays_on_the_bundle(body, phase_map, rng):
     assert np.abs(np.sum(p * body.gradient(x), axis=-1)).max() < 1e-12
 
 
-def test_models_of_bodies(body):
-    name = cr.build_phase_map(body, horizon=0.3, grid=(12, 16), degree=3).model.name
+@pytest.mark.parametrize("degree, bound", [(3, 4e-5), (5, 1e-5)])
+def test_models_of_bodies_and_one_leap_by_splines_of_either_degree(body, degree, bound, rng):
+    states, time = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True), np.array([0.3])
+    exact = trace_states(body, states, time, rtol=1e-12)
+    for precision in ("single", "double"):
+        flow = cr.build_phase_map(body, horizon=0.3, grid=(20, 28), degree=degree, precision=precision, cache=False)
+        # twice what was measured, of maps that are packed and not
+        assert rms(flow.transport(states[:, :6], time), exact[..., :6]) < 2 * bound
+        found = flow.transport(states, time)
+        assert rms(found[..., :6], exact[..., :6]) < 2 * bound and rms(found[..., 6:], exact[..., 6:]) < 20 * bound
     mirrored = isinstance(body, sc.Ellipsoid)
     revolved = "ring" if isinstance(body, sc.Torus) else "meridian"
     turns = body.speed is None and body.axis_of_revolution is not None
-    assert name == (revolved if turns else "octant" if mirrored else "rotation")
+    assert flow.model.name == (revolved if turns else "octant" if mirrored else "rotation")
 
 
 def test_folded_map_equals_the_whole(rng):
