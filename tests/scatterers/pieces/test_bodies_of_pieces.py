@@ -69,7 +69,7 @@ def outside(name, x):
     return np.maximum(np.hypot(np.hypot(x[:, 0], x[:, 1]) - R, x[:, 2]) - TUBE, -x[:, 0])
 
 
-@pytest.mark.parametrize("name", ["L", pytest.param("rod", marks=pytest.mark.slow), "half torus"])
+@pytest.mark.parametrize("name", ["L", *(pytest.param(k, marks=pytest.mark.slow) for k in ("rod", "half torus"))])
 def test_the_level_has_the_sign_of_the_body(name):
     body = opened(name)
     rng = np.random.default_rng(3)
