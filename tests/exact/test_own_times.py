@@ -9,7 +9,6 @@ from creeping.field.likely_cells import parted
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, M11, M12, P, X, pack
-from creeping.geometry.creased import pieces_of
 from creeping.rays.tracer import RayTracer
 
 TIMES = np.linspace(0.0, 3.0, 100)
@@ -42,26 +41,6 @@ def test_a_ray_that_fails_stops_no_other():
     np.testing.assert_array_equal(found[others], alone[others])
 
 
-def test_a_ray_detaches_where_it_starts_straight():
-    side = pieces_of(Capsule(0.5, 1.0))[1]
-    first = pack(np.array([[0.5, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]), lanes=12)
-    found = trace_own(side, first, np.array([0.4]), rtol=1e-10)
-    assert found[0, DETACHMENT] == 0 and found[0, ATTENUATION] == 0
-
-
-def past_the_apex(aside, lengths):
-    """Distance from a cone's apex, and p along the way from it, of rays that started HALF from it: it unrolls."""
-    away = np.sqrt(HALF**2 + lengths**2 - 2 * HALF * lengths * np.cos(aside))
-    return away, (lengths - HALF * np.cos(aside)) / away
-
-
-def up_a_cone(aside):
-    """Points and tangents half-way up a cone, at angles from the way to the apex."""
-    slope = np.array([-0.5, 0.0, 1.0]) / np.hypot(0.5, 1.0)
-    p = np.cos(aside)[:, None] * slope + np.sin(aside)[:, None] * np.array([0.0, 1.0, 0.0])
-    return np.broadcast_to([0.25, 0.0, 0.5], p.shape), p
-
-
 HALF = np.hypot(0.25, 0.5)
 
 
@@ -69,12 +48,18 @@ def test_rays_of_pieces_come_each_to_a_length_of_its_own(rng):
     """Past the apex of a cone, or up to its rim or to the apex, with others that begin at the same time or later."""
     aside, lengths = np.geomspace(1e-2, 2.0, 60), rng.uniform(0.0, 2.0, 60)
     aside[0] = 0.0
-    found, end = trace_to(cone(0.5, 1.0), pack(*up_a_cone(aside), jacobi=True), lengths, rtol=1e-10)
+    # half-way up, at angles from the way to the apex
+    slope = np.array([-0.5, 0.0, 1.0]) / np.hypot(0.5, 1.0)
+    p = np.cos(aside)[:, None] * slope + np.sin(aside)[:, None] * np.array([0.0, 1.0, 0.0])
+    first = pack(np.broadcast_to([0.25, 0.0, 0.5], p.shape), p, jacobi=True)
+    found, end = trace_to(cone(0.5, 1.0), first, lengths, rtol=1e-10)
     rim = HALF * np.cos(aside) + np.sqrt((2 * HALF) ** 2 - (HALF * np.sin(aside)) ** 2)
     on = lengths < rim
     on[0] = lengths[0] < HALF
     assert 30 < on.sum() < 58
-    away, along = past_the_apex(aside, lengths)
+    # it unrolls: distances from the apex, and p along the way from it
+    away = np.sqrt(HALF**2 + lengths**2 - 2 * HALF * lengths * np.cos(aside))
+    along = (lengths - HALF * np.cos(aside)) / away
     radial = found[:, X] - [0.0, 0.0, 1.0]
     np.testing.assert_allclose(np.linalg.norm(radial, axis=1)[on], away[on], atol=1e-8)
     np.testing.assert_allclose(np.sum(radial * found[:, P], axis=1)[on], (along * away)[on], atol=1e-8)
@@ -83,6 +68,9 @@ def test_rays_of_pieces_come_each_to_a_length_of_its_own(rng):
     late = ~on & (aside > 0)
     np.testing.assert_allclose(end[late], rim[late], atol=1e-8)
     np.testing.assert_allclose(np.linalg.norm(radial, axis=1)[late], 2 * HALF, atol=1e-8)
+    # alone it is the same
+    alone = trace_to(cone(0.5, 1.0), first[7:8], lengths[7:8], rtol=1e-10)[0]
+    np.testing.assert_allclose(alone[0], found[7], atol=1e-8)
 
 
 def test_lengths_of_their_own_change_no_ray_across_joints(rng):
@@ -112,25 +100,6 @@ def test_rays_that_pass_by_a_tip_keep_their_invariant():
     # at its turn a ray is so far from the axis
     assert np.sum((np.abs(clairaut) < 0.02) & found.alive) > 20
     np.testing.assert_allclose(end, clairaut, atol=1e-9)
-
-
-def test_rays_do_not_depend_on_their_company_and_all_end_as_data():
-    """On a cone unrolled a ray at a distance from the apex goes on straight; it ends at the rim or next to the apex."""
-    body, slope = cone(0.5, 1.0), np.array([-0.5, 0.0, 1.0]) / np.hypot(0.5, 1.0)
-    aside = np.concatenate([[0.0, 1e-9], np.geomspace(1e-4, 1.0, 14)])
-    p = np.cos(aside)[:, None] * slope + np.sin(aside)[:, None] * np.array([0.0, 1.0, 0.0])
-    first = pack(np.broadcast_to([0.25, 0.0, 0.5], p.shape), p, jacobi=True)
-    found = trace_pieces(body, first, np.linspace(0, 2.0, 21), rtol=1e-10)
-    assert np.all(np.isfinite(found.states)) and np.all(np.isfinite(found.end))
-    half, whole = np.hypot(0.25, 0.5), np.hypot(0.5, 1.0)
-    rim = half * np.cos(aside) + np.sqrt(whole**2 - (half * np.sin(aside)) ** 2)
-    tip = found.crease == 1
-    assert tip[:2].all() and not tip[-9:].any()
-    np.testing.assert_allclose(found.end[~tip], rim[~tip], atol=1e-8)
-    for ray in (0, 7, 15):
-        alone = trace_pieces(body, first[ray : ray + 1], np.linspace(0, 2.0, 21), rtol=1e-10)
-        np.testing.assert_allclose(alone.states[0], found.states[ray], atol=1e-8)
-        assert abs(alone.end[0] - found.end[ray]) < 1e-8
 
 
 def test_neighbours_are_parted_where_more_than_their_spreading_is_between_them():

@@ -1,9 +1,8 @@
 """The unit of a body's lengths, from the file to the axis of a picture."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+import trimesh
 
 import creeping as cr
 import scatterers as sc
@@ -16,22 +15,13 @@ class Metric(sc.Sphere):
     unit = "m"
 
 
-def icosphere(order):
-    """Vertices and triangles of a unit sphere."""
-    import trimesh
-
-    ball = trimesh.creation.icosphere(order)
-    return np.asarray(ball.vertices), np.asarray(ball.faces)
-
-
 def fan_on(body):
     return cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, (0, 0, 1)), length=1.0, n_rays=16)
 
 
 @pytest.mark.parametrize(("units", "unit", "radius"), [("mm", "m", 1e-3), (None, "L", 1.0)])
 def test_meshes_are_metres_if_their_unit_was_given(units, unit, radius):
-    points, triangles = icosphere(3)
-    body = sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), units, cache=False)
+    body = sc.Mesh(trimesh.creation.icosphere(3), units, cache=False)
     assert (body.unit, unit_of(body)) == (unit, unit)
     np.testing.assert_allclose(np.ptp(body.bounds, axis=0).max() / 2, radius, rtol=0.3)
     assert unit_of(sc.Sphere()) == "L"

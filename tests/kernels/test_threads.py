@@ -17,9 +17,9 @@ from creeping.kernels.threads import in_slices, in_threads
 from creeping.phaseflow.coordinates import rotation
 
 
-@pytest.mark.parametrize("count", [0, 1, 63, 64, 5000, 70_001])
+@pytest.mark.parametrize("count", [0, 63, 70_001])
 @pytest.mark.parametrize("several", ["1", "3"])
-@pytest.mark.parametrize("options", [{}, {"seconds": None}, {"seconds": None, "most": 130}, {"seconds": 1.0}])
+@pytest.mark.parametrize("options", [{}, {"seconds": None, "most": 130}, {"seconds": 1.0}])
 def test_slices_cover_everything_once(count, several, options, monkeypatch):
     monkeypatch.setenv("CREEPING_THREADS", several)
     seen, ends = np.zeros(count, int), []
@@ -46,8 +46,7 @@ def test_slices_are_as_long_as_their_time_allows(monkeypatch):
     assert parts[0] == 64 and 256 < max(parts) <= 2048
 
 
-@pytest.mark.parametrize("lanes", [6, 12])
-@pytest.mark.parametrize("ordered", [False, True])
+@pytest.mark.parametrize("lanes, ordered", [(6, False), (12, True)])
 def test_no_bit_depends_on_the_slices(lanes, ordered, rng, monkeypatch):
     body = sc.Ellipsoid(1.2, 0.9, 0.8)
     flow = cr.build_phase_map(body, horizon=0.5, grid=(16, 24))
@@ -131,9 +130,7 @@ def test_a_callback_that_has_failed_is_not_called_again():
 
     body = Failing(1.0, 0.9, 0.8)
     states = pack(*random_bundle_points(sc.Ellipsoid(1.0, 0.9, 0.8), 640, rng=np.random.default_rng(1)))
-    with pytest.raises(ArithmeticError, match="no Hessian"):
-        integrator.trace_states(body, states, np.array([1.0]))
-    assert Failing.calls == 1
-    with pytest.raises(ArithmeticError, match="no Hessian"):
-        integrator.trace_states(body, states, np.array([1.0]))
-    assert Failing.calls == 2
+    for times in (1, 2):
+        with pytest.raises(ArithmeticError, match="no Hessian"):
+            integrator.trace_states(body, states, np.array([1.0]))
+        assert Failing.calls == times

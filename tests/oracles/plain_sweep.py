@@ -2,97 +2,62 @@
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.field.boundary import parse_boundary
 from creeping.field.far import far_field
 from creeping.field.validity_range import launch_validity, validities
-from creeping.geometry.surface import Surface
-from creeping.rays.fan import RayFan, launch
+from creeping.rays.fan import launch
 from creeping.rays.reach import early_length
-from creeping.rays.transport import Flow
-from creeping.shadow.line import ShadowLine, shadow_line
+from creeping.shadow.line import shadow_line
 from creeping.shadow.nodes import shares_of
 from creeping.shadow.status import NO_RAY, OK, SINGULAR
-from creeping.sweeping.request import SweepRequest
 
 PARTS_OF_FIELD = ("creeping", "reflected", "forward", "unresolved", "error")
 
 
 class PlainSweeper:
-    """Results of incidences (n, 3) by the plain route.
+    """Results of incidences (n, 3) by the plain route: arrays, the first axis the incidence."""
 
-    Parameters
-    ----------
-    flow : PhaseMap or DirectFlow
-    request : SweepRequest
-    """
-
-    def __init__(self, flow: Flow, request: SweepRequest) -> None:
+    def __init__(self, flow, request):
         self.flow, self.request = flow, request
 
-    @property
-    def body(self) -> Surface:
-        """Body of the flow."""
-        return self.flow.body
-
-    def __call__(self, incidences: FloatArray) -> dict[str, np.ndarray[Any, Any]]:
-        """Arrays of results, the first axis the incidence; see `SweepRequest.variables`."""
+    def __call__(self, incidences):
         out = self.request.empty(len(incidences))
         for row, direction in enumerate(np.asarray(incidences, dtype=float)):
+            one = {name: values[row : row + 1] for name, values in out.items()}
             try:
-                line = shadow_line(self.body, direction)
+                line = shadow_line(self.flow.body, direction)
             except SingularIncidenceError as error:
-                out["incidence_status"][row] = SINGULAR
-                out["singular_distance"][row] = getattr(error, "distance", 0.0)
+                one["incidence_status"][0] = SINGULAR
+                one["singular_distance"][0] = getattr(error, "distance", 0.0)
                 continue
-            self._line(line, row, out)
-            if self.request.quantity == "rays":
-                self._rays(line, row, out)
-            else:
-                self._fields(line, row, out)
+            known = {"incidence_status": OK, "curves": len(line.curves), "line_length": line.length}
+            known |= {"line_error": line.nodes.error, "singular_distance": line.singular_distance, **shares_of(line)}
+            for name, value in known.items():
+                one[name][0] = value
+            (self._rays if self.request.quantity == "rays" else self._fields)(line, one)
         return out
 
-    def _line(self, line: ShadowLine, row: int, out: dict[str, Any]) -> None:
-        out["incidence_status"][row] = OK
-        out["curves"][row] = len(line.curves)
-        out["line_length"][row] = line.length
-        out["line_error"][row] = line.nodes.error
-        for name, share in shares_of(line).items():
-            out[name][row] = share
-        out["singular_distance"][row] = line.singular_distance
-
-    def _rays(self, line: ShadowLine, row: int, out: dict[str, Any]) -> None:
+    def _rays(self, line, one):
         request = self.request
-        fan = launch(
-            self.flow, line, length=request.length, n_rays=request.n_rays, n_steps=request.n_steps, max_gap=np.inf
-        )
+        fan = self._fan(line, request.n_steps)
         # more arcs than rays: those that find no place are left out
         n = min(len(fan.points), request.n_rays)
-        values = {
-            "ray_status": fan.status,
-            "curve_index": fan.curve_index,
-            "arclength": fan.arclength,
-            "launch_phase": fan.eikonal[:, 0],
-            "detachment": fan.detachment,
-            "points": fan.points[:, 1:],
-            "directions": fan.directions[:, 1:],
-            "spreading": fan.spreading[:, 1:],
-            "spreading_rate": fan.spreading_rate[:, 1:],
-            "attenuation": fan.attenuation[:, 1:],
-        }
-        found = launch_validity(self.body, line.launch_points(request.n_rays))
-        out["least_radius"][row], out["transverse"][row] = (values[0] for values in found)
-        out["ray_status"][row] = NO_RAY
-        for name, value in values.items():
-            out[name][row, :n] = value[:n]
+        found = launch_validity(self.flow.body, line.launch_points(request.n_rays))
+        one["least_radius"][0], one["transverse"][0] = (values[0] for values in found)
+        one["ray_status"][0] = NO_RAY
+        one["ray_status"][0, :n], one["launch_phase"][0, :n] = fan.status[:n], fan.eikonal[:n, 0]
+        for name in ("curve_index", "arclength", "detachment"):
+            one[name][0, :n] = getattr(fan, name)[:n]
+        for name in ("points", "directions", "spreading", "spreading_rate", "attenuation"):
+            one[name][0, :n] = getattr(fan, name)[:n, 1:]
 
-    def _fields(self, line: ShadowLine, row: int, out: dict[str, Any]) -> None:
-        request = self.request
-        fan = self._fan(line)
-        until = min(request.length, early_length(self.body, min(request.wavenumbers)))
-        found = validities(self.body, line.launch_points(request.n_rays), until, request.wavenumbers)
-        out["least_k_rho"][row], out["largest_transverse"][row] = (values[0] for values in found)
+    def _fields(self, line, one):
+        request, body = self.request, self.flow.body
+        fan = self._fan(line, None)
+        until = min(request.length, early_length(body, min(request.wavenumbers)))
+        found = validities(body, line.launch_points(request.n_rays), until, request.wavenumbers)
+        one["least_k_rho"][0], one["largest_transverse"][0] = (values[0] for values in found)
         bistatic = request.quantity == "bistatic"
         observation = np.array(request.observation) if bistatic else -line.direction[None]
         # boundaries outermost would lose the geometry that far_field keeps for each wavenumber
@@ -101,11 +66,10 @@ class PlainSweeper:
                 asked = {"wavenumber": wavenumber, "boundary": parse_boundary(name), "order": request.order}
                 far = far_field(fan, observation, method="rays", **asked)
                 for part in PARTS_OF_FIELD:
-                    if part + suffix in out:
+                    if part + suffix in one:
                         values = getattr(far, part)
-                        out[part + suffix][(row, *which, k)] = values if bistatic else values[0]
+                        one[part + suffix][(0, *which, k)] = values if bistatic else values[0]
 
-    def _fan(self, line: ShadowLine) -> RayFan:
-        return launch(
-            self.flow, line, length=self.request.length, n_rays=self.request.n_rays, n_steps=None, max_gap=np.inf
-        )
+    def _fan(self, line, n_steps):
+        request = self.request
+        return launch(self.flow, line, length=request.length, n_rays=request.n_rays, n_steps=n_steps, max_gap=np.inf)

@@ -32,7 +32,7 @@ def grid_of(nodes, degree=5):
     return Grid((nodes, nodes, 16), degree, (False, False))
 
 
-@pytest.mark.parametrize("margin", [0.2, 0.25, 0.4, 0.6, 0.7, 1.0, 3.9, 4.0, 10.0])
+@pytest.mark.parametrize("margin", [0.2, 0.7, 3.9, 4.0, 10.0])
 def test_least_cells_keep_the_nodes_within_the_charts(margin):
     cells = least_cells(Reaching(margin))
 
@@ -44,11 +44,6 @@ def test_least_cells_keep_the_nodes_within_the_charts(margin):
 
     assert reach(cells) <= margin * (1 + 1e-9)
     assert cells == 1 or reach(cells - 1) > margin
-
-
-def test_charts_without_a_margin_take_any_grid():
-    assert least_cells(SPHERE) == 1
-    assert least_cells(sc.Torus()) == 1
 
 
 @pytest.mark.parametrize("degree", [3, 5])
@@ -69,6 +64,8 @@ def test_monge_charts_say_how_far_they_reach():
     # a rough fit, for its charts alone; what is too small for a margin is refused above
     body = sc.Gridded.sampled(sc.Torus(), 12)
     assert least_cells(body) == least_cells(Reaching(0.4)) == 10
+    # those without a margin take any grid
+    assert least_cells(SPHERE) == least_cells(sc.Torus()) == 1
 
 
 @pytest.mark.parametrize("factor", [0.01, 0.5, 0.9, 1.0, 1.7])
@@ -77,13 +74,3 @@ def test_thinned_and_refined_grids_keep_the_margin(factor):
     grid = _scaled(plan, factor).grid
     assert np.all(grid.cells[:2] >= 12)
     assert _scaled(Plan(0.5, grid_of(20)), 0.5).grid.cells[0] < 12
-
-
-@pytest.mark.slow
-def test_tuned_maps_keep_the_margin():
-    # a loose tolerance alone would ask for fewer cells
-    body, plain = Reaching(0.25), cr.build_phase_map(SPHERE, tolerance=1e-2, cache=False)
-    built = cr.build_phase_map(body, tolerance=1e-2, cache=False)
-    least = least_cells(body)
-    assert built.grid.cells[0] >= least == 16 > plain.grid.cells[0]
-    assert built.error.rms <= 1e-2

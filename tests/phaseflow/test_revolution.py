@@ -1,7 +1,5 @@
 """Maps without azimuth of bodies of revolution: against direct integration, full tables, and what is known exactly."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -35,7 +33,6 @@ CASES = {
     "torus": (sc.Torus(1.1, 0.35), 0.25, (90, 96), "ring"),
     "long": (sc.Ellipsoid(1.4, 0.7, 0.7), 0.25, (60, 64), "meridian"),
     "flat": (sc.Ellipsoid(1.1, 0.7, 1.1), 0.4, (60, 64), "meridian"),
-    "upright": (sc.Ellipsoid(0.9, 0.9, 1.2), 0.5, (60, 64), "meridian"),
     "tilted": (_Tilted(speed=_Ramp("1 + 0.3*(x + 2*y + 2*z)/3")), 0.5, (60, 64), "meridian"),
 }
 
@@ -121,48 +118,21 @@ def test_great_circles():
     np.testing.assert_allclose(found[..., 10], np.broadcast_to(1.3 ** (1 / 3) * s[:, 0], (200, 3)), atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["torus", "flat"])
-def test_full_table_says_the_same(name):
-    body, horizon, _, _ = CASES[name]
-    full = model_of(body, {"torus": "angles", "flat": "octant"}[name])
-    grid = Grid({"torus": (8, 90, 96), "flat": (22, 22, 64)}[name], 5, full.periodic)
-    plans = [Plan(horizon, one, tolerance=1e-7) for one in (grid, Grid((1, 90, 96), 5, model_of(body).periodic))]
-    one, other = (
-        build_direct(body, model, plan, lambda _: None, rtol=1e-11)
-        for model, plan in zip((full, model_of(body)), plans, strict=True)
-    )
-    assert one.leaps[-1].is_packed and other.leaps[-1].is_packed
-    assert not one.grid.is_flat and other.grid.is_flat and other.nbytes < one.nbytes / 2
+def test_full_table_of_a_torus():
+    """Angles of both kinds, as of one whose speed is not of revolution."""
+    body, horizon, _, _ = CASES["torus"]
+    model = model_of(body, "angles")
+    plan = Plan(horizon, Grid((8, 90, 96), 5, model.periodic), tolerance=1e-7)
+    flow = build_direct(body, model, plan, lambda _: None, rtol=1e-11)
+    assert flow.leaps[-1].is_packed and not flow.grid.is_flat
     states, times = rays(body, 1000, 12), horizon * np.array([1.0, 5.0])
-    a, b = one.transport(states, times), other.transport(states, times)
+    a, b = flow.transport(states, times), cr.DirectFlow(body, rtol=1e-12).transport(states, times)
     np.testing.assert_array_equal(np.isfinite(a[..., 11]), np.isfinite(b[..., 11]))
     assert rms(a[..., :6], b[..., :6]) < 1e-6
     assert rms(a[..., 10], b[..., 10]) < 3e-6
-    late = np.minimum(a[..., 11], 1e3) - np.minimum(b[..., 11], 1e3)
-    assert np.abs(late).max() < 1e-2
-    # cells that are trusted have as large a share of the bundle
-    assert abs(_flagged(one) - _flagged(other)) < 0.05
 
 
-def _flagged(flow):
-    cells, first = flow.grid.cells.astype(int), flow.grid.origin.astype(int)
-    inside = flow.leaps[-1].flagged[:, first[0] :, first[1] :][:, : cells[0], : cells[1], : cells[2]]
-    return inside.mean()
-
-
-def test_packed_is_what_its_tables_are(built):
-    leap = built.leaps[-1]
-    assert leap.is_packed
-    careful = replace(built, leaps=(replace(leap, flagged=np.ones(leap.flagged.shape, dtype=np.uint8)),))
-    states = rays(built.body, 500, 12)
-    one, other, bare = built.leap(states, 3), careful.leap(states, 3), built.leap(states[:, :6], 3)
-    np.testing.assert_array_equal(one[:, :10], other[:, :10])
-    assert rms(one[:, 10], other[:, 10]) < 1e-6
-    # displacements come from q alone, or from all of their lanes
-    assert rms(one[:, :6], bare) < 1e-7
-
-
-@pytest.mark.parametrize("lanes", [6, 10, 12])
+@pytest.mark.parametrize("lanes", [6, 12])
 def test_order_of_composition_changes_nothing(built, lanes, monkeypatch):
     states, times = rays(built.body, 1000, lanes), built.horizon * np.array([1.0, 4.0])
     plain = built.transport(states, times)
@@ -171,8 +141,7 @@ def test_order_of_composition_changes_nothing(built, lanes, monkeypatch):
     np.testing.assert_array_equal(built.transport(states, times), plain)
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-@pytest.mark.parametrize("name", ["torus", "long"])
+@pytest.mark.parametrize("name, precision", [("torus", "single"), ("long", "double")])
 def test_stored_and_opened(name, precision, tmp_path):
     body, horizon, _, model = CASES[name]
     flow = cr.build_phase_map(body, horizon=horizon, grid=(9, 24, 28), precision=precision, cache=False)
@@ -182,24 +151,6 @@ def test_stored_and_opened(name, precision, tmp_path):
     states = rays(body, 50, 12)
     np.testing.assert_array_equal(again.leap(states, 2), flow.leap(states, 2))
     assert "1 x 1 x 24 x 28 nodes" in repr(again)
-
-
-def test_doubling_agrees_with_tracing(built):
-    grid = Grid((1, 48, 64), 5, built.model.periodic)
-    maps = [
-        build_direct(built.body, built.model, Plan(0.4, grid, doublings=d), lambda _: None, rtol=1e-11) for d in (0, 2)
-    ]
-    states = rays(built.body, 200, 10)
-    one, other = (flow.leap(states, 1) for flow in maps)
-    assert rms(one, other) < 1e-5
-
-
-def test_tuned_maps_keep_their_tolerance(built):
-    flow = cr.build_phase_map(built.body, tolerance=1e-6, length=4.0, cache=False)
-    assert flow.grid.is_flat and flow.growth.rms[-1] <= 1e-6
-    states = rays(built.body, 500, 6)
-    exact = cr.DirectFlow(built.body, rtol=1e-13).transport(states, np.array([4.0]))
-    assert np.sqrt(np.mean(np.sum((flow.transport(states, np.array([4.0])) - exact) ** 2, axis=2))) < 1.2e-6
 
 
 def test_grids_of_too_few_nodes_are_refused():

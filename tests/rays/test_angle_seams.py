@@ -29,15 +29,6 @@ def test_passing_a_pole_leaves_a_gap():
     assert all(np.ptp(piece[:, 1]) == 0 for piece in pieces)
 
 
-def test_seam_of_both_angles_at_once():
-    path = np.array([[3.0, 3.0], [-3.0, -3.0], [-2.0, -2.9]])
-    pieces = split_at_seam(path, closed=False)
-    assert len(pieces) == 3
-    for piece in pieces:
-        assert np.abs(np.diff(piece, axis=0)).max() <= np.pi
-        assert np.abs(piece).max() <= np.pi + 1e-12
-
-
 def test_closed_curve_without_crossing_returns_to_its_start():
     angle = np.linspace(0, 2 * np.pi, 20, endpoint=False)
     (piece,) = split_at_seam(np.stack([1 + 0.5 * np.cos(angle), 0.5 * np.sin(angle)], axis=1), closed=True)

@@ -34,6 +34,9 @@ def plain_line():
 
 
 def test_spreading_is_the_distance_of_neighbouring_rays(body):
+    if body.speed is not None:
+        # a speed and a body without symmetry, so that J'(0) is not zero
+        body = sc.Ellipsoid(1.0, 0.8, 0.6, speed="1 + x/4 + y*z/2")
     # not by a map: its J errs by more than (x, p)
     line = cr.shadow_line(body, INCIDENCE)
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-11), line, length=1.5, n_rays=24, n_steps=16, max_gap=np.inf)
@@ -43,15 +46,7 @@ def test_spreading_is_the_distance_of_neighbouring_rays(body):
     error = np.abs(fan.spreading - expected)[before_caustic] / np.abs(expected[before_caustic])
     assert before_caustic.sum() > 100
     assert error.max() < SPREADING
-
-
-def test_weighted_rays_part_as_their_neighbours():
-    # a speed and a body without symmetry, so that J'(0) is not zero
-    body = sc.Ellipsoid(1.0, 0.8, 0.6, speed="1 + x/4 + y*z/2")
-    flow = cr.DirectFlow(body, rtol=1e-12)
-    fan = cr.launch(flow, cr.shadow_line(body, INCIDENCE), length=1.5, n_rays=24, n_steps=16, max_gap=np.inf)
-    assert np.abs(fan.spreading_rate[:, 0]).max() > 0.01
-    np.testing.assert_allclose(fan.spreading, across_difference(fan, 1e-4), atol=1e-6)
+    assert body.speed is None or np.abs(fan.spreading_rate[:, 0]).max() > 0.01
 
 
 def test_spreading_rate_is_the_derivative_of_the_spreading(body, phase_map):
@@ -60,6 +55,9 @@ def test_spreading_rate_is_the_derivative_of_the_spreading(body, phase_map):
     middle = (fan.spreading[:, 2:] - fan.spreading[:, :-2]) / (t[2] - t[0])
     np.testing.assert_allclose(fan.spreading_rate[:, 1:-1], middle, atol=2e-3)
     np.testing.assert_allclose(fan.spreading[:, 0], 1.0)
+    # the incident phase on an oblique line
+    offset = fan.points[:, 0] @ fan.line.direction
+    np.testing.assert_allclose(fan.eikonal, offset[:, None] + t, atol=1e-12)
 
 
 def test_sphere_fan_in_closed_form(phase_map):
@@ -73,14 +71,6 @@ def test_sphere_fan_in_closed_form(phase_map):
     assert np.all(fan.caustic_index[:, -1] == 2)
     np.testing.assert_allclose(fan.eikonal, np.broadcast_to(t, fan.eikonal.shape), atol=1e-12)
     assert np.all(fan.status == cr.RayStatus.OK)
-
-
-def test_eikonal_carries_the_incident_phase_on_an_oblique_line(phase_map):
-    body = sc.Ellipsoid(1.0, 0.8, 0.6)
-    fan = cr.launch(phase_map("triaxial"), cr.shadow_line(body, INCIDENCE), length=1.0, n_rays=16)
-    offset = fan.points[:, 0] @ fan.line.direction
-    assert np.ptp(offset) > 0.1
-    np.testing.assert_allclose(fan.eikonal, offset[:, None] + fan.travel_time, atol=1e-12)
 
 
 def test_map_and_direct_integration_launch_the_same_fan(body, phase_map):
@@ -120,6 +110,7 @@ def test_only_attached_points_launch_unless_asked(phase_map):
     shares = [np.mean(every.status[inner] == s) for s in (cr.RayStatus.OCCLUDED, cr.RayStatus.CONCAVE)]
     np.testing.assert_allclose(shares, [0.15522848, 0.28736380], atol=0.01)
     assert np.all(every.status[~inner] <= cr.RayStatus.DETACHED)
+    np.testing.assert_array_equal(every.launched, every.status <= cr.RayStatus.DETACHED)
 
 
 def test_rays_are_inserted_where_neighbours_part(phase_map):
@@ -148,36 +139,15 @@ def test_stalled_rays_are_marked_not_silent(phase_map):
     assert np.all(np.isfinite(fan.spreading[~at_zero]))
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"length": 0.0},
-        {"length": float("nan")},
-        {"launch_from": "lit"},
-        {"n_rays": 0},
-        {"n_steps": 1.5},
-        {"max_gap": 0.0},
-    ],
-)
+@pytest.mark.parametrize("options", [{"launch_from": "lit"}, {"n_rays": 0}, {"n_steps": 1.5}, {"max_gap": 0.0}])
 def test_bad_input_is_named(options, plain_line):
     with pytest.raises(cr.CreepingError, match=next(iter(options))):
         cr.launch(cr.DirectFlow(plain_line.body), plain_line, **({"length": 1.0} | options))
 
 
-def test_flow_of_another_body_is_refused(plain_line):
+def test_flow_of_another_body_is_refused_and_a_fan_says_its_error(plain_line, phase_map):
     with pytest.raises(cr.CreepingError, match="one body for both"):
         cr.launch(cr.DirectFlow(sc.Sphere(2.0)), plain_line, length=1.0)
-
-
-def test_repr_is_short_and_says_the_error(phase_map, plain_line):
     fan = cr.launch(phase_map("sphere"), plain_line, length=1.0, n_rays=8)
     assert len(repr(fan).splitlines()) == 3
     assert "error at the end" in repr(fan)
-
-
-def test_launched_rays_are_those_of_the_wave():
-    body = sc.Torus(1.0, 0.5)
-    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (1, 0.1, 0.3)), length=2.0, n_rays=32, launch_from="all")
-    names = np.array([cr.RayStatus(s).name for s in fan.status])
-    assert set(names[fan.launched]) == {"OK", "DETACHED"} and not set(names[~fan.launched]) & {"OK", "DETACHED"}
-    assert len(names[~fan.launched])

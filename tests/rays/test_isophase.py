@@ -50,16 +50,16 @@ def test_eikonal_levels_split_where_rays_have_not_started(twisted_fan):
     assert not any(curve.closed for curve in curves)
     assert sum(len(curve.points) for curve in curves) < len(twisted_fan.points)
     assert cr.iso_phase_curves(twisted_fan, lowest - 1.0, of="eikonal") == []
-
-
-def test_curves_may_end_at_detachment(twisted_fan):
-    whole = cr.iso_phase_curves(twisted_fan, 1.9)
-    ended = cr.iso_phase_curves(twisted_fan, 1.9, beyond_detachment=False)
+    # and may end at detachment
+    whole, ended = (cr.iso_phase_curves(twisted_fan, 1.9, beyond_detachment=beyond) for beyond in (True, False))
     assert sum(len(c.points) for c in ended) < sum(len(c.points) for c in whole)
 
 
 def test_two_components_give_two_curves(phase_map):
     body = sc.Torus()
+    every = cr.launch(phase_map(body), cr.shadow_line(body, (1, 1, 1)), length=0.5, n_rays=200, launch_from="all")
+    # the inner component has six arcs of three states, and one iso-phase curve
+    assert [curve.closed for curve in cr.iso_phase_curves(every, 0.3)] == [True, True]
     fan = cr.launch(phase_map(body), cr.shadow_line(body, (0, 0, 1)), length=0.5, n_rays=100)
     curves = cr.iso_phase_curves(fan, 0.3)
     assert [curve.closed for curve in curves] == [True, True]
@@ -68,13 +68,6 @@ def test_two_components_give_two_curves(phase_map):
     np.testing.assert_allclose(
         np.sort([np.mean(r) for r in radii]), [1 - 0.5 * np.cos(0.6), 1 + 0.5 * np.cos(0.6)], atol=1e-6
     )
-
-
-def test_curves_of_all_points_are_whole(phase_map):
-    # the inner component has six arcs of three states, and one iso-phase curve
-    body = sc.Torus()
-    fan = cr.launch(phase_map(body), cr.shadow_line(body, (1, 1, 1)), length=0.5, n_rays=200, launch_from="all")
-    assert [curve.closed for curve in cr.iso_phase_curves(fan, 0.3)] == [True, True]
 
 
 def test_pieces_end_on_the_seam(twisted_fan):

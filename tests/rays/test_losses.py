@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.rays.reach import HARD_DECAY
 
 
-@pytest.mark.parametrize("angle", [np.pi / 2, 1.2, 0.9])
+@pytest.mark.parametrize("angle", [np.pi / 2, 0.9])
 def test_cut_sphere(angle):
     body, d = cut_sphere(0.5), (np.sin(angle), 0.0, np.cos(angle))
     fan = cr.launch(
@@ -33,13 +33,9 @@ def test_cut_sphere(angle):
     assert found.rays == pytest.approx(left.mean(), rel=0.01)
 
 
-def test_nothing_is_lost_without_edges():
-    body = Capsule(0.5, 1.0)
-    fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, (1, 0, 0.5)), length=1.0, n_rays=16)
-    assert fan.losses() == (0, 0, 0)
-
-
-def test_all_is_lost_of_a_cylinder_end_on():
-    body = cylinder(0.5, 1.0)
-    fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, (0, 0, 1)), length=1.0, n_rays=16)
-    assert fan.losses() == (1, 0, 1)
+@pytest.mark.parametrize(
+    "body, direction, lost", [(Capsule(0.5, 1.0), (1, 0, 0.5), (0, 0, 0)), (cylinder(0.5, 1.0), (0, 0, 1), (1, 0, 1))]
+)
+def test_nothing_is_lost_without_edges_and_all_of_a_cylinder_end_on(body, direction, lost):
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, direction), length=1.0, n_rays=16)
+    assert fan.losses() == lost

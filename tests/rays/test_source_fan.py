@@ -7,6 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.files import write_mat
 from creeping.geometry.surface import normal
+from creeping.plotting._drawing import compose
 from creeping.rays.fan_points import ray_points
 from creeping.shadow.attachment import line_tangents
 
@@ -19,14 +20,13 @@ def fan_of(body, source, **options):
     return cr.launch(cr.DirectFlow(body, rtol=1e-11), line, **{"length": 3.0, "n_rays": 24, **options})
 
 
-@pytest.mark.parametrize("distance", [1.05, 1.5, 3.0, 30.0])
+@pytest.mark.parametrize("distance", [1.05, 30.0])
 def test_meridians_of_a_sphere(distance):
     fan = fan_of(sc.Sphere(), (0, 0, -distance))
     first, s = np.arccos(1 / distance), fan.travel_time
     np.testing.assert_allclose(-fan.points[..., 2], np.broadcast_to(np.cos(first + s), fan.spreading.shape), atol=1e-8)
-    np.testing.assert_allclose(
-        fan.spreading, np.tile(np.sin(first + s) / np.sin(first), (len(fan.points), 1)), atol=1e-7
-    )
+    spreading = np.sin(first + s) / np.sin(first)
+    np.testing.assert_allclose(fan.spreading, np.tile(spreading, (len(fan.points), 1)), atol=1e-7)
     rate = np.cos(first + s) / np.sin(first)
     np.testing.assert_allclose(fan.spreading_rate, np.tile(rate, (len(fan.points), 1)), atol=1e-7)
     np.testing.assert_allclose(fan.eikonal, np.tile(np.sqrt(distance**2 - 1) + s, (len(fan.points), 1)), rtol=1e-12)
@@ -55,13 +55,6 @@ def test_spreading_is_that_of_neighbouring_rays(body):
         width = abs(np.sum(across * line_tangents(body, fan.points[ray, :1], fan.directions[ray, :1])))
         found = np.abs(np.sum(b * (ends[1] - ends[0]), axis=1)) / (2 * h * width)
         np.testing.assert_allclose(found, np.abs(fan.spreading[ray]), atol=2e-5)
-
-
-def test_rate_is_the_slope_of_spreading():
-    fan = fan_of(WEIGHTED, SOURCE, n_steps=600)
-    slope = np.gradient(fan.spreading, fan.travel_time, axis=1)
-    np.testing.assert_allclose(slope[:, 1:-1], fan.spreading_rate[:, 1:-1], atol=2e-3)
-    assert np.abs(fan.spreading_rate[:, 0]).min() > 0.1
 
 
 def test_points_of_a_fan_know_the_source():
@@ -110,19 +103,13 @@ def test_shown_and_written(tmp_path):
 
 
 def test_pictures_show_the_source():
-    from creeping.plotting._drawing import compose
-
     body = sc.Ellipsoid(1.0, 0.8, 0.6)
-    near = compose(cr.shadow_line(body, source=cr.PointSource(SOURCE)))
-    assert near.incidence.name == "S"
+    near, far = (compose(cr.shadow_line(body, source=cr.PointSource(x))) for x in (SOURCE, 1e3 * SOURCE))
     np.testing.assert_array_equal(near.incidence.foot, SOURCE)
-    assert near.view.visible(body, SOURCE[None])[0]
-    far = compose(cr.shadow_line(body, source=cr.PointSource(1e3 * SOURCE)))
-    assert far.incidence.name == "S" and np.linalg.norm(far.incidence.foot) < 10
+    assert near.incidence.name == far.incidence.name == "S" and np.linalg.norm(far.incidence.foot) < 10
     # in the hole of a torus it is looked at from above
     held = compose(cr.shadow_line(sc.Torus(), source=cr.PointSource((0.0, 0.0, 0.3))))
     assert held.view.visible(sc.Torus(), np.array([[0.0, 0.0, 0.3]]))[0]
-    assert compose(cr.shadow_line(body, direction=(1, 0, 0))).incidence.name == "d"
 
 
 def test_maps_carry_them_too():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shared_bodies as sc
+from body_checks import normal_curvature
 from tolerances import STRIP, STRIP_SLOPE
 
 import creeping as cr
@@ -44,20 +45,13 @@ def test_points_between_rays_are_those_of_a_direct_trace(fans, rng):
     x, p = direct(fan, 0, sigma, s)
     np.testing.assert_allclose(at.points, x, atol=STRIP)
     np.testing.assert_allclose(at.directions, p, atol=STRIP)
-    g = np.linalg.norm(fan.body.gradient(x), axis=-1)
     b = np.cross(normal(fan.body, x), p)
-    H = fan.body.hessian(x)
-    np.testing.assert_allclose(at.curvature[1], np.einsum("ni,nij,nj->n", p, H, p) / g, atol=30 * STRIP)
-    np.testing.assert_allclose(at.transverse[1], np.einsum("ni,nij,nj->n", b, H, b) / g, atol=30 * STRIP)
+    np.testing.assert_allclose(at.curvature[1], normal_curvature(fan.body, x, p), atol=30 * STRIP)
+    np.testing.assert_allclose(at.transverse[1], normal_curvature(fan.body, x, b), atol=30 * STRIP)
     x0, _ = direct(fan, 0, sigma, np.zeros(20))
     np.testing.assert_allclose(at.eikonal, x0 @ fan.line.direction + s, atol=STRIP)
     np.testing.assert_allclose(strip.first_normals(sigma), normal(fan.body, x0), atol=STRIP)
     assert np.all(at.alive)
-
-
-def test_strip_goes_through_its_rays(fans):
-    fan = fans["triaxial"]
-    (strip,) = strips_of(fan)
     for ray in (0, 17, 95):
         at = strip.at(np.full(len(strip.times), strip.positions[ray]), strip.times)
         np.testing.assert_allclose(at.lanes, strip.rays.lanes[ray], atol=1e-9)
@@ -147,17 +141,12 @@ def test_gather_keeps_the_order(fans, rng):
         np.testing.assert_allclose(together.lanes[k], alone.lanes[0], atol=1e-12)
         assert together.alive[k] == alone.alive[0]
     np.testing.assert_array_equal(together.time, s)
+    for some in (strips, ()):
+        empty = gather(some, which[:0], sigma[:0], s[:0])
+        assert empty.points.shape == (0, 3) and empty.integrals.shape == (0, 5)
 
 
-def test_gather_of_nothing(fans):
-    none = np.zeros(0, dtype=int)
-    for strips in (strips_of(fans["torus"]), ()):
-        empty = gather(strips, none, np.zeros(0), np.zeros(0))
-        assert empty.points.shape == (0, 3)
-        assert empty.integrals.shape == (0, 5)
-
-
-@pytest.mark.parametrize("n_rays", [1, 2, 3, 4, 6])
+@pytest.mark.parametrize("n_rays", [1, 3, 6])
 def test_few_rays_make_a_strip_all_the_same(n_rays):
     body = sc.Sphere()
     line = cr.shadow_line(body, (0, 0, 1))

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shared_bodies as sc
+from body_checks import normal_curvature, rms, unit
 
 import creeping as cr
 from creeping.field import on_body
@@ -62,16 +63,13 @@ def test_rays_end_just_before_non_smooth_regions():
     # the look-out's step, and that of the reference
     step = NON_SMOOTH_SPACING * size(EXACT)
     assert np.all(before > -1e-9) and np.all(before < 2 * step + 1e-3)
-
-
-def test_other_rays_and_all_geometry_are_unchanged():
-    non_smooth, plain = fan_of(NON_SMOOTH), fan_of(PLAIN)
-    others = non_smooth.status != cr.RayStatus.NON_SMOOTH
-    np.testing.assert_array_equal(non_smooth.status[others], plain.status[others])
-    np.testing.assert_array_equal(non_smooth.detachment[others], plain.detachment[others])
+    # other rays and all geometry are unchanged
+    plain = fan_of(PLAIN)
+    np.testing.assert_array_equal(fan.status[~met], plain.status[~met])
+    np.testing.assert_array_equal(fan.detachment[~met], plain.detachment[~met])
     for name in ("points", "directions", "spreading", "curvature", "attenuation", "eikonal"):
-        np.testing.assert_array_equal(getattr(non_smooth, name), getattr(plain, name))
-    assert f"{int((~others).sum())} NON_SMOOTH" in repr(non_smooth)
+        np.testing.assert_array_equal(getattr(fan, name), getattr(plain, name))
+    assert f"{int(met.sum())} NON_SMOOTH" in repr(fan)
 
 
 def test_points_of_a_ray_end_where_it_does_and_are_traced_once(monkeypatch):
@@ -124,38 +122,27 @@ def test_what_comes_first_ends_a_ray():
     assert early.detachment[ray] < plain.detachment[ray]
 
 
-def test_empty_and_smooth_fans_say_nothing_of_non_smooth_regions():
-    smooth = fan_of(Wrapped(non_smooth=lambda x: np.zeros(x.shape[:-1], dtype=bool)))
-    assert np.all(smooth.status == cr.RayStatus.OK) and np.all(np.isinf(smooth.detachment))
-
-
 def test_fields_of_a_fan_with_rays_that_end_early_are_finite_and_change_behind_it_only(monkeypatch):
     # fans with such rays are not marched
     monkeypatch.setattr(on_body, "marches", lambda *_: False)
     non_smooth, plain = fan_of(NON_SMOOTH), fan_of(PLAIN)
-    n = normal(EXACT, SPOT)
     k = 30.0
     # behind the ball, and where no ray that met it comes
     met = np.flatnonzero((non_smooth.status == cr.RayStatus.NON_SMOOTH) & (non_smooth.detachment < 0.5))
     behind = non_smooth.points[met[len(met) // 2], 30]
     away = np.flatnonzero(np.min(np.linalg.norm(plain.points[:, :, None] - SPOT, axis=-1), axis=(1, 2)) > 0.6)
-    elsewhere = plain.points[away[len(away) // 2], 10]
-    places = np.stack([behind, elsewhere, SPOT])
+    places = np.stack([behind, plain.points[away[len(away) // 2], 10], SPOT])
+    near_by, asked = places + 0.1 * normal(EXACT, places), {"wavenumber": k, "boundary": "hard"}
     for field in (
-        lambda fan: cr.surface_field(fan, places, wavenumber=k, boundary="hard"),
-        lambda fan: cr.near_field(
-            fan, places + 0.1 * normal(EXACT, places), wavenumber=k, boundary="hard", method="rays"
-        ),
+        lambda fan: cr.surface_field(fan, places, **asked),
+        lambda fan: cr.near_field(fan, near_by, method="rays", **asked),
     ):
         found, expected = field(non_smooth), field(plain)
         assert np.all(np.isfinite(found)) and np.all(np.isfinite(expected))
         assert found[1] == pytest.approx(expected[1], rel=1e-6)
         assert abs(found[0] - expected[0]) > 1e-3 * abs(expected[0])
-    far = [
-        cr.far_field(fan, np.stack([n, -n, fan.line.direction]), wavenumber=k, boundary="hard")
-        for fan in (non_smooth, plain)
-    ]
-    assert all(np.all(np.isfinite(one.total)) for one in far)
+    far = cr.far_field(non_smooth, [normal(EXACT, SPOT), non_smooth.line.direction], **asked)
+    assert np.all(np.isfinite(far.total))
 
 
 # the same body, known to a thousandth
@@ -169,13 +156,10 @@ def by_hand(fan, ray):
     for body in (EXACT, COARSE_FIT):
         start = project(body, fan.points[ray, 0])
         n = normal(body, start)
-        p = d - np.sum(d * n) * n
-        p /= np.linalg.norm(p)
         times = np.linspace(0, LENGTH, 401)
-        x, q = cr.trace(body, start, p, times, rtol=1e-12)
-        hessian, slope = body.hessian(x), np.linalg.norm(body.gradient(x), axis=-1)
-        kappa = np.einsum("ti,tij,tj->t", q, hessian, q) / slope
-        ends.append((x[-1], np.sum(0.5 * (kappa[1:] ** (2 / 3) + kappa[:-1] ** (2 / 3))) * times[1]))
+        x, q = cr.trace(body, start, unit(d - np.sum(d * n) * n), times, rtol=1e-12)
+        rate = normal_curvature(body, x, q) ** (2 / 3)
+        ends.append((x[-1], np.sum(0.5 * (rate[1:] + rate[:-1])) * times[1]))
     return ends
 
 
@@ -185,16 +169,11 @@ def test_error_is_the_difference_of_rays_traced_by_hand():
     chosen = np.unique(np.linspace(0, len(fan.points) - 1, 5).astype(int))
     assert found.rays == len(chosen) == 5
     pairs = [by_hand(fan, ray) for ray in chosen]
-    apart = [np.linalg.norm(one[0] - other[0]) for one, other in pairs]
-    assert found.points == pytest.approx(np.sqrt(np.mean(np.square(apart))), rel=1e-6)
-    attenuation = [one[1] - other[1] for one, other in pairs]
-    assert found.attenuation == pytest.approx(np.sqrt(np.mean(np.square(attenuation))), rel=1e-3)
-
-
-def test_spreading_differs_as_that_of_two_fans():
+    assert found.points == pytest.approx(rms([np.linalg.norm(one[0] - other[0]) for one, other in pairs]), rel=1e-6)
+    assert found.attenuation == pytest.approx(rms([one[1] - other[1] for one, other in pairs]), rel=1e-3)
     # launched from the same points: only along its own line does the fan of the other body agree, so to first order
     ours, theirs = fan_of(UNSURE, n_rays=12), fan_of(COARSE_FIT, n_rays=12)
-    difference = np.sqrt(np.mean((ours.spreading[:, -1] - theirs.spreading[:, -1]) ** 2))
+    difference = rms(ours.spreading[:, -1] - theirs.spreading[:, -1])
     assert body_uncertainty(ours, n_rays=12).spreading == pytest.approx(difference, rel=0.5)
 
 
@@ -208,35 +187,24 @@ def test_error_goes_with_the_difference_of_the_bodies():
     assert 1e-4 < found[0].points < 1e-2
 
 
-def test_a_body_that_errs_by_more_than_it_differs_says_by_how_much():
+def test_a_body_says_by_how_much_it_errs_and_rays_that_end_are_left_out():
     one, two = (
         body_uncertainty(fan_of(Wrapped(coarse_fit=COARSE_FIT, coarse_factor=factor)), n_rays=6)
         for factor in (1.0, 2.5)
     )
     for name in ("points", "spreading", "attenuation"):
         assert getattr(two, name) == pytest.approx(2.5 * getattr(one, name)) and getattr(one, name) > 0
-
-
-def test_the_same_body_has_no_error():
-    found = body_uncertainty(fan_of(Wrapped(coarse_fit=EXACT)), n_rays=6)
-    assert max(found.points, found.spreading, found.attenuation) < 1e-12
-
-
-def test_bodies_known_exactly_have_none():
-    assert body_uncertainty(fan_of(EXACT)) is None
-    assert body_uncertainty(fan_of(PLAIN)) is None
-
-
-def test_rays_that_end_are_left_out():
-    assert (
-        body_uncertainty(fan_of(Wrapped(coarse_fit=COARSE_FIT, non_smooth=lambda x: np.ones(x.shape[:-1], dtype=bool))))
-        is None
-    )
+    same = body_uncertainty(fan_of(Wrapped(coarse_fit=EXACT)), n_rays=6)
+    assert max(same.points, same.spreading, same.attenuation) < 1e-12
+    # bodies known exactly have none
+    assert body_uncertainty(fan_of(EXACT)) is None and body_uncertainty(fan_of(PLAIN)) is None
+    nowhere = Wrapped(coarse_fit=COARSE_FIT, non_smooth=lambda x: np.ones(x.shape[:-1], dtype=bool))
+    assert body_uncertainty(fan_of(nowhere)) is None
     some = fan_of(Wrapped(coarse_fit=COARSE_FIT, non_smooth=near))
     assert body_uncertainty(some, n_rays=1000).rays == np.sum(some.status == cr.RayStatus.OK)
 
 
-@pytest.mark.parametrize("rays", [0, -1, 2.5, "4", True, None, np.nan])
+@pytest.mark.parametrize("rays", [0, 2.5, "4", True, None])
 def test_bad_numbers_of_rays(rays):
     with pytest.raises(cr.CreepingError, match=r"rays = .* is not a whole number >= 1"):
         body_uncertainty(fan_of(UNSURE), n_rays=rays)
@@ -245,8 +213,10 @@ def test_bad_numbers_of_rays(rays):
 class Rough(sc.Cylinder):
     """A cylinder whose lower half is not trusted, and on which nothing is known of curvatures."""
 
+    height = 0.0
+
     def non_smooth(self, points):
-        return np.asarray(points)[..., 2] < 0
+        return np.asarray(points)[..., 2] < self.height
 
 
 def test_rays_of_pieces_stop_where_the_ground_is_not_trusted():
@@ -261,14 +231,9 @@ def test_rays_of_pieces_stop_where_the_ground_is_not_trusted():
     np.testing.assert_array_equal(fan.points[below], np.repeat(fan.points[below, :1], fan.points.shape[1], axis=1))
     ff = cr.far_field(fan, [(0, 0, 1), (0, 1, 0)], wavenumber=20.0)
     assert np.all(np.isfinite(ff.error)) and np.all(ff.error > 0)
-
-
-def test_rays_that_all_end_at_once_have_a_length():
-    class Untrusted(sc.Cylinder):
-        def non_smooth(self, points):
-            return np.ones(np.shape(points)[:-1], dtype=bool)
-
-    body = Untrusted(0.5, 4.0)
-    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (1, 0.2, 0.3)), n_rays=8, wavenumber=20.0)
+    # rays that all end at once have a length as well
+    body = Rough(0.5, 4.0)
+    body.height = 9.0
+    fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), line, n_rays=8, wavenumber=20.0)
     assert fan.length > 0
     assert np.all(np.isfinite(cr.far_field(fan, [(0, 0, 1)], wavenumber=20.0).error))

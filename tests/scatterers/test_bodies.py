@@ -1,21 +1,24 @@
 """Bodies satisfy their protocol, and their compiled evaluators equal the numpy ones."""
 
+from functools import partial
+
 import numpy as np
 import pytest
-from numba import njit
+from body_checks import (
+    assert_compiled_is_its_source,
+    assert_locator,
+    assert_sphere_map,
+    call,
+    directions,
+    evaluated_by,
+)
 
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.frames import polar_frame
 from creeping.geometry.surface import Surface
 from scatterers.kernels.trigonometry import cos_pi, sin_pi
-
-COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
-
-
-@njit
-def call(function, *arguments):
-    function(*arguments)
+from scatterers.spline.tensor import SYMMETRIC
 
 
 def test_every_body_passes_its_check(body):
@@ -30,76 +33,17 @@ def test_area_of_the_sphere_and_the_torus():
     assert cr.check_surface(sc.Torus(1.0, 0.25)).area == pytest.approx(np.pi**2, rel=4e-3)
 
 
-def evaluate(compiled, points):
-    n = len(points)
-    values, gradients, hessians = np.empty(n), np.empty((3, n)), np.empty((6, n))
-    # the plain Python of the compiled function; the compiled one is exercised by the tracer
-    compiled.source(np.ascontiguousarray(points.T), values, gradients, hessians, compiled.parameters)
-    return values, gradients.T, hessians.T
-
-
-def test_compiled_level_equals_numpy(body, rng):
-    points = rng.uniform(0.3, 1.0, (50, 3)) * rng.choice([-1, 1], (50, 3))
-    values, gradients, hessians = evaluate(body.compiled, points)
+def test_compiled_functions_equal_numpy(body, rng):
+    # 37 leaves a remainder for every width of vector
+    points = rng.uniform(0.3, 1.0, (37, 3)) * rng.choice([-1, 1], (37, 3))
+    values, gradients, hessians = evaluated_by(partial(call, body.compiled.function), body.compiled, points)
     np.testing.assert_allclose(values, body.level(points), atol=1e-13)
     np.testing.assert_allclose(gradients, body.gradient(points), atol=1e-12)
-    expected = np.stack([body.hessian(points)[:, i, j] for i, j in COLUMNS], axis=-1)
-    np.testing.assert_allclose(hessians, expected, atol=1e-12)
-
-
-def test_compiled_locator_equals_numpy(body, rng):
-    for number, chart in enumerate(body.atlas.charts):
-        uv = rng.uniform(0.001, 0.999, (40, 2))
-        points = chart.point(uv)
-        found, found_uv, frame = np.empty(40, np.int64), np.empty((2, 40)), np.empty((6, 40))
-        locator = body.atlas.compiled
-        gradients = np.ascontiguousarray(body.gradient(points).T)
-        locator.source(np.ascontiguousarray(points.T), gradients, found, found_uv, frame, locator.parameters)
-        assert np.all(found == number)
-        np.testing.assert_allclose(found_uv.T, uv, atol=1e-13)
-        expected = polar_frame(chart.tangents(uv))
-        np.testing.assert_allclose(frame[:3].T, expected[..., 0], atol=1e-13)
-        np.testing.assert_allclose(frame[3:].T, expected[..., 1], atol=1e-13)
-
-
-def test_compiled_sphere_map_equals_numpy(body, rng):
-    if isinstance(body, sc.Torus):
-        pytest.skip("a torus is no image of the sphere")
-    sphere_map = body.atlas.sphere_map
-    s = rng.normal(size=(50, 3))
-    s /= np.linalg.norm(s, axis=-1, keepdims=True)
-    forward, inverse = sphere_map.compiled_forward, sphere_map.compiled_inverse
-    points, derivatives, back = np.empty((3, 50)), np.empty((9, 50)), np.empty((3, 50))
-    forward.source(np.ascontiguousarray(s.T), points, derivatives, forward.parameters)
-    np.testing.assert_allclose(points.T, sphere_map.forward(s), atol=1e-14)
-    np.testing.assert_allclose(derivatives.T.reshape(-1, 3, 3), sphere_map.derivative(s), atol=1e-14)
-    inverse.source(points, back, inverse.parameters)
-    np.testing.assert_allclose(back.T, s, atol=1e-14)
-
-
-@pytest.mark.parametrize("kind", ["level", "forward", "inverse", "locator"])
-def test_compiled_functions_equal_their_source(body, kind, rng):
-    if isinstance(body, sc.Torus) and kind in ("forward", "inverse"):
-        pytest.skip("a torus is no image of the sphere")
-    # 37 leaves a remainder for every width of vector
-    points = np.ascontiguousarray(body.atlas.charts[0].point(rng.uniform(0.1, 0.9, (37, 2))).T)
-    rows = {"level": (0, 3, 6), "forward": (3, 9), "inverse": (3,), "locator": (-1, 2, 6)}[kind]
-    compiled = {
-        "level": lambda: body.compiled,
-        "locator": lambda: body.atlas.compiled,
-        "forward": lambda: body.atlas.sphere_map.compiled_forward,
-        "inverse": lambda: body.atlas.sphere_map.compiled_inverse,
-    }[kind]()
-
-    def outputs():
-        return [np.empty((r, 37)) if r > 0 else np.empty(37, np.int64 if r else float) for r in rows]
-
-    fast, plain = outputs(), outputs()
-    given = [points, np.ascontiguousarray(body.gradient(points.T).T)] if kind == "locator" else [points]
-    call(compiled.function, *given, *fast, compiled.parameters)
-    compiled.source(*given, *plain, compiled.parameters)
-    for a, b in zip(fast, plain, strict=True):
-        np.testing.assert_allclose(a, b, atol=2e-14)
+    np.testing.assert_allclose(hessians[:, SYMMETRIC], body.hessian(points), atol=1e-12)
+    assert_compiled_is_its_source(body.compiled, points, 2e-14)
+    assert_locator(body, rng)
+    if not isinstance(body, sc.Torus):
+        assert_sphere_map(body.atlas.sphere_map, directions(rng, 37))
 
 
 def test_polynomial_cosine_and_sine(rng):

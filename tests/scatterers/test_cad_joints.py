@@ -1,13 +1,10 @@
 """CAD bodies whose faces join smoothly while the curvature jumps: joints, and the side of each piece."""
 
-import json
-
 import numpy as np
 import pytest
 from cad_files import made
 
 import scatterers as sc
-from creeping.commands import main as cli
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 pytestmark = pytest.mark.slow
@@ -23,14 +20,9 @@ def filleted(tmp_path_factory):
     return made(tmp_path_factory.mktemp("cad"), MAKER) / "filleted_box.step"
 
 
-@pytest.fixture(scope="module")
-def body(filleted):
-    return sc.Cad(filleted, points=1000, cache=False)
-
-
-def test_a_box_with_all_edges_filleted_is_told_by_its_joints(body):
+def test_a_box_with_all_edges_filleted_is_told_by_its_joints(filleted):
     """No edge, no bad vertex: the curvature jumps all over the mesh, so that jets see nothing odd."""
-    r = 6e-3
+    body, r = sc.Cad(filleted, points=1000, cache=False), 6e-3
     # 6 planes, 12 quarters of cylinders, 8 of balls; each of 24 + 24 joints a line or a quarter of a circle
     half, inner = np.array([30e-3, 20e-3, 15e-3]), np.array([24e-3, 14e-3, 9e-3])
     straight = [round(2 * side, 6) for side in inner for _ in range(8)]
@@ -51,30 +43,3 @@ def test_a_box_with_all_edges_filleted_is_told_by_its_joints(body):
     assert near.sum() > 200
     np.testing.assert_array_equal(body.level(x[near]) > 0, away[near] > 0)
     np.testing.assert_allclose(body.level(x[near]), away[near], atol=2e-6)
-
-
-def test_a_filleted_box_is_refused_as_strict(filleted):
-    with pytest.raises(ValueError, match=r"not smooth enough \(curvature jumps\): the curvature jumps at \d+ of \d+ "):
-        sc.Cad(filleted, strict=True, cache=False)
-
-
-def test_check_tells_of_joints_that_jets_do_not_see(filleted, capsys, tmp_path, monkeypatch):
-    """Verdict, vertices on joints and the pieces' kinds are those of the faces, whatever polynomials make of points."""
-    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))
-    texts = {}
-    for form in ([], ["--json"]):
-        with pytest.raises(SystemExit) as ended:
-            cli.main(["check", str(filleted), *form])
-        texts[bool(form)] = capsys.readouterr().out
-        assert ended.value.code == 0, texts
-    answer, told = json.loads(texts[True]), texts[False]
-    jumps, edge = answer["quality"]["jumps"], answer["quality"]["edge_mean"]
-    # 24 straight joints and 24 quarters of circles, 0.98 m in all, with a vertex to each edge
-    straight = 8 * (48e-3 + 28e-3 + 18e-3)
-    assert jumps == pytest.approx((straight + 24 * np.pi / 2 * 6e-3) / edge, rel=0.15)
-    assert answer["quality"]["verdict"] == "curvature jumps" and answer["quality"]["bad_share"] == 0
-    assert answer["pieces"] == 26 and [crease["kind"] for crease in answer["creases"]] == 48 * ["joint"]
-    assert (
-        "verdict                    curvature jumps" in told and f"curvature jumps at         {jumps} vertices" in told
-    )
-    assert "26 smooth pieces, 48 joints, area" in told and "all of planes and quadrics" in told

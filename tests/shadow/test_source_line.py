@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shared_bodies as sc
+from body_checks import unit
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -41,7 +42,7 @@ def curves_of_signs(body, source, mesh):
     return connected_components(coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mixed),) * 2))[0]
 
 
-@pytest.mark.parametrize("distance", [1.0002, 1.05, 1.5, 3.0, 30.0, 1e5])
+@pytest.mark.parametrize("distance", [1.0002, 3.0, 1e5])
 def test_circle_on_a_sphere(distance):
     d = np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
     line = cr.shadow_line(sc.Sphere(2.0), source=cr.PointSource(-2 * distance * d))
@@ -72,22 +73,14 @@ def test_curves_and_states_by_another_route(name, rng):
         wrong = total = 0
         for curve in line.curves:
             away = curve.points - source
-            p = away / np.linalg.norm(away, axis=1, keepdims=True)
-            g = body.gradient(curve.points)
-            assert np.max(np.abs(np.sum(g * p, axis=1)) / np.linalg.norm(g, axis=1)) < 1e-9
+            p = unit(away)
+            assert np.max(np.abs(np.sum(unit(body.gradient(curve.points)) * p, axis=1))) < 1e-9
             bent = np.einsum("ni,nij,nj->n", p, body.hessian(curve.points), p)
             hidden = [np.any(body.level(x - share * y) < -1e-9) for x, y in zip(curve.points, away, strict=True)]
             expected = np.where(bent <= 0, "concave", np.where(hidden, "occluded", "attached"))
             wrong, total = wrong + np.sum(curve.status != expected), total + len(expected)
         # next to where a state ends either may be right
         assert wrong <= 0.02 * total
-
-
-def test_several_states_occur(rng):
-    body = BODIES["torus"]
-    line = cr.shadow_line(body, source=cr.PointSource((1.9, 0.3, 0.2)))
-    assert min(line.fractions.values()) > 0.01
-    assert sum(line.fractions.values()) == pytest.approx(1.0)
 
 
 def test_a_far_source_is_a_plane_wave():
@@ -101,29 +94,19 @@ def test_a_far_source_is_a_plane_wave():
         assert line.fractions == pytest.approx(plane.fractions, abs=10 / distance)
     assert gaps[0] > 5 * gaps[1] > 25 * gaps[2]
     assert gaps[2] < 1e-3
-
-
-def test_a_plane_wave_for_a_source_is_its_direction():
-    body, d = BODIES["twisted"], (1.0, 1.0, 1.0)
-    one, other = cr.shadow_line(body, direction=d), cr.shadow_line(body, source=cr.PlaneWave(d))
-    assert one.source == other.source
-    np.testing.assert_array_equal(one.curves[0].points, other.curves[0].points)
-    np.testing.assert_array_equal(one.direction, other.direction)
-
-
-def test_a_body_and_its_source_of_another_size():
-    small = cr.shadow_line(sc.Ellipsoid(1.0, 0.8, 0.6), source=cr.PointSource((-0.9, 0.7, 0.4)))
-    large = cr.shadow_line(sc.Ellipsoid(1e3, 0.8e3, 0.6e3), source=cr.PointSource((-0.9e3, 0.7e3, 0.4e3)))
-    assert large.length == pytest.approx(1e3 * small.length, rel=1e-10)
-    assert large.singular_distance == pytest.approx(small.singular_distance, rel=1e-6)
+    wave = cr.shadow_line(body, source=cr.PlaneWave(d))
+    assert wave.source == plane.source
+    np.testing.assert_array_equal(wave.curves[0].points, plane.curves[0].points)
 
 
 def test_arcs_end_where_states_change():
     line = cr.shadow_line(BODIES["torus"], source=cr.PointSource((1.9, 0.3, 0.2)))
+    assert min(line.fractions.values()) > 0.01
+    assert sum(line.fractions.values()) == pytest.approx(1.0)
     launch = line.launch_points(64)
     assert np.all(launch.there)
     away = launch.points[0] - (1.9, 0.3, 0.2)
-    np.testing.assert_allclose(launch.headings[0], away / np.linalg.norm(away, axis=1)[:, None], atol=1e-12)
+    np.testing.assert_allclose(launch.headings[0], unit(away), atol=1e-12)
     np.testing.assert_allclose(launch.phase[0], np.linalg.norm(away, axis=1), rtol=1e-12)
     np.testing.assert_allclose(launch.openings[0] * launch.phase[0], 1.0, rtol=1e-12)
 

@@ -9,10 +9,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.kernels.threads import thread_count
-from creeping.phaseflow.building import Plan, build_direct, with_errors
 from creeping.phaseflow.coordinates import rotation as compiled_models
-from creeping.phaseflow.coordinates.base import model_of
-from creeping.phaseflow.grid import Grid
 
 
 def rms_at_end(flow, body, length, rng, rays=1000):
@@ -22,10 +19,7 @@ def rms_at_end(flow, body, length, rng, rays=1000):
     return float(np.sqrt(np.mean(np.sum((flow.transport(states, times) - exact) ** 2, axis=2))))
 
 
-SLOW = pytest.mark.slow
-
-
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, pytest.param(1e-6, marks=SLOW), pytest.param(1e-7, marks=SLOW)])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, pytest.param(1e-7, marks=pytest.mark.slow)])
 def test_tolerance_is_met_after_the_whole_length(body, tolerance, rng):
     flow = cr.build_phase_map(body, tolerance=tolerance, length=4.0, carry_jacobi=False, cache=False)
     assert flow.growth.lengths[-1] == 4.0
@@ -60,22 +54,8 @@ def test_no_jacobi_matrix_without_ride_along(rng):
         flow.transport(pack(*random_bundle_points(body, 3, rng=rng), jacobi=True), np.array([2.0]))
 
 
-def test_doubling_agrees_with_tracing(body, rng):
-    model, grid = model_of(body), Grid((24, 24, 32), 5, tuple(body.atlas.charts[0].periodic))
-    maps = [
-        with_errors(build_direct(body, model, Plan(0.4, grid, doublings=d), lambda _: None, rtol=1e-11)) for d in (0, 2)
-    ]
-    assert maps[1].error.rms < 3 * maps[0].error.rms + 1e-10
-    states = pack(*random_bundle_points(body, 50, rng=rng), lanes=12)
-    one, other = (flow.transport(states, np.array([0.4]))[:, 0] for flow in maps)
-    bound = 20 * (maps[0].error.max + maps[1].error.max)
-    assert np.abs(one[:, :10] - other[:, :10]).max() < bound
-    alive = np.isinf(one[:, 11]) & np.isinf(other[:, 11])
-    assert np.abs(one[alive, 10] - other[alive, 10]).max() < bound
-
-
-@pytest.mark.parametrize("lanes", [6, 10, 12])
-@pytest.mark.parametrize("body", [sc.TwistedEllipsoid(), sc.Torus(), sc.Ellipsoid(1.0, 0.8, 0.6)], ids=repr)
+@pytest.mark.parametrize("lanes", [6, 12])
+@pytest.mark.parametrize("body", [sc.TwistedEllipsoid(), sc.Ellipsoid(1.0, 0.8, 0.6)], ids=repr)
 def test_order_of_composition_changes_nothing(body, lanes, rng, monkeypatch):
     flow = cr.build_phase_map(body, horizon=0.25, grid=(20, 32))
     states = pack(*random_bundle_points(body, 1000, rng=rng), lanes=lanes)
@@ -91,14 +71,12 @@ def test_order_of_composition_changes_nothing(body, lanes, rng, monkeypatch):
 def test_threads_change_nothing(rng, monkeypatch):
     body = sc.Ellipsoid(1.2, 0.8, 0.8)
     flow = cr.build_phase_map(body, horizon=0.5, grid=(16, 24))
-    states = pack(*random_bundle_points(body, 10_000, rng=rng), lanes=12)
-    found = []
+    states, found = pack(*random_bundle_points(body, 10_000, rng=rng), lanes=12), []
     for threads in ("1", "2"):
         monkeypatch.setenv("CREEPING_THREADS", threads)
         assert thread_count() == int(threads)
-        found.append((flow.transport(states, np.array([1.0])), trace_states(body, states[:, :6], np.array([1.0]))))
-    np.testing.assert_array_equal(found[0][0], found[1][0])
-    np.testing.assert_array_equal(found[0][1], found[1][1])
+        found.append(flow.transport(states, np.array([1.0])))
+    np.testing.assert_array_equal(*found)
     monkeypatch.setenv("CREEPING_THREADS", "many")
     with pytest.raises(cr.CreepingError, match="CREEPING_THREADS"):
         thread_count()
@@ -135,28 +113,9 @@ def test_tolerance_below_any_map_is_integrated_directly(rng):
     assert rms_at_end(flow, body, 2.0, rng, 200) <= 1e-11
 
 
-def test_stored_map_is_used_again(tmp_path):
-    body = sc.Ellipsoid(1.2, 0.8, 0.8)
-    options = {"length": 4.0, "tolerance": 1e-5, "cache": tmp_path}
-    cr.build_phase_map(body, **options)
-    messages = []
-    cr.choose_flow(body, n_rays=10**7, progress=messages.append, **options)
-    assert not any("tracing" in text for text in messages)
-
-
-@pytest.mark.parametrize(
-    "options, match",
-    [
-        ({"n_rays": 0}, "n_rays"),
-        ({"n_rays": 2.5}, "n_rays"),
-        ({"length": -1.0}, "length"),
-        ({"length": float("nan")}, "length"),
-        ({"tolerance": 1e-15}, "tolerance"),
-        ({"n_steps": 0}, "n_steps"),
-    ],
-)
-def test_bad_numbers_are_named(options, match):
-    with pytest.raises(cr.CreepingError, match=match):
+@pytest.mark.parametrize("options", [{"n_rays": 2.5}, {"length": -1.0}, {"tolerance": 1e-15}, {"n_steps": 0}])
+def test_bad_numbers_are_named(options):
+    with pytest.raises(cr.CreepingError, match=next(iter(options))):
         cr.choose_flow(sc.Sphere(), **({"n_rays": 10, "length": 2.0, "cache": False} | options))
 
 

@@ -1,13 +1,12 @@
 """Meshes with edges as bodies of pieces: sign, pieces, normals and curvatures against closed forms; what is stored."""
 
-import hashlib
-import io
 from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
+from body_checks import rms, shape_operator, unit
 
 import scatterers as sc
 from creeping.geometry.surface import project
@@ -45,9 +44,7 @@ def half_torus(n=48, m=SIDES):
 
 
 SOURCES = {
-    "box": lambda: trimesh.creation.box(),
     "L": angle_piece,
-    "plate": lambda: trimesh.creation.box(extents=(1.0, 0.8, 0.02)),
     "rod": lambda: trimesh.creation.cylinder(radius=0.5, height=2.0, sections=64),
     "rod of few triangles": lambda: trimesh.creation.cylinder(radius=0.5, height=2.0, sections=24),
     "half torus": half_torus,
@@ -69,17 +66,12 @@ def outside(name, x):
         return np.minimum(long.max(axis=1), short.max(axis=1))
     if name == "rod":
         return np.maximum(np.hypot(x[:, 0], x[:, 1]) - 0.5, np.abs(x[:, 2]) - 1)
-    if name == "half torus":
-        return np.maximum(np.hypot(np.hypot(x[:, 0], x[:, 1]) - R, x[:, 2]) - TUBE, -x[:, 0])
-    half = {"box": [0.5, 0.5, 0.5], "plate": [0.5, 0.4, 0.01]}[name]
-    return np.max(np.abs(x) - half, axis=1)
+    return np.maximum(np.hypot(np.hypot(x[:, 0], x[:, 1]) - R, x[:, 2]) - TUBE, -x[:, 0])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name, pieces", [("box", 6), ("L", 8), ("plate", 6), ("rod", 3), ("half torus", None)])
-def test_the_level_has_the_sign_of_the_body(name, pieces):
+@pytest.mark.parametrize("name", ["L", *(pytest.param(k, marks=pytest.mark.slow) for k in ("rod", "half torus"))])
+def test_the_level_has_the_sign_of_the_body(name):
     body = opened(name)
-    assert pieces is None or len(body.pieces) == pieces
     rng = np.random.default_rng(3)
     low, high = body.bounds
     far = rng.uniform(low - 0.3, high + 0.3, size=(4000, 3))
@@ -93,9 +85,9 @@ def test_the_level_has_the_sign_of_the_body(name, pieces):
     assert np.array_equal(body.level(points)[asked] > 0, expected[asked] > 0)
 
 
-@pytest.mark.parametrize("name", ["L", pytest.param("plate", marks=pytest.mark.slow)])
-def test_the_piece_is_that_of_the_face(name):
-    body = opened(name)
+def test_the_piece_is_that_of_the_face():
+    body = opened("L")
+    assert len(body.pieces) == 8
     corners, normals, number = body.tiles(0.2)
     middles = corners.mean(axis=1)
     assert np.array_equal(body.piece(middles), number)
@@ -103,21 +95,16 @@ def test_the_piece_is_that_of_the_face(name):
     np.testing.assert_allclose(body.level(middles), 0, atol=1e-12)
     np.testing.assert_allclose(body.gradient(middles), normals.mean(axis=1), atol=1e-9)
     # faces are planes along the axes: nothing is uncertain of them
-    np.testing.assert_allclose(
-        np.sort(np.abs(normals.mean(axis=1)), axis=1), np.array([[0, 0, 1]] * len(corners)), atol=1e-9
-    )
+    flat = np.broadcast_to([0, 0, 1], (len(corners), 3))
+    np.testing.assert_allclose(np.sort(np.abs(normals.mean(axis=1)), axis=1), flat, atol=1e-9)
     assert not body.non_smooth(middles).any()
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    assert area == pytest.approx({"L": 2 * 3 + 8, "plate": 1.6 + 3.6 * 0.02}[name])
+    assert area == pytest.approx(2 * 3 + 8)
 
 
 def curvatures(body, x):
     """Normals and mean curvatures."""
-    gradient, hessian = body.gradient(x), body.hessian(x)
-    slope = np.linalg.norm(gradient, axis=1)
-    n = gradient / slope[:, None]
-    bent = np.trace(hessian, axis1=1, axis2=2) - np.einsum("ni,nij,nj->n", n, hessian, n)
-    return n, 0.5 * bent / slope
+    return unit(body.gradient(x)), 0.5 * np.trace(shape_operator(body, x), axis1=1, axis2=2)
 
 
 def test_a_rod_is_a_cylinder_between_two_planes():
@@ -150,8 +137,8 @@ def test_a_torus_cut_in_half_is_known_up_to_its_rims():
     assert np.linalg.norm(x - points[off > 3 * edge], axis=1).max() < 1e-4
     n, mean = curvatures(body, x)
     expected = 0.5 * (1 / TUBE + np.cos(v) / (R + TUBE * np.cos(v)))[off > 3 * edge]
-    assert np.sqrt(np.mean(np.sum((n - exact[off > 3 * edge]) ** 2, axis=1))) < 1e-4
-    assert np.sqrt(np.mean((mean - expected) ** 2)) < 1e-2 * np.sqrt(np.mean(expected**2))
+    assert rms(np.linalg.norm(n - exact[off > 3 * edge], axis=1)) < 1e-4
+    assert rms(mean - expected) < 1e-2 * rms(expected)
     # not trusted beside the rims, where the fit has points on one side only
     spacing = body._parts.reach[np.isfinite(body._parts.reach)].max()
     assert body.non_smooth(points[off < 0.5 * spacing]).all() and not body.non_smooth(points[off > 1.5 * spacing]).any()
@@ -159,27 +146,13 @@ def test_a_torus_cut_in_half_is_known_up_to_its_rims():
     assert bool(body.non_smooth(points[0])) == bool(body.non_smooth(points)[0])
 
 
-@pytest.mark.slow
 def test_stored_pieces_are_the_same_to_the_bit(tmp_path):
-    made, messages = sc.Mesh(SOURCES["rod"](), cache=tmp_path), []
-    again = sc.Mesh(SOURCES["rod"](), cache=tmp_path, progress=messages.append)
+    made, messages = sc.Mesh(SOURCES["L"](), cache=tmp_path), []
+    again = sc.Mesh(SOURCES["L"](), cache=tmp_path, progress=messages.append)
     assert messages == [] and repr(again.creases) == repr(made.creases) and again.fingerprint == made.fingerprint
     x = np.random.default_rng(1).uniform(-1, 1, size=(500, 3))
     for name in ("level", "gradient", "hessian", "piece", "non_smooth"):
         np.testing.assert_array_equal(getattr(again, name)(x), getattr(made, name)(x))
-    (place,) = tmp_path.glob("*.npz")
-    content = place.read_bytes()[32:]
-    with np.load(io.BytesIO(content)) as held:
-        arrays = {name: held[name] for name in held.files}
-    # a program that names a piece there is not, signed as ours are
-    arrays["fine-table"] = np.concatenate([arrays["fine-table"][:-1], [99.0]])
-    packed = io.BytesIO()
-    np.savez(packed, **arrays)
-    place.write_bytes(hashlib.blake2b(packed.getvalue(), digest_size=32).digest() + packed.getvalue())
-    messages = []
-    mended = sc.Mesh(SOURCES["rod"](), cache=tmp_path, progress=messages.append)
-    assert "the stored fit is damaged: fitting again" in messages
-    np.testing.assert_array_equal(mended.level(x), made.level(x))
 
 
 DAMAGE = {
@@ -200,10 +173,6 @@ def test_damaged_pieces_are_refused(name):
     SplinePieces.restored(arrays, "fine")
     with pytest.raises(ValueError, match="damaged"):
         SplinePieces.restored(arrays | {f"fine-{name}": DAMAGE[name](plain)}, "fine")
-
-
-def test_damaged_tables_are_refused():
-    arrays = opened("L")._parts.arrays("fine")
     for place, value in [(3, np.nan), (3, -1.0), (4, 0.0), (4, 1e9), (7, 3.0), (9, 1e12), (9, 0.0)]:
         table = arrays["fine-table"].copy()
         table[place] = value

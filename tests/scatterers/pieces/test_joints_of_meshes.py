@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from body_checks import rms, volume
 from scipy.spatial.transform import Rotation
 
 import creeping as cr
@@ -17,15 +18,13 @@ from scatterers.pieces.mesh_cuts import Cuts, cut
 from scatterers.triangles.jets import osculating_jets
 from scatterers.triangles.quality import assess, jumps_at, noise_at_most
 from scatterers.triangles.topology import edges_of
-from studies._meshes import capsule, geodesic_sphere, on_body, slivers, torus_grid
+from studies._meshes import capsule, geodesic_sphere, slivers, torus_grid
 
-PILL, SHORT, CONE = sc.Capsule(0.8, 3.1), sc.Capsule(1.0, 2.2), sc.ConeSphere(1.0, 3.3)
+PILL, CONE = sc.Capsule(0.8, 3.1), sc.ConeSphere(1.0, 3.3)
 MESHES = {
-    # rings beside the joints, triangles of all shapes, a cylinder of long triangles, one of three rings
+    # rings beside the joints, a cylinder of long triangles, triangles of all shapes
     "even": (lambda: capsule(2000, 1.5, 0.8), PILL),
-    "slivers": (lambda: slivers(PILL, 20), PILL),
     "long": (lambda: long_triangles(), PILL),
-    "short": (lambda: capsule(4000, 0.2, 1.0), SHORT),
     "cone": (lambda: slivers(CONE, 24), CONE),
 }
 
@@ -44,9 +43,7 @@ def opened(name):
     return sc.Mesh(SimpleNamespace(vertices=points @ turn.T, faces=triangles), cache=False), exact, turn
 
 
-@pytest.mark.parametrize(
-    "name", ["even", "cone", *(pytest.param(name, marks=pytest.mark.slow) for name in ("slivers", "long", "short"))]
-)
+@pytest.mark.parametrize("name", ["even", "cone", pytest.param("long", marks=pytest.mark.slow)])
 def test_joints_are_those_of_the_exact_body(name):
     body, exact, turn = opened(name)
     assert body.quality.verdict == "curvature jumps" and "on joints of planes and quadrics" in body.quality.reasons
@@ -66,32 +63,22 @@ def test_joints_are_those_of_the_exact_body(name):
     points = points + rng.uniform(-1e-3, 1e-3, size=(1000, 1)) * normal(exact, points)
     near = np.linalg.norm(points - [0, 0, points[:, 2].max()], axis=1) > 0.05
     assert near.sum() > 500
-    np.testing.assert_allclose(
-        body.level(points[near] @ turn.T) / slope(body, points[near] @ turn.T),
-        exact.level(points[near]) / slope(exact, points[near]),
-        atol=3e-6,
-    )
+    points = points[near]
+    np.testing.assert_allclose(distance(body, points @ turn.T), distance(exact, points), atol=3e-6)
 
 
-def slope(body, points):
-    return np.linalg.norm(body.gradient(points), axis=1)
+def distance(body, points):
+    return body.level(points) / np.linalg.norm(body.gradient(points), axis=1)
 
 
-@pytest.mark.parametrize(
-    ("name", "direction"),
-    [
-        ("even", (0.3, 0.5, 0.8)),
-        pytest.param("slivers", (-0.6, 0.1, 0.4), marks=pytest.mark.slow),
-        ("cone", (0.2, 0.9, -0.5)),
-    ],
-)
+@pytest.mark.parametrize("name, direction", [("even", (0.3, 0.5, 0.8)), ("cone", (0.2, 0.9, -0.5))])
 def test_shadow_line_and_rays_are_those_of_the_exact_body(name, direction):
     body, exact, turn = opened(name)
     d = np.array(direction) / np.linalg.norm(direction)
     line, wanted = cr.shadow_line(body, turn @ d), cr.shadow_line(exact, d)
     assert len(line.curves) == len(wanted.curves)
     points = np.concatenate([curve.points for curve in line.curves]) @ turn
-    assert np.max(np.abs(exact.level(points) / slope(exact, points))) < 1e-7 * size(exact)
+    assert np.max(np.abs(distance(exact, points))) < 1e-7 * size(exact)
     # n.d over the curvature there is the distance from the exact line
     curvature = np.concatenate([curve.curvature for curve in line.curves])
     assert np.max(np.abs(normal(exact, points) @ d) / np.abs(curvature)) < 1e-6
@@ -107,51 +94,34 @@ def test_shadow_line_and_rays_are_those_of_the_exact_body(name, direction):
     np.testing.assert_allclose(a[:, :, 6:10], b[:, :, 6:10], atol=1e-3 * np.nanmax(np.abs(b[:, :, 6:10])))
 
 
-@pytest.mark.parametrize(
-    ("name", "amount"),
-    [
-        ("even", 1e-5),
-        *(pytest.param(*case, marks=pytest.mark.slow) for case in (("slivers", 1e-5), ("short", 1e-5), ("cone", 1e-6))),
-    ],
-)
+@pytest.mark.parametrize("name, amount", [("even", 1e-5), pytest.param("cone", 1e-6, marks=pytest.mark.slow)])
 def test_joints_are_found_within_the_noise_of_the_vertices(name, amount):
     (points, triangles), exact = MESHES[name][0](), MESHES[name][1]
-    noise = amount * 0.5 * np.linalg.norm(np.ptp(points, axis=0))
-    rng = np.random.default_rng(23)
-    body = sc.Mesh(
-        SimpleNamespace(vertices=points + noise * rng.normal(size=points.shape), faces=triangles), cache=False
-    )
+    noise, rng = amount * 0.5 * np.linalg.norm(np.ptp(points, axis=0)), np.random.default_rng(23)
+    moved = points + noise * rng.normal(size=points.shape)
+    body = sc.Mesh(SimpleNamespace(vertices=moved, faces=triangles), cache=False)
     assert body.quality.verdict == "curvature jumps" and len(body.pieces) == len(exact.pieces)
     assert [c.kind for c in body.creases].count("joint") == [c.kind for c in exact.creases].count("joint")
     # quadrics through many vertices are off by less than each of these
     there = exact.tiles(0.1)[0].reshape(-1, 3)[rng.integers(0, 3000, 1000)]
     there = there[np.linalg.norm(there - [0, 0, points[:, 2].max()], axis=1) > 0.05]
-    off = body.level(there) / slope(body, there)
-    assert np.sqrt(np.mean(off**2)) < noise
-
-
-def bumpy():
-    return sc.Implicit("x**2+y**2+z**2-1+0.15*sin(3*x)*sin(3*y)*cos(2*z)")
+    assert rms(distance(body, there)) < noise
 
 
 SMOOTH = {
-    "sphere": lambda n: geodesic_sphere(n),
     "ellipsoid": lambda n: (geodesic_sphere(n)[0] * [3, 1, 1], geodesic_sphere(n)[1]),
     "torus": lambda n: torus_grid(n),
-    "thin torus": lambda n: torus_grid(n, 0.25),
-    "twisted": lambda n: on_body("twisted", n)[1:],
     "twisted, slivers": lambda n: slivers(sc.TwistedEllipsoid(), round(0.57 * np.sqrt(n))),
-    "bumpy": lambda n: slivers(bumpy(), round(0.57 * np.sqrt(n))),
+    "bumpy": lambda n: slivers(
+        sc.Implicit("x**2+y**2+z**2-1+0.15*sin(3*x)*sin(3*y)*cos(2*z)"), round(0.57 * np.sqrt(n))
+    ),
 }
-
-
 QUICK = [("ellipsoid", 0.0), ("torus", 1e-5), ("twisted, slivers", 1e-5), ("bumpy", 1e-7)]
-SLOW = [(name, noise, count) for name in SMOOTH for noise in (0.0, 1e-5) for count in (2000, 10_000)]
 
 
 @pytest.mark.parametrize(
     "name, noise, count",
-    [*((*case, 800) for case in QUICK), *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW)],
+    [*((*case, 800) for case in QUICK), *(pytest.param(*case, 10_000, marks=pytest.mark.slow) for case in QUICK)],
 )
 def test_smooth_bodies_have_no_joints(name, noise, count):
     """Whatever jets say of the curvature there."""
@@ -177,26 +147,4 @@ def test_a_cut_mesh_is_the_same_surface():
     cuts = Cuts(some, middles, np.zeros((len(some), 1), dtype=bool))
     x, t, _ = cut(points, triangles, np.zeros((len(points), 1), dtype=bool), cuts)
     assert len(x) == len(points) + len(some) and np.all(edges_of(t).faces == 2)
-
-    def volume(v, f):
-        a, b, c = np.moveaxis(v[f], 1, 0)
-        return np.sum(a * np.cross(b, c)) / 6
-
     assert volume(x, t) == pytest.approx(volume(points, triangles), rel=1e-13)
-
-
-def test_lines_of_a_cone_come_to_its_tip_from_all_sides():
-    """Next to the tip the slope of a quadric fades into rounding; no curve is lost for that."""
-    body, exact, turn = opened("cone")
-    rng = np.random.default_rng(4)
-    for d in rng.normal(size=(2, 3)):
-        found, wanted = cr.shadow_line(body, turn @ d / np.linalg.norm(d)), cr.shadow_line(exact, d / np.linalg.norm(d))
-        assert len(found.curves) == len(wanted.curves)
-        lengths = [sum(curve.length for curve in line.curves) for line in (found, wanted)]
-        assert lengths[0] == pytest.approx(lengths[1], rel=1e-2)
-
-
-def test_strict_refuses_joints():
-    points, triangles = capsule(2000, 1.5, 0.8)
-    with pytest.raises(ValueError, match=r"\(curvature jumps\): .* on joints of planes and quadrics"):
-        sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), strict=True, cache=False)

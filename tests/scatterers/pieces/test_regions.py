@@ -51,20 +51,6 @@ def test_regions_are_the_faces_and_creases_their_edges(name):
     np.testing.assert_allclose(sorted(crease.length for crease in creases), sorted(lengths), rtol=1e-9)
 
 
-def test_regions_of_a_wing_are_told_apart_by_their_normals():
-    points, triangles = wedge()
-    assert trimesh.Trimesh(points, triangles, process=False).volume > 0
-    found = regions_of(points, triangles)
-    corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    signs = [np.unique(np.sign(np.round(normal[found.number == k][:, 1:], 9)), axis=0) for k in range(4)]
-    assert all(len(sign) == 1 for sign in signs)
-    assert sorted(tuple(sign[0]) for sign in signs) == [(-1, 0), (0, -1), (0, 1), (1, 0)]
-    # at nose and tail both parabolas rise by 0.4: the chords of their ends a little less
-    tips = [c.angle for c in found.creases(points, found.number) if c.length == pytest.approx(2)]
-    np.testing.assert_allclose(tips, np.pi - 2 * np.arctan(0.4 * (1 - 1 / 24)), rtol=1e-9)
-
-
 def test_a_concave_edge_turns_the_other_way():
     box = trimesh.creation.box()
     found = regions_of(np.asarray(box.vertices), np.asarray(box.faces))

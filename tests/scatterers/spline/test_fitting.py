@@ -4,9 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oracles import normal_equations as plain_sums
+from body_checks import directions, rms, unit
 
 import scatterers as sc
+from creeping.geometry.directions import fibonacci_directions
 from scatterers.kernels.normal_equations import accumulate, subtract_roughness
 from scatterers.kernels.spline_constants import OVERREAD
 from scatterers.spline import fitting as _fitting
@@ -16,25 +17,11 @@ from scatterers.spline.roughness import fourth_bands, ranges
 from scatterers.spline.tensor import TensorSpline, coefficients, evaluated
 
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-ORDER = 1.0
-"""Fitted slopes against 6 and 4: the errors of least squares on a shifted grid scatter by half between two counts."""
-COUNTS = (1000, 2000, 4000)
 TRIAXIAL = sc.Ellipsoid(1.0, 0.8, 0.6)
 
 
-def fibonacci(n):
-    """Evenly spread points of the unit sphere."""
-    k = np.arange(n) + 0.5
-    z, phi = 1 - 2 * k / n, np.pi * (1 + np.sqrt(5)) * k
-    return np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], axis=-1)
-
-
-def unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
 def cloud(body, n):
-    points = body.forward(fibonacci(n))
+    points = body.forward(fibonacci_directions(n))
     return points, unit(body.gradient(points))
 
 
@@ -52,7 +39,7 @@ def fitted(body, n):
 def errors(body, n):
     """Rms errors of position, normal and normal curvature at points that were not fitted."""
     rng = np.random.default_rng(7)
-    at = body.forward(unit(rng.normal(size=(2000, 3))))
+    at = body.forward(directions(rng, 2000))
     value, gradient, hessian = evaluated(fitted(body, n).spline.compiled, at)
     slope = np.linalg.norm(gradient, axis=-1)
     exact = body.gradient(at)
@@ -62,7 +49,7 @@ def errors(body, n):
     e = unit(e - np.sum(e * n_fit, axis=-1, keepdims=True) * n_fit)
     bent = np.einsum("ni,nij,nj->n", e, hessian[:, SYMMETRIC], e) / slope
     off = [value / slope, np.linalg.norm(n_fit - unit(exact), axis=-1), bent - curvature]
-    return [float(np.sqrt(np.mean(part**2))) for part in off]
+    return [rms(part) for part in off]
 
 
 @pytest.fixture
@@ -73,19 +60,6 @@ def system(rng):
     places[:20] = np.floor(places[:20])
     size = int(np.prod(shape))
     return places, shape, np.concatenate([rng.normal(size=size), np.zeros(OVERREAD)])
-
-
-def test_kernel_equals_numpy(system, rng):
-    places, shape, c = system
-    values, slopes, weight = rng.normal(size=60), rng.normal(size=(60, 3)), np.array([0.7, 2.0])
-    fast, plain = rng.normal(size=c.shape), np.zeros_like(c)
-    fast[-OVERREAD:] = 0
-    plain[:] = fast
-    left = accumulate(places, values, slopes, weight, shape, c, fast)
-    assert left == pytest.approx(plain_sums.accumulate(places, values, slopes, weight, shape, c, plain), rel=1e-13)
-    np.testing.assert_allclose(fast, plain, atol=1e-13)
-    # what vectors load beyond the last row stays as it was
-    np.testing.assert_array_equal(fast[-OVERREAD:], 0)
 
 
 def test_roughness_is_that_of_fourth_differences(rng):
@@ -112,7 +86,7 @@ def test_roughness_is_that_of_fourth_differences(rng):
     np.testing.assert_allclose(found[:-OVERREAD].reshape(shape), np.where(wanted, expected, 0), atol=1e-13)
 
 
-@pytest.mark.parametrize("shape", [(7, 20, 9), (70, 6, 5), (6, 97, 5), (5, 6, 130)])
+@pytest.mark.parametrize("shape", [(7, 20, 9), (5, 6, 130)])
 def test_cardinal_coefficients_take_the_values_twice(rng, shape):
     damping, wanted = rng.random(shape) + 0.5, rng.random(shape) < 0.7
     wanted[2] = False
@@ -141,51 +115,27 @@ def test_ranges_hold_all_that_is_unknown(rng):
         assert row[first:last].sum() == row.sum() and (last == 0 or (row[first] and row[last - 1]))
 
 
-def test_rows_are_value_and_slopes_of_the_spline(system):
+def test_rows_are_value_and_slopes_of_the_spline_and_scatter_is_their_adjoint(system, rng):
     places, shape, c = system
     spline = TensorSpline(c[:-OVERREAD].reshape(shape), np.zeros(3), np.ones(3))
     value, gradient = spline.value_and_gradient(places)
-    for weight in ([1.0, 0.0], [0.0, 1.0], [0.3, 0.2]):
+    values, slopes = rng.normal(size=60), rng.normal(size=(60, 3))
+    for one, other in ([1.0, 0.0], [0.0, 1.0], [0.7, 2.0]):
+        weight, out, adjoint = np.array([one, other]), np.zeros_like(c), np.zeros_like(c)
         # the targets that the spline meets leave nothing
-        out = np.zeros_like(c)
-        left = accumulate(places, value, gradient, np.array(weight), shape, c, out)
-        assert left < 1e-24
+        assert accumulate(places, value, gradient, weight, shape, c, out) < 1e-24
         np.testing.assert_allclose(out, 0, atol=1e-12)
-
-
-def test_scatter_is_the_adjoint_of_the_spline(system, rng):
-    places, shape, c = system
-    values, slopes, nothing = rng.normal(size=60), rng.normal(size=(60, 3)), np.zeros_like(c)
-    adjoint = np.zeros_like(c)
-    accumulate(places, values, slopes, np.ones(2), shape, nothing, adjoint)
-    spline = TensorSpline(c[:-OVERREAD].reshape(shape), np.zeros(3), np.ones(3))
-    value, gradient = spline.value_and_gradient(places)
-    assert np.vdot(c, adjoint) == pytest.approx(np.vdot(values, value) + np.vdot(slopes, gradient), rel=1e-12)
+        left = accumulate(places, values, slopes, weight, shape, np.zeros_like(c), adjoint)
+        assert left == pytest.approx(one * np.sum(values**2) + other * np.sum(slopes**2), rel=1e-12)
+        product = one * np.vdot(values, value) + other * np.vdot(slopes, gradient)
+        assert np.vdot(c, adjoint) == pytest.approx(product, rel=1e-12)
+        # what vectors load beyond the last row stays as it was
+        np.testing.assert_array_equal(adjoint[-OVERREAD:], 0)
 
 
 @pytest.fixture(scope="module")
 def equations():
     return _Equations(*cloud(TRIAXIAL, 300), 0.35, 1e-3, 0.7)
-
-
-@pytest.mark.parametrize("which", ["equations", "preconditioner"])
-def test_operators_are_symmetric_and_positive(equations, rng, which):
-    size = int(np.prod(equations.shape))
-
-    def free():
-        return np.concatenate([rng.normal(size=size) * equations.unknown.ravel(), np.zeros(OVERREAD)])
-
-    def operate(c):
-        return equations.preconditioned(c) if which == "preconditioner" else -equations.residual(c, targets=False)
-
-    vectors = [free() for _ in range(4)]
-    images = [operate(v) for v in vectors]
-    products = np.array([[np.vdot(v, w) for w in images] for v in vectors])
-    np.testing.assert_allclose(products, products.T, atol=1e-12 * np.abs(products).max())
-    assert np.all(np.linalg.eigvalsh(products) > 0)
-    for image in images:
-        assert np.all(image[:-OVERREAD].reshape(equations.shape)[~equations.unknown] == 0)
-        np.testing.assert_array_equal(image[-OVERREAD:], 0)
 
 
 def test_all_that_samples_see_is_unknown(equations):
@@ -218,35 +168,8 @@ def test_residual_is_the_slope_of_what_is_minimised(equations, rng):
     assert slope == pytest.approx(-2 * np.vdot(away, equations.residual(c, targets=True)), rel=1e-9)
 
 
-def test_start_is_near_the_distance(equations):
-    c = equations.start(None)[:-OVERREAD].reshape(equations.shape)
-    found = TensorSpline(c, np.zeros(3), np.ones(3)).at_nodes()
-    where = equations.low + equations.spacing * np.moveaxis(np.indices(found.shape), 0, -1)
-    distance = TRIAXIAL.level(where) / np.linalg.norm(TRIAXIAL.gradient(where) + 1e-300, axis=-1) / equations.spacing
-    # the level of an ellipsoid tells the distance near it only
-    near = np.abs(distance) < 1
-    assert np.mean((found > 0) == (distance > 0)) > 0.995
-    np.testing.assert_allclose(found[near], distance[near], atol=0.5)
-    assert np.median(np.abs(found[near] - distance[near])) < 0.1
-
-
-@pytest.mark.slow
-def test_orders_of_convergence():
-    # h goes with the distance of the points
-    steps = np.log([spacing(TRIAXIAL, n) for n in COUNTS])
-    position, normal, curvature = (
-        np.polyfit(steps, np.log(e), 1)[0] for e in zip(*(errors(TRIAXIAL, n) for n in COUNTS), strict=True)
-    )
-    assert abs(position - 6) < ORDER
-    assert abs(normal - 5) < ORDER
-    assert abs(curvature - 4) < ORDER
-
-
-@pytest.mark.parametrize(
-    "body, reached", [(sc.Sphere(), (1e-6, 2e-5, 3e-4)), (sc.Ellipsoid(1.2, 0.8, 0.8), (3e-6, 7e-5, 1e-3))]
-)
-def test_errors_of_a_thousand_points(body, reached):
-    assert np.all(np.array(errors(body, 1000)) < reached)
+def test_errors_of_a_thousand_points():
+    assert np.all(np.array(errors(sc.Ellipsoid(1.2, 0.8, 0.8), 1000)) < (3e-6, 7e-5, 1e-3))
 
 
 def test_fit_tells_what_it_reached():
@@ -258,13 +181,10 @@ def test_fit_tells_what_it_reached():
     assert found.change < curvature
     assert found.spacing == spacing(TRIAXIAL, 2000)
     assert 0 < found.iterations <= _fitting.ITERATIONS
-    points, _ = cloud(TRIAXIAL, 2000)
+    points, normals = cloud(TRIAXIAL, 2000)
     box = found.spline.box
     assert np.all(box[0] < points.min(0) - 4 * found.spacing) and np.all(box[1] > points.max(0) + 4 * found.spacing)
-
-
-def test_value_grows_as_the_distance_near_the_body():
-    found, (points, normals) = fitted(TRIAXIAL, 2000), cloud(TRIAXIAL, 2000)
+    # F grows as the distance near the body
     _, gradient, _ = evaluated(found.spline.compiled, points)
     np.testing.assert_allclose(np.linalg.norm(gradient, axis=-1), 1, atol=2e-3)
     for side in (0.5, -0.5):
@@ -276,21 +196,10 @@ def test_scale_and_place_change_nothing(rng):
     points, normals = cloud(TRIAXIAL, 500)
     h = spacing(TRIAXIAL, 500)
     plain, moved = fit(points, normals, h), fit(1e-3 * points + 7, normals, 1e-3 * h)
-    at = TRIAXIAL.forward(unit(rng.normal(size=(100, 3))))
+    at = TRIAXIAL.forward(directions(rng, 100))
     # which third of the points is offset hangs on rounding
     np.testing.assert_allclose(moved.spline.value(1e-3 * at + 7), 1e-3 * plain.spline.value(at), atol=5e-8)
     assert moved.change == pytest.approx(1e3 * plain.change, rel=0.5)
-
-
-def test_smoothing_quiets_noise(rng):
-    points, normals = cloud(TRIAXIAL, 1000)
-    noisy, h = points + 1e-3 * rng.normal(size=points.shape), spacing(TRIAXIAL, 1000)
-    at = TRIAXIAL.forward(unit(rng.normal(size=(500, 3))))
-    rough, smooth = (
-        np.linalg.norm(evaluated(fit(noisy, normals, h, smoothing=s).spline.compiled, at)[2], axis=-1)
-        for s in (1e-8, 1.0)
-    )
-    assert np.std(smooth) < np.std(rough)
 
 
 def test_progress_is_told():
@@ -301,9 +210,7 @@ def test_progress_is_told():
 
 def test_too_many_nodes_are_refused():
     points, normals = cloud(sc.Sphere(), 100)
-    with pytest.raises(
-        ValueError, match=r"2\d\d x 2\d\d x 2\d\d nodes .* more than 8000000; give a coarser mesh or a larger"
-    ):
+    with pytest.raises(ValueError, match=r"2\d\d x 2\d\d x 2\d\d nodes .* more than 8000000; give a coarser mesh"):
         fit(points, normals, 0.01)
 
 
@@ -313,15 +220,10 @@ def test_values_at_the_nodes_are_those_of_the_spline(rng):
     np.testing.assert_allclose(spline.at_nodes(), samples, atol=1e-12)
     nodes = np.moveaxis(np.indices(samples.shape), 0, -1) * spline.spacing + spline.origin
     np.testing.assert_allclose(spline.at_nodes(), spline.value(nodes), atol=1e-12)
-    fit_spline = fitted(sc.Sphere(), 1000).spline
-    values = fit_spline.at_nodes()
-    assert values.shape == tuple(n - 4 for n in fit_spline.coefficients.shape)
-    nodes = np.moveaxis(np.indices(values.shape), 0, -1) * fit_spline.spacing + fit_spline.origin
-    np.testing.assert_allclose(values, fit_spline.value(nodes), atol=1e-13)
 
 
 def test_parts_that_keep_away_from_the_points_change_their_sign():
-    normals = fibonacci(600)
+    normals = fibonacci_directions(600)
     equations = _Equations(normals, normals, 0.2, 1e-8, 1.0)
     axes = [equations.low[k] + 0.2 * (np.arange(equations.shape[k]) - 2.0) for k in range(3)]
     where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -1,17 +1,19 @@
 """Meshes from files: what is read, what is repaired with a word, and every kind of bad file, named."""
 
-import io
 import json
+import re
 import struct
 import zipfile
 
 import numpy as np
 import pytest
 import trimesh
+from body_checks import volume
 
-import scatterers as sc
+from scatterers.triangles.choice import Choice
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.files import TriangleMesh, read_mesh
+from studies.fuzz import seeds
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES, FACES = np.array(BALL.vertices), np.array(BALL.faces)
@@ -28,22 +30,18 @@ def read(source, units=None):
     return found
 
 
-def volume(found):
-    a, b, c = np.moveaxis(found.vertices[found.triangles], 1, 0)
-    return np.sum(a * np.cross(b, c)) / 6
-
-
 MODEL = """<?xml version="1.0"?><model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
-<resources><object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>
-<object id="2"><components><component objectid="1" transform="1 0 0 0 1 0 0 0 -1 5 6 7"/></components></object>
-</resources><build><item objectid="2"/></build></model>"""
+<resources>{objects}</resources><build>{items}</build></model>"""
+MESH = "<mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>".format(
+    vertices="".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in VERTICES.tolist()),
+    triangles="".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES.tolist()),
+)
+ITEM = '<item objectid="1" transform="1 0 0 0 1 0 0 0 -1 5 6 7"/>'
 
 
-def packed(path, unit="millimeter", text=None, part="3D/3dmodel.model"):
-    vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in VERTICES.tolist())
-    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES.tolist())
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr(part, text or MODEL.format(unit=unit, vertices=vertices, triangles=triangles))
+def packed(path, unit="millimeter", text=None, objects=f'<object id="1">{MESH}</object>', items=ITEM):
+    text = text or MODEL.format(unit=unit, objects=objects, items=items)
+    path.write_bytes(seeds.archive_3mf(text.encode()))
     return path
 
 
@@ -54,17 +52,41 @@ def test_formats(tmp_path, kind):
     found = read(path, None if kind == "glb" else "m")
     assert isinstance(found, TriangleMesh) and found.repairs == ()
     assert (len(found.vertices), len(found.triangles)) == (162, 320)
-    assert volume(found) == pytest.approx(BALL.volume, rel=1e-6)
+    assert volume(found.vertices, found.triangles) == pytest.approx(BALL.volume, rel=1e-6)
     if kind != "glb":
         assert np.ptp(read(str(path), "mm").vertices, axis=0) == pytest.approx(np.full(3, 2e-3))
 
 
 def test_3mf_states_its_unit_and_places_its_parts(tmp_path):
     found = read(packed(tmp_path / "ball.3mf"))
-    # mirrored by its component, but facing outwards
-    assert found.repairs == () and volume(found) == pytest.approx(BALL.volume * 1e-9)
+    # mirrored by its place, but facing outwards
+    assert found.repairs == () and volume(found.vertices, found.triangles) == pytest.approx(BALL.volume * 1e-9)
     np.testing.assert_allclose(found.vertices.mean(0), [5e-3, 6e-3, 7e-3], atol=1e-9)
     assert np.ptp(read(packed(tmp_path / "b.3mf", "inch"), "in").vertices[:, 0]) == pytest.approx(0.0508)
+
+
+def test_parts_of_3mf_have_the_names_of_their_objects(tmp_path):
+    objects = (
+        f'<object id="1" name="ball">{MESH}</object><object id="2">{MESH}</object>'
+        '<object id="3" name="pair"><components><component objectid="1"/>'
+        '<component objectid="2" transform="2 0 0 0 2 0 0 0 2 9 0 0"/></components></object>'
+    )
+    items = '<item objectid="3"/><item objectid="2" transform="3 0 0 0 3 0 0 0 3 -9 0 0"/>'
+    path = packed(tmp_path / "three.3mf", objects=objects, items=items)
+    # an object without a name has that of what it is a component of, if that has one
+    for part, radius, centre in (("ball", 1e-3, 0.0), ("pair", 2e-3, 9e-3), ("object 2", 3e-3, -9e-3)):
+        found = read_mesh(path, None, Choice(part=part), progress=str)
+        assert np.ptp(found.vertices[:, 0]) == pytest.approx(2 * radius)
+        assert found.vertices[:, 0].mean() == pytest.approx(centre, abs=1e-9)
+    with pytest.raises(ValueError, match=r"three.3mf has no part 'cube'; it has .*ball"):
+        read_mesh(path, None, Choice(part="cube"), progress=str)
+
+
+def test_objects_placed_many_times_are_counted_before_they_are_made(tmp_path, monkeypatch):
+    path = packed(tmp_path / "bomb.3mf", items=50 * '<item objectid="1"/>')
+    monkeypatch.setattr("scatterers.triangles.files.MOST_TRIANGLES", 4000)
+    with pytest.raises(ValueError, match="each where it is placed, have more than 4000 triangles"):
+        read(path)
 
 
 def test_objects_in_memory():
@@ -75,14 +97,6 @@ def test_objects_in_memory():
     stated = mesh()
     stated.units = "millimeters"
     assert read(stated).vertices.max() == pytest.approx(1e-3)
-
-
-def scene(path, *shifts):
-    parts = trimesh.Scene()
-    for k, shift in enumerate(shifts):
-        parts.add_geometry(mesh(VERTICES + np.array(shift)), node_name=f"part {k}")
-    parts.export(path)
-    return path
 
 
 def test_a_part_is_placed_where_the_scene_says(tmp_path):
@@ -138,13 +152,9 @@ def test_repairs_are_told(name):
     make, message = REPAIRS[name]
     found = read(make())
     assert (len(found.vertices), len(found.triangles)) == (162, 320)
-    assert volume(found) == pytest.approx(BALL.volume, rel=1e-6)
-    if message is None:
-        assert found.repairs == ()
-    else:
-        assert len(found.repairs) == 1
-        with pytest.raises(ValueError, match=message):
-            raise ValueError(found.repairs[0])
+    assert volume(found.vertices, found.triangles) == pytest.approx(BALL.volume, rel=1e-6)
+    assert len(found.repairs) == (message is not None)
+    assert message is None or re.search(message, found.repairs[0])
     if name == "far away":
         assert np.abs(found.vertices).max() <= 1 + 1e-9
 
@@ -163,16 +173,12 @@ def exported(kind):
 
 
 STL, ASCII, PLY, OFF, GLB = (exported(kind) for kind in ("stl", "stl_ascii", "ply", "off", "glb"))
-TEXT_PLY = mesh().export(file_type="ply", encoding="ascii")
 NAN_STL = STL[:96] + struct.pack("<f", float("nan")) + STL[100:]
 XML = '<!DOCTYPE model [<!ENTITY a "aa">]><model><build/></model>'
 
 
 def bomb(folder):
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("3D/3dmodel.model", b" " * 2**20)
-    raw = bytearray(buffer.getvalue())
+    raw = bytearray(seeds.archive_3mf(b" " * 2**20))
     # the directory claims 3 GB
     at = raw.rfind(b"PK\x01\x02") + 24
     raw[at : at + 4] = struct.pack("<I", 3 * 10**9)
@@ -180,14 +186,19 @@ def bomb(folder):
 
 
 def referring(path):
-    content = json.dumps({"asset": {"version": "2.0"}, "buffers": [{"uri": "/etc/passwd", "byteLength": 9}]}).encode()
-    content += b" " * (-len(content) % 4)
-    path.write_bytes(b"glTF" + struct.pack("<4I", 2, 20 + len(content), len(content), 0x4E4F534A) + content)
-    with path.open("ab") as file:
-        file.write(struct.pack("<2I", 0, 0x4E4942))
-    data = bytearray(path.read_bytes())
-    data[8:12] = struct.pack("<I", len(data))
-    path.write_bytes(data)
+    tree = {"asset": {"version": "2.0"}, "buffers": [{"uri": "/etc/passwd", "byteLength": 9}]}
+    path.write_bytes(seeds.glb(json.dumps(tree).encode(), b""))
+    return path
+
+
+def two_bodies(path):
+    trimesh.Scene([mesh(), mesh(VERTICES + np.array([3, 0, 0]))]).export(path)
+    return path
+
+
+def without_model(path):
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("other", "")
     return path
 
 
@@ -196,30 +207,25 @@ BAD_FILES = {
     "address": (lambda f: "https://example.org/a.stl", "addresses are not fetched"),
     "directory": (lambda f: f, "is a directory"),
     "pickle": (written("a.pkl", b"cos\nsystem\n"), "a.pkl is of a kind that is not read"),
-    "zip": (written("a.zip", b"PK"), "a.zip is of a kind"),
     "number": (lambda f: 7, "a int is no mesh"),
     "empty": (written("a.stl", b""), "a.stl is empty"),
     "cut binary": (written("a.stl", STL[:-60]), "a.stl is cut short .* 320 triangles take 16084 bytes, it has 16024"),
     "cut text": (written("a.stl", ASCII[: len(ASCII) // 2]), "a.stl is cut short .* 'endsolid'"),
     "garbage": (written("a.stl", bytes(range(256)) * 9), "a.stl is cut short or no STL"),
-    "garbage in text": (written("a.stl", ASCII.replace("vertex 0", "vertex what", 1)), "a.stl"),
     "no triangles": (written("a.stl", STL[:80] + bytes(4)), "a.stl holds no triangles"),
     "cut ply": (written("a.ply", PLY[:-60]), "a.ply is cut short .* rows take 6052 bytes, it has"),
     "cut header": (written("a.ply", PLY[:60]), "a.ply is cut short .* header has no end"),
-    "cut text ply": (written("a.ply", TEXT_PLY[: len(TEXT_PLY) * 3 // 4]), "a.ply is cut short .* 482 rows"),
     "cut off": (written("a.off", OFF[: len(OFF) * 3 // 4]), "a.off is cut short .* 482 rows"),
     "cut glb": (written("a.glb", GLB[:-100]), "a.glb is cut short"),
-    "no glb": (written("a.glb", b"{}" * 50), "a.glb is cut short or no GLB"),
-    "cut obj": (written("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 9\n"), "a.obj"),
     "outside buffer": (lambda f: referring(f / "a.glb"), "refers to '/etc/passwd', which is not opened"),
     "points": (written("a.obj", "v 0 0 0\nv 1 0 0\n"), "a.obj holds no triangles"),
     "no archive": (written("a.3mf", b"nothing"), "a.3mf cannot be read as 3MF: it is not a whole ZIP"),
-    "no model": (lambda f: packed(f / "a.3mf", part="other"), "no part 3D/3dmodel.model"),
+    "no model": (lambda f: without_model(f / "a.3mf"), "no part 3D/3dmodel.model"),
     "entities": (lambda f: packed(f / "a.3mf", text=XML), "document type"),
     "broken xml": (lambda f: packed(f / "a.3mf", text="<model><build>"), "broken XML"),
     "bomb": (bomb, "unpacks to 3000000000 bytes"),
     "not finite": (written("a.stl", NAN_STL), "1 of 960 vertices of a.stl are not finite .the first is vertex 0"),
-    "two bodies": (lambda f: scene(f / "a.glb", (0, 0, 0), (3, 0, 0)), "a.glb holds 2 separate surfaces"),
+    "two bodies": (lambda f: two_bodies(f / "a.glb"), "a.glb holds 2 separate surfaces"),
 }
 
 
@@ -248,36 +254,15 @@ def test_unit_has_to_be_known_and_agree(tmp_path):
         read(packed(tmp_path / "b.3mf", "furlong"))
 
 
-def placed(*parts):
-    return mesh(
-        np.concatenate([v for v, _ in parts]), np.concatenate([f + k * len(VERTICES) for k, (_, f) in enumerate(parts)])
-    )
+def placed(other):
+    return mesh(np.concatenate([VERTICES, other]), np.concatenate([FACES, FACES + 162]))
 
 
-def handled():
-    """A torus bent through itself: the tube is thicker than the hole."""
-    return trimesh.creation.torus(1.0, 1.3, 24, 24)
-
-
-def klein():
-    u, v = np.meshgrid(np.arange(24), np.arange(12), indexing="ij")
-    a, b = u * np.pi / 12, v * np.pi / 6
-    r = 2 + np.cos(a / 2) * np.sin(b) - np.sin(a / 2) * np.sin(2 * b)
-    z = np.sin(a / 2) * np.sin(b) + np.cos(a / 2) * np.sin(2 * b)
-    points = np.stack([r * np.cos(a), r * np.sin(a), z], axis=-1).reshape(-1, 3)
-
-    def number(i, j):
-        return (i % 24) * 12 + np.where(i >= 24, -j, j) % 12
-
-    u, v = u.ravel(), v.ravel()
-    quads = number(u, v), number(u + 1, v), number(u + 1, v + 1), number(u, v + 1)
-    return mesh(points, np.concatenate([np.stack(quads)[[0, 1, 2]].T, np.stack(quads)[[0, 2, 3]].T]))
-
-
-def folded():
-    points = VERTICES.copy()
-    points[5] *= -1.5
-    return mesh(points)
+def projective_plane():
+    """Six corners, each two of which are joined."""
+    after = [2, 3, 4, 5, 1]
+    faces = [face for a, b in enumerate(after, 1) for face in ([0, a, b], [a, b, (a + 2) % 5 + 1])]
+    return mesh(np.random.default_rng(4).normal(size=(6, 3)), np.array(faces))
 
 
 class Bare:
@@ -293,26 +278,17 @@ SHEET = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0]])
 BAD_MESHES = {
     "open": (lambda: mesh(faces=FACES[1:]), "3 of 480 edges of the mesh are open, the first near .* close them"),
     "three at an edge": (lambda: mesh(faces=np.concatenate([FACES, [[0, 1, 2]]])), "of the mesh"),
-    "cavity": (lambda: placed((VERTICES, FACES), (VERTICES / 2, FACES)), "2 separate surfaces .1 of them within"),
-    "two": (lambda: placed((VERTICES, FACES), (VERTICES + 5, FACES)), "2 separate surfaces, of 320, 320 triangles"),
-    "torus through itself": (handled, "crosses itself: .* pairs"),
-    "klein": (klein, "one side only"),
-    "folded": (folded, "the mesh crosses itself"),
+    "cavity": (lambda: placed(VERTICES / 2), "2 separate surfaces .1 of them within"),
+    "two": (lambda: placed(VERTICES + 5), "2 separate surfaces, of 320, 320 triangles"),
+    "torus through itself": (lambda: trimesh.creation.torus(1.0, 1.3, 24, 24), "crosses itself: .* pairs"),
+    "projective plane": (projective_plane, "one side only"),
     "flat": (lambda: Bare(SHEET, [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]]), "encloses no volume"),
-    "a point": (lambda: Bare(VERTICES * 0, FACES), "all 320 triangles of the mesh are degenerate"),
     "tiny": (lambda: Bare(VERTICES * 1e-30, FACES), "2e-30 m large"),
-    "huge": (lambda: Bare(VERTICES * 1e30, FACES), "2e.30 m large"),
     "infinite": (lambda: Bare(SPOILT, FACES), "1 of 162 vertices of the mesh are not finite .* vertex 7"),
     "index": (lambda: Bare(VERTICES, FACES + 1), "refer to vertices that do not exist .vertex 162 of 162"),
-    "negative": (lambda: Bare(VERTICES, FACES - 1), "vertex -1 of 162"),
     "quads": (lambda: Bare(VERTICES, FACES[:, [0, 1, 2, 2]]), "faces of the mesh have shape .320, 4."),
     "halves": (lambda: Bare(VERTICES, FACES + 0.5), "not whole numbers"),
-    "words": (lambda: Bare([["a"] * 3], FACES), "not numbers"),
-    "no faces": (lambda: Bare(VERTICES, []), "holds no triangles"),
-    "rounded far away": (
-        lambda: Bare((VERTICES + 1e5).astype(np.float32), FACES),
-        "rounded to 0.0078, .* of its mean edge",
-    ),
+    "rounded far away": (lambda: Bare((VERTICES + 1e5).astype(np.float32), FACES), "rounded to 0.0078, .* of its mean"),
 }
 
 
@@ -364,19 +340,3 @@ def test_crossings_of_neighbours():
     assert crossings(points, np.array([[0, 1, 2], [0, 3, 4]]))[0] == 1
     assert crossings(points, np.array([[0, 1, 2], [0, 1, 5]]))[0] == 1
     assert crossings(points, np.array([[0, 1, 2], [0, 1, 4]]))[0] == 0
-
-
-def test_objects_placed_many_times_are_counted_before_they_are_made(tmp_path, monkeypatch):
-    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in np.eye(3))
-    triangles = '<triangle v1="0" v2="1" v3="2"/>' * 100
-    items = '<item objectid="1"/>' * 50
-    model = (
-        '<model unit="meter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
-        f'<object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>'
-        f"</resources><build>{items}</build></model>"
-    )
-    with zipfile.ZipFile(tmp_path / "bomb.3mf", "w") as archive:
-        archive.writestr("3D/3dmodel.model", model)
-    monkeypatch.setattr("scatterers.triangles.files.MOST_TRIANGLES", 4000)
-    with pytest.raises(ValueError, match="each where it is placed, have more than 4000 triangles"):
-        sc.examined_mesh(tmp_path / "bomb.3mf")

@@ -11,7 +11,6 @@ from scatterers.triangles.off import with_triangles
 
 @pytest.mark.parametrize("header", ["OFF\n{} {} 0", "OFF {} {} 0", "# by hand\nOFF\n{} {} 0\n# corners"])
 def test_faces_of_many_corners_in_off_files_are_triangles(tmp_path, header):
-    """2026-11: faces of five corners and more ended in a message of numpy's."""
     angles = (2 * np.pi * np.arange(6) / 6).tolist()
     hexagon = [(math.cos(a), math.sin(a)) for a in angles]
     corners = [f"{x!r} {y!r} {z}" for z in (0, 2) for x, y in hexagon]
@@ -31,8 +30,6 @@ def test_faces_of_many_corners_in_off_files_are_triangles(tmp_path, header):
     "data",
     [
         b"",
-        b"OFF",
-        b"OFF\n-3 9 0\n",
         b"OFF\n3 99999999999 0\n0 0 0",
         b"\x00OFF 1 1\n7",
         b"OFF\n1 1 0\n0 0 0\nx",

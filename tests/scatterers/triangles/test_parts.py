@@ -3,17 +3,16 @@
 import numpy as np
 import pytest
 import trimesh
+from body_checks import normal_curvature, rms, unit
+from body_checks import volume as volume_of
 
 import scatterers as sc
-from creeping.geometry.curvature import gaussian_curvature
-from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.surface import project
 from scatterers.triangles.choice import Choice
 
 
 def volume(mesh):
-    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
-    return float(np.sum(a * np.cross(b, c))) / 6
+    return volume_of(mesh.vertices, mesh.triangles)
 
 
 def ball(radius=1.0, at=0.0, times=2):
@@ -34,8 +33,7 @@ TWO = trimesh.util.concatenate([SMALL, LARGE])
 def test_a_part_is_taken_by_its_area(part, expected):
     mesh = taken(TWO, part=part)
     # area 4 pi and pi
-    share = "20" if expected is LARGE else "80"
-    number = 1 if expected is LARGE else 2
+    number, share = (1, 20) if expected is LARGE else (2, 80)
     assert mesh.repairs == (f"part {number} of 2 of the mesh taken; {share} % of its area left out",)
     assert volume(mesh) == pytest.approx(expected.volume)
     np.testing.assert_allclose(mesh.vertices.mean(axis=0), expected.vertices.mean(axis=0), atol=1e-12)
@@ -134,56 +132,22 @@ def test_subdivision_of_a_coarse_mesh_is_told():
     assert sc.examined_mesh(ball(times=3), subdivide="auto")[0].repairs == ()
 
 
-def test_a_coarse_ball_opens_when_subdivided():
-    body = sc.Mesh(ball(times=1), subdivide="auto", cache=False)
-    assert "subdivided" in body.repairs[0] and body.creases == ()
-    directions = np.random.default_rng(2).normal(size=(100, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    # as large as Loop's surface, and as round
-    radius = 1 - body.level(directions)
-    assert 0.8 < radius.min() and radius.max() < 1 and np.ptp(radius) < 0.05
-    # and its distance from the ball is stated, with what that makes of curvatures, to first order
-    fit = body.fit
-    assert 1 - radius.mean() < 1.1 * fit.misfit
-    assert abs(fit.normal_curvature - 1) < 1.1 * fit.normal_curvature_error
-    assert abs(fit.gaussian_curvature - 1) < 1.1 * fit.gaussian_curvature_error
-
-
-@pytest.mark.parametrize("axes", [(1, 0.8, 0.6), pytest.param((4, 1, 1), marks=pytest.mark.slow)])
-def test_a_subdivided_mesh_passes_by_its_vertices_and_errs_about_as_stated(axes):
-    mesh = ball()
+def test_a_subdivided_mesh_passes_by_its_vertices_and_errs_about_as_stated():
+    axes, mesh = (1, 0.8, 0.6), ball()
     mesh.apply_scale(axes)
     body, exact = sc.Mesh(mesh, subdivide=1, cache=False), sc.Ellipsoid(*axes)
-    off = body.level(mesh.vertices) / np.linalg.norm(body.gradient(mesh.vertices), axis=1)
-    assert np.sqrt(np.mean(off**2)) < 2e-3 * max(axes) and np.sqrt(np.mean(off**2)) < 1.3 * body.fit.misfit
+    off = rms(body.level(mesh.vertices) / np.linalg.norm(body.gradient(mesh.vertices), axis=1))
+    assert off < 2e-3 * max(axes) and off < 1.3 * body.fit.misfit
     x = project(exact, mesh.triangles_center)
-    n = exact.gradient(x) / np.linalg.norm(exact.gradient(x), axis=1, keepdims=True)
-    t = np.cross(n, [0.36, 0.48, 0.8])
-    t /= np.linalg.norm(t, axis=1, keepdims=True)
-    found, wanted = (
-        np.einsum("ni,nij,nj->n", t, one.hessian(x), t) / np.linalg.norm(one.gradient(x), axis=1)
-        for one in (body, exact)
-    )
-    assert np.sqrt(np.mean((found - wanted) ** 2)) < 1.4 * body.fit.normal_curvature_error
-
-
-def noisy_ball(rng, noise):
-    mesh = ball(times=3)
-    mesh.vertices = mesh.vertices * (1 + noise * rng.normal(size=len(mesh.vertices)))[:, None]
-    return mesh
-
-
-@pytest.mark.slow
-def test_a_noisy_mesh_that_is_subdivided_errs_by_what_is_stated(rng):
-    body = sc.Mesh(noisy_ball(rng, 0.005), subdivide=1, cache=False)
-    x = project(body, fibonacci_directions(500))
-    error = np.sqrt(np.mean((gaussian_curvature(body, x) - 1) ** 2))
-    assert 0.1 < error < 1.1 * body.fit.gaussian_curvature_error
+    t = np.cross(unit(exact.gradient(x)), [0.36, 0.48, 0.8])
+    error = rms(normal_curvature(body, x, t) - normal_curvature(exact, x, t))
+    assert error < 1.4 * body.fit.normal_curvature_error
 
 
 def test_a_noisy_mesh_is_no_better_for_a_narrower_grid(rng):
     """On the narrowest both fits would follow the noise, and agree."""
-    mesh = noisy_ball(rng, 0.012)
+    mesh = ball(times=3)
+    mesh.vertices = mesh.vertices * (1 + 0.012 * rng.normal(size=len(mesh.vertices)))[:, None]
     assert sc.examined_mesh(mesh)[1].verdict == "noisy"
     with pytest.raises(ValueError, match="curvatures are uncertain by"):
         sc.Mesh(mesh, subdivide=1, cache=False)
@@ -200,18 +164,15 @@ def test_a_mesh_whose_curvature_is_within_its_edges_is_refused():
     assert np.mean(body.non_smooth(long.vertices)) < 0.2
 
 
-@pytest.mark.parametrize("make", [trimesh.creation.box, trimesh.creation.capsule])
-def test_bodies_of_pieces_are_not_subdivided(make):
-    mesh = make(**({} if make is trimesh.creation.box else {"radius": 0.5, "height": 1.0}))
+@pytest.mark.parametrize("mesh", [trimesh.creation.box(), trimesh.creation.capsule(radius=0.5, height=1.0)])
+def test_bodies_of_pieces_are_not_subdivided(mesh):
     with pytest.raises(ValueError, match=r"edges or joints .*, which subdivide = 1 would round off; leave it"):
         sc.examined_mesh(mesh, subdivide=1)
     assert sc.examined_mesh(mesh, subdivide="auto")[0].repairs == ()
 
 
 def test_what_a_subdivision_makes_is_bounded():
-    with pytest.raises(
-        ValueError, match="subdivide = 3 makes 655488 vertices of 10242, more than 300000; subdivide fewer"
-    ):
+    with pytest.raises(ValueError, match="subdivide = 3 makes 655488 vertices of 10242, more than 300000; subdivide"):
         sc.examined_mesh(ball(times=5), subdivide=3)
 
 
@@ -220,14 +181,11 @@ def test_what_a_subdivision_makes_is_bounded():
     [
         ({"part": ""}, "part = ''; give \"largest\", a number from 1"),
         ({"part": 0}, "part = 0; give"),
-        ({"part": True}, "part = True; give"),
         ({"part": 1.5}, "part = 1.5; give"),
         ({"cap": 0}, "cap = 0 is no size in m"),
-        ({"cap": "wide"}, "cap = 'wide' is no size"),
         ({"cap": np.nan}, "cap = nan is no size"),
         ({"union": 1}, "union = 1 is neither True nor False"),
         ({"subdivide": 0}, "subdivide = 0; give 1, 2 or 3"),
-        ({"subdivide": True}, "subdivide = True; give"),
         ({"subdivide": "often"}, "subdivide = 'often'; give"),
     ],
 )

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from body_checks import volume as volume_of
 
 import scatterers as sc
 from scatterers.triangles.sheets import taken_apart
@@ -10,8 +11,7 @@ from scatterers.triangles.topology import edges_of
 
 
 def volume(mesh):
-    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
-    return float(np.sum(a * np.cross(b, c))) / 6
+    return volume_of(mesh.vertices, mesh.triangles)
 
 
 def boxes(*shifts):
@@ -38,10 +38,9 @@ def apart(mesh):
         ([[0, 0, 0], [1, 1, 1]], "1 vertex of the mesh at which sheets touch taken apart"),
     ],
 )
-@pytest.mark.parametrize("turned", [False, True])
-def test_boxes_that_touch_are_bodies_of_their_own(shifts, note, turned):
+def test_boxes_that_touch_are_bodies_of_their_own(shifts, note):
     whole = boxes(*shifts)
-    if turned:
+    if len(shifts) > 2:
         # all inside out
         whole.faces = whole.faces[:, ::-1]
     vertices, triangles, notes = apart(whole)
@@ -91,17 +90,12 @@ def test_borders_that_meet_in_a_vertex_are_closed():
     assert sum(text.startswith("a hole") for text in mesh.repairs) == 1
 
 
-def spiked(depth):
+def test_a_small_crossing_is_cut_out_with_cap():
     """A ball with a vertex that is pushed out through the other side."""
     ball = trimesh.creation.icosphere(3)
     vertices = ball.vertices.copy()
-    top = int(np.argmax(vertices[:, 2]))
-    vertices[top] = -depth * np.array([0.1, 0.05, 1.0])
-    return trimesh.Trimesh(vertices, ball.faces, process=False)
-
-
-def test_a_small_crossing_is_cut_out_with_cap():
-    crossed = spiked(1.2)
+    vertices[int(np.argmax(vertices[:, 2]))] = [-0.12, -0.06, -1.2]
+    crossed = trimesh.Trimesh(vertices, ball.faces, process=False)
     with pytest.raises(ValueError, match=r"crosses itself: .* give cap= with a size, m: what crosses is cut out"):
         sc.examined_mesh(crossed)
     mesh = sc.examined_mesh(crossed, cap=np.inf)[0]
@@ -110,10 +104,3 @@ def test_a_small_crossing_is_cut_out_with_cap():
     # holes larger than what may be closed are none that can be left
     with pytest.raises(ValueError, match=r"crosses itself: .* too much of it for being cut out"):
         sc.examined_mesh(crossed, cap=1e-3)
-
-
-def test_what_crosses_all_over_is_refused():
-    ball = trimesh.creation.icosphere(2)
-    shaken = ball.vertices + np.random.default_rng(3).normal(scale=0.3, size=ball.vertices.shape)
-    with pytest.raises(ValueError, match=r"crosses itself: .* too much of it for being cut out: repair it"):
-        sc.examined_mesh(trimesh.Trimesh(shaken, ball.faces, process=False), cap=np.inf)
