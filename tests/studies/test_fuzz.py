@@ -27,7 +27,6 @@ CHEAP = (
     "directions-csv",
     "directions-npy",
     "ffe",
-    "mat",
     "map",
 )
 
