@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.geometry.creased import drawn_mesh
-from creeping.plotting import coupling_picture, surface_field_picture
+from creeping.plotting import coupling_picture
 from creeping.plotting.body_fronts import chains, front_strokes
 from creeping.plotting.coupling_pictures import coupling_levels
 
@@ -68,11 +68,3 @@ def test_chains_keep_every_segment():
     (chain,) = chains(closed)
     assert len(chain) == 31 and chain[0] == chain[-1] and set(chain.tolist()) == set(range(30))
     assert len(chains(closed[1:])) == 1 and chains(np.zeros((0, 2), dtype=int)) == []
-
-
-def test_coarse_meshes_have_no_fronts(tmp_path):
-    fan = cr.launch(cr.DirectFlow(BALL), cr.shadow_line(BALL, (0, 0, 1)), length=2.2, n_rays=24)
-    options = {"wavenumber": 60.0, "boundary": "hard", "backend": "matplotlib", "fronts": True}
-    with pytest.raises(cr.InvalidInputError, match=r"edges a wavelength; 4.5 are the least: give .* times the cells"):
-        surface_field_picture(tmp_path / "a.png", fan, cells=12, **options)
-    assert not list(tmp_path.iterdir())

@@ -1,7 +1,5 @@
 """Pictures are drawn, by both libraries alike; their geometry is checked where it can be computed by hand."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,32 +10,15 @@ import creeping as cr
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
 from creeping.plotting._drawing import compose
-from creeping.plotting._strokes import chosen_rays, line_pieces, refined, runs, status_pieces, strokes
+from creeping.plotting._strokes import chosen_rays, line_pieces, strokes
 from creeping.plotting._view import View, shadow_view
 from creeping.plotting.display import GLProbe
-from creeping.plotting.parameter_plane import plot_parameters
 
 
 def pixels(path):
     from matplotlib.image import imread
 
     return np.asarray(imread(path))[..., :3]
-
-
-def test_importing_plotting_imports_no_library():
-    code = (
-        "import sys, creeping.plotting as p; dir(p); "
-        "assert not {'matplotlib', 'pyvista', 'vtkmodules'} & set(sys.modules); p.picture; "
-        "assert not {'matplotlib', 'pyvista', 'vtkmodules'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_unknown_name_is_an_attribute_error():
-    import creeping.plotting
-
-    with pytest.raises(AttributeError, match="attribute nonsense"):
-        _ = creeping.plotting.nonsense
 
 
 def test_both_backends_draw_the_same(tmp_path, opengl, sphere_line, sphere_fan, sphere_curves):
@@ -58,13 +39,6 @@ def test_auto_falls_back_to_matplotlib(tmp_path, monkeypatch, sphere_line, spher
     assert pixels(tmp_path / "a.png").std() > 0.05
 
 
-def test_pyvista_without_opengl_says_what_helps(tmp_path, monkeypatch, sphere_line):
-    monkeypatch.setenv("CREEPING_NO_GL", "1")
-    with pytest.raises(CreepingError, match="CREEPING_NO_GL is set"):
-        picture(tmp_path / "a.png", sphere_line, backend="pyvista")
-    assert not list(tmp_path.iterdir())
-
-
 def test_wrong_arguments(tmp_path, sphere_line, sphere_fan, sphere_curves):
     with pytest.raises(InvalidInputError, match="backend 'povray' is unknown"):
         picture(tmp_path / "a.png", sphere_line, backend="povray")
@@ -77,35 +51,6 @@ def test_wrong_arguments(tmp_path, sphere_line, sphere_fan, sphere_curves):
         parameter_picture(tmp_path / "missing" / "a.png", sphere_line, dpi=40)
 
 
-def test_parameter_picture(tmp_path, sphere_line, sphere_fan, sphere_curves):
-    parameter_picture(tmp_path / "a.png", sphere_line, sphere_fan, sphere_curves, dpi=60)
-    assert pixels(tmp_path / "a.png").std() > 0.05
-
-
-@pytest.mark.parametrize(("body", "name", "span"), [(sc.Sphere(), "phi", (180, 0)), (sc.Torus(), "psi", (-180, 180))])
-def test_axes_of_the_parameter_plane(sphere_line, body, name, span):
-    from matplotlib.figure import Figure
-
-    points = np.stack([body.bounds[0] * [1, 0, 0], [0.0, 1.0, -0.5 if name == "psi" else 0.0]])
-    curve = type(sphere_line)(closed=True, points=points, status=np.array(["attached"] * 2))
-    line = type(sphere_line)(body=body, direction=sphere_line.direction, source=sphere_line.source, curves=[curve])
-    ax = plot_parameters(line, ax=Figure().add_subplot())
-    assert name in ax.get_xlabel()
-    assert ax.get_ylim() == span
-
-
-def test_status_pieces_join_and_close(sphere_line):
-    curve = sphere_line.curves[0]
-    lengths = [
-        [len(piece) for piece in status_pieces(curve.points, curve.status, name)]
-        for name in ("attached", "occluded", "concave")
-    ]
-    assert lengths == [[61], [21], [17]]
-    (whole,) = status_pieces(curve.points, np.full(96, "attached"), "attached")
-    np.testing.assert_array_equal(whole[0], whole[-1])
-    assert not list(status_pieces(curve.points, np.full(96, "attached"), "concave"))
-
-
 def test_open_curves_of_a_line_are_not_closed():
     """On a body of pieces a shadow line is of arcs: no chord joins the ends of one."""
     pill = sc.Capsule(1.0, 4.0)
@@ -113,13 +58,6 @@ def test_open_curves_of_a_line_are_not_closed():
     assert len(pieces) == 4
     for piece in pieces:
         assert np.max(np.linalg.norm(np.diff(piece, axis=0), axis=1)) < 0.1
-
-
-def test_refined_ray_stays_on_the_great_circle(sphere_fan):
-    fine, times = refined(sphere_fan.points[0], sphere_fan.directions[0], sphere_fan.travel_time, 0.02)
-    assert len(fine) == len(times) > 80
-    # cubic Hermite on steps of 0.1; the chord in place of the arc costs 0.1^4/96 of it
-    assert np.abs(np.linalg.norm(fine, axis=-1) - 1).max() < 2e-5
 
 
 def test_rays_stop_at_nan_and_fade_at_detachment(sphere_line, sphere_fan):
@@ -167,13 +105,6 @@ def test_camera_stands_on_the_shadow_side(direction):
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(frame) == pytest.approx(1)
     assert view.up[2] > 0.3
-
-
-def test_runs_need_two_points():
-    points = np.arange(18.0).reshape(6, 3)
-    found = list(runs(points, np.array([True, False, True, True, False, True])))
-    assert len(found) == 1
-    np.testing.assert_array_equal(found[0], points[2:4])
 
 
 @pytest.mark.parametrize("view", [View(0.1, 1.2), View(np.pi / 4, 0.6154), View(1.6, -0.05), View(0.0, 1e-9)])
