@@ -70,20 +70,26 @@ def test_run_with_a_mesh(ball, tmp_path, capsys):
     assert 0 < entry["uncertain_by"]["rms"] <= entry["uncertain_by"]["max"] < 1e-2 * entry["largest"]
 
 
-def test_fitted_bodies_in_the_cache(ball, tmp_path, capsys, monkeypatch):
+def test_maps_and_fitted_bodies_in_the_cache(ball, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))
     assert "0 maps, 0 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
     body = sc.Mesh(ball, "mm")
-    assert "0 maps, 1 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
-    (row,) = json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])
-    assert f"({row['fit']})" in body.fingerprint and row["MB"] > 0
-    assert creeping("cache", "verify", capsys=capsys)[:2] == (0, f"ok       {row['fit']}\n")
-    file = tmp_path / "fits" / f"{row['fit']}.npz"
-    file.write_bytes(file.read_bytes()[:-1])
+    cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(12, 16), degree=3, cache=True)
+    assert "1 maps, 1 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
+    rows = json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])
+    (row,) = (one for one in rows if "fit" in one)
+    assert len(rows) == 2 and f"({row['fit']})" in body.fingerprint and row["MB"] > 0
     code, out, _ = creeping("cache", "verify", capsys=capsys)
-    assert code == 3 and "DAMAGED" in out
-    assert "removed 0 maps, 1 fitted bodies" in creeping("cache", "clear", capsys=capsys)[1]
-    assert not file.exists()
+    assert code == 0 and f"ok       {row['fit']}\n" in out
+    (state,) = tmp_path.glob("*/state-0.npy")
+    for file in (tmp_path / "fits" / f"{row['fit']}.npz", state):
+        whole = file.read_bytes()
+        file.write_bytes(whole[:-1] + bytes([whole[-1] ^ 0x55]))
+        code, out, _ = creeping("cache", "verify", capsys=capsys)
+        assert code == 3 and "DAMAGED" in out
+        file.write_bytes(whole)
+    assert "removed 1 maps, 1 fitted bodies" in creeping("cache", "clear", capsys=capsys)[1]
+    assert not any((tmp_path / "fits").glob("*.npz")) and not state.exists()
 
 
 def test_check_of_a_mesh(ball, tmp_path, capsys):

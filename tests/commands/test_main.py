@@ -113,30 +113,6 @@ def test_interrupt_is_exit_code_130(capsys, monkeypatch):
     assert "interrupted" in err
 
 
-def test_check(capsys):
-    code, out, _ = creeping("check", "torus", capsys=capsys)
-    assert code == 0 and "genus 1" in out
-    code, out, _ = creeping("check", "torus", "--json", capsys=capsys)
-    assert code == 0 and json.loads(out)["ok"] is True
-
-
-def test_cache_commands(tmp_path, capsys, monkeypatch):
-    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "maps"))
-    assert "0 maps" in creeping("cache", "ls", capsys=capsys)[1]
-    options = ["--direction", 1, 0, 0, "--length", 0.2, "--rays", 8, "--tolerance", 1e-2, "--no-pictures"]
-    assert creeping("run", "sphere", *options, "--flow", "map", "-o", tmp_path / "o", capsys=capsys)[0] == 0
-    assert "1 maps" in creeping("cache", "ls", capsys=capsys)[1]
-    assert len(json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])) == 1
-    assert creeping("cache", "verify", capsys=capsys)[0] == 0
-    (array,) = (tmp_path / "maps").glob("*/state-0.npy")
-    array.write_bytes(array.read_bytes()[:-1] + b"\x55")
-    code, out, _ = creeping("cache", "verify", capsys=capsys)
-    assert code == 3
-    assert "DAMAGED" in out
-    assert "removed 1" in creeping("cache", "clear", capsys=capsys)[1]
-    assert "0 maps" in creeping("cache", "ls", capsys=capsys)[1]
-
-
 def test_cache_clear_leaves_what_is_not_ours(tmp_path, capsys, monkeypatch):
     """Neither folders with a file manifest.json, nor what a link leads to."""
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "maps"))

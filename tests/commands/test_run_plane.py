@@ -76,6 +76,10 @@ def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):
     np.testing.assert_array_equal(back["plane"]["status"][outside], rows["status"].astype(int))
     np.testing.assert_array_equal(back["rays"]["points"][..., 0].ravel(), tables["rays"]["x"].astype(float))
     np.testing.assert_array_equal(back["rays"]["spreading"].ravel(), tables["rays"]["J"].astype(float))
+    assert (back["line"]["units"]["length"], back["rays"]["units"]["curvature"]) == ("L", "1/L")
+    assert back["rays"]["units"]["attenuation"] == "L^(1/3)" and set(back["line"]["status"]) == {"attached"}
+    assert set(back["curves"]["of"]) == {"travel_time"}
+    np.testing.assert_array_equal(back["line"]["points"][:, 1], tables["line"]["y"].astype(float))
     np.testing.assert_array_equal(back["curves"]["points"][:, 1], tables["curves"]["y"].astype(float))
     # alone, and what there is not
     assert ran("run", "sphere", *options, "--format", "mat") == 0

@@ -133,15 +133,3 @@ def test_bad_patterns_are_named(heard, tmp_path):
     with pytest.raises(cr.CreepingError, match="create the folder first"):
         write_sofa(tmp_path / "no" / "head.sofa", heard, sound_speed=SPEED)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_extra_is_named_where_the_library_is_missing(heard, tmp_path, monkeypatch):
-    import creeping.storage.extras as extras
-
-    def missing(name):
-        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-    monkeypatch.setattr(extras, "import_module", missing)
-    with pytest.raises(cr.CreepingError, match=r"sofar: pip install 'creeping\[hrtf\]'"):
-        write_sofa(tmp_path / "head.sofa", heard, sound_speed=SPEED)
-    assert not list(tmp_path.iterdir())

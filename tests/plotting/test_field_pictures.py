@@ -39,13 +39,6 @@ def test_levels_are_those_of_the_exact_series(fan, boundary):
     assert error.max() < 0.06
 
 
-def test_shadow_without_rays_is_nan():
-    body = sc.Sphere()
-    short = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=0.3, n_rays=16)
-    levels = surface_levels(short, at([95.0, 170.0]), wavenumber=K, boundary="hard")
-    assert np.isfinite(levels).tolist() == [True, False]
-
-
 @pytest.mark.parametrize("backend", ["matplotlib", "pyvista"])
 def test_picture_of_the_body(tmp_path, fan, backend, request):
     from matplotlib.image import imread

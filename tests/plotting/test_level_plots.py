@@ -49,18 +49,6 @@ def test_what_is_not_to_be_trusted_is_marked(ball_cut):
     ax.figure.draw_without_rendering()
 
 
-def test_fields_over_each_other_keep_room(ball_cut):
-    ax = ball_cut.plot()
-    low, high = ax.get_ylim()
-    louder = replace(
-        ball_cut, creeping=100 * ball_cut.creeping, reflected=100 * ball_cut.reflected, forward=100 * ball_cut.forward
-    )
-    assert louder.plot(ax) is ax
-    assert ax.get_ylim()[0] == low
-    assert ax.get_ylim()[1] == pytest.approx(high + 40)
-    assert ball_cut.plot(ax).get_ylim()[1] == pytest.approx(high + 40)
-
-
 def degrees_of(directions, **options):
     far = far_of(directions, np.ones(len(directions)))
     ax = far.plot(**options)

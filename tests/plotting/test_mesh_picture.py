@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creeping import CreepingError
 from creeping.plotting.mesh_picture import HEIGHT, WIDTH, MeshValues, mesh_picture
 from studies._meshes import geodesic_sphere
 
@@ -51,11 +50,3 @@ def test_colours_and_dots_are_those_of_the_values(tmp_path, ball):
     assert share(good, *violet) > 0.2 > 0.05 > share(high, *violet)
     # a line of text is of the colour of the dots
     assert share(bad, *red) > 3 * share(good, *red)
-
-
-@pytest.mark.parametrize("name", ["missing/a.png", "file/a.png", "."])
-def test_a_file_that_cannot_be_written_is_named(tmp_path, ball, name):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(CreepingError):
-        mesh_picture(tmp_path / name, ball, dpi=40)
-    assert [f.name for f in tmp_path.iterdir()] == ["file"]

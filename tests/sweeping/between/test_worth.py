@@ -18,14 +18,8 @@ def patch(count):
 
 
 def asked(accuracy):
-    more = {
-        "n_steps": 1,
-        "observation": None,
-        "order": 2,
-        "wavenumbers": [18.0],
-        "boundary": ["hard"],
-        "method": "rays",
-    }
+    more = {"n_steps": 1, "observation": None, "order": 2, "method": "rays"}
+    more |= {"wavenumbers": [18.0], "boundary": ["hard"]}
     return sweep_request("monostatic", length=4.0, n_rays=64, accuracy=accuracy, **more)
 
 
@@ -53,9 +47,5 @@ def test_a_level_that_serves_nothing_or_leaves_much_is_left_out():
     assert first_level(lattice, np.zeros((1, 3)), "fields") == 0
     assert first_level(lattice, np.array([[0.5, 0.1, 0.0]] * 3), "rays") == 2
     assert first_level(lattice, np.array([[1e-3, 0.0, 0.0]] * 3), "rays") == 0
-
-
-def test_no_level_pays_where_cells_hold_few_or_none_serves():
-    few = Lattice((), 0.0, 1, 1.5)
-    assert first_level(few, np.zeros((4, 1)), "rays") is None
+    assert first_level(Lattice((), 0.0, 1, 1.5), np.zeros((4, 1)), "rays") is None
     assert first_level(Lattice((), 0.0, 2, 1e4), np.ones((4, 2)), "fields") is None
