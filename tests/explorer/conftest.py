@@ -36,7 +36,7 @@ LOCAL = ("about", "blob", "chrome", "chrome-extension", "chrome-untrusted", "dat
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --enable-unsafe-swiftshader --disable-quic --no-first-run "
     "--disable-background-networking --disable-component-update --disable-sync --disable-dev-shm-usage "
-    "--window-size=320,240"
+    "--window-size=480,360"
 ).split()
 
 
