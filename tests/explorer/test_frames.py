@@ -8,13 +8,12 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.explorer.colours import fitted_span
-from creeping.explorer.preview import outline, preview_of, step_of
+from creeping.explorer.preview import preview_of, step_of
 from creeping.explorer.refined import cut_directions, refined_view
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
 from creeping.explorer.text import legend, preview_text, refined_text
 from creeping.explorer.units import far_levels, wave_scale, wave_text
-from creeping.geometry.surface import normal
 from creeping.geometry.triangulation import triangulate
 
 REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
@@ -60,17 +59,6 @@ def test_levels_are_those_of_the_field(ellipsoid):
     assert frame.fan.error.samples == 0 and found.drawn.error.samples == 16
     told = refined_text(found)
     assert "rays drawn: 64 rays" in told and f"rms {found.drawn.error.rms:.1e}" in told
-
-
-def test_the_outline_lies_near_the_shadow_line(ellipsoid):
-    frame, mesh, found = ellipsoid
-    normals = normal(frame.fan.body, mesh.vertices)
-    drawn = outline(mesh, normals, REQUEST.direction)
-    assert drawn.shape[1:] == (2, 3) and np.all(np.isfinite(drawn))
-    length = float(np.sum(np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1)))
-    assert length == pytest.approx(found.line.length, rel=0.02)
-    n = normal(frame.fan.body, drawn.reshape(-1, 3).astype(float))
-    assert np.max(np.abs(n @ REQUEST.direction)) < 0.05
 
 
 def test_a_newer_wish_ends_the_work():

@@ -128,6 +128,15 @@ def test_table_of_a_far_field(ball_cut):
     assert int(first_number(rows["unresolved"])) == ball_cut.unresolved.sum()
 
 
+def test_tables_of_a_curve_and_of_a_map(twisted_curves, small_map):
+    rows = table(twisted_curves[0]).rows
+    theta = np.degrees([min(twisted_curves[0].parameters[:, 0]), max(twisted_curves[0].parameters[:, 0])])
+    assert rows["level"] == "travel_time = 0.5" and rows["theta"] == "{:.6g} to {:.6g} degrees".format(*theta)
+    rows, growth = table(small_map).rows, small_map.growth
+    assert first_number(rows["horizon T0"]) == 0.5
+    assert f"rms {growth.rms[-1]:.1e}" in rows[f"error after {growth.lengths[-1]:g}"]
+
+
 def test_hostile_names_are_escaped(twisted_fan, twisted_curves, ball_cut, small_map):
     body = Awkward()
     flow = cr.DirectFlow(body)

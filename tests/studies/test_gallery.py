@@ -56,16 +56,6 @@ def test_there_are_the_pages():
 
 
 @pytest.mark.parametrize("page", PAGES, ids=by_name)
-def test_fences_are_paired_and_of_known_kinds(page):
-    kinds = [kind for _, kind, _ in _FENCE.findall(text_of(page))]
-    assert set(kinds) <= {"python", "sh", "text", "toml", "{toctree}"}
-    assert text_of(page).count("```") == 2 * len(kinds)
-    # or the fence would become expected output
-    assert all(body.endswith("\n\n") for body in blocks(page, "python"))
-    assert all(body.startswith(">>> ") for body in blocks(page, "python"))
-
-
-@pytest.mark.parametrize("page", PAGES, ids=by_name)
 def test_dotted_names_are_there(page):
     names = {code for code in inline(page) if re.fullmatch(r"(creeping|scatterers|studies)(\.\w+)+", code)}
     names |= set(re.findall(r"\b(?:creeping|scatterers|studies)(?:\.\w+)+", "\n".join(blocks(page, "text"))))

@@ -1,11 +1,10 @@
 """The tables of sweeps say what they claim: references beside costs, errors within what was asked; never how fast."""
 
 import numpy as np
-import pytest
 from tolerances import FRACTION, LINE_LENGTH
 
 from studies import figure_bistatic_map as bistatic
-from studies import sweep_between, sweep_lines, sweep_speed
+from studies import sweep_lines, sweep_speed
 
 
 def test_lines_agree_with_both_references():
@@ -34,15 +33,6 @@ def test_scipy_errs_no_more_than_the_sweep():
     (row,) = sweep_speed.against_scipy(("ellipsoid",), count=8, lines=1, rays=2)
     assert 0 < row["scipy error"] <= row["error"] < 1e-4
     assert row["ratio"] > row["ratio of rays"] > 0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("quantity", "first", "last"), [("rays", 0, 300), ("fields", 90, 220)])
-def test_interpolated_sweeps_are_compared_with_computed_ones(quantity, first, last):
-    """Echoes of a spheroid from between its waist and its ends: there rays merge, and echoes are no sum of sheets."""
-    found = sweep_between.row("ellipsoid", quantity, sweep_between.cut(1200, sweep_between.TILTED)[first:last], 16)
-    assert found["interpolated"] == 1 and found["between per s"] > 0 and found["computed per s"] > 0
-    assert max(value for name, value in found.items() if "%" in name) < 1e-2
 
 
 def test_reciprocity_finds_what_is_not():

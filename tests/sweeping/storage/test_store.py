@@ -104,6 +104,17 @@ def test_stores_from_before_units_open_and_are_mended(tmp_path):
     assert np.array_equal(ds["creeping"].values, fake.creeping_of(6))
 
 
+def test_the_flow_is_kept(tmp_path):
+    request = sweep_request("rays", length=1.0, n_rays=4)
+    built = cr.build_phase_map(sc.Torus(), horizon=0.25, grid=(16, 24), degree=3, cache=False)
+    for name, flow in (("map", built), ("direct", cr.DirectFlow(sc.Torus(), 1e-7, 0.5, 0.01))):
+        plan = SweepPlan(flow, request, cr.fibonacci_directions(2), 1)
+        store = SweepStore.create(tmp_path / name, plan)
+        assert SweepPlan(store.flow(sc.Torus()), request, plan.incidences, 1).key == plan.key
+        with pytest.raises(cr.CreepingError, match="map of torus|Torus" if name == "map" else "another study.*body"):
+            store.require_same(SweepPlan(store.flow(sc.Torus(R=1.5)), request, plan.incidences, 1))
+
+
 def test_resuming_does_what_is_missing_and_nothing_else(tmp_path, monkeypatch):
     plan = fake.plan(18, 4)
     store = SweepStore.create(tmp_path / "s.zarr", plan)
