@@ -51,18 +51,15 @@ GOOD = NONE | {"frequency": "10GHz", "boundary": "pec"}
 @pytest.mark.parametrize(
     "bad",
     [
-        {"frequency": None},
-        {"wavelength": "3cm"},
-        {"frequency": "ten"},
+        *({"frequency": None}, {"wavelength": "3cm"}, {"frequency": "ten"}),
         {"frequency": None, "wavelength": "300mhz"},
         {"polarisation": "HH,HH"},
         {"polarisation": "HH", "boundary": "soft"},
         {"monostatic": "az", "bistatic": "el"},
-        {"monostatic": "round"},
-        {"monostatic": "az:5:3:1"},
-        {"monostatic": "el:-100:0:1"},
+        *({"monostatic": text} for text in ("round", "az:5:3:1", "el:-100:0:1")),
         {"incidence": "0,95"},
     ],
+    ids=str,
 )
 def test_bad_options(bad):
     with pytest.raises(InvalidInputError, match="--"):

@@ -134,19 +134,13 @@ def opened(page, *, origin=None, cookie=True, host=None):
     )
 
 
+STRANGERS = "http://a.example null http://[::1 http://127.0.0.1.a.example http://127.0.0.1:9999".split()
+
+
 @pytest.mark.parametrize(
     "options",
-    [
-        {"origin": "http://a.example"},
-        {"origin": "null"},
-        {"origin": "http://[::1"},
-        {"origin": "http://127.0.0.1.a.example"},
-        {"origin": "http://127.0.0.1:9999"},
-        {"host": "a.example"},
-        {"cookie": None},
-        {"cookie": "wrong"},
-        {"cookie": "\u00e9" * 3},
-    ],
+    [*({"origin": one} for one in STRANGERS), {"host": "a.example"}, *({"cookie": c} for c in (None, "wrong", "ééé"))],
+    ids=str,
 )
 def test_others_are_turned_away_before_the_upgrade(guarded, options):
     from websockets.exceptions import InvalidStatus

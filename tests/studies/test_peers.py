@@ -10,7 +10,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
-from studies._peers import HeyokaFlow, scipy_flow
+from studies._peers import scipy_flow
 
 BODIES = {"triaxial": sc.Ellipsoid(1.0, 0.8, 0.6), "torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}
 TIMES = np.array([0.0, 0.7, 2.0])
@@ -42,19 +42,3 @@ def test_scipy_agrees(name, carry_jacobi):
         np.testing.assert_allclose(found[:, -1, 8], decay, atol=1e-7 if name == "triaxial" else 1e-4)
     last = scipy_flow(BODIES[name], states, TIMES[-1:], rtol=1e-9, carry_jacobi=carry_jacobi)
     np.testing.assert_allclose(last[:, 0, :lanes], exact[:, -1, :lanes], atol=2e-7)
-
-
-@pytest.mark.parametrize("carry_jacobi", [False, True])
-@pytest.mark.parametrize("name", BODIES)
-def test_heyoka_agrees(name, carry_jacobi):
-    pytest.importorskip("heyoka", exc_type=ImportError)
-    states, exact, decay = traced(name)
-    peer = HeyokaFlow(BODIES[name], tolerance=1e-14, carry_jacobi=carry_jacobi)
-    assert peer.lanes == (6 if not carry_jacobi else 9 if name == "triaxial" else 8)
-    lanes = min(peer.lanes, 8)
-    for outputs in (slice(None), slice(1, None), slice(2, None)):
-        found = peer.flow(states, TIMES[outputs])
-        assert found.shape == (RAYS, len(TIMES[outputs]), peer.lanes)
-        np.testing.assert_allclose(found[..., :lanes], exact[:, outputs, :lanes], atol=1e-9)
-        if peer.lanes == 9:
-            np.testing.assert_allclose(found[:, -1, 8], decay, atol=1e-7)
