@@ -12,7 +12,7 @@ from creeping.explorer.request import ViewRequest
 
 pytest.importorskip("viser")
 BODY = sc.Ellipsoid(1.2, 0.8, 0.6)
-REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=16, length=1.0, spacing=0.25, wavenumber=10.0, boundary="soft")
+REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=16, length=1.0, spacing=0.25, wavenumber=30.0, boundary="soft")
 
 
 def written(path, body=BODY, request=REQUEST):
@@ -33,9 +33,10 @@ def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path):
     assert "<script>alert(1)" not in page
 
 
-def test_trouble_writes_nothing(tmp_path):
+def test_trouble_writes_nothing(tmp_path, monkeypatch):
     with pytest.raises(cr.SingularIncidenceError):
         written(tmp_path / "page.html", sc.Torus(), REQUEST.changed(theta=90.0, phi=0.0))
+    monkeypatch.setattr("creeping.explorer.export.page_of", lambda *_: ("page", None))
     with pytest.raises(cr.CreepingError):
         written(tmp_path / "no" / "such" / "folder" / "page.html")
     assert list(tmp_path.iterdir()) == []

@@ -10,7 +10,7 @@ import creeping as cr
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
 from creeping.plotting._drawing import compose
-from creeping.plotting._strokes import chosen_rays, line_pieces, strokes
+from creeping.plotting._strokes import chosen_rays, line_pieces, refined, strokes
 from creeping.plotting._view import View, shadow_view
 from creeping.plotting.display import GLProbe
 
@@ -58,6 +58,13 @@ def test_open_curves_of_a_line_are_not_closed():
     assert len(pieces) == 4
     for piece in pieces:
         assert np.max(np.linalg.norm(np.diff(piece, axis=0), axis=1)) < 0.1
+
+
+def test_refined_ray_stays_on_the_great_circle(sphere_fan):
+    fine, times = refined(sphere_fan.points[0], sphere_fan.directions[0], sphere_fan.travel_time, 0.02)
+    assert len(fine) == len(times) > 80
+    # cubic Hermite on steps of 0.1; the chord in place of the arc costs 0.1^4/96 of it
+    assert np.abs(np.linalg.norm(fine, axis=-1) - 1).max() < 2e-5
 
 
 def test_rays_stop_at_nan_and_fade_at_detachment(sphere_line, sphere_fan):
