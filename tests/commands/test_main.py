@@ -61,6 +61,8 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     assert entry["largest"] == pytest.approx(forward, rel=0.02)
     rows = table(tmp_path / "far.csv")
     assert len(rows) == entry["directions"]
+    around = {round(float(row["phi"])) for row in rows if row["observe"] == "grid:90"}
+    assert around == {0, 90, 180, 270}
     assert (round(float(rows[-1]["theta"])), round(float(rows[-1]["phi"]))) == (150, 20)
 
 

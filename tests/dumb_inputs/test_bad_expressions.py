@@ -132,6 +132,7 @@ def test_expressions_that_are_no_body(which):
         ("sqrt(x**2+y**2) - (1-z**2)/2", r"it has 2 tips, first .* leave strict out to take them"),
         ("where(z < 0, z**2/2, z**3 - z**2) + x**2 + y**2", r"it has 1 tips, first \(0.0, 0.0, 0.0\)"),
         ("(sqrt(x**2+y**2) - .5)**2 + z**2 - 1", r"it has 2 tips, first \(.*0.866"),
+        ("max(x**2 + y**2 + z**2 - 1, z - 0.3)", r"its normal jumps by up to \d+ degrees near .*round them off"),
     ],
 )
 def test_what_is_refused_as_strict(text, match):
@@ -177,15 +178,3 @@ def test_bad_speeds():
         Implicit(SPHERE, speed="__import__('os')")
     with pytest.raises(TypeError, match="speed 3 is neither"):
         Implicit(SPHERE, speed=3)
-
-
-EDGES = {
-    "cut ball": "max(x**2 + y**2 + z**2 - 1, z - 0.3)",
-    "lens": "where(z > 0, x**2 + y**2 + (z + 0.5)**2 - 1, x**2 + y**2 + (z - 0.5)**2 - 1)",
-}
-
-
-@pytest.mark.parametrize("name", EDGES)
-def test_pieces_that_join_in_an_edge_are_refused_as_strict(name):
-    with pytest.raises(ValueError, match=r"its normal jumps by up to \d+ degrees near .*round them off"):
-        Implicit(EDGES[name], strict=True)

@@ -40,6 +40,12 @@ FLAGS = (
 ).split()
 
 
+@pytest.fixture
+def coarse(monkeypatch):
+    """Bodies of the page in fewer triangles."""
+    monkeypatch.setattr("creeping.explorer.scene.CELLS", 20)
+
+
 class Browser:
     """A page of Chromium.
 

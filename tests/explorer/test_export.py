@@ -21,7 +21,7 @@ def written(path, body=BODY, request=REQUEST):
     return export_page(path, cr.DirectFlow(body, rtol=1e-9), request)
 
 
-def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path):
+def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path, coarse):
     class Named(sc.Ellipsoid):
         def __repr__(self):
             return "<script>alert(1)</script>" + super().__repr__()

@@ -8,12 +8,13 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.explorer.colours import fitted_span
-from creeping.explorer.preview import preview_of, step_of
+from creeping.explorer.preview import outline, preview_of, step_of
 from creeping.explorer.refined import cut_directions, refined_view
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
 from creeping.explorer.text import legend, preview_text, refined_text
 from creeping.explorer.units import far_levels, wave_scale, wave_text
+from creeping.geometry.surface import normal
 from creeping.geometry.triangulation import triangulate
 
 REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
@@ -51,7 +52,11 @@ def test_a_frame_has_no_nan():
 
 
 def test_levels_are_those_of_the_field(ellipsoid):
-    frame, _, found = ellipsoid
+    frame, mesh, found = ellipsoid
+    # the outline is as long as the shadow line
+    drawn = outline(mesh, normal(frame.fan.body, mesh.vertices), REQUEST.direction)
+    length = float(np.sum(np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1)))
+    assert np.all(np.isfinite(drawn)) and length == pytest.approx(found.line.length, rel=0.02)
     assert frame.levels.shape == frame.fan.spreading.shape
     # |u| = 1.4 at the shadow line of a hard body: g(0) = 1.399
     np.testing.assert_allclose(frame.levels[:, 0], 20 * np.log10(1.399), atol=0.01)

@@ -30,7 +30,7 @@ def explorer(body=BODY, request=REQUEST, port=8123, **more):
 
 
 @pytest.fixture
-def page():
+def page(coarse):
     with explorer() as made:
         yield made
 

@@ -109,11 +109,3 @@ def test_tables_that_are_too_large_are_refused(tmp_path, monkeypatch, bound, tex
         monkeypatch.setattr(measured, name, most)
     with pytest.raises(cr.InvalidInputError, match=said):
         read_cut(written(tmp_path, text))
-
-
-def test_a_line_without_an_end_is_not_read_to_its_end(tmp_path):
-    file = tmp_path / "endless.csv"
-    with file.open("wb") as stream:
-        stream.truncate(measured.MOST_BYTES - 1)
-    with pytest.raises(cr.InvalidInputError, match="line 1: more than"):
-        read_cut(file)

@@ -105,3 +105,14 @@ def test_picture_of_the_currents(tmp_path, fan, boundary):
     if boundary == "hard":
         with pytest.raises(InvalidInputError, match="of a conductor"):
             currents_picture(tmp_path / "b.png", currents, incident="theta", backend="matplotlib")
+
+
+def test_currents_between_nodes(fan):
+    # those of the sphere, 2 |n.d| h and the like, and none beyond the rays
+    from creeping.plotting.coloured_body import _magnitudes
+
+    currents = cr.surface_currents(fan, wavenumber=K, boundary="hard")
+    found = _magnitudes(currents, at([5.0, 60.0, 95.0]), None)
+    np.testing.assert_allclose(
+        found, np.abs(sphere.surface_field(K, 1.0, -np.cos(np.radians([5.0, 60.0, 95.0])), "hard")), rtol=0.03
+    )

@@ -9,8 +9,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
-from creeping.plotting._drawing import compose
-from creeping.plotting._strokes import chosen_rays, line_pieces, refined, strokes
+from creeping.plotting._strokes import chosen_rays, line_pieces, refined, runs, status_pieces, strokes
 from creeping.plotting._view import View, shadow_view
 from creeping.plotting.display import GLProbe
 
@@ -49,6 +48,21 @@ def test_wrong_arguments(tmp_path, sphere_line, sphere_fan, sphere_curves):
         parameter_picture(tmp_path / "a.png", sphere_line, curves=mixed)
     with pytest.raises(CreepingError, match="create the folder"):
         parameter_picture(tmp_path / "missing" / "a.png", sphere_line, dpi=40)
+
+
+def test_status_pieces_join_and_close(sphere_line):
+    curve = sphere_line.curves[0]
+    lengths = [
+        [len(piece) for piece in status_pieces(curve.points, curve.status, name)]
+        for name in ("attached", "occluded", "concave")
+    ]
+    assert lengths == [[61], [21], [17]]
+    (whole,) = status_pieces(curve.points, np.full(96, "attached"), "attached")
+    np.testing.assert_array_equal(whole[0], whole[-1])
+    assert not list(status_pieces(curve.points, np.full(96, "attached"), "concave"))
+    points = np.arange(18.0).reshape(6, 3)
+    (found,) = runs(points, np.array([True, False, True, True, False, True]))
+    np.testing.assert_array_equal(found, points[2:4])
 
 
 def test_open_curves_of_a_line_are_not_closed():
@@ -105,12 +119,3 @@ def test_camera_stands_on_the_shadow_side(direction):
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(frame) == pytest.approx(1)
     assert view.up[2] > 0.3
-
-
-@pytest.mark.parametrize("view", [View(0.1, 1.2), View(np.pi / 4, 0.6154), View(1.6, -0.05), View(0.0, 1e-9)])
-def test_names_of_axes_stand_apart(view):
-    marks = compose(cr.shadow_line(sc.Sphere(), (0, 0, 1)), view=view).triad
-    places = [view.project(mark.label(view)) for mark in marks]
-    length = np.linalg.norm(marks[0].tip - marks[0].foot)
-    for first, second in ((0, 1), (0, 2), (1, 2)):
-        assert np.linalg.norm(places[first] - places[second]) > 0.3 * length

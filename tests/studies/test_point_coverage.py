@@ -54,16 +54,6 @@ def test_errors_of_near_and_surface_fields_are_covered_on_the_sphere(boundary):
     assert found["off"] < (5 if boundary == "pec" else 3) and found["on"] < (15 if boundary == "pec" else 5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("study", [near_coverage, conductor_coverage], ids=lambda study: study.__name__)
-def test_a_row_is_printed_for_each_case(study, capsys, monkeypatch):
-    monkeypatch.setattr(near_coverage, "BOUNDARIES", ("hard",))
-    study.main(["--quick"])
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[1].startswith("sphere    hard       10" if study is near_coverage else "sphere      10")
-    assert [line.split(" covered")[0].strip() for line in lines[2:]] == list(study.PARTS)
-
-
 def test_couplings_on_the_sphere():
     row = sphere_row(30.0)
     assert row.worst < 0.006 and row.covered > 0.95

@@ -59,3 +59,15 @@ def test_reciprocity_and_energy(profile, boundary, k):
     scattered = (np.repeat(w, 120) * np.pi / 60) @ np.abs(found.far_field(r.reshape(-1, 3))) ** 2
     forward = np.array([found.far_field(d[[i]])[0, i] for i in range(4)])
     np.testing.assert_allclose(4 * np.pi / k * forward.imag, scattered, rtol=2e-4)
+
+
+def test_profiles_are_what_they_say():
+    for profile, last in ((PROFILES["capsule"], -1.5), (PROFILES["cone"], -0.8)):
+        s = np.linspace(0, profile.length, 4001)
+        x, n = profile.at(s)
+        np.testing.assert_allclose(x[[0, -1], 0], 0, atol=1e-12)
+        assert x[-1, 1] == pytest.approx(last)
+        # arc length, and normals across it
+        step = np.diff(x, axis=0)
+        np.testing.assert_allclose(np.linalg.norm(step, axis=1), np.diff(s), rtol=1e-5)
+        assert np.max(np.abs(np.sum(step * (n[1:] + n[:-1]), axis=1))) < 1e-6

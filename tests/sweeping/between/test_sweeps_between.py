@@ -159,3 +159,18 @@ def test_a_patch_of_the_sphere_comes_back_in_its_own_order(tmp_path):
         np.testing.assert_array_equal(ds.direction, directions)
     np.testing.assert_array_equal(here.points, kept.points)
     np.testing.assert_array_equal(here.interpolated, kept.interpolated)
+
+
+def test_rays_that_are_carried_start_on_the_line():
+    """Launch points that are moved far are not where the interpolation has them."""
+    body, asked = sc.Ellipsoid(2, 0.5, 0.4), {"quantity": "rays", "n_rays": 50, "length": 1.0, "accuracy": 1e-2}
+    directions = arc(-20, 40, 0.2, height=0.1)
+    found = cr.sweep_directions(cr.DirectFlow(body, rtol=1e-8), directions, **asked)
+    row, ray = np.nonzero(found.interpolated.values[:, None] & (found.interpolation_error.values == 0))
+    assert len(row) > 100
+    x, p = (found[name].values[row, ray, 0] for name in ("points", "directions"))
+    start, back = cr.DirectFlow(body, rtol=1e-10).flow(x, -p, 1.0)
+    d = directions[row]
+    assert np.abs(np.sum(start * d, axis=1) - found.launch_phase.values[row, ray]).max() < 1e-6
+    assert np.abs(-back - d).max() < 1e-6
+    assert np.abs(np.linalg.norm(onto_line(body, d, start, reach=0.1) - start, axis=1)).max() < 1e-6

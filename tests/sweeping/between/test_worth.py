@@ -5,8 +5,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.sweeping.between.worth import first_level, representatives, with_paying_lattice
-from creeping.sweeping.lattice import Lattice, lattice_of
+from creeping.sweeping.between.worth import first_level, with_paying_lattice
+from creeping.sweeping.lattice import Lattice
 from creeping.sweeping.request import sweep_request
 
 FLOW = cr.DirectFlow(sc.Ellipsoid(1.2, 0.85, 0.7), rtol=1e-8)
@@ -30,14 +30,6 @@ def test_what_is_found_does_not_depend_on_the_order_of_incidences(accuracy):
     one, other = (with_paying_lattice(FLOW, asked(accuracy), some) for some in (directions, directions[order]))
     assert one == other
     assert (one.lattice is not None) == (accuracy > 1e-3)
-
-
-def test_representatives_stand_for_equal_shares_in_any_order():
-    directions = patch(9000)
-    lattice = lattice_of(directions)
-    some = representatives(lattice, directions)
-    np.testing.assert_array_equal(some, representatives(lattice, directions[::-1]))
-    assert len(some) == 4 and len(np.unique(lattice.located(some, lattice.levels - 1)[0], axis=0)) == 4
 
 
 def test_a_level_that_serves_nothing_or_leaves_much_is_left_out():
