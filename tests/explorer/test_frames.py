@@ -7,11 +7,11 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.explorer.colours import fitted_span
+from creeping.explorer.colours import ENDED, FIELD_COLOURS, field_colours, fitted_span
 from creeping.explorer.preview import outline, preview_of, step_of
 from creeping.explorer.refined import cut_directions, refined_view
 from creeping.explorer.request import ViewRequest
-from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
+from creeping.explorer.svg import _broken, cut_svg, plane_svg, preview_plane_svg
 from creeping.explorer.text import legend, preview_text, refined_text
 from creeping.explorer.units import far_levels, wave_scale, wave_text
 from creeping.geometry.surface import normal
@@ -145,3 +145,13 @@ def test_waves_that_are_too_long_are_flagged(k, flagged):
     frame = preview_of(cr.DirectFlow(body), REQUEST.changed(wavenumber=k, rays=16), step_of(body))
     text = preview_text(frame, 0.01, RANGE)
     assert f"k rho >= {k:g}" in text and ("**k rho" in text) == flagged
+
+
+def test_colours_are_of_the_range_and_lines_break_where_an_angle_jumps():
+    low, high = RANGE
+    colours = field_colours(np.array([np.nan, low - 20, low, high, np.inf]), RANGE)
+    ends = [FIELD_COLOURS.table[n].tolist() for n in (0, 0, 255, 255)]
+    assert colours.tolist() == [list(ENDED), *ends]
+    phi = np.radians([150.0, 170.0, 179.0, -170.0, -150.0, np.nan])
+    pieces = _broken(np.stack([np.full(6, 1.0), phi], axis=1)[None])
+    assert [len(piece) for piece in pieces] == [3, 2] and all(np.isfinite(piece).all() for piece in pieces)

@@ -28,7 +28,7 @@ def forget():
     display._verdict.cache_clear()
 
 
-def test_asks_once_per_process_and_once_per_machine(answers, fresh_display):
+def test_asks_once_per_process_and_once_per_machine(answers, fresh_display, monkeypatch):
     assert gl_available() == GLProbe(True, "rendered")
     assert gl_available().ok
     assert answers.calls == 1
@@ -36,6 +36,9 @@ def test_asks_once_per_process_and_once_per_machine(answers, fresh_display):
     assert gl_available().ok
     assert answers.calls == 1
     assert len(json.loads(fresh_display.read_text())) == 1
+    # another display asks again
+    monkeypatch.setenv("DISPLAY", ":77")
+    assert gl_available().ok and answers.calls == 2
 
 
 @pytest.mark.parametrize(

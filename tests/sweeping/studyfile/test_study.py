@@ -131,7 +131,6 @@ workers = true
         (("[20.0, 40.0]", "{ first = 1, last = 1e300, count = 3 }"), "wavenumbers_per_length = .* is not"),
         (("rays = 256", "rays = 256\nsteps = 4"), r'steps goes with quantity "rays"'),
         (("tolerance = 1e-6", "tolerance = " + 400 * "9"), "tolerance = 9999.* is not a positive finite number"),
-        (("tolerance = 1e-6", "tolerance = 0x" + 5000 * "f"), "tolerance = a number too long to be shown is not"),
         (("[study]", "x = " + 9999 * "[" + "\n[study]"), "is not TOML"),
         (("[study]", "observation = [[0, 0, 1]]\n[study]"), r"observation is not a table: write \[observation\]"),
         (("rays = 256", "observation = [[0, 0, 1]]"), r"\[study\] observation is a table of its own: write"),
