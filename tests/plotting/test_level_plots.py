@@ -7,6 +7,7 @@ import pytest
 from fake_fields import far_of
 
 import creeping as cr
+from creeping.plotting.pictures import new_figure
 from studies.reference import sphere
 
 
@@ -21,6 +22,8 @@ def test_cross_section_of_a_sphere_in_dbsm(ball_cut):
     # 10 log10(4 pi |f|^2) of Mie's series; the far field is good to 2 % here
     exact = sphere.far_field(30.0, 1.0, np.cos(np.radians(at)), "hard")
     np.testing.assert_allclose(found, 10 * np.log10(4 * np.pi * np.abs(exact) ** 2), atol=0.4)
+    polar = ball_cut.plot(new_figure((4, 4)).add_subplot(projection="polar"))
+    np.testing.assert_allclose(polar.lines[0].get_xdata(), np.radians(line.get_xdata()), atol=1e-9)
 
 
 def test_parts_are_drawn_on_request(ball_cut):

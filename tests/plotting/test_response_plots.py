@@ -40,6 +40,11 @@ def test_a_response_has_its_paths_at_their_delays(two_paths):
     assert ax.get_xlim() == (1.0, 8.0) and "(L)" in ax.get_xlabel()
     bound = next(one for one in ax.lines if one.get_label() == "error at most")
     assert bound.get_ydata()[0] == pytest.approx(-60.0)
+    # seconds in a unit that suits
+    k = np.linspace(200.0, 400.0, 101)
+    ax = cr.impulse_response(np.exp(0.3j * k), k, speed=3e8, start=0.0).plot()
+    x, y = ax.lines[0].get_data()
+    assert "(ns)" in ax.get_xlabel() and x[np.argmax(y)] == pytest.approx(1.0, abs=0.1)
 
 
 def test_what_cannot_be_drawn_is_refused(two_paths):
