@@ -26,6 +26,11 @@ def cubed_slope(x):
     return 6 * ((squared(x) - 1) ** 2)[..., None] * x
 
 
+def balls(x):
+    """Two of radius 1 about (2, 0, 0) and (-2, 0, 0)."""
+    return squared(np.stack([np.abs(x[..., 0]) - 2, x[..., 1], x[..., 2]], axis=-1)) - 1
+
+
 def no_triangulation():
     return {
         "empty": (Changed(level=lambda x: squared(x) + 1), "no negative value"),
@@ -35,6 +40,10 @@ def no_triangulation():
         "zero gradient on F = 0": (Changed(level=lambda x: (squared(x) - 1) ** 3, gradient=cubed_slope), "not smooth"),
         "bounds with NaN": (Changed(bounds=BOX * np.nan), "not two corners"),
     }
+
+
+def slope(x):
+    return 2 * (x - np.sign(x[..., :1]) * [2.0, 0, 0])
 
 
 def failing_checks():
@@ -49,6 +58,7 @@ def failing_checks():
     return {
         "wrong gradient": (Changed(gradient=lambda x: 2.01 * x), "gradient against differences"),
         "wrong Hessian": (Changed(hessian=lambda x: 1.1 * hessian(x)), "Hessian against differences"),
+        "two bodies": (Changed(level=balls, gradient=slope, bounds=BOX * [3, 1, 1]), "components beyond one"),
         "charts of another order": (Changed(atlas=Rotated()), "chart inverse"),
     }
 

@@ -88,3 +88,13 @@ def test_a_wavenumber_without_currents_costs_no_other():
     ds = cr.bistatic(sc.Sphere(), wavenumbers=[8.0, 1e6], azimuth=[90.0], boundary="soft", n_rays=32, cache=False)
     assert np.all(np.isfinite(ds.field.total))
     assert ds["by_currents"].values.squeeze().tolist() == [True, False]
+
+
+def test_far_fields_have_names_on_their_axes():
+    fan = cr.launch(cr.DirectFlow(sc.Sphere()), cr.shadow_line(sc.Sphere(), (0, 0, 1)), length=3.0, n_rays=32)
+    far = cr.far_field(fan, [[0, 1, 0], [0, 0, -1]], wavenumber=20.0, boundary="pec", method="rays")
+    found = far.to_xarray()["total"].sel(scattered="phi", incident="theta")
+    np.testing.assert_array_equal(found, far.total[:, 1, 0])
+    np.testing.assert_allclose(far.dbsm[:, 0, 0] - far.target_strength[:, 0, 0], 10 * np.log10(4 * np.pi))
+    table = far.to_dataframe()
+    assert len(table) == 8 and {"total", "error", "azimuth", "unresolved"} <= set(table.columns)

@@ -134,7 +134,6 @@ workers = true
         (("[study]", "x = " + 9999 * "[" + "\n[study]"), "is not TOML"),
         (("[study]", "observation = [[0, 0, 1]]\n[study]"), r"observation is not a table: write \[observation\]"),
         (("rays = 256", "observation = [[0, 0, 1]]"), r"\[study\] observation is a table of its own: write"),
-        (("[study]", "[study"), "is not TOML"),
     ],
 )
 def test_one_mistake_is_one_mistake(change, words, tmp_path):
