@@ -9,7 +9,6 @@ import pytest
 from scatterers.implicit import Implicit
 
 SPHERE = "x**2 + y**2 + z**2 - 1"
-CUBE = [[-2.0] * 3, [2.0] * 3]
 ALLOWED = "allowed are numbers, x, y, z, pi"
 
 HOSTILE = {

@@ -15,7 +15,7 @@ from tests.patience import HANGS, until
 
 pytest.importorskip("viser")
 BODY = sc.Ellipsoid(1.2, 0.8, 0.6)
-REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=16, length=2.0, spacing=0.25, wavenumber=10.0, boundary="hard")
+REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=10.0, boundary="hard")
 
 
 @contextmanager

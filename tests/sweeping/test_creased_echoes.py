@@ -19,7 +19,8 @@ def backscatter(body, elevation, k, boundary, n_rays=32):
     return cr.sweep_directions(flow, d, wavenumbers=k, **words)
 
 
-@pytest.mark.parametrize("boundary", ["soft", pytest.param("pec", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("boundary", ["soft", "pec"])
 def test_capsule_against_fundamental_solutions(boundary):
     """From broadside, where the cylinder has no specular point of its own, to next to the axis."""
     exact = stored.read("capsule_echoes")
