@@ -35,12 +35,6 @@ def seen(srgb, eye):
     return np.clip(linear(srgb) @ EYES[eye].T, 0, 1)
 
 
-def simulated(image, eye):
-    """The same as sRGB: an image (..., 3) to look at."""
-    light = seen(image, eye)
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-
-
 def lab(light):
     """CIE L*a*b* of linear light (..., 3)."""
     ratio = np.asarray(light) @ XYZ.T / XYZ.sum(axis=1)

@@ -15,8 +15,8 @@ class Line:
 class Ball:
     """|x - c| - R, with its derivatives."""
 
-    def __init__(self, centre=(0, 0, 0), radius=1.0, sign=1.0):
-        self.centre, self.radius, self.sign = np.array(centre, float), radius, sign
+    def __init__(self, centre=(0, 0, 0), radius=1.0):
+        self.centre, self.radius = np.array(centre, float), radius
         self.bounds = np.array([self.centre - radius, self.centre + radius])
 
     def level(self, x):
@@ -47,37 +47,14 @@ class Plane:
         return np.zeros((*x.shape, 3))
 
 
-class Tube:
-    """Cylinder about z."""
-
-    def __init__(self, radius, bounds):
-        self.radius, self.bounds = radius, np.array(bounds, float)
-
-    def level(self, x):
-        return np.hypot(x[..., 0], x[..., 1]) - self.radius
-
-    def gradient(self, x):
-        r = np.hypot(x[..., 0], x[..., 1])
-        return np.stack([x[..., 0] / r, x[..., 1] / r, np.zeros_like(r)], axis=-1)
-
-    def hessian(self, x):
-        r = np.hypot(x[..., 0], x[..., 1])
-        a, b = x[..., 0] / r, x[..., 1] / r
-        out = np.zeros((*x.shape, 3))
-        out[..., 0, 0], out[..., 1, 1] = b * b / r, a * a / r
-        out[..., 0, 1] = out[..., 1, 0] = -a * b / r
-        return out
-
-
 class Mantle:
-    """Cone about z with its apex at height h above a base of radius R at z = 0: r cos a + (z - h) sin a."""
+    """Cone about z, or cylinder where its slope is 0: r cos a + z sin a = offset."""
 
-    def __init__(self, radius, height, bounds):
-        self.slope, self.height, self.bounds = np.arctan2(radius, height), height, np.array(bounds, float)
+    def __init__(self, slope, offset, bounds):
+        self.slope, self.offset, self.bounds = slope, offset, np.array(bounds, float)
 
     def level(self, x):
-        r = np.hypot(x[..., 0], x[..., 1])
-        return r * np.cos(self.slope) + (x[..., 2] - self.height) * np.sin(self.slope)
+        return np.hypot(x[..., 0], x[..., 1]) * np.cos(self.slope) + x[..., 2] * np.sin(self.slope) - self.offset
 
     def gradient(self, x):
         r = np.hypot(x[..., 0], x[..., 1])
@@ -85,7 +62,9 @@ class Mantle:
         return np.stack([c * x[..., 0] / r, c * x[..., 1] / r, np.full_like(r, np.sin(self.slope))], axis=-1)
 
     def hessian(self, x):
-        return np.cos(self.slope) * Tube(0.0, self.bounds).hessian(x)
+        r = np.hypot(x[..., 0], x[..., 1])
+        t = np.stack([-x[..., 1] / r, x[..., 0] / r, 0 * r], axis=-1)
+        return (np.cos(self.slope) / r)[..., None, None] * t[..., :, None] * t[..., None, :]
 
 
 class Pieced:
@@ -131,14 +110,8 @@ class Pieced:
             rz = generator(np.linspace(0, 1, count))
             around = max(8, int(np.ceil(2 * np.pi * rz[:, 0].max() / edge)))
             angle = 2 * np.pi * (np.arange(around + 1) / around + 0.0123)
-            x = np.stack(
-                [
-                    rz[:, :1] * np.cos(angle),
-                    rz[:, :1] * np.sin(angle),
-                    np.broadcast_to(rz[:, 1:], (count, around + 1)),
-                ],
-                axis=-1,
-            )
+            z = np.broadcast_to(rz[:, 1:], (count, around + 1))
+            x = np.stack([rz[:, :1] * np.cos(angle), rz[:, :1] * np.sin(angle), z], axis=-1)
             a, b, c, d = x[:-1, :-1], x[:-1, 1:], x[1:, 1:], x[1:, :-1]
             both = np.concatenate([np.stack([a, b, c], 2).reshape(-1, 3, 3), np.stack([a, c, d], 2).reshape(-1, 3, 3)])
             area = np.linalg.norm(np.cross(both[:, 1] - both[:, 0], both[:, 2] - both[:, 0]), axis=1)
@@ -159,13 +132,13 @@ class Pieced:
 class Arc:
     """Generator on a circle about (0, z0), from angle a to angle b from the axis -z: (r, z)."""
 
-    def __init__(self, z0, radius, a, b, r0=0.0):
-        self.z0, self.radius, self.a, self.b, self.r0 = z0, radius, a, b, r0
+    def __init__(self, z0, radius, a, b):
+        self.z0, self.radius, self.a, self.b = z0, radius, a, b
         self.length = radius * abs(b - a)
 
     def __call__(self, t):
         angle = self.a + t * (self.b - self.a)
-        return np.stack([self.r0 + self.radius * np.sin(angle), self.z0 - self.radius * np.cos(angle)], axis=-1)
+        return np.stack([self.radius * np.sin(angle), self.z0 - self.radius * np.cos(angle)], axis=-1)
 
 
 class Straight:
@@ -193,7 +166,7 @@ def cut_sphere(z=0.5):
 def cylinder(radius=0.5, half=1.0):
     """Flat ends: pieces 0 (side), 1 (top), 2 (bottom)."""
     box = [[-radius, -radius, -half], [radius, radius, half]]
-    pieces = [Tube(radius, box), Plane((0, 0, 1), half, box), Plane((0, 0, -1), half, box)]
+    pieces = [Mantle(0.0, radius, box), Plane((0, 0, 1), half, box), Plane((0, 0, -1), half, box)]
     profile = [
         (2, Straight((0, -half), (radius, -half))),
         (0, Straight((radius, -half), (radius, half))),
@@ -206,7 +179,8 @@ def cylinder(radius=0.5, half=1.0):
 def cone(radius=0.5, height=1.0):
     """Flat base at z = 0: pieces 0 (mantle) and 1 (base)."""
     box = [[-radius, -radius, 0], [radius, radius, height]]
-    pieces = [Mantle(radius, height, box), Plane((0, 0, -1), 0.0, box)]
+    slope = np.arctan2(radius, height)
+    pieces = [Mantle(slope, height * np.sin(slope), box), Plane((0, 0, -1), 0.0, box)]
     profile = [(1, Straight((0, 0), (radius, 0))), (0, Straight((radius, 0), (0, height)))]
     creases = [Line("edge", (0, 1), ring(radius, 0.0)), Line("tip", (0, 0), np.array([[0, 0, height]], float))]
     return Pieced(pieces, creases, box, profile)
@@ -218,7 +192,7 @@ class Capsule(Pieced):
     def __init__(self, radius=0.5, half=1.0):
         self.half = half
         box = [[-radius, -radius, -half - radius], [radius, radius, half + radius]]
-        pieces = [Ball((0, 0, -half), radius), Tube(radius, box), Ball((0, 0, half), radius)]
+        pieces = [Ball((0, 0, -half), radius), Mantle(0.0, radius, box), Ball((0, 0, half), radius)]
         creases = [Line("joint", (0, 1), ring(radius, -half)), Line("joint", (1, 2), ring(radius, half))]
         profile = [
             (0, Arc(-half, radius, 0.0, np.pi / 2)),

@@ -5,7 +5,6 @@ from .ffe import write_ffe as write_ffe
 from .ffe_reader import FfeBlock as FfeBlock
 from .ffe_reader import read_ffe as read_ffe
 from .mat import write_mat as write_mat
-from .mat_reader import read_mat as read_mat
 from .measured import MeasuredCut as MeasuredCut
 from .measured import read_cut as read_cut
 from .polylines import polydata as polydata

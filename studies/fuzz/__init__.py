@@ -10,7 +10,7 @@ from collections.abc import Callable
 from studies.fuzz.attack import Attack
 from studies.fuzz.calls import BadCalls
 from studies.fuzz.expressions import Expressions, Specs
-from studies.fuzz.fields import FarFiles, MatFiles
+from studies.fuzz.fields import FarFiles
 from studies.fuzz.files import CadFiles, Directions, Studies, meshes
 from studies.fuzz.origins import Origins
 from studies.fuzz.stored import Fits, Maps, Stores
@@ -30,7 +30,6 @@ ATTACKS: dict[str, Callable[[], Attack]] = {
     "directions-csv": lambda: Directions("csv"),
     "directions-npy": lambda: Directions("npy"),
     "ffe": FarFiles,
-    "mat": MatFiles,
     "map": Maps,
     "fit": Fits,
     "store": Stores,

@@ -196,23 +196,3 @@ def far_field_text() -> bytes:
             lines.append("".join(f"{value:18.9E}" for value in values))
         lines.append("")
     return "\n".join(lines).encode()
-
-
-def matlab(*, packed: bool) -> bytes:
-    """A MATLAB file with everything that is read."""
-    from scipy.io import savemat
-
-    held = io.BytesIO()
-    grid = np.arange(24.0).reshape(2, 3, 4)
-    content = {
-        "f": grid * np.exp(1j * grid),
-        "level": np.where(grid > 20, np.nan, -grid),
-        "status": np.array([0, 1, 255], dtype=np.uint8),
-        "unresolved": grid[0, 0] > 1,
-        "method": np.array(["rays", "currents", "inside"], dtype=object),
-        "rows": np.array(["VV ", "HH ", "pec"]),
-        "units": {"f": "m", "level": "dBsm", "more": {"k": "1/m", "n": np.int32(3)}},
-        "about": "caf\u00e9",
-    }
-    savemat(held, content, do_compression=packed, long_field_names=True)
-    return held.getvalue()

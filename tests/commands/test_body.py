@@ -45,7 +45,7 @@ def test_run_with_an_expression(tmp_path, capsys):
 
 
 def test_run_with_a_mesh(ball, tmp_path, capsys):
-    options = [*SHORT, "--length", 1, "--units", "mm", "-o", tmp_path]
+    options = [*SHORT, "--length", 1, "--units", "mm", "--no-pictures", "-o", tmp_path]
     code, out, err = creeping("run", ball, *options, capsys=capsys)
     assert code == 0
     assert "reading the mesh" in err and "fitting" in err
@@ -70,20 +70,26 @@ def test_run_with_a_mesh(ball, tmp_path, capsys):
     assert 0 < entry["uncertain_by"]["rms"] <= entry["uncertain_by"]["max"] < 1e-2 * entry["largest"]
 
 
-def test_fitted_bodies_in_the_cache(ball, tmp_path, capsys, monkeypatch):
+def test_maps_and_fitted_bodies_in_the_cache(ball, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path))
     assert "0 maps, 0 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
     body = sc.Mesh(ball, "mm")
-    assert "0 maps, 1 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
-    (row,) = json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])
-    assert f"({row['fit']})" in body.fingerprint and row["MB"] > 0
-    assert creeping("cache", "verify", capsys=capsys)[:2] == (0, f"ok       {row['fit']}\n")
-    file = tmp_path / "fits" / f"{row['fit']}.npz"
-    file.write_bytes(file.read_bytes()[:-1])
+    cr.build_phase_map(sc.Sphere(), horizon=0.5, grid=(12, 16), degree=3, cache=True)
+    assert "1 maps, 1 fitted bodies" in creeping("cache", "ls", capsys=capsys)[1]
+    rows = json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])
+    (row,) = (one for one in rows if "fit" in one)
+    assert len(rows) == 2 and f"({row['fit']})" in body.fingerprint and row["MB"] > 0
     code, out, _ = creeping("cache", "verify", capsys=capsys)
-    assert code == 3 and "DAMAGED" in out
-    assert "removed 0 maps, 1 fitted bodies" in creeping("cache", "clear", capsys=capsys)[1]
-    assert not file.exists()
+    assert code == 0 and f"ok       {row['fit']}\n" in out
+    (state,) = tmp_path.glob("*/state-0.npy")
+    for file in (tmp_path / "fits" / f"{row['fit']}.npz", state):
+        whole = file.read_bytes()
+        file.write_bytes(whole[:-1] + bytes([whole[-1] ^ 0x55]))
+        code, out, _ = creeping("cache", "verify", capsys=capsys)
+        assert code == 3 and "DAMAGED" in out
+        file.write_bytes(whole)
+    assert "removed 1 maps, 1 fitted bodies" in creeping("cache", "clear", capsys=capsys)[1]
+    assert not any((tmp_path / "fits").glob("*.npz")) and not state.exists()
 
 
 def test_check_of_a_mesh(ball, tmp_path, capsys):
@@ -153,7 +159,6 @@ def test_options_of_files_reach_the_body(balls, capsys):
         (["--part", 3], "part = 3 is none of balls.off"),
         (["--part", "wing"], "no part 'wing'"),
         (["--cap", -1], "cap = -1.0 is no size in m"),
-        (["--cap", 0], "cap = 0.0 is no size in m"),
         (["--subdivide", 4], "subdivide = 4; give 1, 2 or 3 times"),
         (["--sew", 0.1], "--sew does not belong to this body"),
     ],
@@ -163,22 +168,6 @@ def test_bad_options_of_files_are_exit_code_3(balls, options, match, capsys):
     assert code == 3 and match in err and "Traceback" not in err
 
 
-def test_a_body_without_charts_is_refused(capsys, monkeypatch):
-    def none(*_, **__):
-        raise ValueError("no charts for 68 of 25260 points of the body; give one without sharp parts")
-
-    monkeypatch.setattr("scatterers.atlas.monge.atlas.MongeAtlas.covering", none)
-    torus = "(x**2 + y**2 + z**2 + 0.75)**2 - 4*(x**2 + y**2)"
-    code, _, err = creeping("check", torus, capsys=capsys)
-    assert code == 3 and "no charts for 68 of 25260 points" in err and "Traceback" not in err
-
-
-def test_check_names_a_folder_that_cannot_be(ball, tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    code, _, err = creeping("check", ball, "--units", "mm", "-o", tmp_path / "file", capsys=capsys)
-    assert code == 3 and "cannot make the folder" in err
-
-
 @pytest.mark.parametrize(
     "body, more, match",
     [
@@ -186,18 +175,9 @@ def test_check_names_a_folder_that_cannot_be(ball, tmp_path, capsys):
         ("ball", ["--units", "yard"], "units = 'yard' is none of m, mm"),
         ("cube", ["--units", "m", "--strict"], "not smooth enough (sharp)"),
         ("none.stl", ["--units", "m"], "none.stl is no file on this machine"),
-        ("none.step", [], "none.step is no file"),
         ("none.xyz", [], "unknown body 'none.xyz'"),
-        ("cuboid", [], "unknown body 'cuboid'; give one of sphere"),
         ("torus", ["--units", "mm"], "--units does not belong to this body: torus takes none"),
-        ("torus", ["--strict"], "--strict does not belong to this body: torus takes none"),
-        (
-            "x**2 + y**2 + z**2 - 1",
-            ["--units", "mm"],
-            "--units does not belong to this body: 'x**2 + y**2 + z**2 - 1' takes --strict",
-        ),
         ("x**2 + y**2 - 1", [], "x**2 + y**2 - 1: "),
-        ("x**2 + y**2 + z**2 - w", [], "w"),
         ("__import__('os').system('touch hey') + x", [], ""),
     ],
 )

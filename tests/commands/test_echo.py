@@ -44,53 +44,26 @@ def test_map_of_target_strength_without_pictures(tmp_path, capsys):
     assert float(rows[0]["level_db"]) == pytest.approx(20 * np.log10(0.05 * 0.04 / 0.06 / 2), abs=1.0)
 
 
-GOOD = {
-    "frequency": "10GHz",
-    "wavelength": None,
-    "sound_speed": None,
-    "polarisation": None,
-    "boundary": "pec",
-    "monostatic": None,
-    "bistatic": None,
-    "incidence": None,
-}
+NONE = dict.fromkeys(("wavelength", "sound_speed", "polarisation", "monostatic", "bistatic", "incidence"))
+GOOD = NONE | {"frequency": "10GHz", "boundary": "pec"}
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        {"frequency": None},
-        {"wavelength": "3cm"},
-        {"frequency": None, "wavelength": "3"},
-        {"frequency": "ten"},
-        {"frequency": "3cm"},
+        *({"frequency": None}, {"wavelength": "3cm"}, {"frequency": "ten"}),
         {"frequency": None, "wavelength": "300mhz"},
         {"polarisation": "HH,HH"},
-        {"polarisation": "left"},
         {"polarisation": "HH", "boundary": "soft"},
         {"monostatic": "az", "bistatic": "el"},
-        {"monostatic": "round"},
-        {"monostatic": "az:0"},
-        {"monostatic": "az:5:3:1"},
-        {"monostatic": "az:1:2"},
-        {"monostatic": "el:-100:0:1"},
-        {"incidence": "1"},
+        *({"monostatic": text} for text in ("round", "az:5:3:1", "el:-100:0:1")),
         {"incidence": "0,95"},
     ],
+    ids=str,
 )
 def test_bad_options(bad):
     with pytest.raises(InvalidInputError, match="--"):
         echo_request("rcs", **(GOOD | bad))
-
-
-def test_what_is_taken_if_nothing_is_asked_for():
-    request = echo_request("rcs", **GOOD)
-    assert (request.angle_name, request.span, request.channels) == ("azimuth", (0.0, 360.0), ("HH", "VV"))
-    assert echo_request("rcs", **(GOOD | {"frequency": "1:2:1GHz"})).angle_name == ""
-    assert echo_request("rcs", **(GOOD | {"incidence": "30,0"})).angle_name == ""
-    cut = echo_request("rcs", **(GOOD | {"monostatic": "el:-10:10:5", "incidence": "30,0"}))
-    azimuths, elevations = cut.angles(sc.Sphere())
-    assert azimuths.tolist() == [30.0] * 5 and elevations.tolist() == [-10, -5, 0, 5, 10]
 
 
 def test_a_reference_that_does_not_fit_is_refused_first(tmp_path, capsys):
@@ -101,12 +74,8 @@ def test_a_reference_that_does_not_fit_is_refused_first(tmp_path, capsys):
     assert ran("rcs", "sphere", "--frequency", "1GHz", "--polarisation", "HH", "--compare", given, "-o", tmp_path) == 3
     assert "--column" in capsys.readouterr().err
     assert ran("ts", "sphere", "--frequency", "1kHz", "--sound-speed", 1500, "--boundary", "pec") == 3
-
-
-def test_formats_are_checked_before_anything_is_computed(capsys, tmp_path):
-    for text in ("xls", "csv,csv"):
-        assert ran("rcs", "sphere", "--frequency", "1GHz", "--format", text, "-o", tmp_path / "x") == 3
-        assert "give some of csv, mat" in capsys.readouterr().err
+    assert ran("rcs", "sphere", "--frequency", "1GHz", "--format", "csv,csv", "-o", tmp_path / "x") == 3
+    assert "give some of csv, mat" in capsys.readouterr().err
 
 
 def test_a_comparison_that_fails_costs_no_results(tmp_path, capsys):
@@ -139,29 +108,12 @@ def test_azimuths_of_another_turn_are_compared_and_polar_angles_are_not(tmp_path
 def test_what_may_take_minutes_is_told_before():
     """Of a slender body over a band, and not of a few values, nor of those that rays alone compute."""
     fish = sc.Ellipsoid(0.07, 0.007, 0.007)
-    asked = {"wavelength": None, "sound_speed": 1477.0, "polarisation": None, "boundary": "soft", "bistatic": None}
-    asked |= {"incidence": None}
-    band = echo_request("ts", frequency="38:200:2kHz", monostatic="az:2", **asked)
+    asked = NONE | {"sound_speed": 1477.0, "boundary": "soft"}
+    band = echo_request("ts", **asked | {"frequency": "38:200:2kHz", "monostatic": "az:2"})
     at = band.angles(fish)
     words = _cost(fish, band, *at, "auto")
     # a run of it took 75 minutes
     assert 40 <= int(re.search(r"about (\d+) min", words)[1]) <= 160 and "--method rays" in words
     assert _cost(fish, band, *at, "rays") == ""
-    few = echo_request("ts", frequency="38kHz", monostatic="az:30", **asked)
+    few = echo_request("ts", **asked | {"frequency": "38kHz", "monostatic": "az:30"})
     assert _cost(fish, few, *few.angles(fish), "auto") == ""
-
-
-@pytest.mark.slow
-def test_band_of_a_capsule(tmp_path, capsys, monkeypatch):
-    """Of a body with joints by currents, which table and text say."""
-    # twelve incidences would be asked for it
-    monkeypatch.setattr("creeping.sweeping.echoes.body_length", lambda body, k: 0.4)
-    words = ["capsule:radius=0.05,length=0.25", "--sound-speed", 1500, "--frequency", "40:50:10kHz"]
-    words += ["--incidence", "0,40", "-o", tmp_path, "--no-cache", "--boundary", "hard"]
-    assert ran("ts", *words) == 0
-    assert "physical optics" not in capsys.readouterr().out
-    rows = table(tmp_path / "ts.csv")
-    assert {row["method"] for row in rows} == {"currents"} and (tmp_path / "ts.png").exists()
-    # of the lower cap or the upper: half its radius
-    assert all(abs(float(row["level_db"]) - 20 * np.log10(0.025)) < 2.0 for row in rows)
-    assert all(float(row["error_m"]) > 0 for row in rows)

@@ -5,14 +5,11 @@ import os
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 import shared_bodies as sc
 from command_line import creeping, table
 
 import creeping as cr
-from creeping.commands import run_field as _field_run
-from creeping.field.boundary import parse_boundary
 from studies.reference import sphere
 
 
@@ -45,7 +42,7 @@ def test_few_rays_are_integrated_directly_and_json_is_all_that_is_printed(tmp_pa
 def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     options = ["--direction", 0.06, 0.03, 1, "--flow", "direct", "--rays", 32, "--length", 3.6]
     options += ["--backend", "matplotlib"]
-    field = ["--wavenumber", 20, "--boundary", "hard", "--observe", "cut:30", "--observe", "grid:45"]
+    field = ["--wavenumber", 20, "--boundary", "hard", "--observe", "cut:30:4", "--observe", "grid:90"]
     code, out, _ = creeping("run", "sphere", *options, *field, "--observe", "150,20", "-o", tmp_path, capsys=capsys)
     assert code == 0
     assert "field: k = 20, hard" in out and "direct integration of order 8" in out
@@ -54,8 +51,8 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     assert sorted(summary["files"]) == sorted(f.name for f in tmp_path.iterdir())
     entry = summary["field"]
     assert (entry["wavenumber"], entry["boundary"], entry["order"]) == (20.0, "hard", 2)
-    assert entry["observe"] == ["cut:30", "grid:45", "150,20"]
-    assert entry["directions"] == sum(entry["methods"].values()) == 361 + 5 * 9 + 1
+    assert entry["observe"] == ["cut:30:4", "grid:90", "150,20"]
+    assert entry["directions"] == sum(entry["methods"].values()) == 91 + 3 * 5 + 1
     assert entry["unresolved"] == entry["not_finite"] == 0
     # known exactly, as are its rays
     assert "uncertain_by" not in entry and not {"fit", "verdict", "error_of_body"} & set(summary)
@@ -64,31 +61,9 @@ def test_run_with_a_wavenumber_writes_the_field(tmp_path, capsys):
     assert entry["largest"] == pytest.approx(forward, rel=0.02)
     rows = table(tmp_path / "far.csv")
     assert len(rows) == entry["directions"]
+    around = {round(float(row["phi"])) for row in rows if row["observe"] == "grid:90"}
+    assert around == {0, 90, 180, 270}
     assert (round(float(rows[-1]["theta"])), round(float(rows[-1]["phi"]))) == (150, 20)
-
-
-@pytest.mark.slow
-def test_run_of_a_conductor_shows_its_currents(tmp_path, capsys):
-    options = ["--direction", 1, 1, 0, "--flow", "direct", "--rays", 32, "--length", 3.2, "--backend", "matplotlib"]
-    field = ["--wavenumber", 30, "--boundary", "pec", "--observe", "backscatter"]
-    code, out, _ = creeping("run", "sphere", *options, *field, "--json", "-o", tmp_path, capsys=capsys)
-    assert code == 0
-    summary = json.loads(out)
-    assert set(summary["files"]) & {"far.csv", "far.png", "far.ffe", "field.png"} == {"far.csv", "field.png"}
-    assert summary["field"]["boundary"] == "pec"
-
-
-def test_a_field_needs_a_good_request():
-    job = _field_run.job(20.0, None, None, (1.0, 1.0, 0.0))
-    assert (job.boundary, [target.text for target in job.targets]) == ("soft", ["cut:45"])
-    assert _field_run.job(None, None, None, (1.0, 0.0, 0.0)) is None
-    assert parse_boundary("impedance:0.5+0.2j").admittance == 0.5 + 0.2j
-    # a cut passes d, and goes on past the pole on the other side
-    cut = job.targets[0]
-    assert np.max(cut.directions @ np.array([1, 1, 0]) / np.sqrt(2)) == pytest.approx(1)
-    np.testing.assert_allclose(cut.directions[[0, 90, 270]] @ [1, 1, 1], [-1, -np.sqrt(2), np.sqrt(2)], atol=1e-12)
-    grid = _field_run.parse_target("grid:30", np.array([1.0, 0, 0]))
-    assert grid.directions.shape == (7 * 13, 3)
 
 
 _SPHERE = ["run", "sphere", "--direction", 1, 0, 0, "-o", "x"]
@@ -99,39 +74,20 @@ _FIELD = [*_SPHERE, "--wavenumber", 20]
     "arguments, match",
     [
         (["run", "cube", "--direction", 1, 0, 0, "-o", "x"], "unknown body 'cube'"),
-        (["run", "sphere:radius=-1", "--direction", 1, 0, 0, "-o", "x"], "radius = -1.0 is not positive"),
-        (["run", "sphere:radius", "--direction", 1, 0, 0, "-o", "x"], "not of the form"),
-        (["run", "sphere:size=1", "--direction", 1, 0, 0, "-o", "x"], "size"),
         (["run", "sphere", "--direction", 0, 0, 0, "-o", "x"], "zero vector"),
-        (["run", "sphere", "--direction", "nan", 0, 0, "-o", "x"], "not finite"),
         (["run", "sphere", "--direction", 1, 0, 0, "--length", -1, "-o", "x"], "--length"),
-        (
-            ["run", "sphere", "--direction", 1, 0, 0, "--spacing", 1e-9, "--flow", "direct", "-o", "x"],
-            "iso-phase levels",
-        ),
-        (["run", "sphere", "--direction", 1, 0, 0, "--tolerance", 0, "-o", "x"], "tolerance"),
-        (["run", "sphere", "--direction", 1, 0, 0, "--speed", "import os", "-o", "x"], "not valid"),
+        ([*_SPHERE, "--spacing", 1e-9, "--flow", "direct"], "iso-phase levels"),
         (["run", "torus", "--direction", 1, 0, 0, "-o", "x"], "crosses itself"),
         ([*_SPHERE, "--boundary", "hard"], "--boundary needs --wavenumber"),
-        ([*_SPHERE, "--boundary", "hard", "--observe", "cut:0"], "--boundary and --observe need --wavenumber"),
         ([*_SPHERE, "--wavenumber", -3], "--wavenumber = -3.0 is not a positive"),
         ([*_FIELD, "--boundary", "firm"], "'firm' is not soft, hard, pec or impedance:ETA"),
-        ([*_FIELD, "--boundary", "impedance:q"], "contains 'q'"),
-        ([*_FIELD, "--boundary", "impedance:-1"], "--boundary 'impedance:-1': admittance"),
         (["check", "ellipsoid:q=1"], "ellipsoid has no parameter 'q'; it has a, b, c"),
-        (["check", "ellipsoid:a=1,a=2,b=1,c=1"], "parameter 'a' of ellipsoid is given twice: 1 and 2"),
-        (["check", "ellipsoid:a=1"], "ellipsoid needs b=, c="),
         ([*_FIELD, "--observe", "sphere:3"], "'sphere:3' is unknown; give cut:PHI"),
-        ([*_FIELD, "--observe", "cut"], "'cut' is unknown"),
         ([*_FIELD, "--observe", "grid:7"], "must divide 180"),
         ([*_FIELD, "--observe", "grid:0.1"], "more than 200000 directions"),
         ([*_FIELD, "--observe", "grid:5", "--observe", "grid:9"], "several grids"),
-        ([*_FIELD, "--observe", "200,0"], "not between 0 and 180"),
-        ([*_FIELD, "--observe", "20,nan"], "is unknown"),
         ([*_FIELD, "--speed", "1 + 0.1*x"], "leave out --speed"),
-        (["check", "sphere", "--speed", "-1"], ""),
         (["figure", "nonsense"], "unknown figure"),
-        (["figure"], "give one figure"),
     ],
 )
 def test_bad_input_is_exit_code_3_and_one_line(arguments, match, capsys, tmp_path, monkeypatch):
@@ -146,14 +102,6 @@ def test_usage_is_exit_code_2(arguments, capsys):
     assert creeping(*arguments, capsys=capsys)[0] == 2
 
 
-def test_output_that_is_a_file_is_named(tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    options = ["--direction", 1, 0, 0, "--flow", "direct", "--rays", 8, "--length", 0.2]
-    code, _, err = creeping("run", "sphere", *options, "-o", tmp_path / "file", capsys=capsys)
-    assert code == 3
-    assert "file" in err
-
-
 def test_interrupt_is_exit_code_130(capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
@@ -162,30 +110,6 @@ def test_interrupt_is_exit_code_130(capsys, monkeypatch):
     code, _, err = creeping("run", "sphere", "--direction", 1, 0, 0, "-o", "x", capsys=capsys)
     assert code == 130
     assert "interrupted" in err
-
-
-def test_check(capsys):
-    code, out, _ = creeping("check", "torus", capsys=capsys)
-    assert code == 0 and "genus 1" in out
-    code, out, _ = creeping("check", "torus", "--json", capsys=capsys)
-    assert code == 0 and json.loads(out)["ok"] is True
-
-
-def test_cache_commands(tmp_path, capsys, monkeypatch):
-    monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "maps"))
-    assert "0 maps" in creeping("cache", "ls", capsys=capsys)[1]
-    options = ["--direction", 1, 0, 0, "--length", 0.2, "--rays", 8, "--tolerance", 1e-2, "--no-pictures"]
-    assert creeping("run", "sphere", *options, "--flow", "map", "-o", tmp_path / "o", capsys=capsys)[0] == 0
-    assert "1 maps" in creeping("cache", "ls", capsys=capsys)[1]
-    assert len(json.loads(creeping("cache", "ls", "--json", capsys=capsys)[1])) == 1
-    assert creeping("cache", "verify", capsys=capsys)[0] == 0
-    (array,) = (tmp_path / "maps").glob("*/state-0.npy")
-    array.write_bytes(array.read_bytes()[:-1] + b"\x55")
-    code, out, _ = creeping("cache", "verify", capsys=capsys)
-    assert code == 3
-    assert "DAMAGED" in out
-    assert "removed 1" in creeping("cache", "clear", capsys=capsys)[1]
-    assert "0 maps" in creeping("cache", "ls", capsys=capsys)[1]
 
 
 def test_cache_clear_leaves_what_is_not_ours(tmp_path, capsys, monkeypatch):
@@ -198,19 +122,14 @@ def test_cache_clear_leaves_what_is_not_ours(tmp_path, capsys, monkeypatch):
     foreign = tmp_path / "maps" / "project"
     foreign.mkdir()
     (foreign / "manifest.json").write_text('{"name": "an app"}')
-    (foreign / "thesis.tex").write_text("ten years")
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    (elsewhere / "manifest.json").write_text("{}")
-    (tmp_path / "maps" / "link").symlink_to(elsewhere)
+    (tmp_path / "maps" / "link").symlink_to(foreign)
     (tmp_path / "maps" / "fits").mkdir()
     (tmp_path / "maps" / "fits" / "data.npz").write_bytes(b"measured")
     code, out, _ = creeping("cache", "clear", capsys=capsys)
     assert code == 3 and "removed 1 maps, 0 fitted bodies" in out
     for name in ("project", "link", "notes.txt", "data.npz"):
         assert name in out
-    assert (foreign / "thesis.tex").exists() and (elsewhere / "manifest.json").exists()
-    assert (tmp_path / "maps" / "fits" / "data.npz").exists()
+    assert (foreign / "manifest.json").exists() and (tmp_path / "maps" / "fits" / "data.npz").exists()
     assert not first.exists() and [path.name for path in second.iterdir()] == ["notes.txt"]
 
 
@@ -230,7 +149,6 @@ def test_a_cache_that_others_can_write_is_not_used(tmp_path, monkeypatch):
     "error, words",
     [
         (MemoryError(), "not enough memory (an array is too large)"),
-        (OverflowError("int too large"), "not enough memory (int too large)"),
         (PermissionError(13, "Permission denied", "/nowhere"), "Permission denied: '/nowhere'"),
     ],
 )

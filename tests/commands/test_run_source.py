@@ -8,7 +8,7 @@ from command_line import ran, table
 
 
 def test_source_of_a_run(tmp_path, capsys):
-    options = ["--flow", "direct", "--rays", 16, "--length", 1, "--format", "csv,mat"]
+    options = ["--flow", "direct", "--rays", 16, "--length", 1, "--format", "csv,mat", "--backend", "matplotlib"]
     assert ran("run", "sphere", "--source", 0, 0, -2, *options, "-o", tmp_path) == 0
     assert "source at (0.0000, 0.0000, -2.0000)" in capsys.readouterr().out
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -20,12 +20,6 @@ def test_source_of_a_run(tmp_path, capsys):
     # counted from the source: the line is sqrt(3) away from it
     assert level.min() >= np.sqrt(3) - 1e-9 and level.max() <= np.sqrt(3) + 1 + 1e-9
     np.testing.assert_allclose(-z, np.cos(np.pi / 3 + level - np.sqrt(3)), atol=1e-6)
-
-
-def test_travel_time_if_asked_for(tmp_path):
-    options = ["--flow", "direct", "--rays", 8, "--length", 1, "--no-pictures", "--of", "travel_time"]
-    assert ran("run", "sphere", "--source", 0, 0, -2, *options, "-o", tmp_path) == 0
-    assert json.loads((tmp_path / "summary.json").read_text())["iso_phase_curves"] == 17
 
 
 @pytest.mark.parametrize(

@@ -28,15 +28,11 @@ NUMBERS_THAT_ARE_NONE = {
     "complex": (np.array([1 + 1j]), "complex"),
     "text": ("1.0", "not an array of numbers"),
     "texts": (["1", "2"], "not an array of numbers"),
-    "text among numbers": (np.array(["1", 2.0], dtype=object), "texts or complex"),
-    "dates": (np.array(["2020-01-01"], dtype="datetime64[D]"), "not an array of numbers"),
     "flags": ([True, False], "not an array of numbers"),
     "masked": (np.ma.masked_array([1.0, 2.0], mask=[True, False]), "masked"),
     "ragged": ([[1.0], [1.0, 2.0]], "not an array of numbers"),
     "too many": (range(10**12), "are more than"),
     "too large": (np.broadcast_to(1.0, (10**12,)), "GB of memory"),
-    "too long a number": ([10**400], "not an array of numbers"),
-    "an object": ([object()], "not an array of numbers"),
 }
 
 
@@ -47,19 +43,12 @@ def test_arrays_that_are_no_numbers(which):
         real_array(values, "lengths")
 
 
-@pytest.mark.parametrize(
-    "value", [None, "2", b"2", 2j, [2.0], np.ones(1), datetime.timedelta(1), np.timedelta64(2), True]
-)
+@pytest.mark.parametrize("value", [None, "2", 2j, np.ones(1), datetime.timedelta(1), np.timedelta64(2), True])
 def test_numbers_that_are_none(value):
     with pytest.raises(cr.InvalidInputError, match="gap = "):
         positive_number(value, "gap")
     with pytest.raises(cr.InvalidInputError, match="count = "):
         whole_number(value, "count")
-
-
-@pytest.mark.parametrize("value", [2, 2.0, np.float32(2), np.int8(2), np.array(2.0)])
-def test_numbers_of_any_type(value):
-    assert positive_number(value, "gap") == 2.0
 
 
 WITH_BODY = {
@@ -71,7 +60,7 @@ WITH_BODY = {
     "choose_flow": lambda body: cr.choose_flow(body, n_rays=4, length=1.0, cache=False),
     "load_phase_map": lambda body: cr.load_phase_map("nowhere", body),
 }
-NO_BODIES = {"none": None, "number": 3, "class": sc.Sphere, "flow": FLOW, "array": np.ones(3), "text": "sphere"}
+NO_BODIES = {"number": 3, "class": sc.Sphere, "flow": FLOW}
 
 
 @pytest.mark.parametrize("which", NO_BODIES)
@@ -79,14 +68,6 @@ NO_BODIES = {"none": None, "number": 3, "class": sc.Sphere, "flow": FLOW, "array
 def test_what_is_no_body(name, which):
     with pytest.raises(cr.InvalidInputError, match=r"body = .* (is no body|is a class)"):
         WITH_BODY[name](NO_BODIES[which])
-
-
-def test_a_body_with_members_that_are_no_methods():
-    class Hollow:
-        level = gradient = hessian = bounds = atlas = None
-
-    with pytest.raises(cr.InvalidInputError, match="that are no methods"):
-        cr.check_surface(Hollow())
 
 
 WITH_FAN = {
@@ -101,14 +82,14 @@ WITH_FAN = {
 }
 
 
-@pytest.mark.parametrize("value", [None, 3, BODY, FLOW, [1, 2]], ids=repr)
+@pytest.mark.parametrize("value", [None, FLOW], ids=repr)
 @pytest.mark.parametrize("name", WITH_FAN)
 def test_what_is_no_fan(name, value):
     with pytest.raises(cr.InvalidInputError, match=r"fan = .* is no RayFan; make one by creeping.launch"):
         WITH_FAN[name](value)
 
 
-@pytest.mark.parametrize("value", [None, 3, BODY, cr.DirectFlow], ids=repr)
+@pytest.mark.parametrize("value", [None, BODY, cr.DirectFlow], ids=repr)
 def test_what_is_no_flow_or_line(line, value):
     with pytest.raises(cr.InvalidInputError, match="is no flow"):
         cr.launch(value, line, length=1.0)
@@ -125,37 +106,17 @@ def sweep(**options):
 CALLS = {
     "steps of states": (lambda line, fan: FLOW.transport(np.ones((2, 7)), [1.0]), "states have shape"),
     "states": (lambda line, fan: FLOW.transport(None, [1.0]), "states"),
-    "times": (lambda line, fan: FLOW.transport(np.ones((2, 6)), None), "times"),
-    "rtol": (lambda line, fan: cr.DirectFlow(BODY, rtol="1e-8"), "rtol"),
     "error": (lambda line, fan: cr.DirectFlow(BODY, error=3), "no ErrorEstimate"),
-    "launch from": (lambda line, fan: line.launch_points(8, launch_from="everywhere"), "neither 'attached' nor"),
     "launch points": (lambda line, fan: line.launch_points(None), "n_rays"),
-    "arcs": (lambda line, fan: line.arcs(np.ones(3)), "neither 'attached' nor"),
-    "gap": (lambda line, fan: cr.launch(FLOW, line, length=1.0, max_gap="x"), "max_gap"),
     "length": (lambda line, fan: cr.launch(FLOW, line, length=np.ones(2)), "length"),
     "of": (lambda line, fan: cr.iso_phase_curves(fan, [1.0], of=np.ones(2)), "neither 'travel_time'"),
     "tolerance": (lambda line, fan: cr.build_phase_map(BODY, tolerance="1e-6", cache=False), "tolerance"),
-    "degree": (lambda line, fan: cr.build_phase_map(BODY, degree=np.ones(3), cache=False), "degree"),
-    "progress": (lambda line, fan: cr.build_phase_map(BODY, progress=3, cache=False), "cannot be called"),
-    "length of a choice": (lambda line, fan: cr.choose_flow(BODY, n_rays=3, length=None), "length"),
-    "boundary": (lambda line, fan: sweep(boundary=3), "boundary"),
     "store": (lambda line, fan: sweep(store=3), "store"),
-    "whole length": (lambda line, fan: sweep(length=10**400), "length"),
     "wavenumber": (lambda line, fan: cr.far_field(fan, [(0, 0, 1)], wavenumber=1e300), "another unit of length"),
-    "admittance": (lambda line, fan: cr.ImpedanceBoundary("0.5"), "not a complex number"),
     "length beyond all": (lambda line, fan: cr.launch(FLOW, line, length=2**63, n_steps=8), "sizes of the body"),
-    "length of a sweep": (lambda line, fan: sweep(length=1e16), "sizes of the body"),
     "length below all": (lambda line, fan: sweep(length=1e-9), "less than 1e-06 sizes of the body"),
-    "points of a line": (lambda line, fan: cr.shadow_line(BODY, (0, 0, 1), n_points=10**400), "n_points"),
-    "duration": (lambda line, fan: cr.launch(FLOW, line, length=np.timedelta64(3, "s")), "length"),
-    "number of directions": (lambda line, fan: cr.fibonacci_directions(np.timedelta64(3, "s")), "n = "),
     "chunk": (lambda line, fan: sweep(chunk=np.timedelta64(3, "s")), "chunk"),
-    "grid without end": (lambda line, fan: cr.build_phase_map(BODY, grid=range(10**12), cache=False), "grid"),
-    "cache": (lambda line, fan: cr.build_phase_map(BODY, cache="a\0b"), "cache"),
-    "long name": (lambda line, fan: cr.choose_flow(BODY, n_rays=3, length=1.0, cache="a" * 300), "cache"),
-    "steps of a map": (lambda line, fan: cr.build_phase_map(BODY, length=1.0, n_steps=2**40, cache=False), "GB of"),
-    "far off": (lambda line, fan: cr.near_field(fan, [[1e300] * 3], wavenumber=9.0), "beyond 1e.15"),
-    "order": (lambda line, fan: cr.surface_field(fan, wavenumber=9.0, order=np.ones(2)), "order"),
+    "complex": (lambda line, fan: cr.near_field(fan, [[0, 0, 3j]], wavenumber=9.0), "points are complex"),
 }  # fmt: skip
 
 
@@ -186,25 +147,16 @@ def test_a_cache_that_cannot_be_written_is_gone_without():
     assert any("no cache in /proc" in line for line in said)
 
 
-def test_one_point_is_as_good_as_many(fan):
-    currents = cr.surface_currents(fan, wavenumber=10.0)
-    assert currents.changed([0.0, 0.0, 1.0]).shape == (1,)
-
-
 def test_bodies_refuse_as_well():
-    with pytest.raises(ValueError, match="not a finite number"):
-        sc.Sphere(10**400)
-    with pytest.raises(ValueError, match="are not numbers"):
-        sc.Implicit("x**2 + y**2 + z**2 - 1", range(10**12))
-    with pytest.raises(ValueError, match="neither True nor False"):
-        sc.Implicit("x**2 + y**2 + z**2 - 1", strict=1j)
-    with pytest.raises(ValueError, match=r"whole numbers from .* to 1000"):
-        sc.Gridded.sampled(BODY, 2**31)
-    with pytest.raises(ValueError, match="no name of a file"):
-        sc.examined_mesh("a" * 5000, "m")
-    with pytest.raises(ValueError, match="is no body"):
-        sc.Gridded.sampled(None)
-    with pytest.raises(ValueError, match="nodes = None"):
-        sc.Gridded.sampled(BODY, None)
-    with pytest.raises(ValueError, match="is none of"):
-        sc.examined_mesh("body.stl", np.ones(2))
+    ball = "x**2 + y**2 + z**2 - 1"
+    for make, match in (
+        (lambda: sc.Sphere(10**400), "not a finite number"),
+        (lambda: sc.Implicit(ball, range(10**12)), "are not numbers"),
+        (lambda: sc.Implicit(ball, strict=1j), "neither True nor False"),
+        (lambda: sc.Gridded.sampled(BODY, 2**31), r"whole numbers from .* to 1000"),
+        (lambda: sc.Gridded.sampled(None), "is no body"),
+        (lambda: sc.examined_mesh("a" * 5000, "m"), "no name of a file"),
+        (lambda: sc.examined_mesh("body.stl", np.ones(2)), "is none of"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            make()

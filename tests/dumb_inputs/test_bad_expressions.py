@@ -9,93 +9,28 @@ import pytest
 from scatterers.implicit import Implicit
 
 SPHERE = "x**2 + y**2 + z**2 - 1"
-CUBE = [[-2.0] * 3, [2.0] * 3]
 ALLOWED = "allowed are numbers, x, y, z, pi"
 
 HOSTILE = {
     "import": "__import__('os').system('touch {file}')",
-    "import by a call": "x + __import__('os').system('touch {file}')",
-    "open": "open('{file}', 'w')",
-    "exec": 'exec(\'open("{file}", "w")\')',
-    "eval in sin": 'sin(eval(\'open("{file}", "w")\'))',
-    "attribute": "x.real",
     "attributes of a class": "().__class__.__bases__[0].__subclasses__()",
-    "method of a string": "'{file}'.join(())",
     "comprehension": "[open('{file}', 'w') for x in (1, 2)]",
-    "generator": "sum(x for x in (1, 2))",
     "lambda": "(lambda: open('{file}', 'w'))()",
-    "walrus": "(x := 3) + y",
-    "f string": 'f\'{{open("{file}", "w")}}\'',
-    "string": "'x'",
-    "bytes": "b'x' + x",
-    "subscript": "x[0]",
-    "conditional": "x if y else z",
-    "comparison": "x < 1",
-    "and": "x and y",
-    "not": "not x",
-    "tuple": "x, y",
-    "dictionary": "{{x: y}}",
-    "starred argument": "sin(*x)",
-    "keyword": "sin(x=1)",
     "two arguments": "log(x, 2)",
-    "max of one": "max(x)",
-    "max with a keyword": "max(x, y, key=z)",
-    "max of a tower": "max(exp(exp(exp(19))), x)",
     "function without a call": "sin + x",
-    "function of a function": "sin(cos)(x)",
-    "unknown function": "abs(x) + y",
-    "unknown name": "w + x",
-    "dunder": "__builtins__",
-    "matrix product": "x @ y",
-    "remainder": "x % 2",
-    "floor": "x // 2",
-    "shift": "x << 2",
-    "bits": "~x",
-    "complex": "1j*x",
-    "truth": "True + x",
-    "nothing": "None",
-    "ellipsis": "...",
     "huge power": "x**65",
     "power of a variable": "2**x",
-    "tower": "x**9**9**9",
-    "tower of numbers": "9**9**9 + x",
-    "tower in brackets": "((9**12)**60)**60*x",
-    "infinite": "1e400*x",
-    "not a number": "log(0) + x",
-    "division by zero": "x/(1 - 1)",
-    "negative power of zero": "0**-1 + x",
     "complex root": "sqrt(-1) + x",
-    "complex root of a number": "(-8)**0.5*x",
-    "root that is nowhere real": "sqrt(-x**2) - 1",
-    "long number": "1" * 1500 + " + x",
-    "many minus": "-" * 150 + "x",
     "long sum": "+".join(["x"] * 900),
-    "complex power": "x**sqrt(-1)",
-    "power of a complex number": "sqrt(-1)**2 + x",
-    "infinite power": "x**log(0)",
-    "tower of exponentials": "exp(exp(exp(17)))**2*x",
-    "tower of floats": "exp(exp(exp(1e12)))*x",
-    "comparison with infinity": "where(log(0) < x, x, y)",
     "comparison with a complex number": "where(sqrt(-1) < x, x, y)",
-    "comparison with a tower": "where(exp(exp(exp(19))) < 2, x, y)",
-    "chained comparison": "where(x < y < z, x, y)",
-    "equality": "where(x == 0, 1, y)",
-    "membership": "where(x in y, 1, y)",
-    "where without a comparison": "where(x, 1, y)",
-    "where with two arguments": "where(x < 0, y)",
     "nested calls": "sin(" * 130 + "x" + ")" * 130,
 }
 NOT_VALID = {
     "statement": "x = 1",
-    "two statements": "x; y",
-    "import statement": "import os",
-    "two lines": "x\n+ 1",
-    "bracket": "(x",
-    "null": "x\0",
     "deep brackets": "(" * 500 + "x" + ")" * 500,
     "caret in words": "x squared",
 }
-NO_TEXT = {"empty": "", "blank": "  \n", "number": 3, "none": None, "bytes": b"x", "array": np.ones(3), "list": ["x"]}
+NO_TEXT = {"empty": "", "blank": "  \n", "number": 3, "array": np.ones(3)}
 
 
 @pytest.mark.parametrize("which", HOSTILE)
@@ -123,28 +58,22 @@ def test_nothing_to_parse(which):
 
 
 def test_long_text():
-    with pytest.raises(ValueError, match="3999 characters, more than 2000"):
+    with pytest.raises(ValueError, match="3999 characters, more than 2000") as caught:
         Implicit("+".join(["x"] * 2000))
+    assert len(str(caught.value)) < 500
 
 
-@pytest.mark.parametrize("text", ["sqrt(x**2) + sqrt(y**2) + z**2 - 1", "sqrt((x**2+y**2+z**2-1)**2)"])
-def test_absolute_values_have_no_second_derivative(text):
+def test_absolute_values_have_no_second_derivative():
     with pytest.raises(ValueError, match=r"\|.*\|.*smooth"):
-        Implicit(text)
+        Implicit("sqrt(x**2) + sqrt(y**2) + z**2 - 1")
 
 
 NO_BODY = {
     "nowhere negative": ("x**2 + y**2 + z**2 + 1", None, "no body"),
-    "touching zero": ("(x**2+y**2+z**2-1)**2", None, "no body"),
-    "constant": ("1", None, "no body"),
     "everywhere negative": ("-1", None, "sign turned"),
     "inverted": ("1 - x**2 - y**2 - z**2", None, "sign turned"),
-    "inverted in bounds": ("1 - x**2 - y**2 - z**2", CUBE, "turn the sign"),
     "plane": ("x + y + z", None, "open"),
     "cylinder": ("x**2 + y**2 - 1", None, "unbounded"),
-    "cylinder in bounds": ("x**2 + y**2 - 1", CUBE, "F = 0 is open or cut there; give wider bounds"),
-    "paraboloid": ("x**2 + y**2 - z", None, "unbounded"),
-    "hyperboloid": ("x**2 + y**2 - z**2 - 1", None, "unbounded"),
     "lattice": ("sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)", None, "unbounded"),
     "two": (
         "((x-2)**2+y**2+z**2-1)*((x+2)**2+y**2+z**2-1)",
@@ -157,12 +86,9 @@ NO_BODY = {
         "again beyond it: several bodies or an unbounded one; give bounds",
     ),
     "too far off": ("(x-1000)**2 + y**2 + z**2 - 1e-4", None, "too small or too far off; give bounds"),
-    "too large": ("x**2 + y**2 + z**2 - 1e10", None, "give bounds"),
     "cavity": ("(x**2+y**2+z**2-4)*(x**2+y**2+z**2-1)", None, "cavity inside the body; .* give F of the outer wall"),
-    "shell": ("(sqrt(x**2+y**2+z**2)-1)**2-.04", None, "cavity"),
     "not finite": ("log(x**2+y**2+z**2-.5)", None, r"not finite at \d+ of \d+ points .*without poles and roots"),
     "root of a negative number": ("sqrt(x) + y**2 + z**2 - 1", None, "not finite at"),
-    "overflow": ("exp(exp(x**2+y**2+z**2)) - 9", CUBE, "not finite at"),
     "vanishing gradient": ("(x**2+y**2+z**2-1)**3", None, r"not smooth: grad F = 0 at .* of its points, first \("),
     "cusp": ("x**2+y**2-z**3*(1-z)", None, r"not smooth: grad F = 0 at 1 of its points, .* a cusp or a crossing"),
     "torus that touches itself": ("(sqrt(x**2+y**2) - 1)**2 + z**2 - 1", None, "F = 0 is not smooth: its"),
@@ -185,6 +111,7 @@ def test_expressions_that_are_no_body(which):
         ("sqrt(x**2+y**2) - (1-z**2)/2", r"it has 2 tips, first .* leave strict out to take them"),
         ("where(z < 0, z**2/2, z**3 - z**2) + x**2 + y**2", r"it has 1 tips, first \(0.0, 0.0, 0.0\)"),
         ("(sqrt(x**2+y**2) - .5)**2 + z**2 - 1", r"it has 2 tips, first \(.*0.866"),
+        ("max(x**2 + y**2 + z**2 - 1, z - 0.3)", r"its normal jumps by up to \d+ degrees near .*round them off"),
     ],
 )
 def test_what_is_refused_as_strict(text, match):
@@ -194,16 +121,9 @@ def test_what_is_refused_as_strict(text, match):
 
 BAD_BOUNDS = {
     "NaN": ([[np.nan] * 3, [2] * 3], "no box"),
-    "infinite": ([[-np.inf] * 3, [2] * 3], "no box"),
     "shape": ([[-2, -2], [2, 2]], "no box"),
-    "six numbers": ([-2, 2, -2, 2, -2, 2], "no box"),
-    "corners exchanged": (CUBE[::-1], "no box"),
-    "flat": ([[-2, -2, 0], [2, 2, 0]], "no box"),
     "text": ("all", "not numbers"),
-    "ragged": ([[1, 2, 3], [1]], "not numbers"),
-    "objects": ([[None] * 3, [2] * 3], "no box"),
     "cuts the body": ([[-0.5, -2, -2], [2, 2, 2]], "cut there; give wider bounds"),
-    "inside the body": ([[-0.5] * 3, [0.5] * 3], "cut there; give wider bounds"),
     "beside the body": ([[3] * 3, [5] * 3], "nowhere negative at .* points of the bounds: no body"),
 }
 
@@ -219,12 +139,9 @@ def test_bad_bounds(which):
     "text, centre, match",
     [
         (SPHERE, (2, 0, 0), "not inside the body; give a centre from which every point"),
-        (SPHERE, (90, 0, 0), "not inside the body"),
         (SPHERE, (np.nan, 0, 0), "centre"),
-        (SPHERE, (1, 0), "centre"),
         (SPHERE, "middle", "centre"),
         ("(sqrt(x**2 + y**2) - 1)**2 + z**2 - 0.25", (1, 0, 0), "not star-shaped about .* directions fail"),
-        ("(sqrt(x**2 + y**2) - 1)**2 + z**2 - 0.25", (0, 0, 0), "not inside the body"),
     ],
 )
 def test_bad_centres(text, centre, match):
@@ -237,28 +154,3 @@ def test_bad_speeds():
         Implicit(SPHERE, speed="__import__('os')")
     with pytest.raises(TypeError, match="speed 3 is neither"):
         Implicit(SPHERE, speed=3)
-
-
-def test_messages_are_short():
-    for text in ("+".join(["x"] * 900), "1" * 1500 + "+x", "(" * 500 + "x" + ")" * 500):
-        with pytest.raises(ValueError) as caught:
-            Implicit(text)
-        assert len(str(caught.value)) < 500
-
-
-EDGES = {
-    "octahedron": "where(x < 0, -x, x) + where(y < 0, -y, y) + where(z < 0, -z, z) - 1",
-    "cut ball": "max(x**2 + y**2 + z**2 - 1, z - 0.3)",
-    "lens": "where(z > 0, x**2 + y**2 + (z + 0.5)**2 - 1, x**2 + y**2 + (z - 0.5)**2 - 1)",
-}
-
-
-@pytest.mark.parametrize("name", EDGES)
-def test_pieces_that_join_in_an_edge_are_refused_as_strict(name):
-    with pytest.raises(ValueError, match=r"its normal jumps by up to \d+ degrees near .*round them off"):
-        Implicit(EDGES[name], strict=True)
-
-
-@pytest.mark.parametrize("flatness", [20.0, 100.0, 1000.0])
-def test_thin_discs_are_no_edges(flatness):
-    assert Implicit(f"x**2 + y**2 + {flatness**2!r}*z**2 - 1").star_shaped

@@ -31,34 +31,32 @@ def field(request):
     return FIELDS[request.param]
 
 
-@pytest.mark.parametrize("k", [0, -1.0, NAN, float("inf"), "ten", None, 1j, [10.0, 20.0]])
-def test_bad_wavenumbers_are_named(field, fan, k):
-    with pytest.raises(cr.CreepingError, match="wavenumber"):
-        field(fan, wavenumber=k)
+@pytest.mark.parametrize(
+    "bad",
+    [
+        *({"wavenumber": k} for k in (0, -1.0, NAN, "ten", None, 1j, [10.0, 20.0])),
+        *({"order": order} for order in (0, 3, 1.5, "2")),
+        *({"boundary": boundary} for boundary in ("softt", None, 1j)),
+    ],
+    ids=str,
+)
+def test_bad_options_are_named(field, fan, bad):
+    (name,) = bad
+    with pytest.raises(cr.CreepingError, match=name):
+        field(fan, **({"wavenumber": 10.0} | bad))
 
 
-@pytest.mark.parametrize("order", [0, 3, -1, 1.5, "2", None])
-def test_bad_orders_are_named(field, fan, order):
-    with pytest.raises(cr.CreepingError, match="order"):
-        field(fan, wavenumber=10.0, order=order)
-
-
-@pytest.mark.parametrize("boundary", ["softt", None, 1.0, 1j])
-def test_bad_boundaries_are_named(field, fan, boundary):
-    with pytest.raises(cr.CreepingError, match="boundary"):
-        field(fan, wavenumber=10.0, boundary=boundary)
-
-
-@pytest.mark.parametrize("name", ["near", "surface"])
-def test_a_conductor_has_functions_of_its_own(fan, name):
-    with pytest.raises(cr.CreepingError, match="conductor_field gives its E and H"):
-        FIELDS[name](fan, wavenumber=10.0, boundary="pec")
-
-
-@pytest.mark.parametrize("at", [[1.0, 0.0], 3.0, [[1.0, 0, 0, 0]], np.zeros((3, 2))])
-def test_arrays_of_a_wrong_shape_are_named(field, fan, at):
-    with pytest.raises(cr.CreepingError, match="shape"):
+@pytest.mark.parametrize("at", [[1.0, 0.0], 3.0, [[1.0, 0, 0, 0]], "abc", [[1.0, 2.0], [3.0]], {"x": 1}], ids=str)
+def test_points_of_a_wrong_shape_or_that_are_no_numbers_are_named(field, fan, at):
+    match = "observation|points" if at in ("abc", {"x": 1}, [[1.0, 2.0], [3.0]]) else "shape"
+    with pytest.raises(cr.CreepingError, match=match):
         field(fan, at=at, wavenumber=10.0)
+
+
+def test_a_conductor_has_functions_of_its_own(fan):
+    for name in ("near", "surface"):
+        with pytest.raises(cr.CreepingError, match="conductor_field gives its E and H"):
+            FIELDS[name](fan, wavenumber=10.0, boundary="pec")
 
 
 @pytest.mark.parametrize("bad", [NAN, float("inf")])
@@ -66,19 +64,6 @@ def test_rows_that_are_not_finite_are_counted(field, fan, bad):
     at = np.array([[0.0, 0.6, 0.8], [bad, 0, 1], [0.6, 0.0, 0.8]])
     with pytest.raises(cr.CreepingError, match="1 of 3"):
         field(fan, at=at, wavenumber=10.0)
-
-
-@pytest.mark.parametrize("at", ["abc", [["a", "b", "c"]], [[1.0, 2.0], [3.0]], None, {"x": 1}])
-def test_far_observers_that_are_no_numbers_are_named(fan, at):
-    with pytest.raises(cr.CreepingError, match="observation"):
-        cr.far_field(fan, at, wavenumber=10.0)
-
-
-@pytest.mark.parametrize("at", ["abc", [["a", "b", "c"]], [[1.0, 2.0], [3.0]], {"x": 1}])
-@pytest.mark.parametrize("name", ["near", "surface"])
-def test_points_that_are_no_numbers_are_named(fan, name, at):
-    with pytest.raises(cr.CreepingError, match="points"):
-        FIELDS[name](fan, at=at, wavenumber=10.0)
 
 
 def test_a_direction_of_no_length_is_counted(fan):
@@ -106,19 +91,13 @@ def test_weighted_bodies_are_refused(field):
         field(fan, wavenumber=10.0)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(0.5), "pec"])
-def test_no_directions_give_an_empty_far_field(fan, boundary):
+@pytest.mark.parametrize("boundary", ["soft", "pec"])
+def test_no_points_give_empty_fields(fan, boundary):
+    for field in (cr.near_field, cr.surface_field):
+        assert field(fan, np.zeros((0, 3)), wavenumber=10.0).shape == (0,)
     far = cr.far_field(fan, np.zeros((0, 3)), wavenumber=10.0, boundary=boundary)
     assert far.total.shape == ((0, 2, 2) if boundary == "pec" else (0,))
     assert len(repr(far).splitlines()) == 3
-
-
-def test_no_points_on_the_body_give_an_empty_field(fan):
-    assert cr.surface_field(fan, np.zeros((0, 3)), wavenumber=10.0).shape == (0,)
-
-
-def test_no_points_give_an_empty_near_field(fan):
-    assert cr.near_field(fan, np.zeros((0, 3)), wavenumber=10.0).shape == (0,)
 
 
 def no_rays():
@@ -142,8 +121,7 @@ def test_a_fan_without_rays_sheds_nothing():
     assert cr.surface_field(fan, wavenumber=20.0).shape == (0, len(fan.travel_time))
 
 
-@pytest.mark.parametrize("n_rays", [1, 2, 3])
-@pytest.mark.parametrize("boundary", ["soft", cr.ImpedanceBoundary(1)])
+@pytest.mark.parametrize(("n_rays", "boundary"), [(1, "soft"), (2, cr.ImpedanceBoundary(1)), (3, "soft")])
 def test_a_fan_of_few_rays_gives_finite_fields_or_says_so(n_rays, boundary):
     fan = launched(n_rays=n_rays)
     far = cr.far_field(fan, [[0.0, 0.6, -0.8], [0.6, 0.0, 0.8]], wavenumber=20.0, boundary=boundary)

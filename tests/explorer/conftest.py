@@ -34,18 +34,16 @@ return null;
 # what never leaves the machine; with "chrome" and its relatives the browser fetches its own pages, a new tab's for one
 LOCAL = ("about", "blob", "chrome", "chrome-extension", "chrome-untrusted", "data", "devtools", "file")
 FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-dev-shm-usage",
-    "--window-size=480,360",
-)
+    "--headless=new --no-sandbox --disable-gpu --enable-unsafe-swiftshader --disable-quic --no-first-run "
+    "--disable-background-networking --disable-component-update --disable-sync --disable-dev-shm-usage "
+    "--window-size=480,360"
+).split()
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Bodies of the page in fewer triangles."""
+    monkeypatch.setattr("creeping.explorer.scene.CELLS", 20)
 
 
 class Browser:

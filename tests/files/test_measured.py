@@ -35,17 +35,7 @@ def test_usual_headers(tmp_path, text):
     assert cut.of("HV") is None
 
 
-@pytest.mark.parametrize(
-    ("name", "polar"),
-    [
-        ("azimuth", False),
-        ("phi", False),
-        ("angle (deg)", False),
-        ("theta", True),
-        ("Elevation (deg)", True),
-        ("el", True),
-    ],
-)
+@pytest.mark.parametrize(("name", "polar"), [("phi", False), ("angle (deg)", False), ("theta", True), ("el", True)])
 def test_polar_angles_are_told_by_their_names(tmp_path, name, polar):
     assert read_cut(written(tmp_path, f"{name},VV\n0,-20\n90,-21\n")).polar is polar
 
@@ -57,16 +47,6 @@ def test_frequencies_and_no_header(tmp_path):
     assert levels[0] == -46.2 and np.isnan(levels[1])
     cut = read_cut(written(tmp_path, "0 -1\n1 -2\n2 -3\n"))
     assert cut.over == "angle" and cut.of("VV").tolist() == [-1, -2, -3]
-
-
-@pytest.mark.parametrize(
-    "text", ["", "words only\n", "0\n1\n2\n", "a,b\n1,2\n", "0,1\n1,2,3\n", "angle,phase\n0,1\n1,2\n"]
-)
-def test_what_is_no_cut(tmp_path, text):
-    with pytest.raises(cr.InvalidInputError):
-        read_cut(written(tmp_path, text))
-    with pytest.raises(cr.InvalidInputError, match="cannot read"):
-        read_cut(tmp_path / "none.csv")
 
 
 def test_own_table_reads_back(tmp_path):
@@ -102,11 +82,18 @@ def test_the_column_that_varies_is_the_angle(tmp_path, text):
         "0,5;-10,2\n1,5;-11,2\n",
         "theta,phi,HH\n0,1,2\n1,2,3\n",
         "HH,angle\n-1,0\n-2,\n",
+        # no cut at all
+        "",
+        "0\n1\n2\n",
+        "a,b\n1,2\n",
+        "angle,phase\n0,1\n1,2\n",
     ],
 )
 def test_tables_that_would_be_misread_are_refused(tmp_path, text):
     with pytest.raises(cr.InvalidInputError):
         read_cut(written(tmp_path, text))
+    with pytest.raises(cr.InvalidInputError, match="cannot read"):
+        read_cut(tmp_path / "none.csv")
 
 
 @pytest.mark.parametrize(
@@ -114,8 +101,6 @@ def test_tables_that_would_be_misread_are_refused(tmp_path, text):
     [
         ({"MOST_BYTES": 10}, "angle,HH\n0,1\n1,2\n", "0 MB"),
         ({"MOST_ROWS": 2}, "angle,HH\n0,1\n1,2\n2,3\n", "line 4: more than 2 rows"),
-        ({"MOST_NUMBERS": 4}, "angle,HH\n0,1\n1,2\n2,3\n", "line 4: more than 4 numbers"),
-        ({"MOST_HEADERS": 1}, "# a\n# b\n0,1\n1,2\n", "line 2: more than 1 lines"),
         ({"LONGEST": 20}, "angle,HH\n0," + "1" * 19 + "\n1,2\n", "line 2: more than 20 characters"),
     ],
 )
@@ -124,19 +109,3 @@ def test_tables_that_are_too_large_are_refused(tmp_path, monkeypatch, bound, tex
         monkeypatch.setattr(measured, name, most)
     with pytest.raises(cr.InvalidInputError, match=said):
         read_cut(written(tmp_path, text))
-
-
-def test_a_line_without_an_end_is_not_read_to_its_end(tmp_path):
-    file = tmp_path / "endless.csv"
-    with file.open("wb") as stream:
-        stream.truncate(measured.MOST_BYTES - 1)
-    with pytest.raises(cr.InvalidInputError, match="line 1: more than"):
-        read_cut(file)
-
-
-def test_messages_list_few_columns(tmp_path):
-    names = ["angle", *(f"phase {i}" for i in range(200))]
-    text = ",".join(names) + "\n" + (",".join("1" * 201) + "\n") * 2
-    with pytest.raises(cr.InvalidInputError, match="and 189 more") as refused:
-        read_cut(written(tmp_path, text))
-    assert len(str(refused.value)) < 500

@@ -29,7 +29,6 @@ BACK = 0.05
 """Of a target strength where k times the waist is 12 or more, dB: by rays always, by currents in the mean."""
 WORST = 0.1
 """The same by currents, the largest."""
-THIN = 0.8
 """ka up to which a body is nowhere thick enough for currents to be judged inside it."""
 
 
@@ -129,29 +128,5 @@ def test_errors_stated_for_backscatter(shape, kind):
     assert np.mean(shares <= 1) > 0.9 and shares.max() < 1.5
 
 
-def test_a_low_frequency_is_covered():
-    off, share, unresolved = back("sphere", "hard", 120.0)
-    assert abs(off) < 2.5 and share < 1.5 and not unresolved
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("shape", ["sphere", "spheroid"])
-@pytest.mark.parametrize("kind", ["hard", "soft"])
-def test_low_frequencies_are_covered_or_unknown(shape, kind):
-    for f in LOW:
-        off, share, unresolved = back(shape, kind, f)
-        # 3 dB at ka = 0.5, 0.8 dB at 3
-        assert abs(off) < 2.5 and (share < 1.5 or waist(f) > 5)
-    for f in (12.0, 14.0, 18.0):
-        off, share, unresolved = back(shape, kind, f)
-        if shape == "sphere":
-            assert share < 1 and not unresolved and abs(off) < 0.25
-        else:
-            assert waist(f) < THIN and np.isnan(share) and unresolved and abs(off) < 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["hard", "soft"])
-def test_errors_stated_at_all_aspects(kind):
-    shares = np.array([back("spheroid", kind, 38.0, degrees)[1] for degrees in np.arange(0.0, 91.0, 6.0)])
-    assert np.mean(shares <= 1) > 0.9 and shares.max() < 1.5
+def test_a_high_frequency_by_rays():
+    assert abs(back("sphere", "hard", HIGH[0], method="rays")[0]) < BACK + ROUNDING

@@ -30,26 +30,11 @@ def test_errors_have_not_grown(fan, row, k):
     assert field_sphere.row_functions()[row](fan, k) <= FACTOR * limit
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("boundary", ["soft", "hard"])
-def test_total_over_all_angles(boundary):
-    shares, jump = field_sphere.sectors(field_sphere.sphere_fan(6.6), 100.0, boundary)
-    assert max(shares) < 0.5
-    assert jump < 3.0
-
-
-@pytest.mark.parametrize("boundary", ["soft", "hard"])
+@pytest.mark.parametrize("boundary", ["soft", pytest.param("hard", marks=pytest.mark.slow)])
 def test_second_order_falls_with_frequency(fan, boundary):
     """The error of creeping rays falls at least like 1/ka."""
     errors = [field_sphere.creeping_rays(fan, k, boundary, 2) for k in (30.0, 300.0)]
     assert errors[1] < errors[0] / 9
-
-
-@pytest.mark.parametrize("eta", [0.3 - 0.2j])
-def test_impedance_on_the_body(fan, eta):
-    theta = np.radians(np.array([20.0, 40, 60, 80, 88]))
-    found = cr.surface_field(fan, field_sphere.observers(theta), wavenumber=30.0, boundary=cr.ImpedanceBoundary(eta))
-    assert found == pytest.approx(sphere.surface_field(30.0, 1.0, np.cos(theta), eta), rel=5e-3)
 
 
 @pytest.mark.parametrize(("method", "k"), [("rays", 30.0), pytest.param("currents", 10.0, marks=pytest.mark.slow)])
@@ -60,12 +45,6 @@ def test_impedance_passes_to_hard(fan, method, k):
     assert nearly == pytest.approx(hard, rel=1e-4)
 
 
-def test_soft_field_on_the_body_at_grazing(fan):
-    theta = np.radians(np.array([89.0, 89.9]))
-    found = cr.surface_field(fan, field_sphere.observers(theta), wavenumber=30.0, boundary="soft")
-    assert found == pytest.approx(sphere.surface_derivative(30.0, 1.0, np.cos(theta), "soft"), rel=1e-3)
-
-
 def test_conductor_ahead_and_behind(fan):
     """The radar cross sections that are measured most; no polarisation is turned."""
     ff = cr.far_field(fan, [[0, 0, 1.0], [0, 0, -1.0]], wavenumber=100.0, boundary="pec")
@@ -73,13 +52,3 @@ def test_conductor_ahead_and_behind(fan):
     assert np.abs(ff.total[0, 0, 0]) == pytest.approx(abs(within[0]), rel=2e-3)
     assert np.abs(ff.total[1, 0, 0]) == pytest.approx(abs(within[1]), rel=2e-3)
     assert np.abs(ff.total[:, 0, 1]).max() < 1e-3 * abs(within[1])
-
-
-def test_result_does_not_depend_on_azimuth(fan):
-    theta = np.radians(77.0)
-    r = [[np.sin(theta) * np.cos(a), np.sin(theta) * np.sin(a), np.cos(theta)] for a in np.linspace(0, 6, 7)]
-    f = cr.far_field(fan, r, wavenumber=50.0, boundary="hard", method="rays").total
-    assert f == pytest.approx(np.full(7, f[0]), rel=1e-6)
-    # the quadrature of currents knows no axis
-    f = cr.far_field(fan, r, wavenumber=50.0, boundary="hard", method="currents").total
-    assert f == pytest.approx(np.full(7, f[0]), rel=1e-4)

@@ -6,8 +6,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.geometry.creased import drawn_mesh
-from creeping.plotting import coupling_picture, surface_field_picture
-from creeping.plotting.body_fronts import chains, front_strokes
+from creeping.plotting import coupling_picture
+from creeping.plotting.body_fronts import front_strokes
 from creeping.plotting.coupling_pictures import coupling_levels
 
 BALL = sc.Sphere()
@@ -32,6 +32,8 @@ def test_picture(tmp_path, backend, request):
     assert coupling_picture(tmp_path / "a.png", BALL, (0, 0, 1), **options) == backend
     image = imread(tmp_path / "a.png")[..., :3]
     assert np.mean(np.ptp(image, axis=-1) > 0.2) > 0.1
+    with pytest.raises(cr.InvalidInputError, match=r"edges a wavelength; 4.5 are the least: give .* times the cells"):
+        coupling_picture(tmp_path / "b.png", BALL, (0, 0, 1), **options | {"wavenumber": 60.0})
 
 
 def test_fronts_of_a_plane_wave_are_circles():
@@ -59,20 +61,3 @@ def test_fronts_end_where_the_field_is_not_known():
     (stroke,) = front_strokes(BALL, mesh, wave, known, wavenumber=8.0)
     assert min(line[:, 0].min() for line in stroke.lines) > -1e-9
     assert front_strokes(BALL, mesh, wave, np.zeros(len(wave), dtype=bool), wavenumber=8.0) == []
-
-
-def test_chains_keep_every_segment():
-    rng = np.random.default_rng(2)
-    order = rng.permutation(30)
-    closed = np.stack([order, np.roll(order, -1)], axis=1)[rng.permutation(30)]
-    (chain,) = chains(closed)
-    assert len(chain) == 31 and chain[0] == chain[-1] and set(chain.tolist()) == set(range(30))
-    assert len(chains(closed[1:])) == 1 and chains(np.zeros((0, 2), dtype=int)) == []
-
-
-def test_coarse_meshes_have_no_fronts(tmp_path):
-    fan = cr.launch(cr.DirectFlow(BALL), cr.shadow_line(BALL, (0, 0, 1)), length=2.2, n_rays=24)
-    options = {"wavenumber": 60.0, "boundary": "hard", "backend": "matplotlib", "fronts": True}
-    with pytest.raises(cr.InvalidInputError, match=r"edges a wavelength; 4.5 are the least: give .* times the cells"):
-        surface_field_picture(tmp_path / "a.png", fan, cells=12, **options)
-    assert not list(tmp_path.iterdir())

@@ -1,7 +1,6 @@
 """The question whether OpenGL works, with a subprocess that answers in every way."""
 
 import json
-import subprocess
 from types import SimpleNamespace
 
 import pytest
@@ -29,7 +28,7 @@ def forget():
     display._verdict.cache_clear()
 
 
-def test_asks_once_per_process_and_once_per_machine(answers, fresh_display):
+def test_asks_once_per_process_and_once_per_machine(answers, fresh_display, monkeypatch):
     assert gl_available() == GLProbe(True, "rendered")
     assert gl_available().ok
     assert answers.calls == 1
@@ -37,23 +36,14 @@ def test_asks_once_per_process_and_once_per_machine(answers, fresh_display):
     assert gl_available().ok
     assert answers.calls == 1
     assert len(json.loads(fresh_display.read_text())) == 1
-
-
-def test_another_display_asks_again(answers, monkeypatch):
-    gl_available()
+    # another display asks again
     monkeypatch.setenv("DISPLAY", ":77")
-    gl_available()
-    assert answers.calls == 2
+    assert gl_available().ok and answers.calls == 2
 
 
 @pytest.mark.parametrize(
     ("code", "stderr", "message"),
-    [
-        (-11, b"", "signal 11"),
-        (3, b"", "blank"),
-        (1, b"Traceback\nImportError: libX11.so.6: cannot open", "libX11.so.6"),
-        (7, b"", "exit code 7"),
-    ],
+    [(-11, b"", "signal 11"), (3, b"", "blank"), (1, b"ImportError: libX11.so.6: cannot open", "libX11.so.6")],
 )
 def test_failure_names_the_packages(answers, code, stderr, message):
     answers.code, answers.stderr = code, stderr
@@ -64,27 +54,12 @@ def test_failure_names_the_packages(answers, code, stderr, message):
         assert package in probe.reason
 
 
-def test_timeout_is_not_remembered(answers, fresh_display):
-    answers.raises = subprocess.TimeoutExpired("python", 60)
-    assert "60 s" in gl_available().reason
-    assert not fresh_display.exists()
-
-
-@pytest.mark.parametrize("content", ["", "{", "[]", "null", '{"x": 3}', "\x00\xff"])
+@pytest.mark.parametrize("content", ["{", "null", '{"x": 3}', "\x00\xff"])
 def test_damaged_cache_asks_again(answers, fresh_display, content):
     fresh_display.parent.mkdir()
     fresh_display.write_text(content, encoding="latin-1")
     assert gl_available().ok
     assert answers.calls == 1
-
-
-def test_wrong_entry_asks_again(answers, fresh_display):
-    gl_available()
-    stored = json.loads(fresh_display.read_text())
-    fresh_display.write_text(json.dumps({key: {"ok": "yes"} for key in stored}))
-    forget()
-    assert gl_available().ok
-    assert answers.calls == 2
 
 
 def test_unwritable_cache_is_no_error(answers, monkeypatch, tmp_path):

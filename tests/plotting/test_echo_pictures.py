@@ -26,9 +26,15 @@ def two_channels(second):
     return replace(one, channels=("HH", "VV"), parts=both, **twice)
 
 
-@pytest.mark.parametrize("kind", ["cartesian", "polar"])
-def test_of_equal_curves_the_broken_one_lies_on_top(drawn, kind):
-    echo_pictures.echo_cut_picture("a.png", two_channels(1.0), kind=kind)
+def several(echo):
+    """The same at two wavenumbers."""
+    parts = {name: np.repeat(v, 2, axis=2) for name, v in echo.parts.items()}
+    flags = {name: np.repeat(getattr(echo, name), 2, axis=2) for name in ("error", "unresolved", "by_currents")}
+    return replace(echo, wavenumbers=np.array([20.0, 21.0]), parts=parts, **flags)
+
+
+def test_of_equal_curves_the_broken_one_lies_on_top(drawn):
+    echo_pictures.echo_cut_picture("a.png", two_channels(1.0))
     (figure,) = drawn
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     assert lines["VV"].get_zorder() > lines["HH"].get_zorder() and lines["VV"].get_linestyle() != "-"
@@ -39,10 +45,7 @@ def test_of_equal_curves_the_broken_one_lies_on_top(drawn, kind):
 def test_a_curve_below_the_picture_is_told_in_the_legend(drawn, over):
     echo = two_channels(1e-6)
     if over == "frequency":
-        several = {name: np.repeat(v, 2, axis=2) for name, v in echo.parts.items()}
-        flags = {name: np.repeat(getattr(echo, name), 2, axis=2) for name in ("error", "unresolved", "by_currents")}
-        echo = replace(echo, wavenumbers=np.array([20.0, 21.0]), parts=several, **flags)
-        echo_pictures.echo_band_picture("a.png", echo)
+        echo_pictures.echo_band_picture("a.png", several(echo))
     else:
         echo_pictures.echo_cut_picture("a.png", echo)
     first, second = (text.get_text() for text in drawn[0].legends[0].get_texts())
@@ -51,13 +54,11 @@ def test_a_curve_below_the_picture_is_told_in_the_legend(drawn, over):
 
 
 def test_of_a_map_what_is_unresolved_has_a_veil(drawn):
-    echo = two_channels(0.5)
-    several = {name: np.repeat(v, 2, axis=2) for name, v in echo.parts.items()}
-    flags = {name: np.repeat(getattr(echo, name), 2, axis=2) for name in ("error", "unresolved", "by_currents")}
-    echo = replace(echo, wavenumbers=np.array([20.0, 21.0]), parts=several, **flags)
+    echo = several(two_channels(0.5))
     echo_pictures.echo_map_picture("a.png", echo)
-    flags["unresolved"][1, 0, 1] = True
-    echo_pictures.echo_map_picture("a.png", replace(echo, unresolved=flags["unresolved"]))
+    unresolved = echo.unresolved.copy()
+    unresolved[1, 0, 1] = True
+    echo_pictures.echo_map_picture("a.png", replace(echo, unresolved=unresolved))
     clear, veiled = drawn
     assert not clear.legends and veiled.legends[0].get_texts()[0].get_text() == "veiled: unresolved"
     shown = [int(np.ma.count(ax.collections[1].get_array())) for ax in veiled.axes if ax.get_title()]

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from fake_fields import far_of
 
 import creeping as cr
 from creeping.plotting._strokes import FADED, curve_pieces
@@ -41,11 +40,3 @@ def test_the_plane_fills_its_page(which, request):
     width, height = figure.get_size_inches()
     # a quarter of the height was blank above and below
     assert box.height / height > 0.85 and box.width / width > 0.85
-
-
-def test_parts_are_named_by_their_component():
-    values = np.arange(1, 5).reshape(2, 2) * np.ones((5, 1, 1))
-    phi = np.radians([0.0, 90, 180, 270, 360])
-    far = far_of(np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=-1), values, boundary="pec")
-    labels = [line.get_label() for line in far.plot(parts=True).lines]
-    assert {"θθ (VV)", "φφ (HH)", "θθ (VV), creeping"} <= set(labels) and not any("total" in label for label in labels)

@@ -7,7 +7,6 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.plotting import currents_picture, decay_picture, field_pictures, surface_field_picture
-from creeping.plotting.display import GLProbe
 from creeping.plotting.field_pictures import surface_levels
 from studies.reference import sphere
 
@@ -40,36 +39,6 @@ def test_levels_are_those_of_the_exact_series(fan, boundary):
     assert error.max() < 0.06
 
 
-@pytest.mark.parametrize("boundary", ["hard", "soft", cr.ImpedanceBoundary(0.5 + 0.2j)])
-def test_lit_side_joins_the_shadow(fan, boundary):
-    # the leading order has Fock's function on both sides of the shadow line
-    left, right = surface_levels(fan, at([89.9999, 90.0001]), wavenumber=K, boundary=boundary, order=1)
-    assert left == pytest.approx(right, abs=0.01)
-
-
-def test_shadow_is_the_surface_field(fan):
-    points = at([100.0, 130.0])
-    field = cr.surface_field(fan, points, wavenumber=K, boundary="soft")
-    levels = surface_levels(fan, points, wavenumber=K, boundary="soft")
-    np.testing.assert_allclose(levels, 20 * np.log10(np.abs(field) / K))
-
-
-def test_shadow_without_rays_is_nan():
-    body = sc.Sphere()
-    short = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=0.3, n_rays=16)
-    levels = surface_levels(short, at([95.0, 170.0]), wavenumber=K, boundary="hard")
-    assert np.isfinite(levels).tolist() == [True, False]
-
-
-@pytest.mark.slow
-def test_inner_equator_of_a_torus_is_not_lit_behind_its_tube():
-    body = sc.Torus()
-    line = cr.shadow_line(body, (1, 0, 0.2))
-    fan = cr.launch(cr.DirectFlow(body), line, length=0.2, n_rays=8)
-    points = np.array([[-1.5, 0, 0], [1.5, 0, 0], [0.5, 0, 0]])
-    assert np.isfinite(surface_levels(fan, points, wavenumber=20.0)).tolist() == [True, False, False]
-
-
 @pytest.mark.parametrize("backend", ["matplotlib", "pyvista"])
 def test_picture_of_the_body(tmp_path, fan, backend, request):
     from matplotlib.image import imread
@@ -83,11 +52,6 @@ def test_picture_of_the_body(tmp_path, fan, backend, request):
     # coloured, not grey
     assert np.mean(np.ptp(image, axis=-1) > 0.2) > 0.1
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_auto_falls_back_to_matplotlib(tmp_path, fan, monkeypatch):
-    monkeypatch.setattr("creeping.plotting.pictures.gl_available", lambda: GLProbe(False, "no libEGL"))
-    assert surface_field_picture(tmp_path / "a.png", fan, wavenumber=K, cells=12, dpi=40) == "matplotlib"
 
 
 @pytest.mark.parametrize("boundary", ["hard", "soft"])
@@ -129,13 +93,6 @@ def test_bad_input_is_refused(tmp_path, fan, draw, change, match):
     with pytest.raises(cr.InvalidInputError, match=match):
         draw(tmp_path / "a.png", fan, **options)
     assert not list(tmp_path.iterdir())
-
-
-def test_unknown_backend_and_no_rays(tmp_path, fan):
-    with pytest.raises(cr.InvalidInputError, match="backend 'povray'"):
-        surface_field_picture(tmp_path / "a.png", fan, wavenumber=K, backend="povray")
-    with pytest.raises(cr.InvalidInputError, match="at least one ray"):
-        decay_picture(tmp_path / "a.png", fan, wavenumber=K, rays=0)
 
 
 @pytest.mark.parametrize("boundary", ["hard", "pec"])

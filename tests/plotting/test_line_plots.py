@@ -5,7 +5,6 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.plotting._view import View
 from creeping.plotting.pictures import new_figure
 
 
@@ -75,14 +74,6 @@ def test_axes_that_are_given_get_no_legend_unasked(twisted_fan, ball_cut, small_
     assert not ball_cut.plot(legend=False).figure.legends
 
 
-def test_axes_of_a_torus_are_its_own(torus_fan):
-    ax = torus_fan.plot()
-    assert "psi" in ax.get_xlabel()
-    assert ax.get_ylim() == (-180, 180)
-    # no levels, no colour bar
-    assert not ax.child_axes
-
-
 def test_a_curve_alone_tells_the_torus_by_its_angles(twisted_curves, torus_fan):
     alone = twisted_curves[0].plot()
     assert "phi" in alone.get_xlabel()
@@ -92,15 +83,6 @@ def test_a_curve_alone_tells_the_torus_by_its_angles(twisted_curves, torus_fan):
     assert "psi" in curve.plot().get_xlabel()
     # axes with a picture know better
     assert "psi" in twisted_curves[0].plot(torus_fan.plot()).get_xlabel()
-
-
-def test_fan_in_space(twisted_fan, twisted_curves):
-    ax = twisted_fan.plot(kind="3d", curves=twisted_curves, rays=8)
-    assert ax.name == "3d"
-    start = twisted_fan.points[0, 0]
-    found = np.concatenate([np.concatenate(one._segments3d) for one in ax.collections if hasattr(one, "_segments3d")])
-    assert np.linalg.norm(found - start, axis=1).min() < 1e-12
-    ax.figure.draw_without_rendering()
 
 
 @pytest.mark.parametrize("name", ["fan", "line", "curve"])
@@ -115,14 +97,3 @@ def test_axes_in_space_choose_the_picture(twisted_fan, twisted_curves, name):
         shown.plot(new_figure((4, 4)).add_subplot(), kind="3d")
     with pytest.raises(cr.InvalidInputError, match="kind '4d' is unknown"):
         shown.plot(kind="4d")
-
-
-def test_curve_in_space_keeps_its_points(twisted_curves):
-    (drawn_line,) = twisted_curves[0].plot(kind="3d").lines
-    found = np.stack(drawn_line.get_data_3d(), axis=-1)
-    np.testing.assert_array_equal(found[: len(twisted_curves[0].points)], twisted_curves[0].points)
-
-
-def test_view_is_for_space(twisted_fan):
-    with pytest.raises(cr.InvalidInputError, match="kind='3d'"):
-        twisted_fan.plot(view=View(0.1, 0.2))

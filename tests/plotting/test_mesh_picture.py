@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creeping import CreepingError
 from creeping.plotting.mesh_picture import HEIGHT, WIDTH, MeshValues, mesh_picture
 from studies._meshes import geodesic_sphere
 
@@ -23,7 +22,7 @@ def ball():
     return MeshValues(vertices, triangles, values, np.zeros(len(vertices), dtype=bool), "a ball")
 
 
-@pytest.mark.parametrize("count, dpi", [(1, 50), (1, 100), (2, 50)])
+@pytest.mark.parametrize("count, dpi", [(1, 60), (2, 50)])
 def test_sizes(tmp_path, ball, count, dpi):
     mesh_picture(tmp_path / "a.png", *count * [ball], dpi=dpi)
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG\r\n")
@@ -45,27 +44,9 @@ def test_colours_and_dots_are_those_of_the_values(tmp_path, ball):
     mesh_picture(tmp_path / "bad.png", bad, dpi=60)
     good, high, bad = (pixels(tmp_path / f"{name}.png") for name in ("good", "high", "bad"))
     # the ends of viridis: violet is low, yellow high, shaded
-    yellow, violet, red = (
-        ((0.5, 0.45, 0.0), (1, 1, 0.3)),
-        ((0.1, 0, 0.2), (0.4, 0.3, 0.6)),
-        ((0.5, 0, 0), (0.9, 0.4, 0.4)),
-    )
+    yellow, violet = ((0.5, 0.45, 0.0), (1, 1, 0.3)), ((0.1, 0, 0.2), (0.4, 0.3, 0.6))
+    red = (0.5, 0, 0), (0.9, 0.4, 0.4)
     assert share(high, *yellow) > 0.2 > 0.05 > share(good, *yellow)
     assert share(good, *violet) > 0.2 > 0.05 > share(high, *violet)
     # a line of text is of the colour of the dots
     assert share(bad, *red) > 3 * share(good, *red)
-
-
-def test_values_at_the_ends_are_drawn(tmp_path, ball):
-    values = np.geomspace(1e-30, 1e3, len(ball.values))
-    values[0] = 0.0
-    mesh_picture(tmp_path / "a.png", replace(ball, values=values), dpi=40)
-    assert pixels(tmp_path / "a.png").std() > 0.05
-
-
-@pytest.mark.parametrize("name", ["missing/a.png", "file/a.png", "."])
-def test_a_file_that_cannot_be_written_is_named(tmp_path, ball, name):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(CreepingError):
-        mesh_picture(tmp_path / name, ball, dpi=40)
-    assert [f.name for f in tmp_path.iterdir()] == ["file"]

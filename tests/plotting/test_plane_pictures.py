@@ -1,5 +1,7 @@
 """Pictures of the field on a plane: what is drawn where, and what is said of points that are not to be trusted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shared_bodies as sc
@@ -39,6 +41,8 @@ def test_levels_stand_where_the_points_are(total):
     half = 0.5 * (total.across[1] - total.across[0])
     assert (left, right, bottom, top) == pytest.approx((-1.5 - half, 1.5 + half, -1.5 - half, 1.5 + half))
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("z (L)", "x (L)")
+    marks = [line for line in ax.lines if line.get_marker() == "o"]
+    np.testing.assert_allclose(np.sort(marks[0].get_xydata()[:, 1]), [-1, 1], atol=1e-4)
 
 
 def test_wave_fronts_of_the_incident_wave_are_half_a_wavelength_apart(total):
@@ -67,8 +71,6 @@ def test_what_is_missing_is_grey_and_named(rays):
 
 
 def test_a_field_below_its_error_is_dotted(total):
-    from dataclasses import replace
-
     doubtful = replace(total.field, error=np.full(total.field.error.shape, 0.5))
     ax = replace(total, field=doubtful).plot(legend=False)
     assert any(one.hatches == [plane_marks.DOTS] for one in ax.collections if hasattr(one, "hatches"))
@@ -77,32 +79,7 @@ def test_a_field_below_its_error_is_dotted(total):
     assert not any(getattr(one, "hatches", None) == [plane_marks.DOTS] for one in certain.plot().collections)
 
 
-@pytest.mark.parametrize("show", ["magnitude", "wave"])
-def test_nothing_known_is_all_grey(rays, show):
-    from dataclasses import replace
-
-    lost = replace(rays.field, status=np.full(rays.field.status.shape, int(cr.FieldStatus.LIT)))
-    ax = replace(rays, field=lost).plot(show=show)
-    np.testing.assert_array_equal(ax.images[1].get_array()[..., 3] == 1.0, rays.outside)
-
-
-def test_a_plane_off_the_origin_says_where_it_is(fan):
-    cut = cr.field_cut(fan, wavenumber=K, boundary="hard", point=(0, 0, 1.5), across=(1, 0, 0), up=(0, 1, 0), step=0.4)
-    assert cut.plot(fronts=False).get_xlabel() == "x (L), at z = 1.5"
-
-
-def test_marks_of_the_shadow_line(total):
-    marks = [line for line in total.plot().lines if line.get_marker() == "o"]
-    np.testing.assert_allclose(np.sort(marks[0].get_xydata()[:, 1]), [-1, 1], atol=1e-4)
-
-
-def test_wave_turns_with_the_phase(total):
-    shown = [total.plot(show="wave", phase=phase).images[0].get_array() for phase in (0.0, np.pi)]
-    np.testing.assert_allclose(shown[0], -shown[1], atol=1e-12)
-
-
-@pytest.mark.parametrize("show", ["level", "magnitude", "wave"])
-@pytest.mark.parametrize("error", [False, True])
+@pytest.mark.parametrize(("show", "error"), [("level", False), ("magnitude", False), ("wave", True)])
 def test_files(tmp_path, total, show, error):
     from matplotlib.image import imread
 

@@ -40,14 +40,11 @@ def test_a_response_has_its_paths_at_their_delays(two_paths):
     assert ax.get_xlim() == (1.0, 8.0) and "(L)" in ax.get_xlabel()
     bound = next(one for one in ax.lines if one.get_label() == "error at most")
     assert bound.get_ydata()[0] == pytest.approx(-60.0)
-
-
-def test_seconds_are_shown_in_a_unit_that_suits():
+    # seconds in a unit that suits
     k = np.linspace(200.0, 400.0, 101)
     ax = cr.impulse_response(np.exp(0.3j * k), k, speed=3e8, start=0.0).plot()
-    assert "(ns)" in ax.get_xlabel()
     x, y = ax.lines[0].get_data()
-    assert x[np.argmax(y)] == pytest.approx(1.0, abs=0.1)
+    assert "(ns)" in ax.get_xlabel() and x[np.argmax(y)] == pytest.approx(1.0, abs=0.1)
 
 
 def test_what_cannot_be_drawn_is_refused(two_paths):
@@ -69,6 +66,13 @@ def test_a_range_profile_has_its_echo_at_its_range():
     assert x[np.argmax(y)] == pytest.approx(-1.5, abs=0.05) and y.max() == pytest.approx(20 * np.log10(0.5), abs=0.05)
     assert "(m)" in ax.get_xlabel() and "re 1 m" in ax.get_ylabel()
     assert repr(found).startswith("RangeProfile(") and "array" not in repr(found)
+    assert "resolution" in found._repr_html_() and "radar cross section" in echo_of(1.0, 0.1)._repr_html_()
+
+
+def test_tables_of_notebooks_say_what_they_are(two_paths, ports, pattern):
+    for result in (two_paths, ports, pattern):
+        table = result._repr_html_()
+        assert type(result).__name__ in table and "array" not in table and "nan" not in table
 
 
 def test_a_coupling_matrix_shows_its_levels(ports):
@@ -108,16 +112,3 @@ def test_an_echo_draws_what_varies():
     assert ds["level"].attrs["units"] == "dBsm" and ds["total"].dims == ("channel", "angle", "frequency")
     np.testing.assert_allclose(ds["level"], 10 * np.log10(np.pi))
     assert len(both.to_dataframe()) == 6
-
-
-@pytest.mark.parametrize("name", ["two_paths", "ports", "pattern"])
-def test_tables_of_notebooks_say_what_they_are(name, request):
-    result = request.getfixturevalue(name)
-    table = result._repr_html_()
-    assert type(result).__name__ in table and "array" not in table and "nan" not in table
-
-
-def test_tables_of_echoes_and_profiles():
-    assert "radar cross section" in echo_of(1.0, 0.1)._repr_html_()
-    k = np.linspace(100.0, 200.0, 201)
-    assert "resolution" in cr.range_profile(np.exp(2j * k), k)._repr_html_()

@@ -35,6 +35,28 @@ def test_words_and_facts(fan):
         assert not any(value.endswith(("L", "/L")) for value in told.values())
 
 
+def test_pictures_say_metres(fan, monkeypatch, tmp_path):
+    curves = cr.iso_phase_curves(fan, [0.5, 1.0])
+    assert _strokes.LevelColours.of(curves).words(0.5) == "travel time = 0.5 m"
+    ax = parameter_plane.plot_parameters(fan.line, fan, curves)
+    labels = [one.get_ylabel() for one in (*ax.figure.axes, *ax.child_axes)]
+    assert "iso-phase curves: travel time (m)" in labels
+    drawn, said = [], []
+    monkeypatch.setattr(field_pictures, "save_figure", lambda figure, *_: drawn.append(figure.axes[0]))
+    decay_picture(tmp_path / "a.png", fan, wavenumber=12.0, boundary="hard")
+    assert drawn[0].get_xlabel() == "arclength from the shadow line (m)"
+    assert drawn[0].get_title() == "Field of single rays, k = 12/m, hard boundary"
+    for module in (field_pictures, coloured_body):
+        monkeypatch.setattr(module, "save_painted", lambda *_, label, **__: said.append(label) or "matplotlib")
+    asked = {"wavenumber": 12.0, "boundary": "hard", "cells": 12, "backend": "matplotlib"}
+    surface_field_picture(tmp_path / "a.png", fan, **asked)
+    surface_field_picture(tmp_path / "b.png", fan, wave="38 kHz", **asked)
+    currents = cr.surface_currents(fan, wavenumber=12.0, boundary="hard")
+    currents_picture(tmp_path / "c.png", currents, cells=12, backend="matplotlib")
+    for text, words in zip(said, ("k = 12/m, hard", "38 kHz, hard", "k = 12/m, hard"), strict=True):
+        assert text.endswith(words)
+
+
 def test_tables(fan, tmp_path):
     curves = cr.iso_phase_curves(fan, 1.0)
     for name, given in (("line", {"line": fan.line}), ("fan", {"fan": fan}), ("curves", {"curves": curves})):
@@ -44,48 +66,3 @@ def test_tables(fan, tmp_path):
     assert "# kappa_n: normal curvature along the ray, 1/m, positive where convex" in (
         (tmp_path / "fan.csv").read_text()
     )
-
-
-def test_levels_and_bars(fan):
-    curves = cr.iso_phase_curves(fan, [0.5, 1.0])
-    assert _strokes.LevelColours.of(curves).words(0.5) == "travel time = 0.5 m"
-    ax = parameter_plane.plot_parameters(fan.line, fan, curves)
-    labels = [one.get_ylabel() for one in (*ax.figure.axes, *ax.child_axes)]
-    assert "iso-phase curves: travel time (m)" in labels
-
-
-def labelled(monkeypatch, module, name):
-    """Labels of the painted bodies that a module would write."""
-    said = []
-    monkeypatch.setattr(module, name, lambda *_, label, **__: said.append(label) or "matplotlib")
-    return said
-
-
-def test_painted_bodies_say_the_wave(fan, monkeypatch, tmp_path):
-    said = labelled(monkeypatch, field_pictures, "save_painted")
-    asked = {"wavenumber": 12.0, "boundary": "hard", "cells": 48, "backend": "matplotlib"}
-    surface_field_picture(tmp_path / "a.png", fan, **asked)
-    surface_field_picture(tmp_path / "b.png", fan, wave="38 kHz", **asked)
-    assert said[0].endswith("k = 12/m, hard") and said[1].endswith("38 kHz, hard")
-    said = labelled(monkeypatch, coloured_body, "save_painted")
-    currents = cr.surface_currents(fan, wavenumber=12.0, boundary="hard")
-    currents_picture(tmp_path / "c.png", currents, cells=48, backend="matplotlib")
-    assert said[0].endswith("k = 12/m, hard")
-
-
-def test_decay(fan, monkeypatch, tmp_path):
-    drawn = []
-    monkeypatch.setattr(field_pictures, "save_figure", lambda figure, *_: drawn.append(figure.axes[0]))
-    decay_picture(tmp_path / "a.png", fan, wavenumber=12.0, boundary="hard")
-    assert drawn[0].get_xlabel() == "arclength from the shadow line (m)"
-    assert drawn[0].get_title() == "Field of single rays, k = 12/m, hard boundary"
-
-
-@pytest.mark.slow
-def test_axes_of_a_plane_and_its_fronts(fan):
-    cut = cr.field_cut(fan, wavenumber=6.0, boundary="hard", extent=(3.0, 3.0), step=0.15)
-    ax = cut.plot()
-    assert ax.get_xlabel().endswith("(m)") and ax.get_ylabel().endswith("(m)")
-    assert "wave front" in [one.get_text() for one in ax.figure.legends[0].get_texts()]
-    ax = cut.plot(fronts=False)
-    assert "wave front" not in [one.get_text() for one in ax.figure.legends[0].get_texts()]

@@ -1,11 +1,9 @@
 """The tables of costs say what they claim: rows, errors beside them, tolerances met; never how fast."""
 
-import json
 import math
 
 import pytest
 
-from studies import _flow_cases as cases
 from studies import flow_speed
 
 ELLIPSOID = ("ellipsoid",)
@@ -40,34 +38,3 @@ def test_requested_tolerances_are_met():
     for row in rows:
         assert 0 < row["median"] <= row["achieved"] <= row["worst"] <= row["requested"]
         assert row["ratio"] == pytest.approx(row["achieved"] / row["requested"])
-
-
-def test_refusals_keep_their_reason(monkeypatch):
-    from creeping import ToleranceError
-
-    def none(*_args):
-        raise ToleranceError("no map")
-
-    monkeypatch.setattr(cases, "built", none)
-    (row,) = flow_speed.requested(ELLIPSOID, exponents=(9,), samples=10)
-    assert math.isnan(row["achieved"]) and row["remark"] == "refused: no map"
-
-
-def test_tables_are_printed_stored_and_drawn(capsys, tmp_path):
-    rows = [
-        {"body": "a", "requested": 1e-3, "achieved": 5e-4},
-        {"body": "a", "requested": 1e-4, "achieved": math.nan, "remark": "refused: it is too expensive"},
-    ]
-    cases.show("Table", rows)
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == "Table" and lines[2].split() == ["body", "requested", "achieved", "remark"]
-    assert lines[3].split() == ["a", "0.001", "5.0e-04"] and lines[4].endswith("-  refused: it is too expensive")
-    assert json.loads(json.dumps(cases.plain(rows), allow_nan=False))[1]["achieved"] is None
-    cases.draw(rows, tmp_path / "requested.png")
-    assert (tmp_path / "requested.png").stat().st_size > 0
-
-
-def test_powers_are_fitted():
-    (cost, error, build) = flow_speed.sizes((100, 200), nodes=(12, 16))
-    assert cost["quantity"] == "map s" and build["quantity"] == "build s"
-    assert -12 < error["exponent"] < -4

@@ -9,38 +9,26 @@ import numpy as np
 import pytest
 
 from studies import fuzz
-from studies.fuzz import __main__ as command
 from studies.fuzz import child, readers, seeds, supervision
 from studies.fuzz.attack import ACCEPTED, CRASH, REFUSED, SILENT, SLOW, WRONG, Verdict, generator
-from studies.fuzz.mutation import mutated, shuffled_array
+from studies.fuzz.mutation import mutated
 
 GOOD = (REFUSED, ACCEPTED)
-CHEAP = (
-    "stl-text",
-    "stl-binary",
-    "obj",
-    "off",
-    "ply",
-    "glb",
-    "3mf",
-    "study",
-    "directions-csv",
-    "directions-npy",
-    "ffe",
-    "mat",
-    "map",
-)
+CHEAP = "stl-text stl-binary obj off ply glb 3mf study directions-csv directions-npy ffe map".split()
 
 
-@pytest.mark.parametrize("name", [*CHEAP, pytest.param("body", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", [*CHEAP, *(pytest.param(one, marks=pytest.mark.slow) for one in ("body", "origin"))])
 def test_bad_input_is_refused_or_taken_as_it_is(name, tmp_path):
     attack = fuzz.ATTACKS[name]()
     # fits take seconds
     attack.fitted = 0.0
+    # of connections it is seen that the page's own messages do turn the incidence
     attack.prepare(tmp_path)
     verdicts = [child.tried(attack, name, 5, number, tmp_path / f"case-{number}") for number in range(12)]
     assert [found for found in verdicts if found.kind not in GOOD] == []
     assert any(found.kind == REFUSED for found in verdicts)
+    if name == "origin":
+        attack.page.close()
 
 
 @pytest.mark.slow
@@ -55,25 +43,11 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch):
     assert [found for found in verdicts if found.kind not in GOOD] == []
 
 
-def test_a_case_is_known_by_its_numbers():
-    data = seeds.off()
-    first, again, other = (mutated(data, generator("off", 3, n), text=True) for n in (7, 7, 8))
-    assert first == again != other
-    assert all(mutated(data, generator("off", 0, n), text=True) != data for n in range(60))
-
-
-def test_arrays_are_changed_but_remain_arrays():
-    rng = generator("array", 0, 0)
-    base = np.linspace(0, 1, 30).reshape(10, 3)
-    changed = [shuffled_array(base, rng) for _ in range(50)]
-    assert all(not (c.shape == base.shape and c.dtype == base.dtype and np.array_equal(c, base)) for c in changed[:5])
-    assert len({(c.shape, str(c.dtype)) for c in changed}) > 5
-
-
 def test_the_second_readers_read_what_was_written():
     vertices, triangles = seeds.body_mesh()
     files = {"stl": seeds.stl_binary(), "obj": seeds.obj(), "off": seeds.off(), "glb": seeds.glb()}
     files |= {"3mf": seeds.archive_3mf(), "ply": seeds.ply(binary=True)}
+    assert all(mutated(files["off"], generator("off", 0, n), text=True) != files["off"] for n in range(60))
     for kind, data in files.items():
         np.testing.assert_allclose(readers.corners_of(kind, data), vertices[triangles], rtol=0, atol=1e-7)
     with pytest.raises(readers.UnclearError):
@@ -127,30 +101,8 @@ def test_crashes_hangs_and_wrong_errors_are_findings(tmp_path, monkeypatch):
     monkeypatch.setattr(supervision.subprocess, "Popen", stand_in)
     options = {"seconds": 60.0, "kept": tmp_path / "kept", "limit": 2.0, "memory": 10**9}
     tally = supervision.run_attack("falling", 9, range(7), **options)
-    assert [(f.number, f.verdict) for f in tally.findings] == [
-        (1, CRASH),
-        (2, SLOW),
-        (3, WRONG),
-        (4, SILENT),
-        (5, WRONG),
-    ]
+    assert [f.number for f in tally.findings] == [1, 2, 3, 4, 5]
+    assert [f.verdict for f in tally.findings] == [CRASH, SLOW, WRONG, SILENT, WRONG]
     assert tally.counts[ACCEPTED] == 2 and "SIGSEGV" in tally.findings[0].words and "Memory" in tally.findings[4].words
     assert "python -m studies.fuzz falling --seed 9 --case 3" in str(tally.findings[2])
     assert sorted(p.name for p in (tmp_path / "kept").iterdir()) == [f"falling-9-case-{n}" for n in (1, 2, 3, 4, 5)]
-
-
-def test_the_table_and_its_exit_code(monkeypatch, capsys, tmp_path):
-    def run(name, seed, numbers, **options):
-        tally = supervision.Tally(name)
-        tally.counts["refused"] = len(numbers)
-        if name == "obj":
-            tally.findings.append(supervision.Finding(name, seed, 3, WRONG, "KeyError: x"))
-        return tally
-
-    monkeypatch.setattr(command, "run_attack", run)
-    assert command.main(["off", "--cases", "4", "-o", str(tmp_path)]) == 0
-    assert command.main(["off", "obj", "--quick", "--seed", "2"]) == 1
-    out = capsys.readouterr().out
-    assert "off                   4         4" in out and "python -m studies.fuzz obj --seed 2 --case 3" in out
-    with pytest.raises(SystemExit):
-        command.main(["offf"])

@@ -14,13 +14,10 @@ import pytest
 import creeping
 import scatterers
 import studies
-from creeping import InvalidInputError
 from creeping.commands.main import app
 from creeping.sweeping.studyfile.study import parse_study
 from studies import __main__ as command
-from studies import field_sphere
 from studies.gallery import building
-from studies.gallery.figure_page import flattened, from_docstring, gallery_page
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(building.PAGES.glob("*.md"))
@@ -59,16 +56,6 @@ def test_there_are_the_pages():
 
 
 @pytest.mark.parametrize("page", PAGES, ids=by_name)
-def test_fences_are_paired_and_of_known_kinds(page):
-    kinds = [kind for _, kind, _ in _FENCE.findall(text_of(page))]
-    assert set(kinds) <= {"python", "sh", "text", "toml", "{toctree}"}
-    assert text_of(page).count("```") == 2 * len(kinds)
-    # or the fence would become expected output
-    assert all(body.endswith("\n\n") for body in blocks(page, "python"))
-    assert all(body.startswith(">>> ") for body in blocks(page, "python"))
-
-
-@pytest.mark.parametrize("page", PAGES, ids=by_name)
 def test_dotted_names_are_there(page):
     names = {code for code in inline(page) if re.fullmatch(r"(creeping|scatterers|studies)(\.\w+)+", code)}
     names |= set(re.findall(r"\b(?:creeping|scatterers|studies)(?:\.\w+)+", "\n".join(blocks(page, "text"))))
@@ -81,10 +68,6 @@ def test_dotted_names_are_there(page):
                 importlib.import_module(".".join(parts[: depth + 1]))
             found, depth = getattr(found, part), depth + 1
         assert found is not None, name
-
-
-@pytest.mark.parametrize("page", PAGES, ids=by_name)
-def test_title_ofs_are_public(page):
     for alias, package in (("cr", creeping), ("sc", scatterers)):
         codes = [*inline(page), *blocks(page, "python")]
         names = {name for code in codes for name in re.findall(rf"(?<![\w.]){alias}\.(\w+)", code)}
@@ -118,7 +101,7 @@ def commands(line):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=by_name)
-def test_commands_of_shell_blocks_are_understood(page):
+def test_commands_and_studies_are_understood(page):
     lines = [line for block in blocks(page, "sh") for line in block.splitlines()]
     for words in [words for line in lines for words in commands(line)]:
         if words[0] == "creeping":
@@ -129,20 +112,12 @@ def test_commands_of_shell_blocks_are_understood(page):
             study_is_there(words[2:])
         else:
             assert words[0] in ("python3", "pip"), f"{words[0]} is not checked"
-
-
-@pytest.mark.parametrize("page", PAGES, ids=by_name)
-def test_commands_in_the_text_are_there(page):
     for code in inline(page):
         words = code.split()
         if words[:2] == ["python", "-m"]:
             study_is_there(words[2:])
         elif words[0] == "creeping" and len(words) > 1 and not words[1].startswith("-"):
             app[words[1]]
-
-
-@pytest.mark.parametrize("page", PAGES, ids=by_name)
-def test_study_files_are_understood(page):
     for text in blocks(page, "toml"):
         assert parse_study(text, folder=Path(".")).asked["flow"] == "auto"
 
@@ -165,10 +140,6 @@ def test_all_studies_are_listed():
     modules = {path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")}
     assert set(rows) == set(studies.FIGURES) | modules - set(studies.FIGURES.values()) | {"gallery", "fuzz"}
     assert {name: rows[name] for name in studies.FIGURES} == studies.titles()
-    assert {"field_sphere", "flow_speed", "sweep_lines", "sweep_speed", "map_accuracy", "fitted_bodies"} <= set(rows)
-
-
-def test_every_study_runs_by_its_name():
     for name, source in command.sources().items():
         runs = source if source.stem != "__init__" else source.with_name("__main__.py")
         assert name in studies.FIGURES or 'if __name__ == "__main__":' in text_of(runs), name
@@ -184,115 +155,30 @@ def test_a_study_gets_its_options(monkeypatch):
     assert sys.argv is before
 
 
-def test_a_figure_is_drawn_into_out(monkeypatch, capsys):
-    drawn = []
-    card = {"file": "fig2-grid.png", "seconds": 1.0, "headline": "rms"}
-    monkeypatch.setattr(studies, "draw", lambda name, folder, quick: drawn.append((name, str(folder), quick)) or card)
-    with pytest.raises(SystemExit) as ended:
-        command.main(["fig2-grid", "--quick"])
-    assert ended.value.code == 0
-    assert drawn == [("fig2-grid", "out", True)]
-    assert "rms" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    "arguments, message",
-    [
-        (["field_spheres"], "did you mean field_sphere?"),
-        (["nothing"], "python -m studies lists them"),
-        (["field_cost", "--quick"], "takes no options"),
-    ],
-)
-def test_what_there_is_not_is_refused(arguments, message, capsys):
-    with pytest.raises(SystemExit) as ended:
-        command.main(arguments)
-    assert ended.value.code == 2
-    assert message in capsys.readouterr().err
-
-
-def test_help_of_a_study_without_options_is_its_docstring(capsys):
-    command.main(["field_sphere", "--help"])
-    assert squeezed(capsys.readouterr().out) == squeezed(field_sphere.__doc__)
-
-
-def test_docstring_becomes_text():
-    docstring = "Title.\n\nOf n*d and [YC06b] with ``a*b``:\n\n    x = |w|^2\n      + y\n\n- no list <b>\n"
-    assert from_docstring(docstring) == (
-        "Of n\\*d and \\[YC06b\\] with ``a*b``:\n\n```text\nx = |w|^2\n  + y\n```\n\n\\- no list \\<b\\>"
-    )
-    assert from_docstring("Title.") == ""
-
-
-def test_sidecar_becomes_rows():
-    card = {"map": {"rms": 1.23456e-7, "samples": 3}, "nodes_of": [16, 64.0], "fits": True, "none": None}
-    assert flattened(card) == [
-        ("map, rms", "1.235e-07"),
-        ("map, samples", "3"),
-        ("nodes of", "16, 64"),
-        ("fits", "yes"),
-        ("none", "none"),
-    ]
-
-
-def test_rows_of_the_gallery_are_full():
-    page = gallery_page([{"name": f"n{k}", "file": f"n{k}.png", "title": f"Figure {k}: a."} for k in range(4)])
-    assert len(re.findall(r"^\* -", page, re.MULTILINE)) == 2
-    assert len(re.findall(r"^  -", page, re.MULTILINE)) == 4
-
-
-def test_unknown_figure_leaves_nothing(tmp_path):
-    pytest.importorskip("sphinx")
-    pytest.importorskip("myst_parser")
-    with pytest.raises(InvalidInputError, match="fig3-circles"):
-        building.build_site(tmp_path / "site", ["fig7"])
-    assert not (tmp_path / "site").exists()
-
-
-def built(folder, *names):
-    """Build a site by its command, quickly."""
+@pytest.mark.slow
+def test_site_of_one_figure(tmp_path):
+    """Built by its command, quickly: it loads nothing from a network, and shows what study and sidecar tell."""
     for package in ("sphinx", "myst_parser"):
         pytest.importorskip(package)
-    words = [sys.executable, "-m", "studies.gallery", "-o", str(folder), "--quick", *names]
+    words = [sys.executable, "-m", "studies.gallery", "-o", str(tmp_path / "site"), "--quick", CHEAP]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert Path(done.stdout.strip()) == folder / "index.html"
+    folder = Path(done.stdout.strip()).parent
     for page in folder.rglob("*.html"):
         assert not _LOADED.findall(text_of(page)), f"{page.name} loads from a network"
     for style in folder.rglob("*.css"):
         assert not re.search(r"(url\(|@import)\s*[\"']?(https?:)?//", text_of(style)), f"{style.name} does"
-
-
-def assert_shows(folder, name):
-    """Assert that the page of a figure has all that its study and sidecar tell."""
-    page = text_of(folder / "gallery" / f"{name}.html")
-    card = json.loads(text_of(folder / "figures" / f"{name}.json"))
-    source = re.search(rf'<img [^>]*src="\.\./(_images/{name}[^"]*\.png)"', page)
-    assert source and (folder / source[1]).stat().st_size == (folder / "figures" / card["file"]).stat().st_size
-    read = squeezed(html.unescape(re.sub(r"<[^>]+>", "", page)))
-    module = importlib.import_module(f"studies.{studies.FIGURES[name]}")
-    assert squeezed(card["headline"]) in read
-    assert card["title"].rstrip(".") in read
-    assert squeezed(text_of(Path(module.__file__))) in read
-    below = module.__doc__.partition("\n")[2]
-    assert squeezed(below.replace("`", "")) in read
+    page, card = (text_of(folder / name) for name in (f"gallery/{CHEAP}.html", f"figures/{CHEAP}.json"))
+    source = re.search(rf'<img [^>]*src="\.\./(_images/{CHEAP}[^"]*\.png)"', page)
+    assert source and (folder / source[1]).exists()
+    read, card = squeezed(html.unescape(re.sub(r"<[^>]+>", "", page))), json.loads(card)
+    module = importlib.import_module(f"studies.{studies.FIGURES[CHEAP]}")
+    below = module.__doc__.partition("\n")[2].replace("`", "")
+    for told in (card["headline"], card["title"].rstrip("."), text_of(Path(module.__file__)), below):
+        assert squeezed(told) in read
     assert f"Drawn in {card['seconds']:g} s." in read
-    for parameter in card["parameters"]:
-        assert parameter.replace("_", " ") in read
-    index = text_of(folder / "gallery" / "index.html")
-    assert f'href="{name}.html"' in index and f"_images/{name}" in index
-
-
-@pytest.mark.slow
-def test_site_of_one_figure(tmp_path):
-    built(tmp_path / "site", CHEAP)
-    assert_shows(tmp_path / "site", CHEAP)
+    assert all(parameter.replace("_", " ") in read for parameter in card["parameters"])
+    assert f'href="{CHEAP}.html"' in text_of(folder / "gallery" / "index.html")
     for page in PAGES:
         title = re.match(r"# (.*)\n", text_of(page))[1]
-        assert title in html.unescape(text_of(tmp_path / "site" / f"{page.stem}.html"))
-
-
-@pytest.mark.slow
-def test_site_of_all_figures(tmp_path):
-    built(tmp_path / "site")
-    for name in studies.FIGURES:
-        assert_shows(tmp_path / "site", name)
+        assert title in html.unescape(text_of(folder / f"{page.stem}.html"))

@@ -7,7 +7,7 @@ from studies.fuzz import invariants
 
 @pytest.mark.parametrize("name", invariants.PROPERTIES)
 def test_it_holds(name):
-    invariants.checked(name, 1 if "field" in name else 4)
+    invariants.checked(name, 1 if "field" in name else 3)
 
 
 def test_a_field_that_misses_its_error_is_seen(monkeypatch):

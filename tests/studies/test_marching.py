@@ -1,11 +1,9 @@
 """The tables of the study of marched layers: a row of each kind in the quick suite, all of them in the slow one."""
 
-import numpy as np
 import pytest
 
-from studies import marching
 from studies._section_waves import REGIONS
-from studies.marching import CASES, FACTOR, FAR, SURFACE, VARYING, Solvers, far_row, surface_row, varying_row
+from studies.marching import FACTOR, FAR, SURFACE, VARYING, Solvers, far_row, surface_row, varying_row
 
 UNCOVERED = {"peanut .3 at 60"}
 """Whose rays say that lit concave ground is behind them."""
@@ -54,14 +52,3 @@ def test_far(name, k, boundary, limits, solvers):
     factors = OUTSIDE.get((name, k, boundary), (FACTOR, FACTOR))
     found = far_row(name, k, boundary, solvers)
     assert all(one < factor * limit + ROUNDED for one, factor, limit in zip(found, factors, limits, strict=True))
-
-
-def test_tables_print(capsys, monkeypatch):
-    monkeypatch.setattr(marching, "SURFACE", SURFACE[:1])
-    monkeypatch.setattr(marching, "FAR", FAR[:1])
-    monkeypatch.setattr(marching, "VARYING", VARYING[:1])
-    monkeypatch.setattr("sys.argv", ["marching", "--quick"])
-    marching.main()
-    out = capsys.readouterr().out
-    assert out.count("circle") == 3 and "penumbra" in out and "nan" not in out
-    assert {row[0] for row in (*SURFACE, *FAR)} <= set(CASES) and np.inf not in {row[1] for row in SURFACE}

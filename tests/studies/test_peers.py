@@ -10,7 +10,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
-from studies._peers import HeyokaFlow, heyoka_at_error, scipy_flow, seconds_of
+from studies._peers import scipy_flow
 
 BODIES = {"triaxial": sc.Ellipsoid(1.0, 0.8, 0.6), "torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}
 TIMES = np.array([0.0, 0.7, 2.0])
@@ -42,48 +42,3 @@ def test_scipy_agrees(name, carry_jacobi):
         np.testing.assert_allclose(found[:, -1, 8], decay, atol=1e-7 if name == "triaxial" else 1e-4)
     last = scipy_flow(BODIES[name], states, TIMES[-1:], rtol=1e-9, carry_jacobi=carry_jacobi)
     np.testing.assert_allclose(last[:, 0, :lanes], exact[:, -1, :lanes], atol=2e-7)
-
-
-@pytest.mark.parametrize("carry_jacobi", [False, True])
-@pytest.mark.parametrize("name", BODIES)
-def test_heyoka_agrees(name, carry_jacobi):
-    pytest.importorskip("heyoka", exc_type=ImportError)
-    states, exact, decay = traced(name)
-    peer = HeyokaFlow(BODIES[name], tolerance=1e-14, carry_jacobi=carry_jacobi)
-    assert peer.lanes == (6 if not carry_jacobi else 9 if name == "triaxial" else 8)
-    lanes = min(peer.lanes, 8)
-    for outputs in (slice(None), slice(1, None), slice(2, None)):
-        found = peer.flow(states, TIMES[outputs])
-        assert found.shape == (RAYS, len(TIMES[outputs]), peer.lanes)
-        np.testing.assert_allclose(found[..., :lanes], exact[:, outputs, :lanes], atol=1e-9)
-        if peer.lanes == 9:
-            np.testing.assert_allclose(found[:, -1, 8], decay, atol=1e-7)
-
-
-def test_heyoka_meets_an_error_and_no_more():
-    pytest.importorskip("heyoka", exc_type=ImportError)
-    states, exact, _ = traced("twisted")
-    peer = heyoka_at_error(BODIES["twisted"], states, TIMES, exact, 1e-6, False)
-
-    def rms(flow):
-        gap = flow.flow(states, TIMES)[:, -1] - exact[:, -1, :6]
-        return np.sqrt(np.mean(np.sum(gap**2, axis=1)))
-
-    looser = HeyokaFlow(BODIES["twisted"], tolerance=peer.tolerance * np.exp(2), carry_jacobi=False)
-    assert looser.order == peer.order - 1
-    assert rms(peer) <= 1e-6 < rms(looser)
-    with pytest.raises(ValueError, match="no order"):
-        heyoka_at_error(BODIES["twisted"], states, TIMES, exact, 1e-20, False)
-
-
-def test_peers_refuse_what_they_have_no_equations_for():
-    states = np.zeros((1, 6))
-    for body in (sc.Sphere(), sc.Ellipsoid(1.2, 0.8, 0.8, speed="1 + x / 4")):
-        with pytest.raises(TypeError, match=r"closed form|plain flow"):
-            scipy_flow(body, states, TIMES, rtol=1e-6)
-
-
-def test_measured_warms_up():
-    calls = []
-    assert seconds_of(lambda: calls.append(1), 3) >= 0
-    assert len(calls) == 4

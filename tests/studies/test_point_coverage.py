@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from studies import _point_coverage as shared
+from studies import conductor_coverage, near_coverage
+from studies.port_coverage import ellipsoid_rows, sphere_row
 
 
 def test_shares_of_known_errors():
@@ -40,10 +42,25 @@ def test_parts_are_all_points_and_each_is_of_one():
     assert all(np.array_equal(both[name], np.stack([part, part], axis=1)) for name, part in parts.items())
 
 
-def test_cases_have_seeds_of_their_own():
-    every = list(shared.cases(("a", "b"), ("soft", "hard"), (10.0, 20.0), quick=False))
-    assert len(every) == 8 and every[0] == (10, ("a", "soft", 10.0)) and every[-1] == (120, ("b", "hard", 20.0))
-    assert [case for _, case in shared.cases(("a", "b"), ("soft", "hard"), (10.0, 20.0), quick=True)] == [
-        ("a", "soft", 10.0),
-        ("a", "hard", 10.0),
-    ]
+@pytest.mark.slow
+@pytest.mark.parametrize("boundary", ["hard", 0.7, "pec"])
+def test_errors_of_near_and_surface_fields_are_covered_on_the_sphere(boundary):
+    study = conductor_coverage if boundary == "pec" else near_coverage
+    found = study.row("sphere", 10.0, *(() if boundary == "pec" else (boundary,)), 10)
+    for part in study.PARTS:
+        assert found[part] > 95, part
+        # in the shadow what is next to the body, where errors are largest, counts as close
+        assert found[f"{part} ratio"] < (8 if boundary == "pec" else 15 if part == "shadow" else 10), part
+    assert found["off"] < (5 if boundary == "pec" else 3) and found["on"] < (15 if boundary == "pec" else 5)
+
+
+def test_couplings_on_the_sphere():
+    row = sphere_row(30.0)
+    assert row.worst < 0.006 and row.covered > 0.95
+
+
+@pytest.mark.slow
+def test_couplings_on_an_ellipsoid_are_covered():
+    rows = ellipsoid_rows((0.9, 0.8, 1.0), 10.0, 0.25, 3, sources=2, points=40)
+    assert {row.part for row in rows} <= {"rays", "beams"}
+    assert sum(row.pairs * row.covered for row in rows) > 0.95 * sum(row.pairs for row in rows)

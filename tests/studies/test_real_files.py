@@ -18,18 +18,11 @@ def test_one_option_more_at_a_time():
 @pytest.mark.slow
 def test_a_file_comes_to_its_far_field(tmp_path):
     """A sphere without a unit, and a file of nothing."""
-    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.5)
-    ball.export(tmp_path / "ball.obj")
-    rows = followed(tmp_path / "ball.obj", 300.0)
-    assert [row["stage"] for row in rows] == ["body", "done"]
-    assert rows[0]["options"] == {}
-    assert rows[1]["options"] == {"units": "m"}
-    assert rows[1]["error"] < 0.1 * rows[1]["field"]
-    assert rows[1]["unresolved"] == 0
-    assert "unresolved" in told(rows[1])
-    assert "units" in told(rows[0])
+    trimesh.creation.icosphere(subdivisions=4, radius=0.5).export(tmp_path / "ball.obj")
+    first, last = followed(tmp_path / "ball.obj", 300.0)
+    assert (first["stage"], first["options"], last["stage"], last["options"]) == ("body", {}, "done", {"units": "m"})
+    assert last["error"] < 0.1 * last["field"] and last["unresolved"] == 0 and np.isfinite(last["all, s"])
+    assert "unresolved" in told(last) and "units" in told(first)
     (tmp_path / "nothing.obj").write_text("")
     last = followed(tmp_path / "nothing.obj", 300.0)[-1]
-    assert last["stage"] == "body"
-    assert last["refusal"]
-    assert np.isfinite(rows[1]["all, s"])
+    assert last["stage"] == "body" and last["refusal"]

@@ -62,7 +62,9 @@ def wait_for_tasks(folder, number, process):
     until(marked, lambda: f"{number} tasks were not done", pause=0.02)
 
 
-@pytest.mark.parametrize(("workers", "after", "seconds"), [(0, 7, 0.011), (2, 5, 0.02)])
+@pytest.mark.parametrize(
+    ("workers", "after", "seconds"), [(0, 7, 0.011), pytest.param(2, 5, 0.02, marks=pytest.mark.slow)]
+)
 def test_kill_9_of_the_driver(tmp_path, monkeypatch, workers, after, seconds):
     folder, diary = tmp_path / "s.zarr", tmp_path / "diary"
     code = f"import fake_sweeps; fake_sweeps.drive({str(folder)!r}, 60, 3, {workers})"
@@ -89,19 +91,6 @@ def test_kill_9_of_the_driver(tmp_path, monkeypatch, workers, after, seconds):
     undisturbed = SweepStore.create(tmp_path / "whole.zarr", plan)
     fill(plan, undisturbed)
     assert fake.bytes_of(folder) == fake.bytes_of(undisturbed.folder)
-
-
-def test_kill_9_while_the_store_is_made_leaves_none(tmp_path):
-    folder = tmp_path / "s.zarr"
-    code = (
-        "import os, signal, fake_sweeps; from creeping.sweeping.storage import store;"
-        "store.save_flow = lambda *_: os.kill(os.getpid(), signal.SIGKILL);"
-        f"fake_sweeps.drive({str(folder)!r}, 60, 3, 0)"
-    )
-    driver = started("-c", code)
-    driver.communicate()
-    assert driver.returncode == -signal.SIGKILL and not folder.exists()
-    assert fill(fake.plan(60, 3), open_store(fake.plan(60, 3), folder, resume=True))
 
 
 @pytest.mark.slow

@@ -32,10 +32,13 @@ def test_area_of_the_ellipsoid():
     assert clouds.ellipsoid(a, b, c).area() == pytest.approx(area, rel=1e-4)
 
 
-@pytest.mark.parametrize("body", BODIES, ids=["ellipsoid", "twisted"])
-@pytest.mark.parametrize("mirrored", [True, False])
-def test_points_are_even_and_on_their_side(body, mirrored):
-    body, h = body if mirrored else replace(body, mirrors=()), 0.06
+@pytest.mark.parametrize(
+    "body",
+    [*BODIES, replace(BODIES[1], mirrors=()), clouds.Torus(1.0, 0.4)],
+    ids=["ellipsoid", "twisted", "without mirrors", "torus"],
+)
+def test_points_are_even_and_on_their_side(body):
+    h = 0.06
     cloud = body.spread(h)
     assert np.all(cloud.points[:, list(body.mirrors)] > 0)
     points = whole(body, cloud)
@@ -67,24 +70,12 @@ def test_star_is_the_body_of_its_level_set():
     assert np.all(np.sum(cloud.normals * gradient(cloud.points), axis=-1) > 0)
 
 
-def test_star_without_surface_is_refused():
-    open_body = clouds.star(lambda x: x[..., 0] ** 2 + 1.0, lambda x: 2 * x + 1e-3)
-    with pytest.raises(RuntimeError, match="found no surface"):
-        open_body.spread(0.5)
-
-
-@pytest.mark.parametrize("h", [0.2, 0.06])
-def test_points_are_even_on_a_torus(h):
+def test_points_of_a_torus():
     body = clouds.Torus(1.0, 0.4)
-    cloud = body.spread(h)
-    assert np.all(cloud.points > 0)
+    cloud = body.spread(0.2)
     around = np.hypot(cloud.points[:, 0], cloud.points[:, 1])
     np.testing.assert_allclose((around - 1) ** 2 + cloud.points[:, 2] ** 2, 0.16, rtol=1e-13)
     centre = cloud.points * np.array([1, 1, 0]) / around[:, None]
     np.testing.assert_allclose(0.4 * cloud.normals, cloud.points - centre, atol=1e-14)
-    points = whole(body, cloud)
     # the tube unrolled: 2 pi r by 2 pi R
-    assert len(points) * h**2 == pytest.approx(body.area(), rel=0.05)
     assert body.area() == pytest.approx((2 * np.pi * 0.4) * (2 * np.pi), rel=1e-14)
-    nearest = cKDTree(points).query(points, k=2)[0][:, 1]
-    assert 0.45 * h < nearest.min() and nearest.max() < 1.2 * h

@@ -43,22 +43,3 @@ def test_far_field_is_the_limit():
     phi, r = np.linspace(0, np.pi, 9), 1e5
     near = cylinder.scattered_field(5.0, 1.0, r, phi, "hard") * np.sqrt(r) * np.exp(-5j * r)
     np.testing.assert_allclose(near, cylinder.far_field(5.0, 1.0, phi, "hard"), atol=1e-4)
-
-
-def test_impedance_lies_between_hard_and_soft():
-    phi = np.linspace(0, np.pi, 31)
-    for eta, boundary in ((1e-8, "hard"), (1e8, "soft")):
-        expected = cylinder.far_field(25.0, 1.0, phi, boundary)
-        np.testing.assert_allclose(cylinder.far_field(25.0, 1.0, phi, eta), expected, atol=1e-6)
-
-
-@pytest.mark.parametrize(("boundary", "sign"), [("soft", -1), ("hard", 1)])
-def test_high_frequency_reflection(boundary, sign):
-    phi = np.radians([120.0, 150.0, 180.0])
-    ray = sign * np.sqrt(np.sin(phi / 2) / 2) * np.exp(-1000j * np.sin(phi / 2))
-    np.testing.assert_allclose(cylinder.far_field(500.0, 1.0, phi, boundary), ray, atol=0.005)
-
-
-def test_points_inside_are_refused():
-    with pytest.raises(ValueError, match="inside"):
-        cylinder.scattered_field(1.0, 1.0, [0.5], [0.0], "soft")

@@ -1,7 +1,5 @@
 """Fundamental solutions, against partial waves on the sphere and identities on other bodies."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -58,40 +56,3 @@ def test_reciprocity(boundary):
     back = solution.far_field(-d[:1])[0, 3]
     assert abs(there - back) < 1e-6
     assert abs(there) > 0.01
-
-
-@pytest.mark.slow
-def test_mirrors_change_nothing():
-    kept = [fundamental.scatter(replace(TWISTED, mirrors=m), 6.0, OBLIQUE, "hard", depth=0.15) for m in ((), (0, 2))]
-    r = sphere_of_directions(8)[0]
-    np.testing.assert_allclose(kept[0].far_field(r), kept[1].far_field(r), atol=1e-6)
-
-
-def test_twisted_residual():
-    # measured: 1.8 s, 1.2e-6; 3e-8 with 10 sources a wavelength
-    solution = fundamental.scatter(TWISTED, 20.0, OBLIQUE, "soft", depth=0.12, per_wavelength=8)
-    assert solution.residual[0] < 3e-6
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("body", [TRIAXIAL, TWISTED], ids=["triaxial", "twisted"])
-def test_residual_at_40(body):
-    depth = 0.15 if body is TRIAXIAL else 0.12
-    solution = fundamental.scatter(body, 40.0, OBLIQUE, "hard", depth=depth, per_wavelength=6)
-    assert solution.residual[0] < 2e-6
-
-
-def test_too_few_points_are_refused():
-    cloud = TRIAXIAL.spread(0.2)
-    with pytest.raises(ValueError, match="twice as many"):
-        fundamental.solve(
-            cloud.points,
-            cloud.normals,
-            5.0,
-            OBLIQUE,
-            "soft",
-            sources=cloud,
-            checks=cloud,
-            depth=0.1,
-            mirrors=TRIAXIAL.mirrors,
-        )

@@ -44,16 +44,3 @@ def test_reciprocity_of_an_impedance(name):
     one = solver.solve(0.4, eta).far(directions([2.0]))
     other = solver.solve(2.0 + np.pi, eta).far(directions([0.4 + np.pi]))
     np.testing.assert_allclose(one, other, rtol=1e-9)
-
-
-@pytest.mark.parametrize("name", SECTIONS)
-def test_shapes_are_their_own_derivatives(name):
-    section = SECTIONS[name]
-    s = np.linspace(-1, section.length, 37) + 0.0123
-    here, ahead = section.at(s), section.at(s + 1e-6)
-    np.testing.assert_allclose((ahead.points - here.points) / 1e-6, here.tangents, atol=2e-5)
-    turned = (ahead.tangents - here.tangents) / 1e-6
-    np.testing.assert_allclose(turned, -here.curvature[:, None] * here.normals, atol=2e-3)
-    nodes = section.nodes(200)
-    np.testing.assert_allclose(section.at(nodes.s).points, nodes.places.points, atol=1e-9)
-    assert 2 * np.pi * np.mean(nodes.speed) == pytest.approx(section.length, rel=1e-6)

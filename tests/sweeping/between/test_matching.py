@@ -24,22 +24,6 @@ def test_the_nearest_both_ways_is_taken_and_none_twice():
     assert after.tolist() == [-1, 2, -1]
 
 
-def test_what_is_far_is_another_sheet():
-    after, before = made([[0.0], [1.3]])
-    assert after.tolist() == [-1, -1] and before.tolist() == [-1, -1]
-
-
-def test_nodes_without_sheets_end_chains():
-    after, before = made([[0.0], [], [0.0]])
-    assert np.all(chains(np.array([0]), [after], [before], 0, 3)[0, 1:] == -1)
-
-
-def test_chains_along_one_axis():
-    after, before = made([[0.1 * n, 2.0] for n in range(6)])
-    found = chains(np.array([4, 5]), [after], [before], 2, 6)
-    assert found.tolist() == [[0, 2, 4, 6, 8, 10], [1, 3, 5, 7, 9, 11]]
-
-
 def test_chains_around_a_point_must_close():
     # two sheets that change places on the way round: nodes (0, 0), (0, 1), (1, 0), (1, 1), two sheets each
     straight = np.array([2, 3, -1, -1, 6, 7, -1, -1])
@@ -55,9 +39,3 @@ def test_chains_around_a_point_must_close():
         both = [first, straight], [inverse(first), inverse(straight)]
         found = chains(np.array([0, 1]), *both, 0, 2)
         assert np.all(found >= 0) == whole
-
-
-def test_no_sheets_have_no_chains():
-    none = np.zeros(0, dtype=int)
-    assert chains(none, [none], [none], 2, 6).shape == (0, 6)
-    assert chains(none, [none, none], [none, none], 2, 6).shape == (0, 36)

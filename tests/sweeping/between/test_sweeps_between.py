@@ -31,10 +31,6 @@ def cut():
     return both(arc(10, 34, 0.4), 1e-3, boundary=["soft", "hard", "pec", "impedance:0.5"], **FIELD)
 
 
-def test_most_of_a_dense_cut_of_a_smooth_body_is_interpolated(cut):
-    assert cut[1].interpolated.mean() == 1
-
-
 @pytest.mark.parametrize("suffix", ["", "_pec"])
 def test_fields_agree_within_the_accuracy_and_the_stated_error(cut, suffix):
     computed, between = cut
@@ -50,6 +46,7 @@ def test_fields_agree_within_the_accuracy_and_the_stated_error(cut, suffix):
 
 def test_lines_and_flags_agree(cut):
     computed, between = cut
+    assert between.interpolated.mean() == 1
     np.testing.assert_allclose(between.line_length, computed.line_length, rtol=1e-5)
     for name in ("incidence_status", "curves", "unresolved", "singular_distance"):
         assert np.mean(between[name].values == computed[name].values) > 0.97, name
@@ -77,18 +74,6 @@ def test_results_do_not_depend_on_tasks_or_order(asked):
         assert whole[name].values[order].tobytes() == mixed[name].values.tobytes(), name
 
 
-@pytest.mark.slow
-def test_what_is_computed_is_what_it_was():
-    # the forward lobe is no sum of sheets, and nothing is interpolated there
-    asked = {"quantity": "bistatic", "observation": [(1, 0, 0), (0, 0, -1)], "boundary": "hard", **FIELD}
-    computed, between = both(arc(-8, 8, 0.2, height=0.0), 1e-3, **asked)
-    alone = ~between.interpolated.values
-    assert alone.any()
-    for name in ("creeping", "reflected", "forward", "error", "line_length"):
-        assert computed[name].values[alone].tobytes() == between[name].values[alone].tobytes()
-    assert np.all(between.interpolation_error.values[alone] == 0)
-
-
 def test_a_cut_through_a_singular_direction_says_what_it_is():
     body = sc.Torus(1.0, 0.4)
     directions = arc(-6, 6, 0.1, height=0.0)[:, [2, 0, 1]]
@@ -99,8 +84,7 @@ def test_a_cut_through_a_singular_direction_says_what_it_is():
 
 
 def test_sparse_incidences_are_computed():
-    directions = arc(0, 300, 12.0)
-    computed, between = both(directions, 1e-3, quantity="rays", n_rays=32, length=1.0)
+    computed, between = both(arc(0, 300, 12.0), 1e-3, quantity="rays", n_rays=32, length=1.0)
     assert not between.interpolated.any() and np.all(between.interpolation_error == 0)
     assert computed.points.values.tobytes() == between.points.values.tobytes()
 
@@ -125,6 +109,8 @@ def rays(request):
 
 def test_rays_are_those_that_their_launch_points_have(rays):
     body, directions, found = rays
+    ends = found.detachment.values
+    assert np.array_equal((found.curve_index.values >= 0) & (ends <= 3.0), found.ray_status.values == 1)
     exact, differ = cr.DirectFlow(body, rtol=1e-11), []
     assert found.interpolated.mean() > 0.5
     for row in np.flatnonzero(found.interpolated)[::23]:
@@ -151,57 +137,12 @@ def test_rays_are_those_that_their_launch_points_have(rays):
     assert np.sqrt(np.mean(differ**2)) < 1e-4 and np.quantile(differ, 0.99) < 3e-4
 
 
-def test_statuses_and_detachments_are_those_of_the_rays(rays):
-    body, _, found = rays
-    exact = cr.DirectFlow(body, rtol=1e-10)
-    for row in np.flatnonzero(found.interpolated)[::31]:
-        there = found.curve_index.values[row] >= 0
-        assert set(np.unique(found.ray_status.values[row, there])) <= {cr.RayStatus.OK, cr.RayStatus.DETACHED}
-        ends = found.detachment.values[row, there]
-        assert np.array_equal(np.isfinite(ends) & (ends <= 3.0), found.ray_status.values[row, there] == 1)
-        x, p = (found[name].values[row, there, 1] for name in ("points", "directions"))
-        start, back = exact.flow(x, -p, 3.0)
-        ends_exact = exact.transport(pack(start, -back, lanes=12), np.array([3.0]))[:, 0, 11]
-        alike = np.isfinite(ends) == np.isfinite(ends_exact)
-        assert alike.mean() > 0.97
-        both_end = np.isfinite(ends) & np.isfinite(ends_exact)
-        assert np.all(np.abs(ends[both_end] - ends_exact[both_end]) < 1e-2)
-
-
-@pytest.mark.parametrize("accuracy", [0.0, 1.0, -1e-3, True, "fine", np.nan])
-def test_an_accuracy_is_a_number_between_0_and_1(accuracy):
+@pytest.mark.parametrize("accuracy", [0.0, 1.0, True, "fine", np.nan])
+def test_an_accuracy_is_a_number_between_0_and_1_and_goes_with_rays(accuracy):
     with pytest.raises(cr.CreepingError, match="accuracy"):
         cr.sweep_directions(FLOW, arc(0, 3, 1.0), quantity="rays", n_rays=4, length=1.0, accuracy=accuracy)
-
-
-def test_currents_are_not_interpolated():
     with pytest.raises(cr.CreepingError, match="accuracy goes with rays"):
         cr.sweep_directions(FLOW, arc(0, 3, 1.0), accuracy=1e-3, method="currents", boundary="hard", **FIELD)
-
-
-def test_a_patch_of_the_sphere_of_which_nothing_is_interpolated():
-    near = np.array([0.1, 0.15, 1.0]) + 0.02 * np.random.default_rng(0).uniform(-1, 1, (80, 3))
-    asked = {"wavenumbers": [18.0], "n_rays": 64, "length": 4.0, "boundary": "pec"}
-    computed, between = both(near / np.linalg.norm(near, axis=1, keepdims=True), 1e-6, **asked)
-    assert not between.interpolated.any()
-    assert computed.creeping_pec.values.tobytes() == between.creeping_pec.values.tobytes()
-
-
-def test_rays_that_are_carried_start_on_the_line():
-    # launch points that are moved far are not where the interpolation has them
-    body = sc.Ellipsoid(2, 0.5, 0.4)
-    directions = arc(-20, 40, 0.2, height=0.1)
-    asked = {"quantity": "rays", "n_rays": 50, "length": 1.0, "accuracy": 1e-2}
-    found = cr.sweep_directions(cr.DirectFlow(body, rtol=1e-8), directions, **asked)
-    carried = found.interpolated.values[:, None] & (found.interpolation_error.values == 0)
-    row, ray = np.nonzero(carried)
-    assert len(row) > 100
-    x, p = (found[name].values[row, ray, 0] for name in ("points", "directions"))
-    start, back = cr.DirectFlow(body, rtol=1e-10).flow(x, -p, 1.0)
-    d = directions[row]
-    assert np.abs(np.sum(start * d, axis=1) - found.launch_phase.values[row, ray]).max() < 1e-6
-    assert np.abs(-back - d).max() < 1e-6
-    assert np.abs(np.linalg.norm(onto_line(body, d, start, reach=0.1) - start, axis=1)).max() < 1e-6
 
 
 def test_a_patch_of_the_sphere_comes_back_in_its_own_order(tmp_path):
@@ -218,3 +159,18 @@ def test_a_patch_of_the_sphere_comes_back_in_its_own_order(tmp_path):
         np.testing.assert_array_equal(ds.direction, directions)
     np.testing.assert_array_equal(here.points, kept.points)
     np.testing.assert_array_equal(here.interpolated, kept.interpolated)
+
+
+def test_rays_that_are_carried_start_on_the_line():
+    """Launch points that are moved far are not where the interpolation has them."""
+    body, asked = sc.Ellipsoid(2, 0.5, 0.4), {"quantity": "rays", "n_rays": 50, "length": 1.0, "accuracy": 1e-2}
+    directions = arc(-20, 40, 0.2, height=0.1)
+    found = cr.sweep_directions(cr.DirectFlow(body, rtol=1e-8), directions, **asked)
+    row, ray = np.nonzero(found.interpolated.values[:, None] & (found.interpolation_error.values == 0))
+    assert len(row) > 100
+    x, p = (found[name].values[row, ray, 0] for name in ("points", "directions"))
+    start, back = cr.DirectFlow(body, rtol=1e-10).flow(x, -p, 1.0)
+    d = directions[row]
+    assert np.abs(np.sum(start * d, axis=1) - found.launch_phase.values[row, ray]).max() < 1e-6
+    assert np.abs(-back - d).max() < 1e-6
+    assert np.abs(np.linalg.norm(onto_line(body, d, start, reach=0.1) - start, axis=1)).max() < 1e-6

@@ -5,8 +5,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.sweeping.between.worth import first_level, representatives, with_paying_lattice
-from creeping.sweeping.lattice import Lattice, lattice_of
+from creeping.sweeping.between.worth import first_level, with_paying_lattice
+from creeping.sweeping.lattice import Lattice
 from creeping.sweeping.request import sweep_request
 
 FLOW = cr.DirectFlow(sc.Ellipsoid(1.2, 0.85, 0.7), rtol=1e-8)
@@ -18,14 +18,8 @@ def patch(count):
 
 
 def asked(accuracy):
-    more = {
-        "n_steps": 1,
-        "observation": None,
-        "order": 2,
-        "wavenumbers": [18.0],
-        "boundary": ["hard"],
-        "method": "rays",
-    }
+    more = {"n_steps": 1, "observation": None, "order": 2, "method": "rays"}
+    more |= {"wavenumbers": [18.0], "boundary": ["hard"]}
     return sweep_request("monostatic", length=4.0, n_rays=64, accuracy=accuracy, **more)
 
 
@@ -38,14 +32,6 @@ def test_what_is_found_does_not_depend_on_the_order_of_incidences(accuracy):
     assert (one.lattice is not None) == (accuracy > 1e-3)
 
 
-def test_representatives_stand_for_equal_shares_in_any_order():
-    directions = patch(9000)
-    lattice = lattice_of(directions)
-    some = representatives(lattice, directions)
-    np.testing.assert_array_equal(some, representatives(lattice, directions[::-1]))
-    assert len(some) == 4 and len(np.unique(lattice.located(some, lattice.levels - 1)[0], axis=0)) == 4
-
-
 def test_a_level_that_serves_nothing_or_leaves_much_is_left_out():
     lattice = Lattice((), 0.0, 3, 1600.0)
     left = np.array([[1.0, 1.0, 0.0]] * 3 + [[1.0, 0.0, 0.0]])
@@ -53,9 +39,5 @@ def test_a_level_that_serves_nothing_or_leaves_much_is_left_out():
     assert first_level(lattice, np.zeros((1, 3)), "fields") == 0
     assert first_level(lattice, np.array([[0.5, 0.1, 0.0]] * 3), "rays") == 2
     assert first_level(lattice, np.array([[1e-3, 0.0, 0.0]] * 3), "rays") == 0
-
-
-def test_no_level_pays_where_cells_hold_few_or_none_serves():
-    few = Lattice((), 0.0, 1, 1.5)
-    assert first_level(few, np.zeros((4, 1)), "rays") is None
+    assert first_level(Lattice((), 0.0, 1, 1.5), np.zeros((4, 1)), "rays") is None
     assert first_level(Lattice((), 0.0, 2, 1e4), np.ones((4, 2)), "fields") is None
