@@ -4,7 +4,7 @@ Faults are those that a slip of the pen makes: + for -, * for /, a comparison tu
 one, a sign lost. Modules and places are drawn from ``--seed``. Each fault is planted into a copy of the working tree;
 first run the tests that name the module, then those of its room, then all, each until one fails. A run that does not
 end in time, or takes too much memory, has seen the fault too. Run
-``python -m studies.planted_faults [--count 40] [--seed 1] [--only I ...] [-o FILE]`` (an hour).
+``python -m studies.planted_faults [--count 40] [--seed 1] [--only I ...] [--runs 2] [-o FILE]`` (hours).
 """
 
 import argparse
@@ -146,13 +146,13 @@ def failure(tree: Path, arguments: list[str]) -> str:
     return (told or [f"exit {done.returncode}"])[0][:160]
 
 
-def seen(fault: Fault, tree: Path) -> str:
-    """What sees the fault, "" if nothing does."""
+def seen(fault: Fault, tree: Path, runs: int) -> str:
+    """What sees the fault in so many of the runs, "" if nothing does."""
     target = tree / fault.file
     whole = target.read_text(encoding="utf-8")
     target.write_text(fault.planted(whole), encoding="utf-8")
     try:
-        return next(filter(None, (failure(tree, arguments) for arguments in stages(fault))), "")
+        return next(filter(None, (failure(tree, arguments) for arguments in stages(fault)[:runs])), "")
     finally:
         target.write_text(whole, encoding="utf-8")
 
@@ -164,6 +164,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="*", help="numbers of faults to plant")
     parser.add_argument("--sound", action="store_true", help="do not see first whether all tests pass without a fault")
+    parser.add_argument("--runs", type=int, default=3, help="2: the tests of the module and of its room alone")
     parser.add_argument("-o", type=Path, help="write the results there, as JSON, after each fault")
     options = parser.parse_args()
     rows = []
@@ -176,7 +177,7 @@ def main() -> None:
             if options.only is not None and number not in options.only:
                 continue
             began = time.perf_counter()
-            by = seen(fault, tree)
+            by = seen(fault, tree, options.runs)
             seconds = round(time.perf_counter() - began)
             rows.append({"number": number, **asdict(fault), "seen by": by, "seconds": seconds})
             print(

@@ -9,22 +9,21 @@ which start from Coons's surface through the sides,
 So surfaces of neighbours meet without a gap. A triangle is a square whose side u = 0 is one point: its tip, where it
 has one. A square that is not the body to POSITION and NORMAL is halved.
 
-Sources: [C67], [BT04]; Derivations, B12.
+Sources: [C67], [BT04]; Derivations, B14.
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import is_creased, nearest_crease, pieces_of, tips_of
+from creeping.geometry.coarse_mesh import CoarseMesh, coarse_mesh, tip_vertices
+from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
 from creeping.geometry.kept import kept
 from creeping.geometry.quadrature import nearest_points
 from creeping.geometry.squares import lobatto, on_squares
 from creeping.geometry.surface import Surface, normal, size
-from creeping.geometry.triangulation import quadrilaterals
 
 DEGREE = 6
 """Degree of the polynomials along u and v."""
@@ -41,12 +40,6 @@ WELL, CLOSED = 1e-5, 1e-6
 against a mesh."""
 STEEP = 0.2
 """Sine of the angle between x_u and x_v, at least: less counts against a mesh."""
-CELLS = (3, 4, 5, 6, 8, 12, 24)
-"""Cells of the meshes of a smooth body; the first that is of the kind of the last is taken."""
-SAME = 1e-9
-"""Distance of corners that are one, in body sizes."""
-SQUARE = 0.8
-"""Largest |cos| of a corner of the quadrilateral that two triangles make."""
 NEWTON = 20
 """Steps onto a crease."""
 
@@ -115,14 +108,6 @@ class Patches:
         return Patches(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Patches)))
 
 
-class _Mesh(NamedTuple):
-    """Corners of squares at (0, 0), (1, 0), (1, 1), (0, 1); the first is the last again of a triangle."""
-
-    vertices: FloatArray
-    corners: IntArray
-    pieces: IntArray
-
-
 def patches_of(body: Surface) -> Patches:
     """Squares that cover a body, made once.
 
@@ -142,7 +127,7 @@ def _made(body: Surface) -> Patches:
     failure: Exception | None = None
     for share in SIDES_OF_PIECES if is_creased(body) else (0.0,):
         try:
-            found = _refined(ground, _mesh_of(body, share))
+            found = _refined(ground, coarse_mesh(body, share))
         except (SurfaceError, ValueError) as error:
             failure = error
             continue
@@ -155,7 +140,7 @@ def _made(body: Surface) -> Patches:
     return best
 
 
-def _refined(ground: "_Ground", mesh: "_Mesh") -> Patches:
+def _refined(ground: "_Ground", mesh: "CoarseMesh") -> Patches:
     """Squares of a mesh, parted until they are the body."""
     current = _first(ground, mesh)
     done = []
@@ -231,82 +216,11 @@ class _Ground:
         return np.max(off, axis=(1, 2)), np.max(turned, axis=(1, 2))
 
 
-def _mesh_of(body: Any, share: float) -> _Mesh:
-    """A coarse mesh of a body, of pieces with sides of a share of its size."""
-    if not is_creased(body):
-        meshes = [quadrilaterals(body.level, body.gradient, body.bounds, cells=n, fewest=min(n, 24)) for n in CELLS]
-        kinds = [len(vertices) - len(tiles) for vertices, tiles in meshes]
-        vertices, tiles = meshes[kinds.index(kinds[-1])]
-        return _Mesh(vertices, tiles, np.zeros(len(tiles), dtype=np.int64))
-    corners, _, pieces = body.tiles(share * size(body))
-    grid = np.round(corners.reshape(-1, 3) / (SAME * size(body))).astype(np.int64)
-    _, first, numbers = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-    vertices, triangles = corners.reshape(-1, 3)[first], numbers.reshape(-1, 3)
-    return _Mesh(vertices, *_paired(vertices, triangles, np.asarray(pieces), _tip_vertices(body, vertices)))
-
-
-def _tip_vertices(body: Any, vertices: FloatArray) -> BoolArray:
-    """Which vertices (n, 3) are tips (n,)."""
-    tips = tips_of(body)[1] if is_creased(body) else np.zeros((0, 3))
-    apart = np.linalg.norm(vertices[:, None] - tips, axis=2)
-    return np.asarray(np.min(apart, axis=1, initial=np.inf) < 1e-6 * size(body))
-
-
-def _paired(vertices: FloatArray, triangles: IntArray, pieces: IntArray, tip: BoolArray) -> tuple[IntArray, IntArray]:
-    """Corners of squares that two triangles of a piece make with each other, best first, and of those left alone."""
-    m = len(triangles)
-    # of each side the triangle, and its corners from the one opposite to it
-    turned = np.concatenate([np.roll(triangles, -shift, axis=1) for shift in range(3)])
-    owner = np.tile(np.arange(m), 3)
-    sides = np.sort(turned[:, 1:], axis=1)
-    order = np.lexsort(sides.T)
-    same = np.flatnonzero(np.all(sides[order][1:] == sides[order][:-1], axis=1))
-    one, two = order[same], order[same + 1]
-    fit = (pieces[owner[one]] == pieces[owner[two]]) & (turned[one, 1] == turned[two, 2])
-    one, two = one[fit], two[fit]
-    square = np.stack([turned[one, 0], turned[one, 1], turned[two, 0], turned[one, 2]], axis=1)
-    x = vertices[square]
-    ahead, behind = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
-    with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.sum(ahead * behind, axis=2) / np.linalg.norm(ahead, axis=2) / np.linalg.norm(behind, axis=2)
-    # convex where all corners turn the same way
-    around = np.cross(ahead, behind)
-    convex = np.all(np.sum(around * around.sum(axis=1, keepdims=True), axis=2) > 0, axis=1)
-    # two sides in a row along one crease have no corner between them
-    beyond = np.full(3 * m, -1)
-    fit = np.flatnonzero(pieces[owner[order[same]]] != pieces[owner[order[same + 1]]])
-    beyond[order[same][fit]], beyond[order[same + 1][fit]] = (
-        pieces[owner[order[same + 1]]][fit],
-        pieces[owner[order[same]]][fit],
-    )
-    around = np.stack([beyond[(row + shift * m) % (3 * m)] for row, shift in ((one, 2), (two, 1), (two, 2), (one, 1))])
-    ear = np.any((around >= 0) & (around == np.roll(around, 1, axis=0)), axis=0)
-    worst = np.where(convex & ~ear & ~np.any(tip[square], axis=1), np.max(np.abs(cosine), axis=1), np.inf)
-    taken, squares, owners = np.zeros(m, dtype=bool), [], []
-    for row in np.argsort(worst, kind="stable"):
-        a, b = owner[one[row]], owner[two[row]]
-        if worst[row] > SQUARE:
-            break
-        if not (taken[a] or taken[b]):
-            taken[a] = taken[b] = True
-            squares.append(square[row])
-            owners.append(pieces[a])
-    left = np.flatnonzero(~taken)
-    alone = triangles[left]
-    # the tip first, or the sharpest corner, which is where the square is drawn together
-    x = vertices[alone]
-    opposite = np.linalg.norm(np.roll(x, -1, axis=1) - np.roll(x, 1, axis=1), axis=2)
-    start = np.where(tip[alone].any(axis=1), np.argmax(tip[alone], axis=1), np.argmin(opposite, axis=1))
-    alone = np.take_along_axis(alone, (start[:, None] + np.arange(3)) % 3, axis=1)
-    corners = np.concatenate([np.array(squares, dtype=np.int64).reshape(-1, 4), alone[:, [0, 1, 2, 0]]])
-    return corners, np.concatenate([np.array(owners, dtype=np.int64), pieces[left]])
-
-
 SIDES = ((0, 3), (1, 2), (0, 1), (3, 2))
 """Corners at the ends of the sides u = 0, u = 1, v = 0, v = 1."""
 
 
-def _first(ground: _Ground, mesh: _Mesh) -> Patches:
+def _first(ground: _Ground, mesh: CoarseMesh) -> Patches:
     """Squares of a mesh."""
     t = lobatto(DEGREE)
     m = len(mesh.corners)
@@ -342,7 +256,7 @@ def _first(ground: _Ground, mesh: _Mesh) -> Patches:
     places = _coons(along)
     pointed = mesh.corners[:, 0] == mesh.corners[:, 3]
     places[:, 1:-1, 1:-1] = _onto_within(ground, places, mesh.pieces)
-    tip = _tip_vertices(ground.body, mesh.vertices)[mesh.corners[:, 0]] & pointed
+    tip = tip_vertices(ground.body, mesh.vertices)[mesh.corners[:, 0]] & pointed
     spans = np.where(backward[..., 0], [1.0, 0.0], [0.0, 1.0])
     sides = numbers.reshape(m, 4)
     return Patches(places, mesh.pieces, edge[sides], sides, spans, pointed, tip, np.zeros(m))

@@ -5,7 +5,6 @@ accumulated over (i, j) first and weighted by wa last, which leaves one multiply
 not find this from loops: 16 to 36 rows of run-time length cost it four times the arithmetic in bookkeeping.
 Tables may be float32: products over j are then summed in float32, eight at a time, all other sums in float64, which
 keeps the error of a sum below that of the stored coefficients.
-The twin in plain numpy is in tests/oracles.
 
 Sources: Derivations, B7.
 """

@@ -11,7 +11,7 @@ from scatterers.kernels.tensor import contract_first, scatter
 
 @njit(cache=True, nogil=True, **OPTIONS)
 def accumulate(places, values, slopes, weights, shape, c, out):  # type: ignore[no-untyped-def]
-    """Add A^T W (b - A c) to out; returns (b - A c)^T W (b - A c). Its twin is in tests/oracles.
+    """Add A^T W (b - A c) to out; returns (b - A c)^T W (b - A c).
 
     Rows of A are f and its three slopes at places (m, 3) in cells, where the six coefficients of an axis begin at
     floor(place); b are values (m,) and slopes (m, 3), W the weights of values and of slopes. Coefficients c and out

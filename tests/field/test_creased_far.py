@@ -53,7 +53,7 @@ def test_facet_has_its_lobe(boundary, facing):
     k, a = 25.0, np.sqrt(0.75)
     angle = np.array([0.0, 0.03, 0.1, 0.14])
     r = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
-    found = cr.far_field(facing, r, wavenumber=k, boundary=boundary)
+    found = cr.far_field(facing, r, wavenumber=k, boundary=boundary, method="rays")
     x = k * a * np.sin(angle)
     lobe = (
         1j * k * a**2 * np.divide(j1(x), x, out=np.full(4, 0.5), where=x > 0) * np.exp(-0.5j * k * (1 + np.cos(angle)))
@@ -83,7 +83,9 @@ def test_forward_lobe_is_that_of_the_outline():
 def test_cylinder_broadside():
     """Backscatter of a cylinder of length l, l sqrt(k a/(4 pi)) in size: a line of specular points, no single one."""
     body, k = sc.Cylinder(0.5, 2.0), 40.0
-    found = cr.far_field(fan_of(body, (1, 0, 0), n_rays=16, length=1.0), [(-1, 0, 0)], wavenumber=k, boundary="soft")
+    found = cr.far_field(
+        fan_of(body, (1, 0, 0), n_rays=16, length=1.0), [(-1, 0, 0)], wavenumber=k, boundary="soft", method="rays"
+    )
     assert abs(found.total[0]) == pytest.approx(np.sqrt(k * 0.5 / (4 * np.pi)) * 2.0, rel=0.05)
     assert not found.unresolved[0]
 
@@ -93,10 +95,10 @@ def test_what_is_lost_makes_directions_unresolved(facing):
     """Of a lit edge aside of every lobe the error is the whole of an edge's wave, and says so."""
     k = 25.0
     aside = [(np.sin(1.0), 0, np.cos(1.0)), (np.sin(1.2), 0, np.cos(1.2))]
-    found = cr.far_field(facing, aside, wavenumber=k, boundary="hard")
+    found = cr.far_field(facing, aside, wavenumber=k, boundary="hard", method="rays")
     assert np.all(found.error > 0.02) and np.all(np.isfinite(found.error))
     # faces that see each other: what goes between them is not there
-    both = cr.far_field(fan_of(TwoBalls(0.7), (1, 0, 0)), [(-1, 0, 0.4)], wavenumber=k, boundary="hard")
+    both = cr.far_field(fan_of(TwoBalls(0.7), (1, 0, 0)), [(-1, 0, 0.4)], wavenumber=k, boundary="hard", method="rays")
     assert both.error[0] > 0.1
 
 

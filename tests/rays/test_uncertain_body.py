@@ -229,11 +229,11 @@ def test_rays_of_pieces_stop_where_the_ground_is_not_trusted():
     assert set(fan.status[below]) <= {cr.RayStatus.NON_SMOOTH, cr.RayStatus.EDGE}
     np.testing.assert_array_equal(fan.detachment[below], 0)
     np.testing.assert_array_equal(fan.points[below], np.repeat(fan.points[below, :1], fan.points.shape[1], axis=1))
-    ff = cr.far_field(fan, [(0, 0, 1), (0, 1, 0)], wavenumber=20.0)
+    ff = cr.far_field(fan, [(0, 0, 1), (0, 1, 0)], wavenumber=20.0, method="rays")
     assert np.all(np.isfinite(ff.error)) and np.all(ff.error > 0)
     # rays that all end at once have a length as well
     body = Rough(0.5, 4.0)
     body.height = 9.0
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), line, n_rays=8, wavenumber=20.0)
     assert fan.length > 0
-    assert np.all(np.isfinite(cr.far_field(fan, [(0, 0, 1)], wavenumber=20.0).error))
+    assert np.all(np.isfinite(cr.far_field(fan, [(0, 0, 1)], wavenumber=20.0, method="rays").error))

@@ -143,6 +143,15 @@ class Solution:
         Of GMRES.
     left : (m,) or (m, 2)
         What is left of the equation, as a share of its right side.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> solution = cr.solve(sc.Sphere(), [(1, 0, 0), (0, 0, 1)], wavenumber=2.0, boundary="soft")
+    >>> u = solution.near_field([(0, 0, -1.001), (0, 0, 3)], incidence=1)
+    >>> u.shape, bool(abs(u.values[0]) < 0.01), solution.backscatter().total.shape
+    ((2,), True, (2,))
     """
 
     def __init__(

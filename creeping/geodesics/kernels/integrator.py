@@ -1,4 +1,4 @@
-"""Compiled Runge-Kutta tracer; its twin in plain numpy is in tests/oracles.
+"""Compiled Runge-Kutta tracer.
 
 Rays go in blocks of BLOCK with one step for the block, chosen for its worst ray. With e the largest error of a ray in
 units of the tolerance a step is accepted where e < 1, and the next one is

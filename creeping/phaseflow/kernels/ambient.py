@@ -1,4 +1,4 @@
-"""Compiled composition of maps stored in space, for any atlas; its twin in plain numpy is in tests/oracles.
+"""Compiled composition of maps stored in space, for any atlas.
 
 A body enters as the addresses of its block evaluator and of its locator (see `creeping.geometry.surface.Compiled`), so
 the kernel compiles once for all bodies.

@@ -1,7 +1,5 @@
 """Block functions of maps on bodies with one doubly periodic chart (the torus).
 
-The twin in plain numpy is in tests/oracles.
-
 The tangent frames of the chart cover the body, so (u, v, angle), all in turns and none of them cut, are coordinates of
 the whole bundle, and a map stores their displacement. The frame is the orthogonal polar factor of (x_u, x_v).
 

@@ -1,4 +1,4 @@
-"""Compiled composition of phase maps in the model coordinates of a body; twins in plain numpy are in tests/oracles.
+"""Compiled composition of phase maps in the model coordinates of a body.
 
 Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`rotation`), and ANGLES, turns (`angles`). A map
 is a table of their displacement; a ray is converted to the model once, is composed there, and is converted back for an

@@ -1,7 +1,5 @@
 """Compiled composition of maps on bodies x = psi(s), s on the unit sphere.
 
-The twin in plain numpy is in tests/oracles.
-
 The state of a ray is the unit quaternion r = (w, x, y, z) of the rotation R = [s, q, s x q], q the direction
 
     A = d psi [e1, e2],  G = A^T A,   q = [e1, e2] G^(-1/2) A^T p,   p = A G^(-1/2) [e1, e2]^T q

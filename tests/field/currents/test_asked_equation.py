@@ -127,7 +127,9 @@ def test_what_it_refuses(ellipsoid, monkeypatch):
     drum = sc.Cylinder(1.0, 3.0)
     edged = cr.launch(cr.DirectFlow(drum), cr.shadow_line(drum, (1, 0.2, 0.3)), length=3.0, n_rays=24)
     with pytest.raises(cr.InvalidInputError, match="edges"):
-        cr.far_field(edged, [(0, 0, 1)], wavenumber=6.0, boundary="hard", method="equation")
+        cr.surface_currents(edged, wavenumber=6.0, boundary="hard", solve=True)
+    with pytest.raises(cr.InvalidInputError, match=r"at wavenumber 150: \d+ nodes take about"):
+        cr.far_field(edged, [(0, 0, 1)], wavenumber=150.0, boundary="hard", method="equation")
     with pytest.raises(cr.InvalidInputError, match="not solved at wavenumber 4: give solve=True"):
         cr.surface_currents(fan, wavenumber=4.0, boundary="pec", solve=False)
     fan = fan_of(fan.body, fan.line.direction)
