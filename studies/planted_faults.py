@@ -97,11 +97,12 @@ def inside_functions(tree: ast.AST) -> Iterator[ast.expr]:
 def places(path: Path) -> list[Fault]:
     """All faults that can be planted into a file, those of one line each."""
     text, found = path.read_text(encoding="utf-8"), []
-    for node in inside_functions(ast.parse(text)):
-        after, before = changed(node), ast.get_source_segment(text, node)
-        if after is None or before is None or "\n" in before or not text.isascii():
+    lines, name = text.splitlines(), path.relative_to(ROOT).as_posix()
+    for node in inside_functions(ast.parse(text)) if text.isascii() else ():
+        after = changed(node)
+        if after is None or node.lineno != node.end_lineno:
             continue
-        name = path.relative_to(ROOT).as_posix()
+        before = lines[node.lineno - 1][node.col_offset : node.end_col_offset]
         found.append(Fault(name, node.lineno, node.col_offset, before, f"({ast.unparse(after)})"))
     return sorted(set(found), key=lambda fault: (fault.line, fault.column, fault.after))
 

@@ -210,7 +210,7 @@ def _swept(
     flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
     # small enough that progress is told in time, large enough that a task is not all overhead
     options: dict[str, Any] = {
-        "chunk": CREASED_TASK if is_creased(body) else TASK,
+        "chunk": CREASED_TASK if is_creased(body) and not has_edges(body) else TASK,
         "progress": progress,
         "length": length,
     }

@@ -38,7 +38,7 @@ def block_gmres(
     basis = np.empty((steps + 1, n, m), dtype=complex)
     basis[0] = right / scale
     H = np.zeros((m, steps + 1, steps), dtype=complex)
-    used, left, y = 0, np.ones(m), np.zeros((m, 0), dtype=complex)
+    used, left, y = 0, np.ones(m), np.zeros((m, steps), dtype=complex)
     for step in range(steps):
         new = product(basis[step])
         # twice, for the sake of rounding
@@ -52,10 +52,12 @@ def block_gmres(
         used = step + 1
         first = np.zeros((m, used + 1), dtype=complex)
         first[:, 0] = size
-        y = np.stack(
-            [np.linalg.lstsq(h, one, rcond=None)[0] for h, one in zip(H[:, : used + 1, :used], first, strict=True)]
-        )
-        left = np.linalg.norm(np.einsum("mij,mj->mi", H[:, : used + 1, :used], y) - first, axis=1) / scale
+        # each right side ends where it would by itself
+        for one in np.flatnonzero(left > tolerance):
+            h = H[one, : used + 1, :used]
+            found = np.linalg.lstsq(h, first[one], rcond=None)[0]
+            y[one, :used] = found
+            left[one] = np.linalg.norm(h @ found - first[one]) / scale[one]
         if np.all(left <= tolerance):
             break
-    return np.einsum("snm,ms->nm", basis[:used], y), left, used
+    return np.einsum("snm,ms->nm", basis[:used], y[:, :used]), left, used

@@ -30,6 +30,7 @@ from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
 from creeping.field.polarisation import spherical_frame
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.creased import is_convex, is_creased
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.patches import patches_of
 from creeping.geometry.surface import Surface, size
@@ -226,7 +227,8 @@ class Solution:
             vector = self._kind.kind == "conductor"
             at = (slice(None),) * (2 if vector else 1) + (incidence,)
             lit = np.asarray(tiles.normals @ d < 0)
-            lit[lit] = ~occluded(self.body, self._above[lit], d)
+            if not (is_creased(self.body) and is_convex(self.body)):
+                lit[lit] = ~occluded(self.body, self._above[lit], d)
             make = ConductorCurrents if vector else SurfaceCurrents
             found = self._made[incidence] = make(
                 body=self.body,
