@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.errors import SurfaceError
 from creeping.geometry.creased import is_creased, tips_of
 from creeping.geometry.surface import size
 from creeping.geometry.triangulation import quadrilaterals
@@ -22,6 +23,8 @@ SAME = 1e-9
 """Distance of corners that are one, in body sizes."""
 SQUARE = 0.8
 """Largest |cos| of a corner of the quadrilateral that two triangles make."""
+MOST = 4000
+"""Triangles of a body of pieces that squares are made of: of more there are too many nodes at any wavenumber."""
 
 
 class CoarseMesh(NamedTuple):
@@ -40,6 +43,8 @@ def coarse_mesh(body: Any, share: float) -> CoarseMesh:
         vertices, tiles = meshes[kinds.index(kinds[-1])]
         return CoarseMesh(vertices, tiles, np.zeros(len(tiles), dtype=np.int64))
     corners, _, pieces = body.tiles(share * size(body))
+    if len(corners) > MOST:
+        raise SurfaceError(f"{len(corners)} triangles are more than the {MOST} that squares are made of")
     grid = np.round(corners.reshape(-1, 3) / (SAME * size(body))).astype(np.int64)
     _, first, numbers = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     vertices, triangles = corners.reshape(-1, 3)[first], numbers.reshape(-1, 3)

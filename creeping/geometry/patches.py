@@ -111,6 +111,11 @@ class Patches:
 def patches_of(body: Surface) -> Patches:
     """Squares that cover a body, made once.
 
+    Raises
+    ------
+    SurfaceError
+        If no mesh of squares is the body.
+
     Examples
     --------
     >>> import scatterers as sc
@@ -118,26 +123,28 @@ def patches_of(body: Surface) -> Patches:
     >>> bool(patches.off.max() < 1e-5), bool(patches.edges.any())
     (True, True)
     """
-    found: Patches = kept(body, "patches", lambda: _made(body))
+    found: Patches | str = kept(body, "patches", lambda: _made(body))
+    if isinstance(found, str):
+        raise SurfaceError(found)
     return found
 
 
-def _made(body: Surface) -> Patches:
+def _made(body: Surface) -> Patches | str:
+    """The squares, or why there are none."""
     ground, best, least = _Ground(body), None, np.inf
     failure: Exception | None = None
     for share in SIDES_OF_PIECES if is_creased(body) else (0.0,):
         try:
             found = _refined(ground, coarse_mesh(body, share))
         except (SurfaceError, ValueError) as error:
-            failure = error
+            # coarser ones come first
+            failure = failure or error
             continue
         # the fewest squares that are the body; where none are, those that are nearest to it
         amiss = max(found.off.max() / (WELL * ground.size), found.gap / CLOSED, 1.0) / min(found.angle, STEEP)
         if len(found.off) * amiss**2 < least:
             best, least = found, len(found.off) * amiss**2
-    if best is None:
-        raise SurfaceError(f"no mesh of squares covers the body: {failure}")
-    return best
+    return best or f"no mesh of squares covers the body: {failure}"
 
 
 def _refined(ground: "_Ground", mesh: "CoarseMesh") -> Patches:

@@ -115,7 +115,8 @@ def solve(
             f"the integral equation at wavenumber {k:g} has {told}, more than the {seconds:g} s that it may take; "
             "give seconds=, or a lower wavenumber, or let rays serve (creeping.far_field)"
         )
-    within_budget(memory, f"the integral equation between {len(tiles.points)} nodes", "lower the wavenumber")
+    what = f"the integral equation between {len(tiles.points)} nodes for {len(d)} incidences"
+    within_budget(memory, what, "lower the wavenumber or give fewer")
     tell(f"{told}: integrals between the nodes")
     return Solution(body, d, k, boundary, kind, tiles, tell)
 
@@ -126,7 +127,9 @@ def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]
     entries = float(nodes) ** 2 * (4 if vector else 1)
     pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if vector else 1.0)
     products = 25 * entries * PER_ENTRY * incidences * (2 if vector else 1)
-    return (pairs + 2 * nodes * PER_NODE + products) / thread_count(), 8 * entries + 4e8
+    # the matrix and its transpose, values and changes, and what GMRES keeps
+    memory = 16 * entries + 64.0 * nodes * incidences * (6 if vector else 1) + TOGETHER
+    return (pairs + 2 * nodes * PER_NODE + products) / thread_count(), memory
 
 
 class Solution:

@@ -115,6 +115,10 @@ def test_what_cannot_be_solved_is_told(flat, monkeypatch):
         flat.near_field([(0, 0, 0.2), (0, 0, 2)])
     with pytest.raises(InvalidInputError, match="boundary = 'rigid'"):
         cr.solve(CYLINDER, (1, 0, 0), wavenumber=3.0, boundary="rigid")
+    monkeypatch.setenv("CREEPING_MEMORY", "1M")
+    with pytest.raises(InvalidInputError, match=r"for 2 incidences would take .* GB of memory"):
+        cr.solve(CYLINDER, D, wavenumber=3.0, boundary="soft")
+    monkeypatch.delenv("CREEPING_MEMORY")
     told = []
     cr.solve(CYLINDER, (1, 0, 0), wavenumber=1.0, boundary="soft", progress=told.append)
     assert "nodes, about" in told[0]
