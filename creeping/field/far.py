@@ -13,15 +13,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from creeping._typing import ArrayLike, FloatArray
+from creeping._typing import ArrayLike
 from creeping.errors import SurfaceError
-from creeping.field.arguments import UNRESOLVED, checked, checked_method, checked_plain, observers_of
-from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
+from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.creased_far import creased_far_field, tip_waves
+from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.kept import affordable, kept_currents
-from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.currents.whole_solution import pairs_of
 from creeping.field.equation.kept import asked_solution, solution_for
 from creeping.field.extrapolated import measured_level
@@ -113,8 +111,8 @@ def far_field(
             currents = kept_currents(fan, k, boundary, solve=solve)
             # the equation knows of tips, expansions do not
             left_out = tip_waves(fan, k) if creased and not currents.solved else 0.0
-            far = _by_currents(currents, r, boundary, left_out)
-            return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
+            far = far_by_currents(currents, r, boundary, left_out=left_out)
+            return replace(far, validity=validity(fan, wavenumber=k))
         except SurfaceError:
             if must or solve:
                 raise
@@ -126,24 +124,3 @@ def far_field(
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far
-
-
-def _by_currents(currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike, left_out: float) -> FarField:
-    """Far field in unit directions (m, 3), with what is ``left_out``, L, of every direction in its error."""
-    lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
-    error = np.hypot(currents.error(r), left_out)
-    largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
-    off = ~(error < UNRESOLVED * largest)
-    return FarField(
-        directions=r.copy(),
-        creeping=dark,
-        reflected=lit,
-        forward=np.zeros(lit.shape, dtype=complex),
-        method=np.full(len(r), "equation" if currents.solved else "currents", dtype="<U16"),
-        unresolved=off.any(axis=tuple(range(1, off.ndim))),
-        error=error,
-        error_by="extinction",
-        wavenumber=currents.wavenumber,
-        boundary=boundary_name(boundary),
-        order=2,
-    )

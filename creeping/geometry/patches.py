@@ -176,6 +176,7 @@ class _Ground:
     def __init__(self, body: Any) -> None:
         self.body, self.size = body, size(body)
         self.pieces = list(pieces_of(body)) if is_creased(body) else [body]
+        self.creases = body.creases if is_creased(body) else ()
 
     def onto(self, points: FloatArray, pieces: IntArray) -> FloatArray:
         """The nearest points (n, 3) of the pieces with these numbers (n,)."""
@@ -244,6 +245,12 @@ def _first(ground: _Ground, mesh: CoarseMesh) -> Patches:
     inside = lines[:, 1:-1]
     edge = np.zeros(len(pairs), dtype=bool)
     long = pairs[:, 0] != pairs[:, 1]
+    # edges are known by the two pieces that share them
+    apart = int(np.sum(np.bincount(numbers)[long] != 2))
+    if apart or any(crease.kind == "edge" and len(set(crease.pieces)) == 1 for crease in ground.creases):
+        raise SurfaceError(
+            f"{apart} sides of the body's squares are not shared by two, or a piece has an edge with itself"
+        )
     plain = long & (least == most)
     inside[plain] = ground.onto(inside[plain].reshape(-1, 3), np.repeat(least[plain], DEGREE - 1)).reshape(
         -1, DEGREE - 1, 3

@@ -1,6 +1,7 @@
 """Fields of many incidences on a body with edges, joints or tips: of each alone, as `creeping.far_field` has them."""
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 
@@ -44,36 +45,32 @@ def fill_creased(
     passed: Callable[[float], None] = lambda _: None,
 ) -> None:
     """Fields of incidences with these lines into arrays whose first axis is the incidence; ``passed`` of `Sweeper`."""
-    _solved(flow.body, request, lines)
     bistatic = request.quantity == "bistatic"
-    each = len(request.problems) * len(request.wavenumbers)
-    for row, line in enumerate(lines):
-        if line is None:
-            continue
-        fan = launch(flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
+    there = {row: line for row, line in enumerate(lines) if line is not None}
+    rows = list(there)
+    asked = list(product(request.problems, enumerate(request.wavenumbers)))
+    # the equation of a body with edges is solved for all incidences at once, and these come before the next one
+    together = has_edges(flow.body) and request.order == 2 and request.method in ("auto", "equation")
+    jobs = [(row, one) for one in asked for row in rows] if together else [(r, one) for r in rows for one in asked]
+    directions = np.array([line.direction for line in there.values()])
+    fans: dict[int, RayFan] = {}
+    for done, (row, ((name, which, suffix), (k, wavenumber))) in enumerate(jobs, 1):
+        boundary, line = parse_boundary(name), there[row]
+        if together and row == rows[0]:
+            solve_together(flow.body, directions, wavenumber, boundary)
+        if row not in fans:
+            fan = launch(flow, line, length=request.length, n_rays=request.n_rays, max_gap=np.inf, measured=False)
+            fans = {**fans, row: fan} if together else {row: fan}
         observers = np.array(request.observation) if bistatic else -line.direction[None]
-        for problem, (name, which, suffix) in enumerate(request.problems):
-            boundary = parse_boundary(name)
-            for k, wavenumber in enumerate(request.wavenumbers):
-                field = _field(fan, observers, wavenumber, boundary, request)
-                for part, values in FieldArrays.of(field, 1).arrays.items():
-                    if part + suffix in out:
-                        out[part + suffix][(row, *which, k)] = values[0] if bistatic else values[0, 0]
-                if field.validity is not None:
-                    numbers = (field.validity.least_k_rho, field.validity.largest_transverse)
-                    for known, value in zip(VALID, numbers, strict=True):
-                        out[known][row, k] = value
-                passed((row + (problem * len(request.wavenumbers) + k + 1) / each) / len(lines))
-
-
-def _solved(body: Surface, request: SweepRequest, lines: tuple[ShadowLine | None, ...]) -> None:
-    """Solve the equation of a body with edges for all incidences at once, where `far_field` will ask for each."""
-    d = np.array([line.direction for line in lines if line is not None])
-    if not has_edges(body) or not len(d) or request.order != 2 or request.method not in ("auto", "equation"):
-        return
-    for name, _, _ in request.problems:
-        for wavenumber in request.wavenumbers:
-            solve_together(body, d, wavenumber, parse_boundary(name))
+        field = _field(fans[row], observers, wavenumber, boundary, request)
+        for part, values in FieldArrays.of(field, 1).arrays.items():
+            if part + suffix in out:
+                out[part + suffix][(row, *which, k)] = values[0] if bistatic else values[0, 0]
+        if field.validity is not None:
+            numbers = (field.validity.least_k_rho, field.validity.largest_transverse)
+            for known, value in zip(VALID, numbers, strict=True):
+                out[known][row, k] = value
+        passed(done / len(jobs))
 
 
 def _field(

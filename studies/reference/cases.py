@@ -68,22 +68,24 @@ def ellipsoid_ports() -> Arrays:
 
 def ellipsoid_monopoles() -> Arrays:
     """E of a monopole on the conductor (0.75, 0.9, 1.15), k = 12, at points all about it."""
-    body, points = ellipsoid(0.75, 0.9, 1.15), np.random.default_rng(7).normal(size=(60, 3))
-    sources = np.array([[0.45, 0.6, -np.sqrt(1 - 0.45**2 - 0.6**2)]])
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    points = points[np.max(points @ sources.T, axis=1) < 0.9]
+    body, sources, points = _about_a_monopole(60)
     found = monopoles.coupled_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
     return {"ports": found.ports, "points": found.points, "values": found.values, "spread": found.spread}
 
 
 def ellipsoid_antennas() -> Arrays:
     """H of the same monopole along two tangents of each point."""
-    body, points = ellipsoid(0.75, 0.9, 1.15), np.random.default_rng(7).normal(size=(80, 3))
-    sources = np.array([[0.45, 0.6, -np.sqrt(1 - 0.45**2 - 0.6**2)]])
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    points = points[np.max(points @ sources.T, axis=1) < 0.9]
+    body, sources, points = _about_a_monopole(80)
     found = antennas.slots_of_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
     return {name: getattr(found, name) for name in ("ports", "points", "tangents", "values", "spread")}
+
+
+def _about_a_monopole(count: int) -> tuple[Body, FloatArray, FloatArray]:
+    """The conductor, the direction of the foot, and those of so many points drawn that are not next to it."""
+    points = np.random.default_rng(7).normal(size=(count, 3))
+    sources = np.array([[0.45, 0.6, -np.sqrt(1 - 0.45**2 - 0.6**2)]])
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    return ellipsoid(0.75, 0.9, 1.15), sources, points[np.max(points @ sources.T, axis=1) < 0.9]
 
 
 def ellipsoid_caustic() -> Arrays:

@@ -61,9 +61,8 @@ def asked_solution(body: Surface, direction: FloatArray, wavenumber: float, boun
                 f"the integral equation is not solved at wavenumber {wavenumber:g}: {why}; rays and optics serve "
                 "without method='equation'"
             )
-        _keep(body, solve(body, direction, wavenumber=wavenumber, boundary=boundary, seconds=np.inf))
-        found = _found(body, direction, wavenumber, boundary)
-        assert found is not None
+        found = Solved(solve(body, direction, wavenumber=wavenumber, boundary=boundary, seconds=np.inf), 0)
+        _keep(body, found.solution)
     return found
 
 

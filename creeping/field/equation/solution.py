@@ -19,9 +19,10 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import UNRESOLVED, checked, checked_plain, observers_of
+from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.conductor import ConductorCurrents
+from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.block_gmres import block_gmres
 from creeping.field.equation.matrix import EACH, VECTOR, Matrix, Places
@@ -267,24 +268,7 @@ class Solution:
         return self._far(observers_of(observation), self.currents(incidence))
 
     def _far(self, r: FloatArray, currents: SurfaceCurrents) -> FarField:
-        lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
-        error = LEVEL.get(self._kind.kind, 1.0) * currents.error(r)
-        largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
-        off = ~(error < UNRESOLVED * largest)
-        return FarField(
-            directions=r.copy(),
-            creeping=dark,
-            reflected=lit,
-            forward=np.zeros(lit.shape, dtype=complex),
-            method=np.full(len(r), "equation", dtype="<U16"),
-            unresolved=off.any(axis=tuple(range(1, off.ndim))),
-            error=error,
-            error_by="extinction",
-            wavenumber=self.wavenumber,
-            boundary=boundary_name(self.boundary),
-            order=2,
-            unit=unit_of(self.body),
-        )
+        return far_by_currents(currents, r, self.boundary, level=LEVEL.get(self._kind.kind, 1.0))
 
     def backscatter(self) -> FarField:
         """Far field of each incidence back to where it comes from, in directions -d (m,)."""

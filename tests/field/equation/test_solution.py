@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import creeping as cr
 import scatterers as sc
-from creeping.errors import InvalidInputError
+from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.equation import kept, solution
 from studies.reference import sphere
 
@@ -83,6 +83,31 @@ def test_far_field_of_a_fan_is_that_of_the_equation_where_edges_diffract(flat):
     assert kept.solution_for(CYLINDER, fan.line.direction, 3.0, "hard") is not None
     by_rays = cr.far_field(fan, R[:3], wavenumber=3.0, boundary="hard", method="rays")
     assert set(by_rays.method) == {"rays+optics"}
+
+
+def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
+    asked, wavenumbers = [], np.array([1.0, 1.2, 1.4])
+    monkeypatch.setattr(kept, "KEPT", 1)
+    known = kept.solve
+    monkeypatch.setattr(kept, "solve", lambda *of, **how: asked.append(how["wavenumber"]) or known(*of, **how))
+    body = sc.Cylinder(0.5, 1.0)
+    ds = cr.backscatter(body, wavenumbers=wavenumbers, elevation=[10.0, 50.0], boundary="hard")
+    assert asked == wavenumbers.tolist()
+    up = np.radians(ds["elevation"].values.ravel())
+    d = -np.stack([np.cos(up), 0 * up, np.sin(up)], axis=1)
+    one = known(body, d, wavenumber=wavenumbers[0], boundary="hard").backscatter()
+    total = sum(ds[name] for name in ("creeping", "reflected"))
+    assert_allclose(np.ravel(total.sel(wavenumber=wavenumbers[0])), one.total, atol=1e-6)
+
+
+def test_squares_that_do_not_share_their_sides_are_refused():
+    class Torn(sc.Cylinder):
+        def tiles(self, edge):
+            corners, normals, pieces = super().tiles(edge)
+            return corners[1:], normals[1:], pieces[1:]
+
+    with pytest.raises(SurfaceError, match="sides of the body's squares are not shared by two"):
+        cr.solve(Torn(1.0, 2.0), (1, 0, 0), wavenumber=2.0, boundary="hard")
 
 
 def test_units_scale(flat):

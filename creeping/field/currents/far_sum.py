@@ -1,0 +1,34 @@
+"""The far field that currents of the whole body give, with the error that they state."""
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.field.arguments import UNRESOLVED
+from creeping.field.boundary import BoundaryLike, boundary_name
+from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.far_result import FarField
+from creeping.geometry.unit import unit_of
+
+
+def far_by_currents(
+    currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike, *, left_out: float = 0.0, level: float = 1.0
+) -> FarField:
+    """Far field in unit directions (m, 3); its error is ``level`` times that of the currents and ``left_out``, L."""
+    lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
+    error = np.hypot(level * currents.error(r), left_out)
+    largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
+    off = ~(error < UNRESOLVED * largest)
+    return FarField(
+        directions=r.copy(),
+        creeping=dark,
+        reflected=lit,
+        forward=np.zeros(lit.shape, dtype=complex),
+        method=np.full(len(r), "equation" if currents.solved else "currents", dtype="<U16"),
+        unresolved=off.any(axis=tuple(range(1, off.ndim))),
+        error=error,
+        error_by="extinction",
+        wavenumber=currents.wavenumber,
+        boundary=boundary_name(boundary),
+        order=2,
+        unit=unit_of(currents.body),
+    )
