@@ -5,6 +5,7 @@ lines are orthogonal, so the polar frame is the pair of their unit tangents. The
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -129,6 +130,11 @@ class Torus(Body):
         radii = np.array([self.R, self.r])
         there, back = Compiled(_forward, "forward", radii), Compiled(_inverse, "inverse", radii)
         return PeriodicAtlas(chart, self._coordinates, Compiled(_locate, "locator", radii), there, back)
+
+    @property
+    def tiling(self) -> Sequence[PeriodicChart]:
+        """The one chart."""
+        return self.atlas.charts
 
 
 def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]

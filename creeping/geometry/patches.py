@@ -12,6 +12,7 @@ has one. A square that is not the body to POSITION and NORMAL is halved.
 Sources: [C67], [BT04]; Derivations, B14.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -23,7 +24,7 @@ from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
 from creeping.geometry.kept import kept
 from creeping.geometry.quadrature import nearest_points
 from creeping.geometry.squares import lobatto, on_squares
-from creeping.geometry.surface import Surface, normal, size
+from creeping.geometry.surface import Chart, Surface, normal, size
 
 DEGREE = 6
 """Degree of the polynomials along u and v."""
@@ -31,8 +32,9 @@ POSITION, NORMAL = 2e-6, 3e-4
 """What squares may be off the body, in its sizes, and their normals, radians."""
 WORST = 1e-3
 """What the worst of them may be off the body, in its sizes."""
-ROUNDS, TURNS = 5, 2.0
-"""Times that a square is parted at most, and ratio of the turns of its normal from which it is along one side."""
+ROUNDS, TURNS, PARTS = 5, 2.0, 2
+"""Times that a square is parted at most, and ratio of the turns of its normal from which it is along one side; and
+parts along a side of a chart before."""
 SIDES_OF_PIECES = (1.0, 0.7, 0.5, 0.3)
 """Longest sides of the triangles of a body of pieces, in its sizes, of the meshes that are tried."""
 WELL, CLOSED = 1e-5, 1e-6
@@ -132,6 +134,9 @@ def patches_of(body: Surface) -> Patches:
 def _made(body: Surface) -> Patches | str:
     """The squares, or why there are none."""
     ground, best, least = _Ground(body), None, np.inf
+    charts = () if is_creased(body) else getattr(body, "tiling", ())
+    if charts:
+        return _of_charts(ground, charts)
     failure: Exception | None = None
     for share in SIDES_OF_PIECES if is_creased(body) else (0.0,):
         try:
@@ -327,16 +332,62 @@ def _along(points: FloatArray, lines: FloatArray) -> FloatArray:
     return np.asarray(curve(start[:, None] + along[:, None] * lobatto(lines.shape[1] - 1)))
 
 
-def _parted(ground: _Ground, patches: Patches) -> Patches:
-    """Squares halved along the sides over which they turn more, or along both, and brought onto the body again."""
+def _of_charts(ground: _Ground, charts: Sequence[Chart]) -> Patches:
+    """Parts of the unit squares of charts that cover a body once, parted until they are the body."""
+    t, done = lobatto(DEGREE), []
+    for chart in charts:
+        low, high = (np.stack(np.meshgrid(*[np.arange(PARTS)] * 2), axis=-1).reshape(-1, 2) + end for end in (0, 1))
+        low, high = low / PARTS, high / PARTS
+        for turn in range(ROUNDS + 1):
+            u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
+            grid = np.broadcast_arrays(u[:, :, None], v[:, None, :])
+            current = _smooth(chart.point(np.stack(grid, axis=-1)))
+            off, turned = ground.misfit(current)
+            poor = ~((off < POSITION * ground.size) & (turned < NORMAL)) & (turn < ROUNDS)
+            done.append(replace(current, off=off)[~poor])
+            if not np.any(poor):
+                break
+            low, high = _halves(low[poor], high[poor], _long(current[poor]))
+    return Patches.joined(done)
+
+
+def _halves(low: FloatArray, high: FloatArray, along: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Boxes (m, 2) halved along one or both axes (m, 2): corners (k, 2) of the parts."""
+    parts = []
+    for right in (False, True):
+        for upper in (False, True):
+            # the other half of what is not halved is itself
+            there = (along[:, 0] | (not right)) & (along[:, 1] | (not upper))
+            a, b, half = low[there], high[there], along[there]
+            middle = 0.5 * (a + b)
+            last = np.array([right, upper])
+            parts.append((np.where(half & last, middle, a), np.where(half & ~last, middle, b)))
+    first, second = zip(*parts, strict=True)
+    return np.concatenate(first), np.concatenate(second)
+
+
+def _smooth(places: FloatArray) -> Patches:
+    """Squares (m, q + 1, q + 1, 3) of a smooth body."""
+    m = len(places)
+    none, zero = np.zeros((m, 4), dtype=bool), np.zeros(m, dtype=np.int64)
+    spans = np.zeros((m, 4, 2))
+    return Patches(places, zero, none, np.zeros((m, 4), dtype=np.int64), spans, none[:, 0], none[:, 0], np.zeros(m))
+
+
+def _long(patches: Patches) -> BoolArray:
+    """Whether squares are to be halved along u and v (m, 2): where they turn most, or along both."""
     at = lobatto(DEGREE)
     _, along, across = on_squares(patches.places, *(np.broadcast_to(at[1:-1], (len(patches.off), DEGREE - 1)),) * 2)
     n = np.cross(along, across)
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
-    turns = [np.linalg.norm(np.diff(n, axis=axis), axis=-1).sum(axis=axis).max(axis=1) for axis in (1, 2)]
-    halves = [turns[axis] > TURNS * turns[1 - axis] for axis in (0, 1)]
-    parts = []
-    for which, mine in enumerate((halves[0], halves[1], ~(halves[0] | halves[1]))):
+    u, v = (np.linalg.norm(np.diff(n, axis=axis), axis=-1).sum(axis=axis).max(axis=1) for axis in (1, 2))
+    return np.stack([v <= TURNS * u, u <= TURNS * v], axis=1)
+
+
+def _parted(ground: _Ground, patches: Patches) -> Patches:
+    """Squares halved along the sides over which they turn more, or along both, and brought onto the body again."""
+    halved, parts = _long(patches), []
+    for which, mine in enumerate((~halved[:, 1], ~halved[:, 0], np.all(halved, axis=1))):
         mine = np.flatnonzero(mine)
         some = patches[mine]
         for right in (None,) if which == 1 else (False, True):

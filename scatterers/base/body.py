@@ -62,6 +62,11 @@ class Body:
         """None: the body is smooth as a whole."""
         return ()
 
+    @property
+    def tiling(self) -> Sequence[Any]:
+        """Charts whose unit squares cover the body once and meet along their sides; none if it has no such charts."""
+        return ()
+
     def _set_speed(self) -> None:
         object.__setattr__(self, "speed", as_speed(getattr(self, "speed", None)))
 

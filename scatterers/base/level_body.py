@@ -4,7 +4,7 @@ A star-shaped body, upright or along a bent spine, has the sphere map of `scatte
 charts; any other body has the Monge charts of `scatterers.atlas.monge.atlas`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.atlas.charts import CubeSphereAtlas
+from scatterers.atlas.charts import CubeSphereAtlas, FaceChart
 from scatterers.base.body import Body
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.spline_constants import CENTRE, HEADER
@@ -127,6 +127,11 @@ class LevelBody(Body):
             If the body is too thin, or too sharply curved, for charts.
         """
         return self._covered()
+
+    @property
+    def tiling(self) -> Sequence[FaceChart]:
+        """The six charts of a star-shaped body; none of others."""
+        return CubeSphereAtlas(self._map).charts if self._map is not None else ()
 
     def _covered(self) -> "CubeSphereAtlas | MongeAtlas":
         """Make the atlas."""

@@ -5,13 +5,13 @@ differ in their parameters only, so they share one evaluator and one chart locat
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.atlas.charts import CubeSphereAtlas
+from scatterers.atlas.charts import CubeSphereAtlas, FaceChart
 from scatterers.base.body import Body, finite, positive
 from scatterers.kernels.compiled import Compiled, Kind
 from scatterers.kernels.frames import cube_tangents, fill_frame
@@ -122,6 +122,11 @@ class BentEllipsoid(Body):
     def atlas(self) -> CubeSphereAtlas:
         """Six charts."""
         return CubeSphereAtlas(self, self._compiled(_locate, "locator"))
+
+    @property
+    def tiling(self) -> Sequence[FaceChart]:
+        """The six charts."""
+        return self.atlas.charts
 
 
 def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]

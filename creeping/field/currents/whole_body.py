@@ -38,22 +38,18 @@ from creeping.field.boundary import Boundary
 from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.depth import TRIED, inner_points
-from creeping.geometry.quadrature import BodyNodes, body_nodes, nodes_at
+from creeping.geometry.depth import inner_points
+from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import Surface
 
 DEPTH = 0.25
 """Least depth, in wavelengths, of the points inside at which currents are judged: nearer the sums over nodes err."""
 SHALLOW = 0.12
 """Least depth where the body is too thin for that."""
-APART = 2.5
-"""The same over the spacing of nodes next to it, where solved currents have some all over the body."""
 RIM = 0.3
 """Share of the error, in the square, that stands next to the shadow line."""
 AHEAD = 1.0
 """What of epsilon the field itself is off by, where it is large."""
-SUMS = 5e-4
-"""What the sums over nodes of the equation err by, of which points deep inside may know less."""
 BESIDE, STEP, LARGEST = 6, 0.05, 2.0
 """Nodes next to one, the change of admittance to these from which it steps, and |u| of a wave that comes back."""
 POINTS = 100
@@ -121,6 +117,8 @@ class SurfaceCurrents:
     solved: bool = False
     _factors: ClassVar[tuple[float, float]] = (2.5, 2.0)
     """Factors of the error: of what all directions share, and of what the second order says of each."""
+    _least: ClassVar[float] = 0.0
+    """What is left inside, at least: points deep inside may know less of what is wrong."""
 
     def __repr__(self) -> str:
         dark = "in the dark" if self.solved else "on rays"
@@ -199,17 +197,13 @@ class SurfaceCurrents:
         """Points inside the body at which the currents are judged (m, 3), L; none where it is nowhere thick enough."""
         wavelength = 2 * np.pi / self.wavenumber
         found = (inner_points(self.body, depth * wavelength, POINTS) for depth in (DEPTH, SHALLOW))
-        points = next((points for points in found if len(points)), np.zeros((0, 3)))
-        if self.solved and not len(points):
-            nodes, x = body_nodes(self.body, 2 * self.wavenumber), inner_points(self.body, 0.0, TRIED)
-            points = x[nodes.nearest(x) > APART * nodes.spacing_at(x)][:POINTS]
-        return points
+        return next((points for points in found if len(points)), np.zeros((0, 3)))
 
     @cached_property
     def extinction(self) -> float:
         """Rms of what is left of the incident wave inside, as a share of it; NaN if the body is nowhere thick enough.
 
-        Of solved currents at least 5e-4.
+        Of solved currents at least 1e-4.
 
         It is the error of the far field, rms over all directions, as a share of the field's rms, within a factor of
         about 2. Of a conductor it is the mean of both polarisations, in the square.
@@ -283,12 +277,11 @@ class SurfaceCurrents:
         )
 
     def _at_least(self, left: FloatArray) -> FloatArray:
-        """What is left inside, of solved currents no less than what sums over nodes err by at the surface.
+        """What is left inside, no less than is known.
 
         With what it cannot tell: between nodes an admittance that steps may be another one, exactly solved.
         """
-        left = np.maximum(left, SUMS) if self.solved else left
-        return np.hypot(left, self.stepped / (self._factors[0] * self._amplitude))
+        return np.hypot(np.maximum(left, self._least), self.stepped / (self._factors[0] * self._amplitude))
 
     @cached_property
     def stepped(self) -> float:

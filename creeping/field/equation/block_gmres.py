@@ -9,6 +9,9 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 
+TOLERANCE, STEPS = 1e-4, 80
+"""What is left of the equation, as a share of its right side, and steps at most."""
+
 
 def block_gmres(
     product: Callable[[ComplexArray], ComplexArray], right: ComplexArray, tolerance: float, steps: int

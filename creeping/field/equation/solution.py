@@ -17,31 +17,27 @@ from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.block_gmres import block_gmres
-from creeping.field.equation.matrix import EACH, VECTOR, Matrix, Places
+from creeping.field.equation.block_gmres import STEPS, TOLERANCE, block_gmres
+from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
+from creeping.field.equation.matrix import EACH, VECTOR, Matrix
 from creeping.field.equation.tiles import Tiles, tiles_for
 from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
 from creeping.field.polarisation import spherical_frame
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.creased import is_convex, is_creased
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.patches import patches_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.unit import unit_of
 from creeping.kernels.threads import thread_count
-from creeping.shadow.occlusion import occluded
 from creeping.storage.memory import within_budget
 
-TOLERANCE, STEPS = 1e-4, 80
-"""What is left of the equation, as a share of its right side, and steps at most."""
 TOGETHER = 2e8
 """Bytes of what GMRES keeps of incidences that are solved together."""
 PER_NODE = 5e-4
@@ -50,8 +46,6 @@ PER_ENTRY = 4e-10
 """Seconds of an entry of the matrix in a product with one of several columns."""
 SECONDS = 30.0
 """What the equation may take, unless the caller says."""
-ON_BODY = 5.0
-"""Error of currents at a point and of the field next to the body, in what they leave inside."""
 LEVEL = {"soft": 2.0}
 """Error of the far field over that of `creeping.field.currents.whole_body`: soft edges leave less inside."""
 TOUCHING = 1e-6
@@ -173,8 +167,12 @@ class Solution:
         self._kind, self._matrix = kind, Matrix(tiles, wavenumber, kind)
         self.nodes = len(tiles.points)
         matrix = self._matrix
-        right = self._incident(matrix.nodes)
-        right[matrix.at] -= 1j * self._incident(matrix.inner)
+        magnetic = np.swapaxes(np.cross(directions[:, None], spherical_frame(directions)), 1, 2)
+        right, under = (
+            twice_incident(kind, places, directions, wavenumber, magnetic) for places in (matrix.nodes, matrix.inner)
+        )
+        right = right.reshape(*right.shape[: matrix.columns], -1)
+        right[matrix.at] -= 1j * under.reshape(-1, *right.shape[1:])
         n, columns = len(right) * matrix.columns, right.shape[-1]
         right = (right.reshape(self.nodes, -1) * matrix.root[:, None]).reshape(n, columns)
         product, found, left = matrix.product, [], []
@@ -210,30 +208,14 @@ class Solution:
             f"  {self.nodes} nodes, {self.steps} steps; {100 * worst:.2g} % of the incident wave left inside"
         )
 
-    def _incident(self, places: Places) -> ComplexArray:
-        """2 u_inc, 2 du_inc/dn or 2 n x H_inc at places (p,): (p, m), of a conductor (p, 2, 2 m)."""
-        k, d = self.wavenumber, self.directions
-        wave = 2 * np.exp(1j * k * (places.points @ d.T))
-        if self._kind.kind == "soft":
-            return np.asarray(1j * k * (places.normals @ d.T) * wave)
-        if self._kind.kind != "conductor":
-            return np.asarray(wave)
-        H = np.cross(d[:, None], spherical_frame(d))
-        # a.(n x H) = -b.H, b.(n x H) = a.H
-        rows = [-np.einsum("pc,mec->pme", places.b, H), np.einsum("pc,mec->pme", places.a, H)]
-        return np.asarray((np.stack(rows, axis=1) * wave[:, None, :, None]).reshape(len(wave), 2, -1))
-
-    def currents(self, incidence: int = 0) -> SurfaceCurrents:
+    def currents(self, incidence: int = 0) -> TileCurrents | ConductorTileCurrents:
         """Currents of one incidence at the nodes."""
         found = self._made.get(incidence)
         if found is None:
             tiles, d = self._matrix.tiles, self.directions[incidence]
             vector = self._kind.kind == "conductor"
             at = (slice(None),) * (2 if vector else 1) + (incidence,)
-            lit = np.asarray(tiles.normals @ d < 0)
-            if not (is_creased(self.body) and is_convex(self.body)):
-                lit[lit] = ~occluded(self.body, self._above[lit], d)
-            make = ConductorCurrents if vector else SurfaceCurrents
+            make = ConductorTileCurrents if vector else TileCurrents
             found = self._made[incidence] = make(
                 body=self.body,
                 direction=d,
@@ -243,25 +225,20 @@ class Solution:
                 travel=np.broadcast_to(d, tiles.points.shape),
                 values=self._values[at],
                 change=self._change[at],
-                lit=lit,
+                lit=lit_ground(self.body, tiles.points, tiles.normals, d),
                 rim=np.zeros((0, 3)),
                 rim_length=0.0,
                 unserved=0.0,
                 wavenumber=self.wavenumber,
                 boundary=self._kind,
                 solved=True,
+                matrix=self._matrix,
             )
         return found
 
     @cached_property
-    def _made(self) -> dict[int, SurfaceCurrents]:
+    def _made(self) -> dict[int, TileCurrents | ConductorTileCurrents]:
         return {}
-
-    @cached_property
-    def _above(self) -> FloatArray:
-        """Points just above the nodes: the polynomials of tiles may pass under the body."""
-        tiles = self._matrix.tiles
-        return np.asarray(tiles.points + 1e-5 * size(self.body) * tiles.normals)
 
     def far_field(self, observation: ArrayLike, incidence: int = 0) -> FarField:
         """Far field of one incidence in directions (..., 3), which need not be unit, with its error."""
@@ -290,8 +267,8 @@ class Solution:
         y = as_points(points)
         x = y.reshape(-1, 3)
         inside = np.flatnonzero(self.body.level(x) < 0)
-        k, values = self.wavenumber, self._values[:, incidence]
-        tile, u, v, off = self._matrix.tiles.located(x)
+        currents = self.currents(incidence)
+        off = self._matrix.tiles.located(x)[3]
         on = off < TOUCHING * size(self.body)
         inside = inside[off[inside] > TOUCHING * size(self.body)]
         if len(inside):
@@ -299,15 +276,12 @@ class Solution:
                 f"{len(inside)} of {len(x)} points are inside the body (deepest: row "
                 f"{inside[np.argmax(off[inside])]}, {off[inside].max():.3g}); give points on it or outside"
             )
-        incident, scattered = np.exp(1j * k * (x @ self.directions[incidence])), np.zeros(len(x), dtype=complex)
-        away = Places.at(x[~on], np.broadcast_to([0.0, 0.0, 1.0], x[~on].shape))
-        single = self._kind.kind == "soft"
-        sums = self._matrix.received(away, values[:, None], "single" if single else "double")[:, 0]
-        scattered[~on] = (-0.5 if single else 0.5) * sums
+        incident, scattered = np.exp(1j * self.wavenumber * (x @ currents.direction)), np.zeros(len(x), dtype=complex)
+        scattered[~on] = currents.scattered(x[~on])
         if np.any(on):
-            total = 0.0 if single else self._on(tile[on], u[on], v[on], incidence)
+            total = 0.0 if self._kind.kind == "soft" else currents.on_body(x[on]).values
             scattered[on] = total - incident[on]
-        error = np.full(len(x), ON_BODY * self.currents(incidence).extinction)
+        error = np.full(len(x), ON_BODY * currents.extinction)
         lanes = self._lanes(y, incident + scattered, error, 1.0)
         shape = y.shape[:-1]
         nothing = np.zeros(shape, dtype=complex)
@@ -325,14 +299,11 @@ class Solution:
         """
         self._scalar("surface_field")
         y = as_points(points)
-        x = y.reshape(-1, 3)
-        tile, u, v, _ = self._matrix.tiles.located(x)
-        values, unit = self._on(tile, u, v, incidence), self.wavenumber if self._kind.kind == "soft" else 1.0
-        error = np.full(len(x), ON_BODY * unit * self.currents(incidence).extinction)
-        normals = self._matrix.tiles.on(tile, u, v)[1]
-        lit = (normals @ self.directions[incidence] < 0).reshape(y.shape[:-1])
-        lanes = self._lanes(y, values, error, unit)
-        nothing = np.zeros_like(lanes["values"])
+        currents, unit = self.currents(incidence), self.wavenumber if self._kind.kind == "soft" else 1.0
+        found = currents.on_body(y)
+        error = np.full(len(found.values), ON_BODY * unit * currents.extinction)
+        lanes = self._lanes(y, found.values, error, unit)
+        lit, nothing = found.lit.reshape(y.shape[:-1]), np.zeros_like(lanes["values"])
         return SurfaceField(
             **lanes, lit=np.where(lit, lanes["values"], nothing), creeping=np.where(lit, nothing, lanes["values"])
         )
@@ -342,15 +313,6 @@ class Solution:
         if self._kind.kind == "conductor":
             other = "conductor_current" if name == "surface_field" else "conductor_field"
             raise InvalidInputError(f"{name} is of scalar fields; a conductor's are by creeping.{other}")
-
-    def _on(self, tile: IntArray, u: FloatArray, v: FloatArray, incidence: int) -> ComplexArray:
-        """Field u or du/dn on tiles (p,) at u and v: what the equation gives there of that at the nodes."""
-        points, normals = self._matrix.tiles.on(tile, u, v)
-        places = Places.at(points, normals, (tile, u, v))
-        wave = self._incident(places)[:, incidence]
-        soft = self._kind.kind == "soft"
-        sums = self._matrix.received(places, self._values[:, incidence, None], "slope" if soft else "double")[:, 0]
-        return np.asarray(wave - sums if soft else wave + sums)
 
     def _lanes(self, points: FloatArray, values: ComplexArray, error: FloatArray, unit: float) -> dict[str, Any]:
         """What fields at points (..., 3) have in common."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.geometry.patches import DEGREE, Patches
-from creeping.geometry.squares import barycentric, lobatto, on_squares
+from creeping.geometry.squares import barycentric, interpolation, lobatto, on_squares
 from creeping.kernels.threads import in_threads
 
 POINTS = 4
@@ -127,6 +127,17 @@ class Tiles:
         in_threads(work, self.count, least=4, multiple=1, seconds=1e-3)
         return np.asarray(out[:, :3] + 1j * out[:, 3:])
 
+    def finer(self, points: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Gauss's nodes of every tile, ``points`` along a side: x and n (t points^2, 3), and weights, L^2."""
+        return _nodes(self.shapes, points)
+
+    def interpolated(self, values: ComplexArray, points: int) -> ComplexArray:
+        """Values (n, ...) at the nodes, by the polynomials of tiles at their finer nodes (t points^2, ...)."""
+        rows = interpolation(gauss(self.p)[0], gauss(points)[0])
+        each = values.reshape(self.count, self.p, self.p, -1)
+        found = np.einsum("ai,bj,tijc->tabc", rows, rows, each, optimize=True)
+        return np.asarray(found.reshape(-1, *values.shape[1:]))
+
     @property
     def own_places(self) -> tuple[IntArray, FloatArray, FloatArray]:
         """Tile of each node, and u and v there: (n,) each."""
@@ -176,18 +187,20 @@ def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, p: int
     low, high = (np.concatenate([np.array(box)[:, side_of] for box in boxes]) for side_of in ([0, 2], [1, 3]))
     places = patches.places[owner]
 
-    def at(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
-        return on_squares(places, u, v)
+    t = lobatto(DEGREE)
+    u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
+    shapes = on_squares(places, u, v)[0]
+    return Tiles(shapes, *_nodes(shapes, p), p)
 
-    u, w = gauss(p)
-    shapes = at(lobatto(DEGREE))[0]
-    x, along_u, along_v = at(u)
-    area = np.cross(along_u, along_v) * np.prod(high - low, axis=1)[:, None, None, None]
+
+def _nodes(shapes: FloatArray, points: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gauss's nodes of tiles (t, n, n, 3), ``points`` along a side: x and n (t points^2, 3), and weights, L^2."""
+    u, w = gauss(points)
+    x, along, across = on_squares(shapes, *(np.broadcast_to(u, (len(shapes), points)),) * 2)
+    area = np.cross(along, across)
     scale = np.linalg.norm(area, axis=-1)
     normals = (area / scale[..., None]).reshape(-1, 3)
-    weights = (scale * np.outer(w, w)).ravel()
-    return Tiles(shapes, np.ascontiguousarray(x.reshape(-1, 3)), normals, weights, p)
+    return np.ascontiguousarray(x.reshape(-1, 3)), normals, (scale * np.outer(w, w)).ravel()
 
 
 NEXT = ((0, 2, 0), (0, 3, 1), (1, 2, 0), (1, 3, 1), (2, 0, 0), (2, 1, 1), (3, 0, 0), (3, 1, 1))

@@ -1,0 +1,199 @@
+"""Currents at the nodes of a body's tiles, which satisfy its integral equation, and their fields at any distance.
+
+    u(x) = 2 u_inc + M u,   du/dn = 2 du_inc/dn - M* du/dn,   J = 2 n x H_inc + M J        on the body
+    u(x) = u_inc + M u/2,   u(x) = u_inc - int du/dn G dS,   n x H = n x H_inc + M J/2      next to it
+
+with the integrals over tiles of `creeping.field.equation.matrix`. Farther off than APART wavelengths fields are sums
+over FINE x FINE nodes of each tile, where a current is what the polynomial through its own p x p nodes says.
+
+Sources: [CK13, sec. 3.2 and 6.2]; Derivations, F36.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping.field.boundary import Boundary
+from creeping.field.currents.conductor import ConductorCurrents
+from creeping.field.currents.whole_body import DEPTH, POINTS, SHALLOW, SurfaceCurrents
+from creeping.field.equation.block_gmres import TOLERANCE
+from creeping.field.equation.matrix import Matrix, Places
+from creeping.geodesics.bundle import as_points
+from creeping.geometry.creased import is_convex, is_creased
+from creeping.geometry.depth import inner_points
+from creeping.geometry.surface import Surface, size
+from creeping.shadow.occlusion import occluded
+
+FINE, APART = 12, 0.12
+"""Nodes along a side of a tile by which fields are summed, and the distance from them, in wavelengths: what these sums
+err by falls off like e^(-2 pi distance/spacing), to 1e-5 there."""
+THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
+"""Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
+ON_BODY = 5.0
+"""Error of currents at a point and of the field next to the body, in what they leave inside."""
+ABOVE = 1e-5
+"""Height of points just above the nodes, in body sizes: polynomials of tiles may pass under the body."""
+
+
+def lit_ground(body: Surface, points: FloatArray, normals: FloatArray, direction: FloatArray) -> BoolArray:
+    """Whether the wave comes straight to points of the body with normals (m, 3): (m,)."""
+    lit = np.asarray(normals @ direction < 0)
+    if not (is_creased(body) and is_convex(body)):
+        above = points[lit] + ABOVE * size(body) * normals[lit]
+        lit[lit] = ~occluded(body, above, direction)
+    return lit
+
+
+def twice_incident(
+    boundary: Boundary, places: Places, directions: FloatArray, wavenumber: float, magnetic: ComplexArray
+) -> ComplexArray:
+    """2 u_inc or 2 du_inc/dn of waves (m,) at places (p,): (p, m); 2 n x H_inc of H0 (m, 3, c): (p, 2, m, c)."""
+    wave = 2 * np.exp(1j * wavenumber * (places.points @ directions.T))
+    if boundary.kind == "soft":
+        return np.asarray(1j * wavenumber * (places.normals @ directions.T) * wave)
+    if boundary.kind != "conductor":
+        return np.asarray(wave)
+    # a.(n x H) = -b.H, b.(n x H) = a.H
+    rows = [-np.einsum("px,mxc->pmc", places.b, magnetic), np.einsum("px,mxc->pmc", places.a, magnetic)]
+    return np.asarray(np.stack(rows, axis=1) * wave[:, None, :, None])
+
+
+class OnBody(NamedTuple):
+    """Current at places of the body (m, ...), their points and normals (m, 3), and whether they are lit (m,)."""
+
+    values: ComplexArray
+    points: FloatArray
+    normals: FloatArray
+    lit: BoolArray
+
+
+class _OnTiles(SurfaceCurrents):
+    """What currents of scalar fields and of conductors share: the parts of their bases that know of tiles."""
+
+    matrix: Matrix
+    _least: ClassVar[float] = TOLERANCE
+
+    def on_body(self, points: ArrayLike) -> OnBody:
+        """Current at the places of the body nearest to points (m, 3), L; it errs by ON_BODY times `extinction`."""
+        tiles, soft = self.matrix.tiles, self.boundary.kind == "soft"
+        tile, u, v, _ = tiles.located(as_points(points).reshape(-1, 3))
+        x, normals = tiles.on(tile, u, v)
+        places = Places.at(x, normals, (tile, u, v))
+        sums = self._received(places, self.values, "slope" if soft else "double")
+        magnetic = np.atleast_3d(self._incident)[None] if self._incident.ndim else np.zeros((1, 3, 0))
+        wave = twice_incident(self.boundary, places, self.direction[None], self.wavenumber, magnetic)
+        values = _vectors(places, wave[:, :, 0]) if self._incident.ndim else wave[:, 0]
+        lit = lit_ground(self.body, x, normals, self.direction)
+        return OnBody(values - sums if soft else values + sums, x, normals, lit)
+
+    def _received(self, places: Places, values: ComplexArray, kind: str = "double") -> ComplexArray:
+        """What places (m,) receive of values at the nodes, as of `Matrix.received`: (m, ...), J as vectors."""
+        if values.ndim == 1:
+            return self.matrix.received(places, values[:, None], kind)[:, 0]
+        nodes = self.matrix.nodes
+        both = np.stack([np.einsum("nx,nxc->nc", t, values) for t in (nodes.a, nodes.b)], axis=1)
+        return _vectors(places, self.matrix.received(places, both))
+
+    def _off_the_body(self, points: ArrayLike) -> FloatArray:
+        return as_points(points).reshape(-1, 3)
+
+    def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
+        away, _ = self._finer._nodes.query(points)
+        far = away * self.wavenumber > 2 * np.pi * APART
+        out = np.empty((len(points), *values.shape[1:]), dtype=complex)
+        out[far] = self._finer._field(self.matrix.tiles.interpolated(values, FINE), points[far])
+        out[~far] = self._next_to(values, points[~far])
+        return out
+
+    def _next_to(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
+        """Scattered field, of a conductor H, at points (m, 3) next to the body, of values at the nodes: (m, ...)."""
+        x, z = (np.broadcast_to(row, points.shape) for row in np.eye(3)[[0, 2]])
+        if self.boundary.kind == "soft":
+            return -0.5 * self._received(Places.at(points, z), values, "single")
+        across = 0.5 * self._received(Places.at(points, z), values)
+        if values.ndim == 1:
+            return across
+        # (n x H) x n has no part along n: another n for that one
+        H = np.cross(across, z[:, :, None], axis=1)
+        H[:, 2] = np.cross(0.5 * self._received(Places.at(points, x), values), x[:, :, None], axis=1)[:, 2]
+        return H
+
+    def _with_change(self, x: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        return self._field(self.values, x), np.abs(self._field(self.change, x)) / self._change_inside
+
+    @cached_property
+    def inner_points(self) -> FloatArray:
+        """Points inside the body at which the currents are judged (m, 3), L."""
+        wavelength = 2 * np.pi / self.wavenumber
+        found = (inner_points(self.body, depth * wavelength, POINTS) for depth in THIN)
+        return next((points for points in found if len(points)), np.zeros((0, 3)))
+
+    @cached_property
+    def _finer(self) -> Any:
+        """No currents, at the finer nodes."""
+        x, normals, weights = self.matrix.tiles.finer(FINE)
+        nothing = np.zeros((len(x), *self.values.shape[1:]), dtype=complex)
+        same = {name: getattr(self, name) for name in ("body", "direction", "rim", "wavenumber", "boundary")}
+        make = ConductorCurrents if nothing.ndim > 1 else SurfaceCurrents
+        return make(
+            **same,
+            points=x,
+            normals=normals,
+            weights=weights,
+            travel=np.broadcast_to(self.direction, x.shape),
+            values=nothing,
+            change=nothing,
+            lit=np.ones(len(x), dtype=bool),
+            rim_length=0.0,
+            unserved=0.0,
+            solved=True,
+        )
+
+
+def _vectors(places: Places, both: ComplexArray) -> ComplexArray:
+    """Vectors (m, 3, c) of parts along a and b (m, 2, c)."""
+    return np.asarray(places.a[:, :, None] * both[:, :1] + places.b[:, :, None] * both[:, 1:])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TileCurrents(_OnTiles):
+    """Currents of a scalar field at the nodes of tiles.
+
+    Attributes
+    ----------
+    matrix : Matrix
+        Of the equation that they satisfy.
+    """
+
+    matrix: Any = None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConductorTileCurrents(_OnTiles, ConductorCurrents):
+    """Currents n x H of a conductor at the nodes of tiles.
+
+    Attributes
+    ----------
+    matrix : Matrix
+        Of the equation that they satisfy.
+    """
+
+    matrix: Any = None
+
+    def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
+        found: ComplexArray = self._finer._electric(self.matrix.tiles.interpolated(values, FINE), points)
+        return found
+
+    def changed_electric(self, points: FloatArray) -> FloatArray:
+        """As `changed`, of E and components added (m, p)."""
+        return np.linalg.norm(self._electric(self.change, points), axis=1) / self._electric_inside
+
+    def changed_magnetic(self, points: FloatArray) -> FloatArray:
+        """As `changed`, components added (m, p)."""
+        return np.linalg.norm(self._field(self.change, points), axis=1) / self._change_inside
