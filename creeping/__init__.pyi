@@ -8,6 +8,7 @@ from .errors import StoredMapError as StoredMapError
 from .errors import SurfaceError as SurfaceError
 from .errors import ToleranceError as ToleranceError
 from .field.antennas import antenna_coupling as antenna_coupling
+from .field.body_currents import surface_currents as surface_currents
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
 from .field.comparison import Comparison as Comparison
 from .field.comparison import compare as compare
@@ -18,7 +19,6 @@ from .field.conductor.result import ConductorField as ConductorField
 from .field.conductor.result import Fields as Fields
 from .field.coupling_result import Coupling as Coupling
 from .field.coupling_result import CouplingPaths as CouplingPaths
-from .field.currents.assembly import surface_currents as surface_currents
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.cut_result import FieldCut as FieldCut
 from .field.echo import Echo as Echo

@@ -25,7 +25,7 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import SingularIncidenceError
-from creeping.field.currents.kept import kept_currents
+from creeping.field.body_currents import kept_currents
 from creeping.rays.fan import RayFan
 from studies.reference import clouds, dipoles, fundamental, sphere
 

@@ -13,8 +13,8 @@ from creeping._typing import FloatArray
 from creeping.commands.formats import write_tables
 from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
+from creeping.field.body_currents import kept_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
-from creeping.field.currents.kept import kept_currents
 from creeping.field.decibels import cross_section_decibels
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField

@@ -13,8 +13,8 @@ from creeping._typing import FloatArray
 from creeping.commands.formats import write_tables
 from creeping.commands.run_field import DPI, ORDER, Job
 from creeping.errors import InvalidInputError
+from creeping.field.body_currents import affordable
 from creeping.field.conductor.near import conductor_field
-from creeping.field.currents.kept import affordable
 from creeping.field.cut_result import FieldCut
 from creeping.field.near import near_field
 from creeping.field.plane_cut import cut_grid, field_cut

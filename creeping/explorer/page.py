@@ -30,7 +30,7 @@ from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
 from creeping.explorer.text import legend, preview_text, refined_text, wave_note
 from creeping.explorer.titled import titled
 from creeping.explorer.units import wave_scale
-from creeping.field.currents.kept import expected_nodes
+from creeping.field.body_currents import expected_nodes
 from creeping.field.lit_ground import convex
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import size

@@ -11,7 +11,7 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.explorer.preview import Preview
 from creeping.explorer.request import ViewRequest
-from creeping.field.currents.kept import affordable, kept_currents
+from creeping.field.body_currents import affordable, kept_currents
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.geometry.creased import has_edges, is_creased

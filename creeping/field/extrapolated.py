@@ -18,9 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping.errors import SurfaceError
+from creeping.field.body_currents import expected_nodes, surface_currents
 from creeping.field.boundary import BoundaryLike
-from creeping.field.currents.assembly import surface_currents
-from creeping.field.currents.kept import expected_nodes
 from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField

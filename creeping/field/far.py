@@ -16,19 +16,19 @@ from dataclasses import replace
 from creeping._typing import ArrayLike
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
+from creeping.field.body_currents import affordable, has_expansions, kept_currents
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.creased_far import creased_far_field, tip_waves
 from creeping.field.currents.far_sum import far_by_currents
-from creeping.field.currents.kept import affordable, kept_currents
-from creeping.field.currents.whole_solution import pairs_of
-from creeping.field.equation.kept import asked_solution, solution_for
+from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.equation.kept import solution_for
 from creeping.field.extrapolated import measured_level
 from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.geometry.arguments import one_of
-from creeping.geometry.creased import has_edges, is_creased
+from creeping.geometry.creased import is_creased
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 
@@ -93,29 +93,28 @@ def far_field(
     checked_method(method, order)
     r = observers_of(observation)
     creased, solve = is_creased(fan.body), True if method == "equation" else None
-    if has_edges(fan.body) and order == 2 and method in ("auto", "equation") and len(r):
-        # edges diffract: the equation knows them, rays and optics do not
-        of = fan.body, fan.line.direction, k, boundary
-        solved = asked_solution(*of) if solve else solution_for(*of)
-        if solved:
-            return replace(solved.solution.far_field(r, solved.incidence), validity=validity(fan, wavenumber=k))
-    # currents go across joints, by marching, not round edges; those of a conductor only if they are solved
-    serve = not creased or (order == 2 and not has_edges(fan.body) and (len(kinds) == 1 or pairs_of(fan.body, k) > 0))
-    # a conductor's sums are of six columns, those of one scalar problem of one to four
+    serve = has_expansions(fan.body, boundary) and (order == 2 or not creased)
     auto = method == "auto" and order == 2 and len(r) > 0
+    # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = serve and auto and affordable(fan, len(kinds) * len(r), k, distant=True)
     # there are no modes of an admittance that varies
-    must = serve and (method == "currents" or (method == "auto" and kinds[0].varies and not creased))
-    if must or cheap or solve:
+    must = solve or (serve and (method == "currents" or (method == "auto" and kinds[0].varies and not creased)))
+    currents: SurfaceCurrents | None = None
+    if auto and creased:
+        # edges diffract, and currents go across joints: the equation alone knows how
+        solved = solution_for(fan.body, fan.line.direction, k, boundary)
+        currents = solved.currents if solved else None
+    if not currents and (must or cheap):
         try:
             currents = kept_currents(fan, k, boundary, solve=solve)
-            # the equation knows of tips, expansions do not
-            left_out = tip_waves(fan, k) if creased and not currents.solved else 0.0
-            far = far_by_currents(currents, r, boundary, left_out=left_out)
-            return replace(far, validity=validity(fan, wavenumber=k))
         except SurfaceError:
-            if must or solve:
+            if must:
                 raise
+    if currents:
+        # the equation knows of tips, expansions do not
+        left_out = tip_waves(fan, k) if creased and not currents.solved else 0.0
+        far = far_by_currents(currents, r, boundary, left_out=left_out)
+        return replace(far, validity=validity(fan, wavenumber=k))
     if creased:
         far = creased_far_field(fan, r, k, boundary, order)
         return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))

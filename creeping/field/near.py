@@ -21,10 +21,12 @@ import numpy as np
 from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain
+from creeping.field.body_currents import affordable, kept_currents
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
-from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough, total_at
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.equation.currents import ON_BODY as SOLVED
+from creeping.field.equation.currents import TileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.near_layer import layer_field
@@ -37,6 +39,7 @@ from creeping.field.surface import scalar_boundary
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.arguments import one_of
+from creeping.geometry.creased import has_edges
 from creeping.geometry.surface import normal, size
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
@@ -106,10 +109,10 @@ def near_field(
     ((2,), 0.04, ['rays', 'currents'])
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, edgeless="the near field")
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     checked_method(method, order)
+    checked_plain(fan.body, edgeless="the near field by rays" if method == "rays" or order == 1 else "")
     y = as_points(points)
     flat = y.reshape(-1, 3)
     on = checked_height(fan, flat) <= ON_BODY
@@ -117,8 +120,8 @@ def near_field(
     dark = np.zeros(len(flat), dtype=bool)
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
     field = zero_field(len(flat), "boundary")
-    must = method in ("currents", "equation")
-    solved = kept_currents(fan, k, boundary, solve=True) if method == "equation" else None
+    must = method in ("currents", "equation") or has_edges(fan.body)
+    solved = kept_currents(fan, k, boundary, solve=True if method == "equation" else None) if must else None
     by_currents = method != "rays" and order == 2 and (must or affordable(fan, len(off), k))
     # of rays on the lit side nothing is known that currents do not know better
     marched = march_alone(fan.body, kind)
@@ -242,17 +245,26 @@ def _with_currents(
     if not must and not affordable(fan, len(asked), k):
         return field
     try:
-        far = far_enough(fan.body, k, points[asked])
         currents = solved or kept_currents(fan, k, boundary)
+        if isinstance(currents, TileCurrents):
+            return field.put_better(asked, _solved_at(currents, points[asked], dark[asked]), must=must)
+        far = far_enough(fan.body, k, points[asked])
     except SurfaceError:
         if must:
             raise
         return field
     at, close = asked[far], asked[~far]
     incident, scattered, error = total_at(currents, points[at], dark[at])
-    by = "equation" if currents.solved else "currents"
-    field = field.put_better(at, measured_field(incident + scattered, error, by, "extinction"), must=must)
+    field = field.put_better(at, measured_field(incident + scattered, error, "currents", "extinction"), must=must)
     if len(close):
         rows, layer = layer_field(fan, currents, points[close], scalar_boundary(boundary))
         field = field.put_better(close[rows], layer, must=must)
     return field
+
+
+def _solved_at(currents: TileCurrents, points: FloatArray, dark: BoolArray) -> Served:
+    """Total field of solved currents at points (n, 3), L, off the body, some of them in the dark."""
+    incident, scattered, error = total_at(currents, points, dark)
+    close = currents.next_to(points)
+    error = np.where(close, np.maximum(error, SOLVED * currents.extinction), error)
+    return measured_field(incident + scattered, error, "equation", "extinction")

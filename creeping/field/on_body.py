@@ -4,8 +4,8 @@
 
 with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
 w_i of rays that come from afar. `creeping.field.lit_ground` says how far it is off. On a body that may reflect onto
-itself or hides part of its line, or if it is asked for, the integral equation's solution stands for both, where it is
-affordable (`creeping.field.currents.whole_solution`).
+itself, hides part of its line, or has edges, joints or tips, or if it is asked for, the solution of the integral
+equation stands for both, where it is affordable (`creeping.field.equation`).
 
 Sources: [F46], [LK59]; Derivations, F9, F16 and F20.
 """
@@ -20,14 +20,13 @@ import numpy as np
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain
+from creeping.field.body_currents import affordable, kept_currents
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
-from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
-from creeping.field.currents.second_kind import with_a_step
 from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.currents.whole_solution import ON_BODY, lit_ground, resolved_at, solved_at
+from creeping.field.equation.currents import ON_BODY, TileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error, without_tips
 from creeping.field.marched_sum import marched_sum, marches
@@ -116,7 +115,6 @@ def surface_field(
         if method == "equation":
             raise InvalidInputError("method 'equation' is of the field at points, not of each ray's own; give points")
         return own_waves(fan, k, boundary, kind, order)
-    checked_plain(fan.body, edgeless="the field at points of the body")
     y = as_points(points)
     shape = y.shape[:-1]
     on = on_body(fan.body, y).reshape(-1, 3)
@@ -196,8 +194,9 @@ def total_on(
     alone = not jointed and convex(fan) and not kind.varies
     if not currents and not alone:
         currents = _currents_of(fan, k, kind)
-    if currents and currents.solved and order == 2:
+    if isinstance(currents, TileCurrents) and order == 2:
         return _solved_on(currents, points, unit)
+    checked_plain(fan.body, edgeless="the field at points of the body")
     currents = None if alone else currents
     lit = _lit_at(fan, points, k, kind, order)
     rays, by = rays_on(fan, points, k, kind, order, 1 - lit[2])
@@ -207,21 +206,15 @@ def total_on(
         # as much may come later, to and fro, and to dark ground, whose rays do not know of it
         lit = lit[0] + lit[2] * thrown, np.hypot(lit[1], np.abs(thrown)), lit[2]
     field = composed(fan, lit, rays, by, left, k, kind, unit)
-    if currents and order == 2 and jointed:
-        field = with_a_step(field, currents, points, lit[2], unit)
     return without_tips(field) if jointed else field
 
 
-def _solved_on(currents: SurfaceCurrents, points: FloatArray, unit: float) -> Served:
+def _solved_on(currents: TileCurrents, points: FloatArray, unit: float) -> Served:
     """Total field of solved currents at points of the body (n, 3); ``unit`` is the size of the incident wave's."""
-    normals = normal(currents.body, points)
-    values = solved_at(currents, points, normals)
+    found = currents.on_body(points)
     error = np.full(len(points), ON_BODY * unit * currents.extinction)
-    field = measured_field(values, error, "equation", "extinction")
-    lit = lit_ground(currents.body, points, normals, currents.direction)
-    field = replace(field, wave=np.where(lit, values, 0.0), creeping=np.where(lit, 0.0, values))
-    sharp = ~resolved_at(currents, points, normals)
-    return without_tips(replace(field, error=np.where(sharp, np.inf, field.error))) if np.any(sharp) else field
+    field = measured_field(found.values, error, "equation", "extinction")
+    return replace(field, wave=np.where(found.lit, found.values, 0.0), creeping=np.where(found.lit, 0.0, found.values))
 
 
 def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:
@@ -231,7 +224,7 @@ def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | Non
     try:
         # as many points as they are judged at
         return kept_currents(fan, k, boundary) if affordable(fan, INNER, k) else None
-    except SurfaceError:
+    except (InvalidInputError, SurfaceError):
         return None
 
 

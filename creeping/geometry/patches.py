@@ -336,8 +336,8 @@ def _of_charts(ground: _Ground, charts: Sequence[Chart]) -> Patches:
     """Parts of the unit squares of charts that cover a body once, parted until they are the body."""
     t, done = lobatto(DEGREE), []
     for chart in charts:
-        low, high = (np.stack(np.meshgrid(*[np.arange(PARTS)] * 2), axis=-1).reshape(-1, 2) + end for end in (0, 1))
-        low, high = low / PARTS, high / PARTS
+        low = np.stack(np.meshgrid(*[np.arange(PARTS) / PARTS] * 2), axis=-1).reshape(-1, 2)
+        high = low + 1 / PARTS
         for turn in range(ROUNDS + 1):
             u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
             grid = np.broadcast_arrays(u[:, :, None], v[:, None, :])

@@ -14,8 +14,8 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_method, checked_plain
+from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
-from creeping.field.currents.kept import expected_seconds
 from creeping.field.echo import Echo
 from creeping.field.labelled import PARTS
 from creeping.geodesics.direct_flow import DirectFlow

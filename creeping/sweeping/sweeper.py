@@ -7,8 +7,8 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
+from creeping.field.body_currents import affordable
 from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundaries
-from creeping.field.currents.kept import affordable
 from creeping.field.far import far_field
 from creeping.field.far_geometry import FarGeometry
 from creeping.field.far_rays import Parts, parts_of

@@ -8,7 +8,7 @@ import scatterers as sc
 from creeping.field import on_body
 from creeping.field.beams import beam_sums
 from creeping.field.boundary import HARD
-from creeping.field.currents import whole_solution
+from creeping.field.equation import kept
 from creeping.field.marching.fan_waves import fan_waves
 from creeping.rays.shedding import shed_on
 from studies.reference import clouds, fundamental, sphere, stored
@@ -65,7 +65,7 @@ def test_where_rays_have_ended(monkeypatch):
     reference = fundamental.scatter(clouds.twisted_ellipsoid(), k, d[None], "hard", depth=0.12, per_wavelength=5.0)
     exact = reference.total(points)[:, 0]
     # as where the integral equation would cost too much
-    monkeypatch.setattr(whole_solution, "MOST", 1.0)
+    monkeypatch.setattr(kept, "SECONDS", 0.0)
     found = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
     monkeypatch.setattr(on_body, "marches", lambda *_: False)
     modes = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
@@ -80,11 +80,11 @@ def test_ground_that_the_body_hides():
     """Behind the waist of a peanut along the wave the field is nearly the incident one, and no creeping ray comes."""
     peanut, k = sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.9**4"), 20.0
     fan = fan_of(peanut, (1, 0.05, 0.02), 3.0, 48)
-    kept = stored.read("peanut_shadow")
-    x, exact = kept["points"], kept["values"]
+    known = stored.read("peanut_shadow")
+    x, exact = known["points"], known["values"]
     with pytest.MonkeyPatch.context() as patch:
         # as where the integral equation would cost too much
-        patch.setattr(whole_solution, "MOST", 1.0)
+        patch.setattr(kept, "SECONDS", 0.0)
         found = cr.surface_field(fan, x, wavenumber=k, boundary="hard")
         patch.setattr(on_body, "marches", lambda *_: False)
         modes = cr.surface_field(fan, x, wavenumber=k, boundary="hard")

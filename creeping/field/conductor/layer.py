@@ -38,7 +38,7 @@ LEFT_OUT, LEFT_OUT_ACROSS = 0.1, 0.3
 the cube of the heights they span."""
 
 
-def lowest_height(fan: RayFan, wavenumber: float) -> float:
+def lowest_height(currents: ConductorCurrents) -> float:
     """Height above the body, in wavelengths, from which sums over nodes are the fields of currents.
 
     Raises
@@ -46,8 +46,10 @@ def lowest_height(fan: RayFan, wavenumber: float) -> float:
     SurfaceError
         If the wavenumber is too high for any mesh of the body.
     """
-    nodes = body_nodes(fan.body, 2 * wavenumber)
-    return max(LOWEST, SPACED * nodes.spacing / 2 * wavenumber / (2 * np.pi))
+    if currents.solved:
+        return LOWEST
+    nodes = body_nodes(currents.body, 2 * currents.wavenumber)
+    return max(LOWEST, SPACED * nodes.spacing / 2 * currents.wavenumber / (2 * np.pi))
 
 
 def layer_fields(
@@ -55,7 +57,7 @@ def layer_fields(
 ) -> tuple[IntArray, list[Served]]:
     """Rows of the points (n, 3), L, that the layer serves, and E and H (m, 6) there for each polarisation."""
     body, k, d = fan.body, currents.wavenumber, currents.direction
-    low = lowest_height(fan, k)
+    low = lowest_height(currents)
     above = (low, low + APART, low + 2 * APART)
     at, nodes, height, tops = feet_of(body, points, k, above, CLEAR * low)
     surface = on_conductor(fan, nodes.points, k, currents.incident_electric, left, currents)

@@ -18,13 +18,13 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain
+from creeping.field.body_currents import affordable, kept_currents
 from creeping.field.conductor.layer import layer_fields, lowest_height
 from creeping.field.conductor.on_body import OnConductor, on_conductor
 from creeping.field.conductor.result import ConductorCurrent, ConductorField, Fields
 from creeping.field.conductor.shed import shed_sums
 from creeping.field.conductor.total import incident_fields, total_fields
 from creeping.field.currents.conductor import ConductorCurrents
-from creeping.field.currents.kept import affordable, kept_currents
 from creeping.field.currents.total import far_enough
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.lit_ground import LEFT, UNKNOWN, convex
@@ -297,7 +297,7 @@ def _with_currents(
     if currents is None:
         return fields
     k, by = currents.wavenumber, "equation" if currents.solved else "currents"
-    far = far_enough(fan.body, k, points[asked], lowest_height(fan, k))
+    far = far_enough(fan.body, k, points[asked], lowest_height(currents))
     at, close = asked[far], asked[~far]
     if len(at):
         incident, scattered, error = total_fields(currents, points[at], dark[at])

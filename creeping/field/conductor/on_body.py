@@ -26,9 +26,9 @@ from creeping.field.conductor.marched import current_marches, marched_current
 from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
 from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
-from creeping.field.currents.whole_solution import ON_BODY, lit_ground, resolved_at, solved_at
+from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents
 from creeping.field.far_geometry import fan_strips
-from creeping.field.lit_ground import composed, convex, lit_error, without_tips
+from creeping.field.lit_ground import composed, convex, lit_error
 from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus
 from creeping.field.ray_scales import fock_parameter
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
@@ -86,9 +86,9 @@ def on_conductor(
 
     ``left`` (p,) is what ``currents`` of the whole body leave inside of each incident wave, 0 on a body that is convex.
     """
-    solved = currents is not None and currents.solved
+    solved = isinstance(currents, ConductorTileCurrents)
     cross = crosses(fan.body, fan.line.direction, points, k, rough=solved)
-    if currents is not None and currents.solved:
+    if isinstance(currents, ConductorTileCurrents):
         served, total = _solved_on(currents, points, cross, left)
     else:
         served, total = _by_expansions(fan, cross, k, electric, left, currents)
@@ -102,19 +102,18 @@ def on_conductor(
 
 
 def _solved_on(
-    currents: ConductorCurrents, points: FloatArray, cross: Crosses, left: FloatArray
+    currents: ConductorTileCurrents, points: FloatArray, cross: Crosses, left: FloatArray
 ) -> tuple[list[Served], ComplexArray]:
     """J of solved currents at points (n,) for each polarisation, and at them and around them (9n, 3, p)."""
-    total = solved_at(currents, cross.points, cross.normals)
-    count, n = len(points), cross.normals[: len(points)]
-    lit = lit_ground(currents.body, points, n, currents.direction)
-    smooth = resolved_at(currents, points, n)
+    found = currents.on_body(cross.points)
+    total, count = found.values, len(points)
+    lit = found.lit[:count]
     served = []
     for i, share in enumerate(left):
         J = total[:count, :, i]
         one = measured_field(J, np.full(count, ON_BODY * float(share)), "equation", "extinction")
         one = replace(one, wave=np.where(lit[:, None], J, 0.0), creeping=np.where(lit[:, None], 0.0, J))
-        served.append(without_tips(replace(one, error=np.where(smooth, one.error, np.inf))))
+        served.append(one)
     return served, total
 
 

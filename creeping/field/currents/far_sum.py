@@ -11,11 +11,11 @@ from creeping.geometry.unit import unit_of
 
 
 def far_by_currents(
-    currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike, *, left_out: float = 0.0, level: float = 1.0
+    currents: SurfaceCurrents, r: FloatArray, boundary: BoundaryLike, *, left_out: float = 0.0
 ) -> FarField:
-    """Far field in unit directions (m, 3); its error is ``level`` times that of the currents and ``left_out``, L."""
+    """Far field in unit directions (m, 3); its error is that of the currents and ``left_out``, L."""
     lit, dark = (currents.far_of(part, r) for part in (currents.lit, ~currents.lit))
-    error = np.hypot(level * currents.error(r), left_out)
+    error = np.hypot(currents.error(r), left_out)
     largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
     off = ~(error < UNRESOLVED * largest)
     return FarField(

@@ -9,7 +9,7 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 
-TOLERANCE, STEPS = 1e-4, 80
+TOLERANCE, STEPS = 3e-5, 80
 """What is left of the equation, as a share of its right side, and steps at most."""
 
 

@@ -22,10 +22,9 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.whole_body import DEPTH, POINTS, SHALLOW, SurfaceCurrents
-from creeping.field.equation.block_gmres import TOLERANCE
 from creeping.field.equation.matrix import Matrix, Places
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.creased import is_convex, is_creased
+from creeping.geometry.creased import has_edges, is_convex, is_creased
 from creeping.geometry.depth import inner_points
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.occlusion import occluded
@@ -37,6 +36,10 @@ THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 """Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
 ON_BODY = 5.0
 """Error of currents at a point and of the field next to the body, in what they leave inside."""
+LEAST = 1e-4
+"""What is left inside, at least: a few times what is left of the equation and what integrals over tiles err by."""
+SOFT_EDGES = 2.0
+"""Error of the far field over that of other currents: soft edges leave less inside."""
 ABOVE = 1e-5
 """Height of points just above the nodes, in body sizes: polynomials of tiles may pass under the body."""
 
@@ -51,7 +54,7 @@ def lit_ground(body: Surface, points: FloatArray, normals: FloatArray, direction
 
 
 def twice_incident(
-    boundary: Boundary, places: Places, directions: FloatArray, wavenumber: float, magnetic: ComplexArray
+    boundary: Boundary, places: Places, directions: FloatArray, wavenumber: float, magnetic: ComplexArray | FloatArray
 ) -> ComplexArray:
     """2 u_inc or 2 du_inc/dn of waves (m,) at places (p,): (p, m); 2 n x H_inc of H0 (m, 3, c): (p, 2, m, c)."""
     wave = 2 * np.exp(1j * wavenumber * (places.points @ directions.T))
@@ -77,7 +80,7 @@ class _OnTiles(SurfaceCurrents):
     """What currents of scalar fields and of conductors share: the parts of their bases that know of tiles."""
 
     matrix: Matrix
-    _least: ClassVar[float] = TOLERANCE
+    _least: ClassVar[float] = LEAST
 
     def on_body(self, points: ArrayLike) -> OnBody:
         """Current at the places of the body nearest to points (m, 3), L; it errs by ON_BODY times `extinction`."""
@@ -100,16 +103,25 @@ class _OnTiles(SurfaceCurrents):
         both = np.stack([np.einsum("nx,nxc->nc", t, values) for t in (nodes.a, nodes.b)], axis=1)
         return _vectors(places, self.matrix.received(places, both))
 
+    def error(self, directions: ArrayLike) -> FloatArray:
+        """Error of f, L, that 95 of 100 directions keep to: (m, 3) -> (m,), of a conductor (m, 2, 2)."""
+        level = SOFT_EDGES if self.boundary.kind == "soft" and has_edges(self.body) else 1.0
+        return np.asarray(level * super().error(directions))
+
     def _off_the_body(self, points: ArrayLike) -> FloatArray:
         return as_points(points).reshape(-1, 3)
 
     def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
-        away, _ = self._finer._nodes.query(points)
-        far = away * self.wavenumber > 2 * np.pi * APART
+        far = ~self.next_to(points)
         out = np.empty((len(points), *values.shape[1:]), dtype=complex)
         out[far] = self._finer._field(self.matrix.tiles.interpolated(values, FINE), points[far])
         out[~far] = self._next_to(values, points[~far])
         return out
+
+    def next_to(self, points: FloatArray) -> BoolArray:
+        """Whether points (m, 3), L, are so near to the body that tiles are integrated (m,)."""
+        away, _ = self._finer._nodes.query(points)
+        return np.asarray(away * self.wavenumber <= 2 * np.pi * APART)
 
     def _next_to(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         """Scattered field, of a conductor H, at points (m, 3) next to the body, of values at the nodes: (m, ...)."""
@@ -192,8 +204,8 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
 
     def changed_electric(self, points: FloatArray) -> FloatArray:
         """As `changed`, of E and components added (m, p)."""
-        return np.linalg.norm(self._electric(self.change, points), axis=1) / self._electric_inside
+        return np.asarray(np.linalg.norm(self._electric(self.change, points), axis=1) / self._electric_inside)
 
     def changed_magnetic(self, points: FloatArray) -> FloatArray:
         """As `changed`, components added (m, p)."""
-        return np.linalg.norm(self._field(self.change, points), axis=1) / self._change_inside
+        return np.asarray(np.linalg.norm(self._field(self.change, points), axis=1) / self._change_inside)

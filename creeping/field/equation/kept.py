@@ -10,6 +10,7 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
+from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.solution import SECONDS, Solution, cost, solve
 from creeping.field.equation.tiles import tiles_for
 from creeping.geometry.kept import kept
@@ -33,6 +34,11 @@ class Solved(NamedTuple):
     solution: Solution
     incidence: int
 
+    @property
+    def currents(self) -> TileCurrents | ConductorTileCurrents:
+        """Currents of the incidence."""
+        return self.solution.currents(self.incidence)
+
 
 def solution_for(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
     """The solution of an incidence, if the equation of the body costs less than SECONDS and resolves it, else None."""
@@ -40,7 +46,7 @@ def solution_for(body: Surface, direction: FloatArray, wavenumber: float, bounda
     if found is None and not too_much(body, wavenumber, boundary, SECONDS):
         solve_together(body, direction[None], wavenumber, boundary)
         found = _found(body, direction, wavenumber, boundary)
-    if found is None or not found.solution.currents(found.incidence).extinction <= POOR:
+    if found is None or not found.currents.extinction <= POOR:
         return None
     return found
 
@@ -86,6 +92,14 @@ def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: 
     if takes > seconds:
         return f"{nodes} nodes take about {takes:.2g} s, more than {seconds:g}"
     return f"{nodes} nodes take {memory / 1e9:.2g} GB" if memory > budget() else ""
+
+
+def expected_seconds_of(body: Surface, wavenumber: float, boundary: BoundaryLike) -> float:
+    """About what the equation of one incidence costs, 0 where it is not solved by itself."""
+    if too_much(body, wavenumber, boundary, SECONDS):
+        return 0.0
+    kinds = scalar_boundaries(boundary)
+    return cost(_nodes(body, wavenumber), CONDUCTOR if len(kinds) == 2 else kinds[0], 1)[0]
 
 
 def _nodes(body: Surface, wavenumber: float) -> int:

@@ -119,7 +119,7 @@ class Matrix:
         out, to = np.empty((m * c, n * c), dtype=np.complex64), self.root / (2 * np.pi)
         x, normals, a, b = (np.ascontiguousarray(part.T) for part in places[:4])
         y, sides, c_, e_ = (np.ascontiguousarray(part.T) for part in self.nodes[:4])
-        single = self._single(kind)
+        single = self.single(kind)
         layer = np.ascontiguousarray(np.stack([single.real, single.imag]))
         tilt = {"single": 0, "double": 1, "slope": 2}[kind]
         both = out.view(np.float32).reshape(m, 2, n, 2, 2) if self.vector else out.view(np.float32).reshape(m, n, 2)
@@ -133,7 +133,7 @@ class Matrix:
                 scalar_pairs(x, normals, scale, y, sides, to, layer, k, tilt, part.start, part.stop, both)
 
         in_threads(work, m, least=8, multiple=1, seconds=EACH * n * (VECTOR if self.vector else 1.0))
-        targets, columns, near = self._near(places, kind, single)
+        targets, columns, near = self.near(places, kind)
         share = scale[targets, None] * (1 / (2 * np.pi * self.root))[columns]
         if self.vector:
             rows, ends = targets[:, None, None, None], columns[:, None, :, None]
@@ -143,7 +143,7 @@ class Matrix:
             out[targets[:, None], columns] = near * share
         return out
 
-    def _single(self, kind: str) -> ComplexArray:
+    def single(self, kind: str) -> ComplexArray:
         """What multiplies G at the nodes (n,), or nothing (0,)."""
         n = len(self.root)
         if kind == "single":
@@ -152,9 +152,12 @@ class Matrix:
             return np.asarray(1j * self.k * np.broadcast_to(self.boundary.at(self.tiles.points).admittance, (n,)))
         return np.zeros(0, dtype=complex)
 
-    def _near(self, places: Places, kind: str, single: ComplexArray) -> tuple[IntArray, IntArray, ComplexArray]:
-        """Of tiles near places: numbers of these (pairs,), those of the nodes (pairs, p p), and the integrals."""
-        tiles, pp = self.tiles, self.tiles.p**2
+    def near(self, places: Places, kind: str) -> tuple[IntArray, IntArray, ComplexArray]:
+        """Of tiles near places: numbers of these (pairs,), those of the nodes (pairs, p p), and the integrals.
+
+        These are (pairs, p p), of a conductor (pairs, 2, p p, 2), of what is times 4 pi.
+        """
+        tiles, pp, single = self.tiles, self.tiles.p**2, self.single(kind)
         near = tiles.near(places.points)
         starts, targets = near
         columns = np.repeat(np.arange(tiles.count), np.diff(starts))[:, None] * pp + np.arange(pp)

@@ -26,6 +26,7 @@ from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.block_gmres import STEPS, TOLERANCE, block_gmres
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
 from creeping.field.equation.matrix import EACH, VECTOR, Matrix
+from creeping.field.equation.split_product import SplitProduct
 from creeping.field.equation.tiles import Tiles, tiles_for
 from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
@@ -36,18 +37,22 @@ from creeping.geometry.patches import patches_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.unit import unit_of
 from creeping.kernels.threads import thread_count
-from creeping.storage.memory import within_budget
+from creeping.storage.memory import budget, within_budget
 
 TOGETHER = 2e8
 """Bytes of what GMRES keeps of incidences that are solved together."""
-PER_NODE = 5e-4
-"""Seconds of a core that integrals over tiles near to a node take."""
+DENSE = 4e9
+"""Bytes of a matrix, and of its transpose, that are kept at most."""
+PRODUCTS = 25
+"""Products with the matrix, about, that an incidence takes."""
+PER_NODE, NEAR_VECTOR = 5e-4, 2.0
+"""Seconds of a core that integrals over tiles near to a node take, and what those of a conductor take of that."""
 PER_ENTRY = 4e-10
 """Seconds of an entry of the matrix in a product with one of several columns."""
+SUM, SUM_VECTOR = 1e-5, 4e-5
+"""Seconds of a node in a split sum for one column."""
 SECONDS = 30.0
 """What the equation may take, unless the caller says."""
-LEVEL = {"soft": 2.0}
-"""Error of the far field over that of `creeping.field.currents.whole_body`: soft edges leave less inside."""
 TOUCHING = 1e-6
 """Distance from the body, in its sizes, up to which a point is on it."""
 
@@ -119,12 +124,23 @@ def solve(
 def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]:
     """Seconds and bytes, about, that the equation between nodes takes, of one incidence or of several."""
     vector = boundary.kind == "conductor"
-    entries = float(nodes) ** 2 * (4 if vector else 1)
-    pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if vector else 1.0)
-    products = 25 * entries * PER_ENTRY * incidences * (2 if vector else 1)
-    # the matrix and its transpose, values and changes, and what GMRES keeps
-    memory = 16 * entries + 64.0 * nodes * incidences * (6 if vector else 1) + TOGETHER
-    return (pairs + 2 * nodes * PER_NODE + products) / thread_count(), memory
+    columns = incidences * (2 if vector else 1)
+    # of incidences their values and changes, and what GMRES keeps
+    kept = 64.0 * nodes * incidences * (6 if vector else 1) + TOGETHER
+    near = 2 * nodes * PER_NODE * (NEAR_VECTOR if vector else 1.0)
+    if is_dense(nodes, boundary):
+        entries = float(nodes) ** 2 * (4 if vector else 1)
+        pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if vector else 1.0)
+        products = PRODUCTS * entries * PER_ENTRY * columns
+        # the matrix and its transpose
+        return (pairs + near + products) / thread_count(), 16 * entries + kept
+    each, memory = (SUM_VECTOR, 2e4 * 4) if vector else (SUM, 2e4)
+    return near / thread_count() + PRODUCTS * columns * each * nodes, memory * nodes + kept
+
+
+def is_dense(nodes: int, boundary: Boundary) -> bool:
+    """Whether the matrix is kept: else its products are sums (`creeping.field.equation.split_product`)."""
+    return 16.0 * nodes**2 * (4 if boundary.kind == "conductor" else 1) <= min(DENSE, budget())
 
 
 class Solution:
@@ -175,7 +191,8 @@ class Solution:
         right[matrix.at] -= 1j * under.reshape(-1, *right.shape[1:])
         n, columns = len(right) * matrix.columns, right.shape[-1]
         right = (right.reshape(self.nodes, -1) * matrix.root[:, None]).reshape(n, columns)
-        product, found, left = matrix.product, [], []
+        product = matrix.product if is_dense(self.nodes, kind) else SplitProduct(matrix)
+        found, left = [], []
         many = max(1, min(columns, int(TOGETHER / (16 * n * (STEPS + 1)))))
         self.steps = 0
         for first in range(0, columns, many):
@@ -245,7 +262,7 @@ class Solution:
         return self._far(observers_of(observation), self.currents(incidence))
 
     def _far(self, r: FloatArray, currents: SurfaceCurrents) -> FarField:
-        return far_by_currents(currents, r, self.boundary, level=LEVEL.get(self._kind.kind, 1.0))
+        return far_by_currents(currents, r, self.boundary)
 
     def backscatter(self) -> FarField:
         """Far field of each incidence back to where it comes from, in directions -d (m,)."""

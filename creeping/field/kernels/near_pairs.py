@@ -1,20 +1,21 @@
 """Compiled sums over the pairs of points x and nodes y that are near to each other, found by cells of the nodes.
 
-    value  h G - S,   slope  -(h G' - S'),   G = e^{ikR}/R,   S = G - E/R (`creeping.field.currents.smooth_kernel`)
+    value  D = E/R,   slope  -D',   G = e^{ikR}/R = S + D (`creeping.field.equation.smooth_kernel`)
     entries   w value,   w slope n.(x - y)/R;   vectors   w slope (y - x)/R x J
-    window sums of chi w, chi w kappa, chi w/R and chi w n.(x - y)/R^3,   chi = e^{-(R/a)^2}
 
-h is 1, or 1 - e^{-(kR)^2} for nodes that do not share the phase of x.
+A node that is x itself has no D: its value takes S off but for ik, what (e^{ikR} - 1)/R is there.
 
-Source: Derivations, F30 and F35.
+Source: Derivations, F35.
 """
 
 import math
 
 from numba import njit
 
-from creeping.field.kernels.second_kind import TOUCHING
 from creeping.kernels.block import entry_options, options, strict_inlined
+
+TOUCHING = 1e-6
+"""Distance, over 1/k, below which a node is the point itself."""
 
 
 @njit(**options)
@@ -63,10 +64,10 @@ def count_near(x, y, origin, side, cells, begins, reach, first, last, out):
 
 
 @njit(**options)
-def _pair(square, k, table, step, at_zero, whole):
-    """Value and slope of a pair, real and imaginary parts (4,); h is 1 if it is taken ``whole``."""
+def _pair(square, k, table, step, at_zero):
+    """Value and slope of a pair."""
     if square < (TOUCHING / k) ** 2:
-        return -at_zero, 0.0, 0.0 if whole else -k, 0.0
+        return -at_zero, 0.0
     R = math.sqrt(square)
     inverse = 1.0 / R
     place = R / step
@@ -77,27 +78,20 @@ def _pair(square, k, table, step, at_zero, whole):
     keep, take, rise, fall = v * v * (1 + 2 * u), u * u * (3 - 2 * u), u * v * v * step, -u * u * v * step
     E = keep * table[row, 0] + take * table[row + 1, 0] + rise * table[row, 1] + fall * table[row + 1, 1]
     dE = keep * table[row, 1] + take * table[row + 1, 1] + rise * table[row, 2] + fall * table[row + 1, 2]
-    value, slope = E * inverse, (E * inverse - dE) * inverse
-    if whole:
-        return value, slope, 0.0, 0.0
-    # what of G is left out, and of -G'
-    out = math.exp(-square * k * k) * inverse
-    c, s = out * math.cos(k * R), out * math.sin(k * R)
-    return value - c, slope - (c * inverse + s * k), -s, c * k - s * inverse
+    return E * inverse, (E * inverse - dE) * inverse
 
 
 @njit(**entry_options)
 def fill_near(
-    x, normals, y, sides, weights, alike, origin, side, cells, begins, order, reach, near, k, table, at_zero, tilted,
-    tilt_of_x, starts, first, last, columns, real, imaginary,
+    x, normals, y, sides, weights, origin, side, cells, begins, order, reach, k, table, at_zero, tilted, tilt_of_x,
+    starts, first, last, columns, entries,
 ):  # fmt: skip
-    """Fill the entries of rows first..last of a sparse matrix: columns, and real and imaginary parts.
+    """Fill rows first..last of a sparse matrix: columns and entries.
 
     As for `count_near`; ``order`` (n,) has the numbers of the nodes as ordered, ``starts`` (m + 1,) where rows begin.
-    Entries are values, or ``tilted`` by the ``normals`` (3, m) of x or the ``sides`` (3, n) of y. Which nodes are
-    ``alike`` (n,) matters up to the distances ``near`` (m,). ``imaginary`` (0 or as many,) is filled if there is room.
+    Entries are values, or ``tilted`` by the ``normals`` (3, m) of x or the ``sides`` (3, n) of y.
     """
-    close, step, whole = reach * reach, reach / (table.shape[0] - 1), imaginary.shape[0] > 0
+    close, step = reach * reach, reach / (table.shape[0] - 1)
     for j in range(first, last):
         x0, x1, x2 = x[0, j], x[1, j], x[2, j]
         n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
@@ -111,25 +105,21 @@ def fill_near(
                     square = _squared(dx, dy, dz)
                     if not square < close:
                         continue
-                    value, slope, value_i, slope_i = _pair(
-                        square, k, table, step, at_zero, alike[i] or square > near[j] ** 2
-                    )
+                    value, slope = _pair(square, k, table, step, at_zero)
                     if tilted:
                         lean = n0 * dx + n1 * dy + n2 * dz
                         if not tilt_of_x:
                             lean = sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz
                         lean /= math.sqrt(max(square, (TOUCHING / k) ** 2))
-                        value, value_i = slope * lean, slope_i * lean
+                        value = slope * lean
                     columns[place] = order[i]
-                    real[place] = weights[i] * value
-                    if whole:
-                        imaginary[place] = weights[i] * value_i
+                    entries[place] = weights[i] * value
                     place += 1
 
 
 @njit(**entry_options)
 def near_vectors(
-    x, y, alike, currents, origin, side, cells, begins, reach, near, k, table, at_zero, first, last, out
+    x, y, currents, origin, side, cells, begins, reach, k, table, at_zero, first, last, out
 ):  # fmt: skip
     """Fill rows first..last of out (m, p, 6) with w slope (y - x)/R x J of p waves, real and imaginary parts.
 
@@ -148,55 +138,14 @@ def near_vectors(
                     square = _squared(dx, dy, dz)
                     if not square < close or square < (TOUCHING / k) ** 2:
                         continue
-                    whole = alike[i] or square > near[j] ** 2
-                    _, slope, _, slope_i = _pair(square, k, table, step, at_zero, whole)
-                    inverse = 1.0 / math.sqrt(square)
-                    slope, slope_i = slope * inverse, slope_i * inverse
+                    slope = _pair(square, k, table, step, at_zero)[1] / math.sqrt(square)
                     for q in range(currents.shape[1]):
                         J = currents[i, q]
                         r0, r1, r2 = dy * J[2] - dz * J[1], dz * J[0] - dx * J[2], dx * J[1] - dy * J[0]
                         i0, i1, i2 = dy * J[5] - dz * J[4], dz * J[3] - dx * J[5], dx * J[4] - dy * J[3]
-                        out[j, q, 0] += slope * r0 - slope_i * i0
-                        out[j, q, 1] += slope * r1 - slope_i * i1
-                        out[j, q, 2] += slope * r2 - slope_i * i2
-                        out[j, q, 3] += slope * i0 + slope_i * r0
-                        out[j, q, 4] += slope * i1 + slope_i * r1
-                        out[j, q, 5] += slope * i2 + slope_i * r2
-
-
-@njit(**entry_options)
-def window_sums(
-    x, normals, y, sides, weights, bends, alike, origin, side, cells, begins, reach, near, k, tilt_of_x,
-    first, last, out,
-):  # fmt: skip
-    """Fill rows first..last of out (m, 4): sums of chi w, chi w kappa, chi w/R and chi w n.(x - y)/R^3.
-
-    As for `count_near` and `fill_near`; chi is of width ``reach`` (m,) and counts up to the distances ``near`` (m,),
-    over nodes that are ``alike`` (n,), kappa the ``bends`` (n,). A node that is x itself has no part in the last two.
-    """
-    least = (TOUCHING / k) ** 2
-    for j in range(first, last):
-        x0, x1, x2 = x[0, j], x[1, j], x[2, j]
-        n0, n1, n2 = normals[0, j], normals[1, j], normals[2, j]
-        wide, close = 1.0 / reach[j] ** 2, near[j] ** 2
-        a0, b0, a1, b1, a2, b2 = _spans(x, j, origin, side, cells, near[j])
-        area, bent, still, tilted = 0.0, 0.0, 0.0, 0.0
-        for c0 in range(a0, b0 + 1):
-            for c1 in range(a1, b1 + 1):
-                row = (c0 * cells[1] + c1) * cells[2]
-                for i in range(begins[row + a2], begins[row + b2 + 1]):
-                    dx, dy, dz = x0 - y[0, i], x1 - y[1, i], x2 - y[2, i]
-                    square = _squared(dx, dy, dz)
-                    if square > close or not alike[i]:
-                        continue
-                    chi = math.exp(-square * wide) * weights[i]
-                    area += chi
-                    bent += chi * bends[i]
-                    if square < least:
-                        continue
-                    inverse = 1.0 / math.sqrt(square)
-                    across = sides[0, i] * dx + sides[1, i] * dy + sides[2, i] * dz
-                    lean = (n0 * dx + n1 * dy + n2 * dz if tilt_of_x else across) * inverse
-                    still += chi * inverse
-                    tilted += chi * inverse * inverse * lean
-        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = area, bent, still, tilted
+                        out[j, q, 0] += slope * r0
+                        out[j, q, 1] += slope * r1
+                        out[j, q, 2] += slope * r2
+                        out[j, q, 3] += slope * i0
+                        out[j, q, 4] += slope * i1
+                        out[j, q, 5] += slope * i2

@@ -25,6 +25,8 @@ KEPT, SLOTS = 2, 49
 """Halvings of parts that are kept, and how many such parts there are: (2^(KEPT + 1) - 1)^2."""
 DEEPEST = 12
 """Halvings at most."""
+BESIDE = 1e-7
+"""Distance of a point from a side, over its length, up to which it is on it."""
 LONG = 1.6
 """Ratio of the sides of a part from which only the longer one is halved."""
 
@@ -155,6 +157,8 @@ def _around(table, grid, bary, u0, v0, angles, share, radii, weight, room, by, a
         low, high = p0 * t0 + q0 * t1, p1 * t0 + q1 * t1
         far = p0 * t1 - q0 * t0
         first, last = math.atan2(low, far), math.atan2(high, far)
+        # next to a side the triangle between is so thin that rounding is all that would be integrated
+        thin = 0.0 if far < BESIDE * length else 1.0
         for a in range(angles.shape[0]):
             angle = first + (last - first) * angles[a]
             c0, s0 = math.cos(angle), math.sin(angle)
@@ -168,7 +172,7 @@ def _around(table, grid, bary, u0, v0, angles, share, radii, weight, room, by, a
                 _cardinal(grid, bary, at[0, count], at_u[0])
                 _cardinal(grid, bary, at[1, count], at_v[0])
                 _place(table, at_u[0], at_v[0], q)
-                _set(q, (last - first) * share[a] * reach * weight[b] * r / (along * across), count, by)
+                _set(q, thin * (last - first) * share[a] * reach * weight[b] * r / (along * across), count, by)
                 count += 1
 
 

@@ -6,8 +6,8 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError
+from creeping.field.body_currents import kept_currents
 from creeping.field.conductor import near
-from creeping.field.currents.kept import kept_currents
 from creeping.shadow.occlusion import occluded
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-
-import creeping as cr
-import scatterers as sc
-from creeping.field.currents import node_sums
 from creeping.field.currents.node_sums import sums_at
 from creeping.field.currents.smooth_kernel import SmoothKernel
 from creeping.field.currents.split_sums import CURL, ONE_LAYER, SPLITS, SplitSums, best_split, cells_of
 from creeping.field.currents.whole_solution import second_surface, windows_of
+
+import creeping as cr
+import scatterers as sc
+from creeping.field.currents import node_sums
 from creeping.field.kernels import near_pairs
 from creeping.geometry.quadrature import body_nodes
 from tests.tolerances import TWIN

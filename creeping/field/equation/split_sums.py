@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.currents.smooth_kernel import SmoothKernel
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
+from creeping.field.equation.smooth_kernel import SmoothKernel
 from creeping.kernels.threads import in_threads
 from creeping.storage.memory import budget
 
@@ -85,10 +85,6 @@ class SplitSums:
     nodes, sides : (n, 3), L and 1
         Places of the nodes, and their normals.
     weights : (n,)
-    alike : (n,) of bool
-        Nodes that share the phase of the points.
-    near : (m,), L
-        Distances up to which others have but 1 - e^{-(kR)^2} of G.
     """
 
     def __init__(
@@ -99,12 +95,10 @@ class SplitSums:
         nodes: FloatArray,
         sides: FloatArray,
         weights: FloatArray,
-        alike: BoolArray,
-        near: FloatArray,
     ) -> None:
         self.kernel, self._points, self._normals, self._sides = kernel, points, normals, sides
-        self._nodes, self._weights, self._alike, self._part_of_others = nodes, weights, alike, near
-        self._made: dict[str, tuple[Any, ...]] = {}
+        self._nodes, self._weights = nodes, weights
+        self._made: dict[str, Any] = {}
 
     def values(self, a: ComplexArray) -> ComplexArray:
         """Sum of w a G (m,), of values (n,)."""
@@ -144,8 +138,8 @@ class SplitSums:
         mine = np.moveaxis(J * self._weights[:, None, None], 2, 1)[cells.order]
         mine = np.ascontiguousarray(np.concatenate([mine.real, mine.imag], axis=2))
         x, y = np.ascontiguousarray(self._points.T), np.ascontiguousarray(self._nodes[cells.order].T)
-        given = x, y, self._alike[cells.order], mine, *cells.grid
-        table = kernel.reach, self._part_of_others, kernel.k, kernel.table, kernel.at_zero
+        given = x, y, mine, *cells.grid
+        table = kernel.reach, kernel.k, kernel.table, kernel.at_zero
         out = np.empty((m, mine.shape[1], 6))
 
         def work(part: slice) -> None:
@@ -192,19 +186,16 @@ class SplitSums:
 
     def _pairs(self, kind: str, values: ComplexArray) -> ComplexArray:
         """What near pairs give of values (n,) or (n, columns): (m, ...)."""
-        real, imaginary = self._matrices(kind)
         columns = np.ascontiguousarray(values.reshape(len(values), -1), dtype=np.complex64).view(np.float32)
-        out = (real @ columns).view(np.complex64).astype(complex)
-        if imaginary is not None:
-            out += 1j * (imaginary @ columns).view(np.complex64)
+        out = (self._near(kind) @ columns).view(np.complex64).astype(complex)
         return np.asarray(out.reshape(len(self._points), *values.shape[1:]))
 
     @cached_property
     def _cells(self) -> Cells:
         return cells_of(self._nodes, 0.5 * self.kernel.reach)
 
-    def _matrices(self, kind: str) -> tuple[Any, ...]:
-        """Real and imaginary part of the sparse matrix of near pairs; no imaginary one if all nodes are alike."""
+    def _near(self, kind: str) -> Any:
+        """The sparse matrix of near pairs."""
         from scipy.sparse import csr_array
 
         from creeping.field.kernels.near_pairs import count_near, fill_near
@@ -214,7 +205,7 @@ class SplitSums:
         cells, kernel, m = self._cells, self.kernel, len(self._points)
         x, normals = (np.ascontiguousarray(part.T) for part in (self._points, self._normals))
         y, sides = (np.ascontiguousarray(part[cells.order].T) for part in (self._nodes, self._sides))
-        weights, alike = self._weights[cells.order], self._alike[cells.order]
+        weights = self._weights[cells.order]
         counts = np.zeros(m + 1, dtype=np.int64)
         seconds = 1e-8 * len(self._nodes)
 
@@ -223,23 +214,18 @@ class SplitSums:
 
         in_threads(count, m, least=64, multiple=1, seconds=seconds)
         starts = np.cumsum(counts)
-        columns, real = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1], dtype=np.float32)
-        imaginary = np.empty(0 if alike.all() else starts[-1], dtype=np.float32)
-        given = x, normals, y, sides, weights, alike, *cells.grid, cells.order
-        table = kernel.reach, self._part_of_others, kernel.k, kernel.table, kernel.at_zero
+        columns, entries = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1], dtype=np.float32)
+        given = x, normals, y, sides, weights, *cells.grid, cells.order
+        table = kernel.reach, kernel.k, kernel.table, kernel.at_zero
         tilt = kind != "values", kind == "tilted at points"
 
         def fill(part: slice) -> None:
-            fill_near(*given, *table, *tilt, starts, part.start, part.stop, columns, real, imaginary)
+            fill_near(*given, *table, *tilt, starts, part.start, part.stop, columns, entries)
 
         in_threads(fill, m, least=64, multiple=1, seconds=seconds)
         small = starts.astype(np.int32) if starts[-1] < 2**31 else starts
-        shape = m, len(weights)
-        self._made[kind] = found = tuple(
-            csr_array((data, columns, small), shape) if len(data) == len(columns) else None
-            for data in (real, imaginary)
-        )
-        return found
+        self._made[kind] = csr_array((entries, columns, small), (m, len(weights)))
+        return self._made[kind]
 
 
 def best_split(
@@ -248,7 +234,6 @@ def best_split(
     nodes: FloatArray,
     load: Load,
     seconds: float,
-    least_reach: float = 0.0,
 ) -> SmoothKernel | None:
     """The kernel that splits sums over nodes (n, 3) at points (m, 3) best, or None where all pairs are done sooner.
 
@@ -260,8 +245,6 @@ def best_split(
     load : Load
     seconds : float
         What a sum over all pairs takes.
-    least_reach : float, L
-        Distance up to which pairs are to be near.
     """
     from scipy.spatial import cKDTree
 
@@ -272,7 +255,7 @@ def best_split(
     for split in SPLITS:
         kernel = make(split)
         modes = float(np.prod(kernel.modes.astype(float)))
-        if kernel.reach < least_reach or kernel.k * kernel.period.max() > LONGEST:
+        if kernel.k * kernel.period.max() > LONGEST:
             continue
         if least <= USES * load.transforms * PER_MODE * modes or load.mode_bytes * modes > room:
             continue

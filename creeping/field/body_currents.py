@@ -1,0 +1,221 @@
+"""Currents of the whole body of a fan: by expansions, or by the body's integral equation where these do not serve.
+
+Expansions: nodes of the lit side and of creeping rays (`creeping.field.currents.nodes`), each boundary's waves on them.
+The equation: `creeping.field.equation.kept`. What either costs is reckoned here, and currents are kept with the fan.
+
+Sources: Derivations, F16 to F18 and F36.
+"""
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray
+from creeping.errors import InvalidInputError, SurfaceError
+from creeping.field.arguments import checked, checked_plain
+from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.currents.bounce import faces_itself, may_face_itself
+from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
+from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, ray_nodes
+from creeping.field.currents.radiation import grid_cells, transformed
+from creeping.field.currents.waves import lit_waves, ray_waves
+from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.equation.kept import asked_solution, expected_seconds_of, solution_for
+from creeping.geometry.arguments import one_of
+from creeping.geometry.creased import has_edges, is_creased
+from creeping.geometry.quadrature import node_count
+from creeping.geometry.surface import Surface, size
+from creeping.rays.fan import RayFan
+from creeping.rays.reach import ray_length
+from creeping.shadow.line import ShadowLine
+
+CUT = 1e-3
+"""Share of the shadow line without rays from which lit ground is not that of a convex body."""
+POOR = 0.02
+"""What currents leave of the incident wave inside from which the equation of any body is solved."""
+AFFORDABLE = 3e9
+"""Nodes times directions, one by one, up to which "auto" takes currents: some ten seconds of one core."""
+POINTS = 2e10
+"""Nodes times points near the body, likewise: forty seconds."""
+MOST_NODES = 1_500_000
+"""Nodes up to which it does, for the memory's sake."""
+MAKING = 2700.0
+"""What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
+SECONDS = 3.3e-9
+"""Of one node at one place."""
+LIT = 0.6
+"""Share of a body's nodes that are lit or in the penumbra."""
+KEPT = 2
+"""Currents kept with a fan, of so many wavenumbers and boundaries."""
+_CURRENTS: "WeakKeyDictionary[RayFan, dict[Any, SurfaceCurrents]]" = WeakKeyDictionary()
+
+
+def surface_currents(
+    fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft", solve: bool | None = None
+) -> SurfaceCurrents:
+    """Currents of the whole body of a fan, by expansions, or by its integral equation.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Its flow and its line are used; rays are as long and as dense as the wavenumber asks for.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard", "pec" or ImpedanceBoundary
+    solve : bool, optional
+        Whether the equation is solved, as by `creeping.solve`. By default it is where expansions are known to fail, on
+        a body with edges, joints or tips, one that may reflect onto itself, hides part of its shadow line or has an
+        admittance that steps, or where they leave more than 2 % of the incident wave inside or cannot be judged, and
+        it costs less than about 30 seconds; True is for as much as 300.
+
+    Returns
+    -------
+    SurfaceCurrents
+
+    Raises
+    ------
+    InvalidInputError
+        On a bad wavenumber or boundary, for a weighted body, for one without expansions whose equation is not solved,
+        and if ``solve`` is asked of a body that needs too many nodes.
+    SurfaceError
+        If the wavenumber is too high for any mesh of the body.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=3.0, n_rays=16)
+    >>> currents = cr.surface_currents(fan, wavenumber=12.0, boundary="hard")
+    >>> currents.extinction < 0.02, bool(currents.error([(0, 1, 0)])[0] < 0.05)
+    (True, True)
+    """
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    kinds = scalar_boundaries(boundary)
+    checked_plain(fan.body)
+    k = checked(wavenumber, 2)
+    problem = fan.body, fan.line.direction, k, boundary
+    if solve:
+        return asked_solution(*problem).currents
+    # expansions know little of joints and tips, and nothing of edges
+    found = solution_for(*problem) if solve is None and is_creased(fan.body) else None
+    if found:
+        return found.currents
+    if not has_expansions(fan.body, boundary):
+        raise InvalidInputError(
+            "a body with edges, or a conductor with joints, has no currents but those of its integral equation, not "
+            f'solved at wavenumber {k:g}: give solve=True or method="equation"; far_field has rays'
+        )
+    lit = lit_nodes(fan.body, fan.line, k)
+    try:
+        currents, facing = _expanded(fan, lit, k, kinds), faces_itself(lit)
+    except SurfaceError:
+        # along the axis of a capsule rays start on a joint
+        found = solution_for(*problem) if solve is None else None
+        if not found:
+            raise
+        return found.currents
+    poor = facing or currents.unserved > CUT or currents.stepped > 0 or not currents.extinction <= POOR
+    found = solution_for(*problem) if solve is None and poor else None
+    if found:
+        return found.currents
+    if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
+        currents.values[currents.lit] += currents.thrown(lit.points, lit.normals)
+    return currents
+
+
+def has_expansions(body: Surface, boundary: BoundaryLike) -> bool:
+    """Whether there are expansions of currents on all of a body: not round edges, nor across joints of a conductor."""
+    return not has_edges(body) and not (boundary == "pec" and is_creased(body))
+
+
+def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...]) -> SurfaceCurrents:
+    """Currents by the expansion at nodes of the lit side and on creeping rays."""
+    # a conductor's rays are as long as its wave that decays less
+    shadow = ray_nodes(fan, k, kinds[-1])
+    if len(kinds) == 2:
+        kind = CONDUCTOR
+        shadow = shadow[shadow.rays.alive]
+        values, first = (conductor_waves(lit, shadow, fan.line.direction, k, order) for order in (2, 1))
+        change = values - first
+    else:
+        kind = kinds[0]
+        bright, first = lit_waves(lit, fan.line.direction, size(fan.body), k, kind)
+        dark, second = ray_waves(shadow, k, kind)
+        values, change = np.concatenate([bright, dark]), np.concatenate([bright - first, second])
+    make = ConductorCurrents if kind.kind == "conductor" else SurfaceCurrents
+    return make(
+        body=fan.body,
+        direction=fan.line.direction,
+        points=np.concatenate([lit.points, shadow.rays.points]),
+        normals=np.concatenate([lit.normals, shadow.normals]),
+        weights=np.concatenate([lit.weights, shadow.weights]),
+        travel=np.concatenate([np.broadcast_to(fan.line.direction, lit.points.shape), shadow.rays.directions]),
+        values=values,
+        change=change,
+        lit=np.arange(len(values)) < len(lit.points),
+        rim=_rim(fan.line, k),
+        rim_length=fan.line.length,
+        unserved=1.0 - float(fan.line.fractions["attached"]),
+        wavenumber=k,
+        boundary=kind,
+    )
+
+
+def _rim(line: ShadowLine, wavenumber: float) -> FloatArray:
+    """Points of a shadow line (l, 3), an eighth of a wavelength apart on all its curves."""
+    apart = np.pi / (4 * wavenumber)
+    parts = []
+    for curve in line.curves:
+        count = max(64, int(np.ceil(curve.length / apart)))
+        parts.append(curve.at(curve.length * (np.arange(count) + 0.5) / count))
+    return np.concatenate(parts)
+
+
+def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = False) -> bool:
+    """Whether currents cost little enough for so many points, or directions if ``distant``."""
+    nodes = expected_nodes(fan, wavenumber)
+    if nodes > MOST_NODES:
+        return False
+    cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
+    by_transform = distant and transformed(nodes, places, cells)
+    if not distant:
+        return nodes * MAKING < AFFORDABLE and nodes * places < POINTS
+    return nodes * (MAKING + (0 if by_transform else places)) < AFFORDABLE
+
+
+def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boundary: BoundaryLike = "soft") -> float:
+    """About what currents of one incidence at wavenumbers (k,), 1/L, and their far field cost, where they are taken."""
+    known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
+    plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
+    solved = 1.0 - fan.line.fractions["attached"] > CUT or not has_expansions(fan.body, boundary)
+    if not (solved or may_face_itself(fan.body)):
+        return plain
+    return plain + sum(expected_seconds_of(fan.body, k, boundary) for k in known)
+
+
+def expected_nodes(fan: RayFan, wavenumber: float) -> int:
+    """About how many nodes the currents of a fan's incidence have."""
+    wavelength = 2 * np.pi / wavenumber
+    line = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
+    rays = RAYS * STEPS * line * ray_length(fan.line, wavenumber=wavenumber) / wavelength**2
+    return int(LIT * node_count(fan.body, 2 * wavenumber) + rays)
+
+
+def kept_currents(
+    fan: RayFan, wavenumber: float, boundary: BoundaryLike, *, solve: bool | None = None
+) -> SurfaceCurrents:
+    """Currents of the whole body, made once for each of the last wavenumbers and boundaries.
+
+    Raises
+    ------
+    InvalidInputError, SurfaceError
+        As `surface_currents`.
+    """
+    kept = _CURRENTS.setdefault(fan, {})
+    key = (wavenumber, boundary, solve)
+    if key not in kept:
+        while len(kept) >= KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = surface_currents(fan, wavenumber=wavenumber, boundary=boundary, solve=solve)
+    return kept[key]
