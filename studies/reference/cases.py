@@ -3,14 +3,23 @@
 import numpy as np
 
 from studies.reference import antennas, dipoles, fundamental, monopoles, ports, slots
-from studies.reference._boundary import FloatArray
+from studies.reference._boundary import Boundary, FloatArray
 from studies.reference.clouds import Body, ellipsoid, star
+from studies.reference.generatrix import pieces_profile
+from studies.reference.mirrored_box import scatter_box
+from studies.reference.modal_conductor import scatter_conductor
+from studies.reference.modal_equation import scatter_by_modes
+from studies.reference.revolution import Profile
 from studies.reference.stored import Arrays
 
 HEIGHTS = (0.05, 0.08, 0.11, 0.14)
 """Of sources above their ports, L."""
 LOW_HEIGHTS = (0.03, 0.05, 0.07, 0.09, 0.12)
 """The same of monopoles, L."""
+ADMITTANCE = 0.5 + 0.2j
+"""Of the edged cylinder."""
+LOBE = 0.25
+"""Angle off the forward direction within which a few directions are, radians: half the lobe of k a = 10."""
 
 
 def ellipsoid_slots() -> Arrays:
@@ -167,3 +176,59 @@ def ellipsoid_echoes() -> Arrays:
     found = dipoles.scatter(ellipsoid(1.0, 0.7, 0.5), 20.0, d, depth=0.15)
     values = np.array([found.far_field(row)[:, number] for number, row in enumerate(r)])
     return {"incident": d, "directions": r, "values": values}
+
+
+def edged_cylinder() -> Arrays:
+    """Far fields, L, of the cylinder of radius 1 and height 2, at 30 and 90 degrees to its axis, k = 10."""
+    profile = pieces_profile([(0.0, 1.0), (1.0, 1.0), (1.0, -1.0), (0.0, -1.0)])
+    kinds: dict[str, Boundary | None] = {"hard": "hard", "soft": "soft", "impedance": ADMITTANCE, "pec": None}
+    return _edged(profile, np.radians([30.0, 90.0]), kinds)
+
+
+def edged_cone() -> Arrays:
+    """Far fields of the cone of radius 1 and height 2, its base at z = 0, at 50 degrees to its axis, k = 10."""
+    profile = pieces_profile([(0.0, 2.0), (1.0, 0.0), (0.0, 0.0)])
+    return _edged(profile, np.radians([50.0]), {"hard": "hard", "soft": "soft", "pec": None})
+
+
+def edged_ogive() -> Arrays:
+    """Far field of the hard ogive of radius 0.5 and length 3, end on, k = 10."""
+    radius, half = 0.5, 1.5
+    middle = 0.5 * (radius**2 - half**2) / radius
+    return _edged(pieces_profile([(0.0, half), (0.0, -half)], {0: (middle, 0.0)}), np.zeros(1), {"hard": "hard"})
+
+
+def edged_half_ball() -> Arrays:
+    """Far fields of the upper half of the unit ball, its flat face at z = 0, at 60 degrees to its axis, k = 10."""
+    profile = pieces_profile([(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)], {0: (0.0, 0.0)})
+    return _edged(profile, np.radians([60.0]), {"soft": "soft", "pec": None})
+
+
+def edged_cube() -> Arrays:
+    """Far fields of the cube of side 2, met at an odd angle, k = 5."""
+    d = np.array([[0.3, 0.5, -0.81]]) / np.linalg.norm([0.3, 0.5, -0.81])
+    r = _about(d)
+    kinds: tuple[Boundary, ...] = ("hard", "soft")
+    far = {str(kind): scatter_box((1, 1, 1), 5.0, d, kind).far_field(r) for kind in kinds}
+    return {"incident": d, "directions": r} | far
+
+
+def _edged(profile: Profile, polar: FloatArray, kinds: dict[str, Boundary | None]) -> Arrays:
+    """Far fields of a body of revolution by the names of its boundaries: (m, d), of a conductor (m, d, 2, 2)."""
+    d = np.stack([np.sin(polar), 0 * polar, np.cos(polar)], axis=-1)
+    r, k = _about(d), 10.0
+    found: Arrays = {"incident": d, "directions": r}
+    for name, kind in kinds.items():
+        if kind is None:
+            found[name] = scatter_conductor(profile, k, polar, cuts=7).far_field(r)
+        else:
+            found[name] = scatter_by_modes(profile, k, polar, kind, cuts=7).far_field(r)
+    return found
+
+
+def _about(d: FloatArray) -> FloatArray:
+    """Sixty directions all about, straight ahead of each incidence among them, four within `LOBE` of it: (60, 3)."""
+    rng = np.random.default_rng(20261126)
+    ahead = d[:, None] + LOBE / np.sqrt(3) * rng.uniform(-1, 1, (len(d), 5, 3)) * (np.arange(5) > 0)[:, None]
+    r = np.concatenate([ahead.reshape(-1, 3), rng.normal(size=(60 - 5 * len(d), 3))])
+    return np.asarray(r / np.linalg.norm(r, axis=1, keepdims=True))
