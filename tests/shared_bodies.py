@@ -18,8 +18,9 @@ def _shared(kind):
     return body
 
 
-Sphere, Ellipsoid, Torus, TwistedEllipsoid = map(
-    _shared, (scatterers.Sphere, scatterers.Ellipsoid, scatterers.Torus, scatterers.TwistedEllipsoid)
+Sphere, Ellipsoid, Torus, TwistedEllipsoid, Implicit = map(
+    _shared,
+    (scatterers.Sphere, scatterers.Ellipsoid, scatterers.Torus, scatterers.TwistedEllipsoid, scatterers.Implicit),
 )
 
 

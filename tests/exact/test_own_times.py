@@ -1,10 +1,10 @@
 """Rays traced each to a time of its own, against closed forms and in the company of rays that fail; parted rays."""
 
 import numpy as np
+import shared_bodies as sc
 from creased_bodies import Ball, Capsule, cone
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.likely_cells import parted
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.pieces import trace_pieces, trace_to

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field import on_body
 from creeping.field.currents import assembly
 from creeping.field.special.fock import surface_function

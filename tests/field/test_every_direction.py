@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from studies.field_coverage import bodies
 from studies.reference.dipoles import frames
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field import on_body
 from creeping.field.beams import beam_sums
 from creeping.field.boundary import HARD

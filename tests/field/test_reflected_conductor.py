@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from scipy.special import h1vp, hankel1, jv, jvp
 
 import creeping as cr
-import scatterers as sc
 from studies.reference import stored
 
 

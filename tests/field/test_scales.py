@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.surface import normal, project
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from studies.field_coverage import bodies
 from studies.reference import fundamental, sphere
 

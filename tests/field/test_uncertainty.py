@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.rays.uncertain_body import coarse_fan
 from studies._meshes import on_body
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from studies.reference import stored
 
 RADIUS, HALF, K = 0.4, 0.5, 20.0

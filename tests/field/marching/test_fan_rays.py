@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import HARD, SOFT
 from creeping.field.marching.fan_rays import fan_profiles
 from creeping.field.marching.layer import march_rays
