@@ -41,6 +41,7 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.pluginmanager.register(ProcessorTime())
+    config.pluginmanager.register(sc.SharedInExamples())
 
 
 def pytest_collection_modifyitems(config, items):

@@ -83,14 +83,14 @@ def both():
 @pytest.mark.parametrize(
     ("kind", "ka", "most"),
     [
-        ("ports", 10.0, 0.025),
         ("ports", 100.0, 0.0012),
         ("slots", 10.0, 0.06),
-        ("slots", 100.0, 0.005),
         ("monopoles", 10.0, 0.01),
-        ("monopoles", 100.0, 0.002),
         ("antennas", 10.0, 0.03),
-        ("antennas", 100.0, 0.0025),
+        pytest.param("ports", 10.0, 0.025, marks=pytest.mark.slow),
+        pytest.param("slots", 100.0, 0.005, marks=pytest.mark.slow),
+        pytest.param("monopoles", 100.0, 0.002, marks=pytest.mark.slow),
+        pytest.param("antennas", 100.0, 0.0025, marks=pytest.mark.slow),
     ],
 )
 def test_sphere_against_partial_waves(kind, ka, most):

@@ -152,7 +152,7 @@ def test_units():
         body = sc.Ellipsoid(s, 0.8 * s, 0.6 * s)
         line = cr.shadow_line(body, direction=OBLIQUE)
         fan = cr.launch(cr.DirectFlow(body), line, length=4.0 * s, n_rays=32)
-        found.append(cr.conductor_current(fan, s * x, wavenumber=20 / s))
+        found.append(cr.conductor_current(fan, s * x, wavenumber=10 / s))
     assert found[0].method.tolist() == found[1].method.tolist()
     for name in ("values", "charge", "error"):
         np.testing.assert_allclose(getattr(found[1], name), getattr(found[0], name), atol=1e-4)
@@ -163,10 +163,10 @@ def test_where_rays_end_the_status_says_so(monkeypatch):
     monkeypatch.setattr(whole_solution, "MOST", 1.0)
     body = sc.TwistedEllipsoid()
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, direction=OBLIQUE), length=4.0, n_rays=48)
-    nodes = body_nodes(body, 10.0)
-    dark = nodes.points[nodes.normals @ OBLIQUE > 0.3][::120]
-    found = cr.conductor_current(fan, dark, wavenumber=10.0)
+    nodes = body_nodes(body, 6.0)
+    dark = nodes.points[nodes.normals @ OBLIQUE > 0.3][::60]
+    found = cr.conductor_current(fan, dark, wavenumber=6.0)
     counts = found.status_counts
     assert counts.get("DETACHED", 0) > 0 and np.all(np.isfinite(found.error))
     short = cr.launch(fan.flow, fan.line, length=0.2, n_rays=48)
-    assert "TRUNCATED" in cr.conductor_current(short, dark, wavenumber=10.0).status_counts
+    assert "TRUNCATED" in cr.conductor_current(short, dark, wavenumber=6.0).status_counts
