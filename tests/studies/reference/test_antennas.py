@@ -88,7 +88,7 @@ def test_points_inside_a_hard_sphere():
 
 
 def test_slots_by_dipoles_inside_a_sphere():
-    k, angles = 5.0, np.radians([30.0, 60.0, 110.0, 150.0])
+    k, angles = 8.0, np.radians([30.0, 60.0, 110.0, 150.0])
     points, there = places(angles)
     found = coupled_slots(BALL, k, [SOURCE], points, depth=0.3, heights=(0.06, 0.09, 0.12, 0.16), per_wavelength=8.0)
     across, along = sphere_slots(k, 1.0, angles)
