@@ -26,6 +26,12 @@ SHARED = ("Sphere", "Ellipsoid", "Torus", "TwistedEllipsoid", "Implicit")
 Sphere, Ellipsoid, Torus, TwistedEllipsoid, Implicit = (_shared(getattr(scatterers, name)) for name in SHARED)
 
 
+class Metric(scatterers.Sphere):
+    """A sphere that knows its unit, as bodies from files do."""
+
+    unit = "m"
+
+
 def __getattr__(name):
     return getattr(scatterers, name)
 

@@ -174,14 +174,3 @@ def test_bad_methods_are_named(fan):
         cr.near_field(fan, [[0, 0, 2.0]], wavenumber=10.0, method="fast")
     with pytest.raises(InvalidInputError, match="has no order 1"):
         cr.near_field(fan, [[0, 0, 2.0]], wavenumber=10.0, order=1, method="currents")
-
-
-@pytest.mark.parametrize("scale", [1e5])
-def test_any_unit_of_length(fan, scale):
-    y = around(40, least=1.3)
-    one = cr.near_field(fan, y, wavenumber=15.0, boundary="hard")
-    ball = sc.Sphere(radius=scale)
-    other = cr.near_field(fan_of(ball, length=4.0 * scale), scale * y, wavenumber=15.0 / scale, boundary="hard")
-    np.testing.assert_array_equal(other.status, one.status)
-    np.testing.assert_allclose(other, one, atol=2e-4)
-    np.testing.assert_allclose(other.error, one.error, rtol=0.1)
