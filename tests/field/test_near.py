@@ -34,7 +34,7 @@ def behind(points):
     return (np.hypot(points[:, 0], points[:, 1]) < 1) & (points[:, 2] > 0)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", 0.7])
+@pytest.mark.parametrize("boundary", ["soft", 0.7, pytest.param("hard", marks=pytest.mark.slow)])
 def test_currents_give_the_total_field_on_all_sides(fan, boundary):
     kind = cr.ImpedanceBoundary(boundary) if boundary == 0.7 else boundary
     y = around(300, least=1.35)
@@ -116,7 +116,7 @@ def test_where_rays_have_ended_is_named(farther):
         assert np.all(cr.near_field(fan, y, wavenumber=15.0, boundary="hard").ok)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", 0.7])
+@pytest.mark.parametrize("boundary", ["hard", 0.7, pytest.param("soft", marks=pytest.mark.slow)])
 def test_close_to_lit_ground_the_field_is_between_currents_and_the_body(fan, boundary):
     kind = cr.ImpedanceBoundary(boundary) if boundary == 0.7 else boundary
     r = around(200, seed=2)

@@ -35,8 +35,8 @@ def total(marched, ray, s):
     [
         (20.0, "soft", (2.0, 0.4, 0.6)),
         (20.0, "hard", (0.35, 0.8, 1.4)),
-        (40.0, "hard", (0.2, 0.5, 0.8)),
-        (100.0, "hard", (0.1, 0.25, 0.4)),
+        pytest.param(40.0, "hard", (0.2, 0.5, 0.8), marks=pytest.mark.slow),
+        pytest.param(100.0, "hard", (0.1, 0.25, 0.4), marks=pytest.mark.slow),
     ],
 )
 def test_sphere(fan, k, kind, limits):

@@ -95,7 +95,7 @@ def test_lit_surface_functions_are_those_of_a_plane():
 
 
 @pytest.mark.parametrize("name", ["pekeris_star", "surface_function", "pekeris_slope", "surface_slope"])
-@pytest.mark.parametrize("q", BOUNDARIES)
+@pytest.mark.parametrize("q", [None, 0.0, 2 + 1j])
 @pytest.mark.parametrize("power", [1, 2])
 def test_powers_are_derivatives(name, q, power):
     if q is None and name.endswith("slope"):

@@ -19,7 +19,7 @@ def sphere_of_directions(order):
     return r.reshape(-1, 3), np.repeat(w * np.pi / order, 2 * order)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", 0.5 - 0.3j])
+@pytest.mark.parametrize("boundary", ["soft", 0.5 - 0.3j, pytest.param("hard", marks=pytest.mark.slow)])
 def test_sphere(boundary):
     d = np.concatenate([OBLIQUE, [[0.0, 0.0, 1.0]]])
     solution = fundamental.scatter(clouds.ellipsoid(1.0, 1.0, 1.0), 10.0, d, boundary, depth=0.25)
