@@ -39,7 +39,15 @@ def test_stays_on_the_bundle(body, phase_map, rng):
     assert np.abs(np.sum(p * body.gradient(x), axis=-1)).max() < 1e-12
 
 
-@pytest.mark.parametrize("degree, bound", [(5, 1e-5), pytest.param(3, 4e-5, marks=pytest.mark.slow)])
+NAMES = ("sphere", "ellipsoid", "triaxial", "torus", "twisted", "weighted")
+CUBIC = [
+    # one whose map has two axes and one with three; the other bodies' models are those of degree 5
+    pytest.param(name, 3, 4e-5, marks=() if name in ("torus", "twisted") else pytest.mark.slow)
+    for name in NAMES
+]
+
+
+@pytest.mark.parametrize("body, degree, bound", [*((name, 5, 1e-5) for name in NAMES), *CUBIC], indirect=["body"])
 def test_models_of_bodies_and_one_leap_by_splines_of_either_degree(body, degree, bound, rng):
     states, time = pack(*random_bundle_points(body, 100, rng=rng), jacobi=True), np.array([0.3])
     exact = trace_states(body, states, time, rtol=1e-12)
