@@ -27,11 +27,11 @@ from studies._flow_cases import Row, show, threads
 from studies._peers import seconds_of
 
 BODIES: dict[str, Any] = {
-    "ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8),
-    "torus": sc.Torus(),
-    "twisted": sc.TwistedEllipsoid(),
-    "peanut": sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
-    "bumpy": sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
+    "ellipsoid": lambda: sc.Ellipsoid(1.2, 0.8, 0.8),
+    "torus": sc.Torus,
+    "twisted": sc.TwistedEllipsoid,
+    "peanut": lambda: sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
+    "bumpy": lambda: sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
 }
 SHARES = ("attached", "occluded", "concave")
 RAYS = 256
@@ -106,7 +106,7 @@ def differences(found: Lines, exact: Lines) -> Row:
 
 def measure(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     """One body: cost and statuses, then errors against the finest mesh and against the independent line."""
-    body, directions = BODIES[name], fibonacci_directions(count)
+    body, directions = BODIES[name](), fibonacci_directions(count)
     found = swept(body, directions)
     seconds, meshes = (
         seconds_of(call, REPEATS) / count

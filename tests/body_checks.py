@@ -23,7 +23,10 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def volume(vertices, triangles):
+def volume(vertices, triangles=None):
+    """Of vertices and triangles, or of a mesh that has both."""
+    if triangles is None:
+        vertices, triangles = vertices.vertices, vertices.triangles
     a, b, c = np.moveaxis(np.asarray(vertices)[np.asarray(triangles)], 1, 0)
     return float(np.sum(a * np.cross(b, c))) / 6
 

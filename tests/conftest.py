@@ -27,7 +27,7 @@ from results_to_show import (  # noqa: F401
 
 import creeping as cr
 
-FIRST = ("README.md", "tests/studies/reference/", "tests/dumb_inputs/test_bad_arguments.py", "tests/scatterers/")
+FIRST = ("README.md", "tests/studies/reference/", "tests/scatterers/", "tests/dumb_inputs/test_bad_arguments.py")
 """Files that a run begins with, for the two workers in turn: one compiles kernels while the other needs few of them."""
 
 
@@ -41,6 +41,7 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.pluginmanager.register(ProcessorTime())
+    config.pluginmanager.register(sc.SharedInExamples())
 
 
 def pytest_collection_modifyitems(config, items):

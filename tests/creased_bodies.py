@@ -47,26 +47,6 @@ class Plane:
         return np.zeros((*x.shape, 3))
 
 
-class Mantle:
-    """Cone about z, or cylinder where its slope is 0: r cos a + z sin a = offset."""
-
-    def __init__(self, slope, offset, bounds):
-        self.slope, self.offset, self.bounds = slope, offset, np.array(bounds, float)
-
-    def level(self, x):
-        return np.hypot(x[..., 0], x[..., 1]) * np.cos(self.slope) + x[..., 2] * np.sin(self.slope) - self.offset
-
-    def gradient(self, x):
-        r = np.hypot(x[..., 0], x[..., 1])
-        c = np.cos(self.slope)
-        return np.stack([c * x[..., 0] / r, c * x[..., 1] / r, np.full_like(r, np.sin(self.slope))], axis=-1)
-
-    def hessian(self, x):
-        r = np.hypot(x[..., 0], x[..., 1])
-        t = np.stack([-x[..., 1] / r, x[..., 0] / r, 0 * r], axis=-1)
-        return (np.cos(self.slope) / r)[..., None, None] * t[..., :, None] * t[..., None, :]
-
-
 class Pieced:
     """Union or intersection of pieces by ``choice`` (np.argmax or np.argmin over the levels), or by ``piece``."""
 
@@ -161,48 +141,6 @@ def cut_sphere(z=0.5):
     box = [[-1, -1, -1], [1, 1, z]]
     profile = [(0, Arc(0.0, 1.0, 0.0, np.pi - np.arccos(z))), (1, Straight((rim, z), (0, z)))]
     return Pieced([Ball(), Plane((0, 0, 1), z, box)], [Line("edge", (0, 1), ring(rim, z))], box, profile)
-
-
-def cylinder(radius=0.5, half=1.0):
-    """Flat ends: pieces 0 (side), 1 (top), 2 (bottom)."""
-    box = [[-radius, -radius, -half], [radius, radius, half]]
-    pieces = [Mantle(0.0, radius, box), Plane((0, 0, 1), half, box), Plane((0, 0, -1), half, box)]
-    profile = [
-        (2, Straight((0, -half), (radius, -half))),
-        (0, Straight((radius, -half), (radius, half))),
-        (1, Straight((radius, half), (0, half))),
-    ]
-    creases = [Line("edge", (0, 1), ring(radius, half)), Line("edge", (0, 2), ring(radius, -half))]
-    return Pieced(pieces, creases, box, profile)
-
-
-def cone(radius=0.5, height=1.0):
-    """Flat base at z = 0: pieces 0 (mantle) and 1 (base)."""
-    box = [[-radius, -radius, 0], [radius, radius, height]]
-    slope = np.arctan2(radius, height)
-    pieces = [Mantle(slope, height * np.sin(slope), box), Plane((0, 0, -1), 0.0, box)]
-    profile = [(1, Straight((0, 0), (radius, 0))), (0, Straight((radius, 0), (0, height)))]
-    creases = [Line("edge", (0, 1), ring(radius, 0.0)), Line("tip", (0, 0), np.array([[0, 0, height]], float))]
-    return Pieced(pieces, creases, box, profile)
-
-
-class Capsule(Pieced):
-    """Cylinder of half length h with hemispheres: pieces 0 (lower), 1 (side), 2 (upper)."""
-
-    def __init__(self, radius=0.5, half=1.0):
-        self.half = half
-        box = [[-radius, -radius, -half - radius], [radius, radius, half + radius]]
-        pieces = [Ball((0, 0, -half), radius), Mantle(0.0, radius, box), Ball((0, 0, half), radius)]
-        creases = [Line("joint", (0, 1), ring(radius, -half)), Line("joint", (1, 2), ring(radius, half))]
-        profile = [
-            (0, Arc(-half, radius, 0.0, np.pi / 2)),
-            (1, Straight((radius, -half), (radius, half))),
-            (2, Arc(half, radius, np.pi / 2, np.pi)),
-        ]
-        super().__init__(pieces, creases, box, profile)
-
-    def piece(self, x):
-        return np.where(x[..., 2] < -self.half, 0, np.where(x[..., 2] > self.half, 2, 1))
 
 
 class TwoBalls(Pieced):

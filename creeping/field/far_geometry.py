@@ -203,6 +203,7 @@ class FarGeometry:
         most = len(times) * PARTS
         cells, crossings = min(CELLS[is_creased(self.body)], most * rays), 2 + int(self.tracer.steps * TURN / np.pi)
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
+        closed = np.ascontiguousarray(launch.closed)
         self.ends = RayEnds(self.tracer, launch, states, times)
         pieces = [(np.empty((0, 4), np.int64), np.empty((0, 2)), np.empty((0, 4)))]
         # parts of a size that is the same wherever it runs: what is passed over depends on the observers of a call
@@ -210,14 +211,14 @@ class FarGeometry:
         each, weights = max(1, share // max(1, many)), quintic_weights(times[1])
         for row, seen in np.ndindex(-(-n // each), -(-many // share)) if rays else ():
             here, some = slice(row * each, (row + 1) * each), slice(seen * share, (seen + 1) * share)
-            observers, chi = np.ascontiguousarray(self.observers[here, some]), self._chi[here, some].copy()
+            observers, chi = self.observers[here, some].copy(), self._chi[here, some].copy()
             behind = np.ascontiguousarray(back[here, some])
             while True:
                 found, places = np.empty((cells * chi.size, 4), np.int64), np.empty((cells * chi.size, 2))
                 crossed = np.empty((crossings * rays * max(1, int(behind.sum())), 4))
                 with evaluators(self.body) as parts:
                     a, b = seek_all(
-                        *parts[:2], times[1], weights, states[here], arc[here], launch.closed[here],
+                        *parts[:2], times[1], weights, states[here], arc[here], closed[here],
                         observers, behind, EARLY * size(self.body), ALONG, cells * chi.shape[1], crossings * rays,
                         found, places, crossed, chi, self._roots[here],
                     )  # fmt: skip

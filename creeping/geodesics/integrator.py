@@ -164,7 +164,7 @@ def counted_states(
     out = np.empty((len(states), len(times), states.shape[1]))
     states = np.ascontiguousarray(states, dtype=float)
     scale = error_scale(body, states.shape[1])
-    ends = np.asarray(times, dtype=float)
+    ends = np.ascontiguousarray(times, dtype=float)
     taken: list[int] = []
     controls = scale, float(rtol), float(step), int(limit), BUDGET
     with evaluators(body) as parts:

@@ -243,7 +243,7 @@ def _passages(
     lanes, last = np.zeros((rays, count - 4 + BEHIND, LANES)), np.zeros(rays, dtype=np.int64)
     with evaluators(body) as parts:
         port_fan(parts.level, parts.level_parameters, step, size(body), 1.0, states, lanes, last)
-    most = PER_PAIR * len(ports) + 64
+    most, ports = PER_PAIR * len(ports) + 64, np.ascontiguousarray(ports)
     while True:
         owner, found = np.empty(most, dtype=np.int64), np.empty((most, LANES + START + 3))
         total = passed(lanes, last, ports, number, *boxes, pad, folds, owner, found)

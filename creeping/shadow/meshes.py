@@ -103,7 +103,8 @@ def _packed(body: Surface, mesh: Triangulation, nodes: int) -> tuple[Any, ...]:
     return (
         np.ascontiguousarray(mesh.vertices.T),
         np.ascontiguousarray(n.T).ravel(),
-        mesh.triangles.astype(np.int32),
+        # of one layout, for which kernels are compiled once
+        np.ascontiguousarray(mesh.triangles, dtype=np.int32),
         neighbours_of(mesh.triangles),
         mesh.edge_length,
         float(np.sqrt(np.mean(turn**2))),

@@ -24,8 +24,9 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
     hidden = np.zeros(len(points), dtype=bool)
     if not len(points):
         return hidden
-    directions = np.ascontiguousarray(np.broadcast_to(direction, points.shape), dtype=float)
-    limit = np.ascontiguousarray(np.broadcast_to(reach, len(points)), dtype=float)
+    # copies: of arrays that cannot be written kernels would be compiled once more
+    directions = np.array(np.broadcast_to(direction, points.shape), dtype=float, order="C")
+    limit = np.array(np.broadcast_to(reach, len(points)), dtype=float)
     box = np.ascontiguousarray(body.bounds, dtype=float)
     columns = np.ascontiguousarray(points.T, dtype=float)
     with evaluators(body) as parts:

@@ -87,8 +87,12 @@ def test_points_off_the_body_are_counted(fan):
 
 def test_weighted_bodies_are_refused(field):
     fan = launched(sc.Sphere(speed="1 + x/4"), length=1.0)
+    # with no points as well
+    for options in ({}, {"at": np.zeros((0, 3))}):
+        with pytest.raises(cr.CreepingError, match="speed"):
+            field(fan, wavenumber=10.0, **options)
     with pytest.raises(cr.CreepingError, match="speed"):
-        field(fan, wavenumber=10.0)
+        cr.surface_field(fan, wavenumber=10.0)
 
 
 @pytest.mark.parametrize("boundary", ["soft", "pec"])

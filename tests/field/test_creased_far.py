@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from creased_bodies import SplitBall, TwoBalls, cut_sphere
 from scipy.special import j1
 
 import creeping as cr
-import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.field.equation import kept
 

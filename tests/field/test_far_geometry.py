@@ -5,9 +5,9 @@ import weakref
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.far_geometry import TAPERED, far_geometry
 from creeping.geometry.surface import normal
 

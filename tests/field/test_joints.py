@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.field import on_body
 from creeping.field.equation import kept
@@ -69,11 +69,11 @@ def test_each_ray_crosses_joints():
 def test_the_unit_of_length_is_no_matter(monkeypatch):
     monkeypatch.setattr(on_body, "affordable", lambda *_: False)
     monkeypatch.setattr(kept, "SECONDS", 0.0)
-    points = np.array([[1.0, 0.0, 0.3], [-1.0, 0.0, 0.2], [0.0, 0.6, 1.8], [0.0, -1.0, -0.4]])
+    points = np.array([[1.0, 0.0, 0.1], [0.0, 0.6, 1.05], [0.0, -1.0, -0.2]])
     d = (0.9, 0.0, 0.4)
     small, large = (
         cr.surface_field(
-            fan_of(sc.Capsule(1.0 * scale, 4.0 * scale), d, n_rays=16, length=4.0 * scale),
+            fan_of(sc.Capsule(1.0 * scale, 2.5 * scale), d, n_rays=16, length=3.0 * scale),
             points * scale, wavenumber=5.0 / scale, boundary="hard",
         )
         for scale in (1.0, 1024.0)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field import on_body
 from creeping.field.beams import beam_sums
 from creeping.field.boundary import HARD
@@ -24,8 +24,14 @@ def ball():
     return fan_of(sc.Sphere(), (0, 0, 1), 4.0, 48)
 
 
-@pytest.mark.parametrize(("k", "limit"), [(10.0, 2.5), (100.0, 0.4)])
-@pytest.mark.parametrize("boundary", ["soft", "hard"])
+@pytest.mark.parametrize(
+    ("k", "limit", "boundary"),
+    [
+        (10.0, 2.5, "soft"),
+        (100.0, 0.4, "hard"),
+        *(pytest.param(*c, marks=pytest.mark.slow) for c in ((10.0, 2.5, "hard"), (100.0, 0.4, "soft"))),
+    ],
+)
 def test_focus_behind_a_sphere(ball, k, limit, boundary):
     """Per cent of the field at the focus, up to 30 degrees from it: rays alone are infinite there."""
     theta = np.radians([0.0, 0.1, 0.5, 2.0, 5.0, 10.0, 20.0, 30.0])

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.field.special.airy import hard_modes
 from creeping.field.special.fock import transition, transition_rate

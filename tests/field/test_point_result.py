@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
-from creeping.errors import InvalidInputError
 from creeping.field.equation import kept
 from creeping.field.point_result import FieldStatus, judged
 from creeping.field.served import measured_field
@@ -152,17 +151,6 @@ def test_an_error_that_is_not_known_is_not_ok(fan, monkeypatch):
     monkeypatch.setattr(module, "total_at", lambda *given: (*taken(*given)[:2], np.full(len(given[1]), np.nan)))
     u = cr.near_field(fan, [(0.0, 0.0, -2.0)], wavenumber=K, boundary="hard", method="currents")
     assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound"
-
-
-def test_weighted_bodies_are_refused_with_or_without_points():
-    body = sc.Torus(1.0, 0.5, speed="1 + 0.1*x")
-    fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0.2, 0.1, 1)), length=0.5, n_rays=8)
-    for points in (np.zeros((0, 3)), [(0.0, 0.0, 3.0)]):
-        with pytest.raises(InvalidInputError, match="has a speed"):
-            cr.near_field(fan, points, wavenumber=K)
-    for points in (np.zeros((0, 3)), [(1.5, 0.0, 0.0)], None):
-        with pytest.raises(InvalidInputError, match="has a speed"):
-            cr.surface_field(fan, points, wavenumber=K)
 
 
 def test_fields_at_points_have_the_validity_of_their_fan(fan, fields):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import HARD, scalar_boundaries
 from creeping.field.far_geometry import far_geometry
 from studies.reference import sphere

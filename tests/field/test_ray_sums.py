@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import HARD
 from creeping.field.far_geometry import fan_strips
 from creeping.field.ray_sums import MERGING, fan_decay, fold_share, merging_error, ray_sum, tube_share

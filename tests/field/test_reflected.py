@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from scipy.special import spherical_jn, spherical_yn
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary, scalar_boundaries
 from creeping.field.reflected import plane_reflection, reflected_amplitude, reflected_error, reflection
 from creeping.rays.specular import specular_points

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.reflected_fold import fold_error
 from creeping.geometry.quadrature import body_nodes
 from creeping.shadow.nodes import prepared

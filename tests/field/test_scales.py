@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.surface import normal, project
 
@@ -63,6 +63,8 @@ def points(s):
 def at_points(s, kind):
     on, off = points(s)
     options = {"wavenumber": K / s, "boundary": BOUNDARIES[kind]}
+    if options["boundary"] == "pec":
+        return [(cr.conductor_current(fan_of(s), on, wavenumber=K / s), 1.0)]
     # du/dn of the soft boundary is 1/L
     unit = s if kind == "soft" else 1.0
     return [
@@ -72,15 +74,18 @@ def at_points(s, kind):
     ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("kind", ["soft", "hard", "impedance"])
+@pytest.mark.parametrize(
+    "kind", ["hard", "pec", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("soft", "impedance"))]
+)
 def test_fields_at_points(kind, scale):
     for (one, unit), (other, its_unit) in zip(at_points(1.0, kind), at_points(scale, kind), strict=True):
         np.testing.assert_array_equal(other.status, one.status)
         np.testing.assert_array_equal(other.method, one.method)
         compare(np.asarray(other) * its_unit, np.asarray(one) * unit, TRACED)
         compare(other.error * its_unit, one.error * unit, TRACED)
+        if kind == "pec":
+            compare(other.charge, one.charge, TRACED)
 
 
 @cache

@@ -1,9 +1,9 @@
 """Each shed ray counts once, whatever cells of the fan find it."""
 
 import numpy as np
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 
 
 def test_rays_on_flat_ground_that_two_cells_find_are_one():

@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary
 from creeping.field.far_geometry import far_geometry
 from creeping.field.ray_scales import fock_parameter

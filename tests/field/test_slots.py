@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.surface import normal
 from creeping.rays.port_rays import tangent_frames
 from studies.reference import stored

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.on_rays import ray_magnitude
 from creeping.geometry.surface import normal
 from studies.reference import clouds
@@ -24,7 +24,10 @@ def exact_on_sphere(k, distance, cosine, boundary):
     return source_on_sphere(k, 1.0, distance, cosine, boundary)[0 if boundary == "hard" else 1]
 
 
-@pytest.mark.parametrize(("boundary", "k", "distance"), SPHERE)
+@pytest.mark.parametrize(
+    ("boundary", "k", "distance"),
+    [pytest.param(*case, marks=() if case[1] == 30 else pytest.mark.slow) for case in SPHERE],
+)
 def test_wave_on_a_sphere(boundary, k, distance):
     ball = sc.Sphere()
     line = cr.shadow_line(ball, source=cr.PointSource((0, 0, -distance)))
@@ -53,7 +56,7 @@ def test_errors_grow_where_the_source_is_near(boundary):
     assert np.median(field.error[0] / np.abs(exact)) > 0.03
 
 
-@pytest.mark.parametrize(("boundary", "most"), [("hard", 8.0), ("soft", 13.0)])
+@pytest.mark.parametrize(("boundary", "most"), [("hard", 8.0), pytest.param("soft", 13.0, marks=pytest.mark.slow)])
 def test_wave_on_an_ellipsoid(boundary, most):
     axes, k, source = (1.1, 0.7, 0.9), 12.0, np.array([0.5, 1.1, -0.8])
     exact = beside_source(clouds.ellipsoid(*axes), k, source, boundary, depth=0.12)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.validity_range import (
     SOME,
     TURN,
@@ -32,13 +32,6 @@ def test_a_slender_body_along_its_axis():
     rho = c * c / a
     assert found.least_k_rho == pytest.approx(k * rho, rel=1e-3)
     assert found.largest_transverse == pytest.approx(rho / a / (k * rho / 2) ** (2 / 3), rel=1e-3)
-
-
-def test_units():
-    one, large = (
-        cr.validity(fan_of(sc.Ellipsoid(s, 0.8 * s, 0.6 * s), (1, 2, 3), 2 * s), wavenumber=15 / s) for s in (1.0, 1e5)
-    )
-    assert large == pytest.approx(one, rel=1e-6)
 
 
 def test_a_fan_without_rays(dark_fan):

@@ -64,7 +64,7 @@ def test_coarse_meshes_that_do_not_close_are_passed_over(monkeypatch):
     """Of the peanut few points on large tiles miss the area by more than 1e-4; those that are taken do not."""
     body = bodies()["peanut"][0]
     rough = quadrature._nodes(body, quadrilaterals(body.level, body.gradient, body.bounds, cells=6, fewest=6), 3)
-    sharp = body_nodes(body, 160.0).weights.sum()
+    sharp = body_nodes(body, 80.0).weights.sum()
     assert abs(rough.weights.sum() / sharp - 1) > 1e-4 and rough.error > tile_rules.CLOSED
     taken = body_nodes(body, 16.0)
     assert len(taken.points) < 16_000 and taken.weights.sum() == pytest.approx(sharp, rel=1e-5)

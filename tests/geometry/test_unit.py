@@ -2,17 +2,11 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 import trimesh
 
 import creeping as cr
-import scatterers as sc
 from creeping.geometry.unit import unit_of
-
-
-class Metric(sc.Sphere):
-    """A sphere that says what its lengths are."""
-
-    unit = "m"
 
 
 def fan_on(body):
@@ -29,7 +23,7 @@ def test_meshes_are_metres_if_their_unit_was_given(units, unit, radius):
 
 def test_results_take_the_unit_of_their_body():
     far = {}
-    for body in (Metric(), sc.Sphere()):
+    for body in (sc.Metric(), sc.Sphere()):
         fan = fan_on(body)
         far[unit_of(body)] = cr.far_field(fan, [(0, 1, 0), (0, 0.6, 0.8), (0, 0, -1)], wavenumber=20.0)
         near = cr.near_field(fan, [(0, 0.5, 1.5)], wavenumber=20.0, boundary="soft")
@@ -45,7 +39,7 @@ def test_results_take_the_unit_of_their_body():
 def test_sweeps_say_metres_of_a_body_that_knows():
     found = {
         unit_of(body): cr.backscatter(body, wavenumbers=20.0, boundary="soft", n_rays=16, cache=False)
-        for body in (Metric(), sc.Sphere())
+        for body in (sc.Metric(), sc.Sphere())
     }
     units = {
         name: {one: ds[one].attrs["units"] for one in ("wavenumber", "creeping", "line_length")}

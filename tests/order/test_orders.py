@@ -50,7 +50,7 @@ def test_burn_in_order():
     body = sc.Torus()
     steps = np.array([2.0**-3, 2.0**-4, 2.0**-5])
     errors = [
-        error_of(body, horizon=1 / 4, grid=(64, 64, 64), degree=5, method="tower", time_step=float(tau), stages=k)
+        error_of(body, horizon=1 / 4, grid=(48, 48, 48), degree=5, method="tower", time_step=float(tau), stages=k)
         for k, tau in enumerate(steps, start=1)
     ]
     assert slope(steps, errors) == pytest.approx(4, abs=ORDER)

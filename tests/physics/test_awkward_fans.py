@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 
 DIRECTIONS = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 1], [0.3, 0.5, 0.812], [-1, -1, -1]])
 FANS = {

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 
 TABLES = Path(__file__).parents[3] / "shared" / "benchmarks"
 pytestmark = pytest.mark.skipif(not TABLES.is_dir(), reason="the published tables are not beside the repository")

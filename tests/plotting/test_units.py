@@ -1,24 +1,18 @@
 """Results of a body whose lengths are metres say so, in words, tables and pictures."""
 
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.files import write_csv
 from creeping.plotting import _facts, _strokes, coloured_body, field_pictures, parameter_plane
 from creeping.plotting.coloured_body import currents_picture
 from creeping.plotting.field_pictures import decay_picture, surface_field_picture
 
 
-class Ball(sc.Sphere):
-    """As a body from a file is."""
-
-    unit = "m"
-
-
 @pytest.fixture(scope="module")
 def fan():
-    ball = Ball()
+    ball = sc.Metric()
     return cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, (0, 0.6, 0.8)), length=2.0, n_rays=24)
 
 

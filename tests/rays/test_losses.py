@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from creased_bodies import Capsule, cut_sphere, cylinder
+import shared_bodies as sc
+from creased_bodies import cut_sphere
 
 import creeping as cr
 from creeping.rays.reach import HARD_DECAY
@@ -34,7 +35,8 @@ def test_cut_sphere(angle):
 
 
 @pytest.mark.parametrize(
-    "body, direction, lost", [(Capsule(0.5, 1.0), (1, 0, 0.5), (0, 0, 0)), (cylinder(0.5, 1.0), (0, 0, 1), (1, 0, 1))]
+    "body, direction, lost",
+    [(sc.Capsule(0.5, 3.0), (1, 0, 0.5), (0, 0, 0)), (sc.Cylinder(0.5, 2.0), (0, 0, 1), (1, 0, 1))],
 )
 def test_nothing_is_lost_without_edges_and_all_of_a_cylinder_end_on(body, direction, lost):
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, direction), length=1.0, n_rays=16)

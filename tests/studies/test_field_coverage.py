@@ -3,14 +3,10 @@
 import numpy as np
 import pytest
 import shared_bodies as sc
+from body_checks import directions
 
 from studies import field_coverage as coverage
 from studies.reference import clouds, dipoles
-
-
-def directions(rng, n):
-    r = rng.normal(size=(n, 3))
-    return r / np.linalg.norm(r, axis=1, keepdims=True)
 
 
 def test_the_frames_of_the_conducting_ball(rng):

@@ -125,12 +125,12 @@ def test_rays_of_a_sweep_are_as_long_as_the_lowest_wavenumber_asks():
 
 
 @pytest.mark.parametrize(
-    "body", [sc.Sphere(), sc.Implicit("max(x**2 + y**2 + z**2 - 1, x**2 + y**2 + (z - 1)**2 - 1)")]
+    "make", [sc.Sphere, lambda: sc.Implicit("max(x**2 + y**2 + z**2 - 1, x**2 + y**2 + (z - 1)**2 - 1)")]
 )
-def test_progress_is_told_between_the_frequencies_of_one_direction(monkeypatch, body):
+def test_progress_is_told_between_the_frequencies_of_one_direction(monkeypatch, make):
     monkeypatch.setattr(run, "EVERY", 0.0)
     seen = []
     asked = {"wavenumbers": [10.0, 11.0, 12.0, 13.0], "n_rays": 16, "length": 2.0}
-    cr.sweep_directions(cr.DirectFlow(body, rtol=1e-6), [(0, 0.6, 0.8)], progress=lambda *a: seen.append(a), **asked)
+    cr.sweep_directions(cr.DirectFlow(make(), rtol=1e-6), [(0, 0.6, 0.8)], progress=lambda *a: seen.append(a), **asked)
     assert [one[:2] for one in seen] == [(0.25, 1), (0.5, 1), (0.75, 1), (1, 1)]
     assert all(first[2] <= second[2] for first, second in itertools.pairwise(seen))

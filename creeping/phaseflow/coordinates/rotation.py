@@ -86,7 +86,7 @@ class CompiledModel:
         """
         from creeping.phaseflow.kernels.nodes import displacements
 
-        out, sure = np.empty((len(nodes), 4)), [1.0]
+        out, sure, traced = np.empty((len(nodes), 4)), [1.0], np.ascontiguousarray(traced)
         parts = self.kind, self._surface_table, *self._there, *self._back
 
         def run(part: slice) -> None:

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from studies.reference import clouds, dipoles, sphere
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import ELECTRIC_HARD, HARD
 from creeping.field.conductor import on_body
 from creeping.field.currents import whole_solution

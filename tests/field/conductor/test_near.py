@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
+from body_checks import directions
 
 import creeping as cr
-import scatterers as sc
 from creeping.errors import InvalidInputError
 from creeping.field.body_currents import kept_currents
 from creeping.field.conductor import near
@@ -12,11 +13,6 @@ from creeping.shadow.occlusion import occluded
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])
 K = 30.0
-
-
-def vectors(rng, n):
-    r = rng.normal(size=(n, 3))
-    return r / np.linalg.norm(r, axis=1, keepdims=True)
 
 
 def wrong(field, E, H):
@@ -31,7 +27,7 @@ def places():
     height = np.exp(rng.uniform(np.log(0.01 * 2 * np.pi / K), np.log(2.0), 100))
     axis = rng.uniform(1.02, 3.0, 20)[:, None] * OBLIQUE + 0.1 * rng.normal(size=(20, 3))
     axis = axis[np.linalg.norm(axis, axis=1) > 1.01]
-    return np.concatenate([(1 + height[:, None]) * vectors(rng, 100), axis])
+    return np.concatenate([(1 + height[:, None]) * directions(rng, 100), axis])
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +58,7 @@ def test_parts_add_up(field, places, ball):
 @pytest.mark.slow
 def test_triaxial(triaxial, rng):
     fan, k, solution = triaxial
-    x = vectors(rng, 200) * (1.0, 0.8, 0.6) * (1 + np.exp(rng.uniform(-4, 1, (200, 1))))
+    x = directions(rng, 200) * (1.0, 0.8, 0.6) * (1 + np.exp(rng.uniform(-4, 1, (200, 1))))
     E, H = (part[:, :, 0] for part in solution.total(x))
     found = cr.conductor_field(fan, x, wavenumber=k)
     off = wrong(found, E, H)
@@ -72,7 +68,7 @@ def test_triaxial(triaxial, rng):
 
 def test_onto_the_body_the_field_is_that_on_it(ball, rng):
     """E along the normal and H across it on the body; the layer comes to that from above."""
-    x = vectors(rng, 60)
+    x = directions(rng, 60)
     on, above = (cr.conductor_field(ball, s * x, wavenumber=K) for s in (1.0, 1.0 + 1e-5))
     assert np.max(np.linalg.norm(np.cross(x[:, :, None], on.E, axis=1), axis=1)) < 1e-12
     assert np.max(np.abs(np.einsum("nc,nci->ni", x, on.H))) < 1e-12
@@ -85,7 +81,7 @@ def test_onto_the_body_the_field_is_that_on_it(ball, rng):
 def test_currents_radiate_by_maxwells_equations(ball, rng):
     """The sums for E and for H are two kernels: curl E = ikH and curl H = -ikE between them."""
     currents = kept_currents(ball, 8.0, "pec")
-    x = 1.5 * vectors(rng, 6)
+    x = 1.5 * directions(rng, 6)
     step = 1e-3
     ends = np.concatenate([x + sign * step * axis for axis in np.eye(3) for sign in (1, -1)])
     for first, second, sign in (

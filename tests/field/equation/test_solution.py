@@ -86,7 +86,7 @@ def test_far_field_of_a_fan_is_that_of_the_equation_where_edges_diffract(flat):
 
 
 def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
-    asked, wavenumbers = [], np.array([1.0, 1.2, 1.4])
+    asked, wavenumbers = [], np.array([1.0, 1.2])
     monkeypatch.setattr(kept, "KEPT", 1)
     known = kept.solve
     monkeypatch.setattr(kept, "solve", lambda *of, **how: asked.append(how["wavenumber"]) or known(*of, **how))

@@ -2,21 +2,21 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 from numpy.testing import assert_allclose
 
-import scatterers as sc
 from creeping.field.boundary import HARD, Boundary
 from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.tiles import tiles_for
 from creeping.geometry.patches import patches_of
 
 BODIES = {
-    "sphere": (sc.Sphere(1.5), 9 * np.pi, 4.5 * np.pi),
-    "torus": (sc.Torus(R=1.0, r=0.4), 1.6 * np.pi**2, 0.32 * np.pi**2),
-    "cylinder": (sc.Cylinder(0.5, 2.0), 2.5 * np.pi, 0.5 * np.pi),
-    "cone": (sc.Cone(1.0, 2.0), np.pi * (1 + 5**0.5), 2 / 3 * np.pi),
-    "capsule": (sc.Capsule(0.5, 3.0), 3 * np.pi, 2 / 3 * np.pi),
-    "box": (sc.Implicit("max(x-1,-x-1,y-1,-y-1,z-1,-z-1)", bounds=[[-1.1] * 3, [1.1] * 3]), 24.0, 8.0),
+    "sphere": (lambda: sc.Sphere(1.5), 9 * np.pi, 4.5 * np.pi),
+    "torus": (lambda: sc.Torus(R=1.0, r=0.4), 1.6 * np.pi**2, 0.32 * np.pi**2),
+    "cylinder": (lambda: sc.Cylinder(0.5, 2.0), 2.5 * np.pi, 0.5 * np.pi),
+    "cone": (lambda: sc.Cone(1.0, 2.0), np.pi * (1 + 5**0.5), 2 / 3 * np.pi),
+    "capsule": (lambda: sc.Capsule(0.5, 3.0), 3 * np.pi, 2 / 3 * np.pi),
+    "box": (lambda: sc.Implicit("max(x-1,-x-1,y-1,-y-1,z-1,-z-1)", bounds=((-1.1,) * 3, (1.1,) * 3)), 24.0, 8.0),
 }
 """Bodies, their areas and their volumes."""
 
@@ -24,16 +24,16 @@ BODIES = {
 @pytest.mark.parametrize("name", BODIES)
 def test_squares_close_and_have_the_area_and_volume_of_the_body(name):
     body, area, volume = BODIES[name]
-    patches = patches_of(body)
+    patches = patches_of(body())
     tiles = tiles_for(patches, 4.0)
     assert patches.gap < 1e-8
     assert_allclose(tiles.weights.sum(), area, rtol=2e-5)
     assert_allclose((tiles.weights @ np.sum(tiles.points * tiles.normals, axis=1)) / 3, volume, rtol=2e-5)
 
 
-@pytest.mark.parametrize("name", ["torus", "cone", "box"])
+@pytest.mark.parametrize("name", ["sphere", "cone", "box"])
 def test_a_static_double_layer_of_one_is_minus_one_half_on_the_body(name):
-    body = BODIES[name][0]
+    body = BODIES[name][0]()
     tiles = tiles_for(patches_of(body), 2.0)
     matrix = Matrix(tiles, 1e-9, HARD)
     one = np.ones((len(tiles.points), 1), dtype=complex)
@@ -63,7 +63,7 @@ def test_tiles_on_both_faces_of_an_edge_are_parted_at_the_same_places():
 
 def test_single_and_double_layers_of_a_harmonic_function():
     # on the surface of a body u/2 = S du/dn - D u, u harmonic inside: 2 S du/dn - 2 D u = u
-    tiles = tiles_for(patches_of(BODIES["cone"][0]), 4.0)
+    tiles = tiles_for(patches_of(sc.Cone(1.0, 2.0)), 4.0)
     matrix = Matrix(tiles, 1e-9, Boundary("impedance", 0j))
     x, n = tiles.points, tiles.normals
     u, slope = x[:, 0] * x[:, 1], n[:, 0] * x[:, 1] + n[:, 1] * x[:, 0]

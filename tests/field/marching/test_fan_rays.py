@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
 import creeping as cr
-import scatterers as sc
 from creeping.field.boundary import HARD, SOFT
 from creeping.field.marching.fan_rays import fan_profiles
 from creeping.field.marching.layer import march_rays
@@ -35,8 +35,8 @@ def total(marched, ray, s):
     [
         (20.0, "soft", (2.0, 0.4, 0.6)),
         (20.0, "hard", (0.35, 0.8, 1.4)),
-        (40.0, "hard", (0.2, 0.5, 0.8)),
-        (100.0, "hard", (0.1, 0.25, 0.4)),
+        pytest.param(40.0, "hard", (0.2, 0.5, 0.8), marks=pytest.mark.slow),
+        pytest.param(100.0, "hard", (0.1, 0.25, 0.4), marks=pytest.mark.slow),
     ],
 )
 def test_sphere(fan, k, kind, limits):

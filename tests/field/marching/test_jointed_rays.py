@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
-import scatterers as sc
 from creeping.field.marching.jointed_rays import jointed_rays, piece_nodes
 from creeping.geodesics.states import M11, P, X, pack
 

@@ -95,7 +95,7 @@ def test_lit_surface_functions_are_those_of_a_plane():
 
 
 @pytest.mark.parametrize("name", ["pekeris_star", "surface_function", "pekeris_slope", "surface_slope"])
-@pytest.mark.parametrize("q", BOUNDARIES)
+@pytest.mark.parametrize("q", [None, 0.0, 2 + 1j])
 @pytest.mark.parametrize("power", [1, 2])
 def test_powers_are_derivatives(name, q, power):
     if q is None and name.endswith("slope"):
@@ -111,8 +111,7 @@ def test_powers_are_derivatives(name, q, power):
 
 
 @pytest.mark.parametrize("name", ["pekeris", "surface"])
-@pytest.mark.parametrize("q", [0.0, 2 + 1j])
-@pytest.mark.parametrize("power", [0, 1])
+@pytest.mark.parametrize("q, power", [(0.0, 0), (2 + 1j, 1)])
 def test_slopes_are_differences_in_q(name, q, power):
     whole = fock.pekeris_star if name == "pekeris" else fock.surface_function
     slope = fock.pekeris_slope if name == "pekeris" else fock.surface_slope

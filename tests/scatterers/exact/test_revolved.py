@@ -102,7 +102,12 @@ def test_area_and_volume_of_tiles_converge_to_closed_forms(name):
     assert np.max(errors[-1]) < 2e-3
 
 
-@every
+QUICK = ("cylinder", "cone", "almond", "dumbbell", "two lines in one")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in BODIES]
+)
 def test_tiles_lie_on_their_pieces_and_close(name):
     body, edge = BODIES[name], 0.07
     corners, normals, pieces = body.tiles(edge)

@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
-from body_checks import normal_curvature, rms, unit
-from body_checks import volume as volume_of
+from body_checks import normal_curvature, rms, unit, volume
 
 import scatterers as sc
 from creeping.geometry.surface import project
 from scatterers.triangles.choice import Choice
-
-
-def volume(mesh):
-    return volume_of(mesh.vertices, mesh.triangles)
 
 
 def ball(radius=1.0, at=0.0, times=2):

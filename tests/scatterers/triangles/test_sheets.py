@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
-from body_checks import volume as volume_of
+from body_checks import volume
 
 import scatterers as sc
 from scatterers.triangles.sheets import taken_apart
 from scatterers.triangles.topology import edges_of
-
-
-def volume(mesh):
-    return volume_of(mesh.vertices, mesh.triangles)
 
 
 def boxes(*shifts):

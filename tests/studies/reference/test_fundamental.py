@@ -19,7 +19,7 @@ def sphere_of_directions(order):
     return r.reshape(-1, 3), np.repeat(w * np.pi / order, 2 * order)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", 0.5 - 0.3j])
+@pytest.mark.parametrize("boundary", ["soft", 0.5 - 0.3j, pytest.param("hard", marks=pytest.mark.slow)])
 def test_sphere(boundary):
     d = np.concatenate([OBLIQUE, [[0.0, 0.0, 1.0]]])
     solution = fundamental.scatter(clouds.ellipsoid(1.0, 1.0, 1.0), 10.0, d, boundary, depth=0.25)
@@ -36,7 +36,7 @@ def test_sphere(boundary):
         np.testing.assert_allclose(solution.normal_derivative(r, r)[:, i], slope, atol=5e-5 * 10)
 
 
-@pytest.mark.parametrize(("boundary", "residual"), [("soft", 6e-6), ("hard", 4e-5)])
+@pytest.mark.parametrize(("boundary", "residual"), [("soft", 6e-6), pytest.param("hard", 4e-5, marks=pytest.mark.slow)])
 def test_triaxial_residual(boundary, residual):
     solution = fundamental.scatter(TRIAXIAL, 20.0, OBLIQUE, boundary, depth=0.15, per_wavelength=6)
     # measured: 4.3e-6 and 3.9e-5; 2e-7 and 2e-6 with 7.5 sources a wavelength
@@ -47,7 +47,7 @@ def test_triaxial_residual(boundary, residual):
     assert 4 * np.pi / 20 * forward.imag == pytest.approx(section, rel=1e-6)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", 0.6])
+@pytest.mark.parametrize("boundary", [0.6, *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("soft", "hard"))])
 def test_reciprocity(boundary):
     d = np.array([[0.48, 0.6, 0.64], [0.0, 0.8, -0.6]])
     solution = fundamental.scatter(TWISTED, 8.0, np.concatenate([d, -d]), boundary, depth=0.12)

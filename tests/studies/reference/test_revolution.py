@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from body_checks import directions
 
 from studies.reference import sphere
 from studies.reference.revolution import Profile, capsule_profile, cone_sphere_profile, scatter_by_rings
@@ -13,11 +14,6 @@ POLAR = np.radians([20.0, 75.0])
 def ball(s):
     n = np.stack([np.sin(s), np.cos(s)], axis=-1)
     return n, n
-
-
-def directions(rng, n):
-    r = rng.normal(size=(n, 3))
-    return r / np.linalg.norm(r, axis=1, keepdims=True)
 
 
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.5 - 0.3j])

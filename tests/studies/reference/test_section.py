@@ -27,7 +27,7 @@ def test_circle(boundary):
 
 
 @pytest.mark.parametrize("name", SECTIONS)
-@pytest.mark.parametrize("boundary", ["soft", "hard"])
+@pytest.mark.parametrize("boundary", ["hard", pytest.param("soft", marks=pytest.mark.slow)])
 def test_optical_theorem(name, boundary):
     """The cross section by the far field all round and by its forward value."""
     k, found = 10.0, surface_data(SECTIONS[name], 10.0, 0.4, boundary)

@@ -9,7 +9,7 @@ ANGLES = np.radians([30.0, 60.0, 90.0, 120.0, 150.0])
 
 
 @pytest.mark.parametrize("ka", [10.0, pytest.param(100.0, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("boundary", ["soft", "hard", 0.5 - 0.3j])
+@pytest.mark.parametrize("boundary", ["soft", 0.5 - 0.3j, pytest.param("hard", marks=pytest.mark.slow)])
 def test_shadow_is_all_residues(ka, boundary):
     theta = np.radians([0.0, 20.0, 40.0, 55.0])
     exact = sphere.surface_derivative if boundary == "soft" else sphere.surface_field

@@ -7,11 +7,11 @@ import shutil
 import fake_sweeps as fake
 import numpy as np
 import pytest
+import shared_bodies as sc
 import xarray
 from filelock import FileLock
 
 import creeping as cr
-import scatterers as sc
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
 from creeping.sweeping.plan import SweepPlan
@@ -45,13 +45,7 @@ def test_a_store_holds_what_memory_holds(tmp_path):
         assert plain["creeping"].dims == ("incidence", "boundary", "wavenumber") and "theta" in plain.coords
 
 
-class Metric(sc.Sphere):
-    """A sphere that knows its unit, as bodies from files do."""
-
-    unit = "m"
-
-
-METRIC = cr.DirectFlow(Metric(), rtol=1e-6)
+METRIC = cr.DirectFlow(sc.Metric(), rtol=1e-6)
 
 
 @pytest.mark.parametrize("quantity", ["rays", "monostatic", "bistatic"])
