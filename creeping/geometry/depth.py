@@ -32,11 +32,16 @@ def inner_points(body: Surface, depth: float, count: int) -> FloatArray:
     return np.asarray(x[distance > depth][:count])
 
 
-def _depths(body: Surface) -> tuple[FloatArray, FloatArray]:
-    """Points inside (n, 3) and bounds of their depth (n,), L."""
+def box_points(body: Surface) -> FloatArray:
+    """Points inside, evenly spread over the body's box (n, 3), L; the same ones at every call."""
     from scipy.stats import qmc
 
     low, high = np.asarray(body.bounds, dtype=float)
     x = low + (high - low) * qmc.Halton(3, scramble=False).random(TRIED)
-    x = x[body.level(x) < 0]
+    return np.asarray(x[body.level(x) < 0])
+
+
+def _depths(body: Surface) -> tuple[FloatArray, FloatArray]:
+    """Points inside (n, 3) and bounds of their depth (n,), L."""
+    x = box_points(body)
     return x, body_nodes(body, 4 / size(body)).distance(x)

@@ -6,7 +6,7 @@
 J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
 the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
 (`creeping.field.conductor.mode_beams`). Where the integral equation is solved its solution stands for all of it
-(`creeping.field.currents.whole_solution`). Divergences are by `creeping.field.conductor.divergence`.
+(`creeping.field.equation`). Divergences are by `creeping.field.conductor.divergence`.
 Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
 ground BEYOND |J_thrown| stands besides, for what comes to it later. The charge of expansions has the error of J; that
 of the solution has it over kh, h the step of differences, and what two steps tell.

@@ -86,7 +86,7 @@ class SurfaceCurrents:
     boundary : Boundary
     solved : bool
         Whether nodes are all over the body and their values satisfy its integral equation
-        (`creeping.field.currents.whole_solution`); ``change`` is what a step would add then.
+        (`creeping.field.equation`); ``change`` is what is left of the equation then.
 
     Examples
     --------

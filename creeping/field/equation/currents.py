@@ -23,15 +23,16 @@ from creeping.field.boundary import Boundary
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.whole_body import DEPTH, POINTS, SHALLOW, SurfaceCurrents
 from creeping.field.equation.matrix import Matrix, Places
+from creeping.field.equation.tiles import Tiles
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.creased import has_edges, is_convex, is_creased
-from creeping.geometry.depth import inner_points
+from creeping.geometry.depth import box_points
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.occlusion import occluded
 
-FINE, APART = 12, 0.12
-"""Nodes along a side of a tile by which fields are summed, and the distance from them, in wavelengths: what these sums
-err by falls off like e^(-2 pi distance/spacing), to 1e-5 there."""
+APART = 0.12
+"""Distance from the fine nodes, in wavelengths, from which sums over them are fields: what they err by falls off like
+e^(-2 pi distance/spacing), to 1e-5 there."""
 THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 """Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
 ON_BODY = 5.0
@@ -114,13 +115,13 @@ class _OnTiles(SurfaceCurrents):
     def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         far = ~self.next_to(points)
         out = np.empty((len(points), *values.shape[1:]), dtype=complex)
-        out[far] = self._finer._field(self.matrix.tiles.interpolated(values, FINE), points[far])
+        out[far] = self._finer._field(self.matrix.tiles.interpolated(values), points[far])
         out[~far] = self._next_to(values, points[~far])
         return out
 
     def next_to(self, points: FloatArray) -> BoolArray:
         """Whether points (m, 3), L, are so near to the body that tiles are integrated (m,)."""
-        away, _ = self._finer._nodes.query(points)
+        away, _ = self.matrix.tiles.fine_tree.query(points)
         return np.asarray(away * self.wavenumber <= 2 * np.pi * APART)
 
     def _next_to(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
@@ -142,14 +143,14 @@ class _OnTiles(SurfaceCurrents):
     @cached_property
     def inner_points(self) -> FloatArray:
         """Points inside the body at which the currents are judged (m, 3), L."""
-        wavelength = 2 * np.pi / self.wavenumber
-        found = (inner_points(self.body, depth * wavelength, POINTS) for depth in THIN)
-        return next((points for points in found if len(points)), np.zeros((0, 3)))
+        if self.matrix.inside is None:
+            self.matrix.inside = _inside(self.body, self.matrix.tiles, 2 * np.pi / self.wavenumber)
+        return self.matrix.inside
 
     @cached_property
     def _finer(self) -> Any:
         """No currents, at the finer nodes."""
-        x, normals, weights = self.matrix.tiles.finer(FINE)
+        x, normals, weights = self.matrix.tiles.fine
         nothing = np.zeros((len(x), *self.values.shape[1:]), dtype=complex)
         same = {name: getattr(self, name) for name in ("body", "direction", "rim", "wavenumber", "boundary")}
         make = ConductorCurrents if nothing.ndim > 1 else SurfaceCurrents
@@ -166,6 +167,16 @@ class _OnTiles(SurfaceCurrents):
             unserved=0.0,
             solved=True,
         )
+
+
+def _inside(body: Surface, tiles: Tiles, wavelength: float) -> FloatArray:
+    """Points inside a body (m, 3), L, evenly spread, as deep as it is thick enough for."""
+    x = box_points(body)
+    away, nearest = tiles.fine_tree.query(x)
+    # half of what the nodes next to it are apart
+    depth = np.sqrt(np.maximum(away**2 - tiles.fine[2][nearest], 0.0))
+    each = (x[depth > least * wavelength][:POINTS] for least in THIN)
+    return next((points for points in each if len(points)), np.zeros((0, 3)))
 
 
 def _vectors(places: Places, both: ComplexArray) -> ComplexArray:
@@ -199,7 +210,7 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
     matrix: Any = None
 
     def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
-        found: ComplexArray = self._finer._electric(self.matrix.tiles.interpolated(values, FINE), points)
+        found: ComplexArray = self._finer._electric(self.matrix.tiles.interpolated(values), points)
         return found
 
     def changed_electric(self, points: FloatArray) -> FloatArray:

@@ -69,6 +69,8 @@ class Matrix:
         The nodes, and points beneath those with numbers ``at`` (s,).
     root : (n,)
         sqrt(w).
+    inside : (m, 3), L, or None
+        Points inside the body at which currents are judged, once they are known.
     """
 
     def __init__(self, tiles: Tiles, wavenumber: float, boundary: Boundary) -> None:
@@ -80,6 +82,7 @@ class Matrix:
         self.inner = Places(points, under.normals, under.a, under.b)
         self.root = np.sqrt(tiles.weights)
         self.columns = 2 if self.vector else 1
+        self.inside: FloatArray | None = None
 
     @cached_property
     def whole(self) -> np.ndarray:

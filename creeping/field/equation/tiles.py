@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.geometry.patches import DEGREE, Patches
 from creeping.geometry.squares import barycentric, interpolation, lobatto, on_squares
 from creeping.kernels.threads import in_threads
@@ -25,6 +25,8 @@ SIDE = 0.8
 """Longest sides of tiles, in wavelengths."""
 TURN = 0.5
 """Angle by which the normal turns along a side, radians, at most: currents are no smoother than the body."""
+FINE = 12
+"""Nodes along a side of a tile by which fields off it are summed."""
 CUT = 0.2
 """Width of the tile next to an edge or tip, over that of the one it is cut from."""
 NEAR = 1.7
@@ -127,13 +129,21 @@ class Tiles:
         in_threads(work, self.count, least=4, multiple=1, seconds=1e-3)
         return np.asarray(out[:, :3] + 1j * out[:, 3:])
 
-    def finer(self, points: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Gauss's nodes of every tile, ``points`` along a side: x and n (t points^2, 3), and weights, L^2."""
-        return _nodes(self.shapes, points)
+    @cached_property
+    def fine(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """FINE x FINE nodes of every tile: x and n (t FINE^2, 3), and weights, L^2."""
+        return _nodes(self.shapes, FINE)
 
-    def interpolated(self, values: ComplexArray, points: int) -> ComplexArray:
-        """Values (n, ...) at the nodes, by the polynomials of tiles at their finer nodes (t points^2, ...)."""
-        rows = interpolation(gauss(self.p)[0], gauss(points)[0])
+    @cached_property
+    def fine_tree(self) -> Any:
+        """Of the fine nodes: a distance from these is one from the body but for half of what they are apart."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.fine[0])
+
+    def interpolated(self, values: ComplexArray) -> ComplexArray:
+        """Values (n, ...) at the nodes, by the polynomials of tiles at the fine nodes (t FINE^2, ...)."""
+        rows = interpolation(gauss(self.p)[0], gauss(FINE)[0])
         each = values.reshape(self.count, self.p, self.p, -1)
         found = np.einsum("ai,bj,tijc->tabc", rows, rows, each, optimize=True)
         return np.asarray(found.reshape(-1, *values.shape[1:]))
