@@ -1,4 +1,4 @@
-"""A coarse mesh of a body, of quadrilaterals and triangles: where its squares begin (`creeping.geometry.patches`).
+"""A coarse mesh of a body, of quadrilaterals and triangles: where its squares begin (`creeping.geometry.covering`).
 
 Of a smooth body the quadrilaterals around the grid edges that it crosses; of one of pieces its triangles, joined by two
 where they make a good quadrilateral: convex, its corners no sharper than SQUARE, and no two sides in a row along one

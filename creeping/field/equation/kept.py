@@ -13,8 +13,8 @@ from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.solution import SECONDS, Solution, cost, solve
 from creeping.field.equation.tiles import tiles_for
+from creeping.geometry.covering import patches_of
 from creeping.geometry.kept import kept
-from creeping.geometry.patches import patches_of
 from creeping.geometry.surface import Surface
 from creeping.storage.memory import budget
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
+from creeping.field.equation.edge_term import EdgeTerm
 from creeping.field.equation.tiles import Tiles
 from creeping.kernels.threads import in_threads
 
@@ -83,6 +84,11 @@ class Matrix:
         self.root = np.sqrt(tiles.weights)
         self.columns = 2 if self.vector else 1
         self.inside: FloatArray | None = None
+
+    @cached_property
+    def edge_term(self) -> EdgeTerm:
+        """What edges may radiate that currents do not know."""
+        return EdgeTerm(self.tiles, self.k)
 
     @cached_property
     def whole(self) -> np.ndarray:

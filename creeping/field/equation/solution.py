@@ -32,8 +32,8 @@ from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
 from creeping.field.polarisation import spherical_frame
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.covering import patches_of
 from creeping.geometry.directions import unit_directions
-from creeping.geometry.patches import patches_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.unit import unit_of
 from creeping.kernels.threads import thread_count

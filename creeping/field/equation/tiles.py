@@ -19,15 +19,17 @@ from creeping.geometry.patches import DEGREE, Patches
 from creeping.geometry.squares import barycentric, interpolation, lobatto, on_squares
 from creeping.kernels.threads import in_threads
 
-POINTS = 4
+POINTS = 5
 """p, nodes along a side of a tile."""
-SIDE = 0.8
+SIDE = 0.9
 """Longest sides of tiles, in wavelengths."""
-TURN = 0.5
+TURN = 0.8
 """Angle by which the normal turns along a side, radians, at most: currents are no smoother than the body."""
+SLACK = 0.1
+"""Share of a tile by which tiles may be too long before there is one more."""
 FINE = 12
 """Nodes along a side of a tile by which fields off it are summed."""
-CUT = 0.2
+CUT = 0.1
 """Width of the tile next to an edge or tip, over that of the one it is cut from."""
 NEAR = 1.7
 """Distance of points from the middle of a tile, over its size, from which its nodes serve alone."""
@@ -57,6 +59,9 @@ class Tiles:
         Nodes, tile by tile.
     weights : (t p p,), L^2
     p : int
+    edges : (t, 4)
+        Of tiles along an edge its number, the side u = 0, u = 1, v = 0 or v = 1 that lies on it, by 0 to 3, and where
+        on the edge, 0 to 1, that side begins and ends; -1 throughout of others. On both faces tiles meet there.
     """
 
     shapes: FloatArray
@@ -64,6 +69,7 @@ class Tiles:
     normals: FloatArray
     weights: FloatArray
     p: int
+    edges: FloatArray
 
     @property
     def count(self) -> int:
@@ -194,13 +200,14 @@ def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, p: int
     along = _edge_breaks(patches, steps)
     boxes = [_boxes(patches, number, [lane[number] for lane in steps], along) for number in range(len(patches.off))]
     owner = np.repeat(np.arange(len(boxes)), [len(box) for box in boxes])
-    low, high = (np.concatenate([np.array(box)[:, side_of] for box in boxes]) for side_of in ([0, 2], [1, 3]))
+    every = np.concatenate([np.array(box) for box in boxes])
+    low, high, edges = every[:, [0, 2]], every[:, [1, 3]], every[:, 4:]
     places = patches.places[owner]
 
     t = lobatto(DEGREE)
     u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
     shapes = on_squares(places, u, v)[0]
-    return Tiles(shapes, *_nodes(shapes, p), p)
+    return Tiles(shapes, *_nodes(shapes, p), p, edges)
 
 
 def _nodes(shapes: FloatArray, points: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -228,7 +235,7 @@ def _parts(patches: Patches, longest: float) -> tuple[FloatArray, FloatArray]:
     lanes = []
     for axis in (1, 2):
         step, turn = (np.linalg.norm(np.diff(part, axis=axis), axis=-1) for part in (patches.places, n))
-        lanes.append(np.hypot(step / longest, turn / TURN))
+        lanes.append(np.maximum(step / longest, turn / TURN))
     return lanes[0], lanes[1]
 
 
@@ -252,7 +259,7 @@ def _edge_breaks(patches: Patches, steps: tuple[FloatArray, FloatArray]) -> dict
     out = {}
     for key, given in ends.items():
         at = np.unique(np.round([0.0, 1.0, *given], 12))
-        counts = np.maximum(1, np.ceil(lengths[key] * np.diff(at) - 1e-9)).astype(int)
+        counts = np.maximum(1, np.ceil(lengths[key] * np.diff(at) - SLACK)).astype(int)
         if len(counts) == 1 and counts[0] == 1 and len(corners.get(key, ())) == 2:
             counts[0] = 2
         parts = [np.linspace(a, b, n + 1) for a, b, n in zip(at[:-1], at[1:], counts, strict=True)]
@@ -267,10 +274,10 @@ def _edge_breaks(patches: Patches, steps: tuple[FloatArray, FloatArray]) -> dict
 
 def _boxes(
     patches: Patches, number: int, steps: list[FloatArray], along: dict[int, FloatArray]
-) -> list[tuple[float, float, float, float]]:
-    """Parts (u0, u1, v0, v1) of a square: next to each edge a strip that is parted as the edge is, and what is left."""
+) -> list[tuple[float, ...]]:
+    """Parts (u0, u1, v0, v1) of a square and their ``edges``: strips parted as the edges are, and what is left."""
     edges, t = patches.edges[number], lobatto(DEGREE)
-    counts = [max(1, int(np.ceil(float(steps[axis].sum(axis=axis).max()) - 1e-9))) for axis in (0, 1)]
+    counts = [max(1, int(np.ceil(float(steps[axis].sum(axis=axis).max()) - SLACK))) for axis in (0, 1)]
     breaks: dict[int, FloatArray] = {}
     for side in range(4):
         if not edges[side]:
@@ -289,15 +296,16 @@ def _boxes(
             cut = float(its[1] if side % 2 == 0 else 1 - its[-2])
         widths[side] = cut
     a, b, c, d = widths[0], 1 - widths[1], widths[2], 1 - widths[3]
-    out = []
+    out: list[tuple[float, ...]] = []
     for side, v in breaks.items():
+        key, (start, end) = float(patches.sides[number, side]), patches.spans[number, side]
         if side < 2:
-            u0, u1 = (0.0, a) if side == 0 else (b, 1.0)
-            out += [(u0, u1, v0, v1) for v0, v1 in pairwise(v)]
+            across, along = (0.0, a) if side == 0 else (b, 1.0), v
         else:
-            v0, v1 = (0.0, c) if side == 2 else (d, 1.0)
-            u = np.concatenate([[a], v[(v > a + 1e-9) & (v < b - 1e-9)], [b]])
-            out += [(u0, u1, v0, v1) for u0, u1 in pairwise(u)]
+            across, along = (0.0, c) if side == 2 else (d, 1.0), np.union1d([a, b], v[(v > a + 1e-9) & (v < b - 1e-9)])
+        for one, two in pairwise(along):
+            where = key, float(side), start + one * (end - start), start + two * (end - start)
+            out.append((*across, one, two, *where) if side < 2 else (one, two, *across, *where))
     u = _between(a, b, counts[0])
     if patches.tips[number]:
         u = np.union1d(u, u[1] * CUT ** np.arange(1.0, 3.0))
@@ -305,8 +313,8 @@ def _boxes(
     for u0, u1 in pairwise(u):
         inside = (t >= u0) & (t <= u1)
         most = max(float(np.max(wide[inside], initial=0.0)), *np.interp([u0, u1], t, wide))
-        v = _between(c, d, max(1, int(np.ceil(most - 1e-9))))
-        out += [(u0, u1, v0, v1) for v0, v1 in pairwise(v)]
+        v = _between(c, d, max(1, int(np.ceil(most - SLACK))))
+        out += [(u0, u1, v0, v1, *(-1.0,) * 4) for v0, v1 in pairwise(v)]
     return out
 
 

@@ -11,7 +11,7 @@ from creeping.field.equation.smooth_kernel import SmoothKernel
 from creeping.field.equation.split_product import SplitProduct
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, SPLITS, SplitSums, best_split
 from creeping.field.equation.tiles import tiles_for
-from creeping.geometry.patches import patches_of
+from creeping.geometry.covering import patches_of
 
 SPLIT = 3e-5
 """What split sums leave of those over all pairs, rms."""

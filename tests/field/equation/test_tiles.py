@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from creeping.field.boundary import HARD, Boundary
 from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.tiles import tiles_for
-from creeping.geometry.patches import patches_of
+from creeping.geometry.covering import patches_of
 
 BODIES = {
     "sphere": (lambda: sc.Sphere(1.5), 9 * np.pi, 4.5 * np.pi),
