@@ -48,6 +48,8 @@ from creeping.shadow.occlusion import occluded
 
 ON_BODY = 1e-7
 """Distance from the body, in its sizes, below which a point counts as on it."""
+OFF = 3.5
+"""Error of solved currents off the body in that of expansions, which leave more inside of what is wrong with them."""
 FINE = 0.01
 """Error of rays up to which currents are not asked."""
 MISSING = 2.0
@@ -266,5 +268,5 @@ def _solved_at(currents: TileCurrents, points: FloatArray, dark: BoolArray) -> S
     """Total field of solved currents at points (n, 3), L, off the body, some of them in the dark."""
     incident, scattered, error = total_at(currents, points, dark)
     close = currents.next_to(points)
-    error = np.where(close, np.maximum(error, SOLVED * currents.extinction), error)
+    error = np.where(close, SOLVED * currents.extinction, OFF * error)
     return measured_field(incident + scattered, error, "equation", "extinction")

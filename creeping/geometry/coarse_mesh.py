@@ -13,7 +13,8 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import is_creased, tips_of
+from creeping.geometry.creased import is_creased, pieces_of, tips_of
+from creeping.geometry.quadrature import nearest_points
 from creeping.geometry.surface import size
 from creeping.geometry.triangulation import quadrilaterals
 
@@ -23,6 +24,8 @@ SAME = 1e-9
 """Distance of corners that are one, in body sizes."""
 SQUARE = 0.8
 """Largest |cos| of a corner of the quadrilateral that two triangles make."""
+EVENED = 5
+"""Times that vertices inside pieces move to the middle of their neighbours."""
 MOST = 4000
 """Triangles of a body of pieces that squares are made of: of more there are too many nodes at any wavenumber."""
 
@@ -48,7 +51,35 @@ def coarse_mesh(body: Any, share: float) -> CoarseMesh:
     grid = np.round(corners.reshape(-1, 3) / (SAME * size(body))).astype(np.int64)
     _, first, numbers = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     vertices, triangles = corners.reshape(-1, 3)[first], numbers.reshape(-1, 3)
+    vertices = _evened(body, vertices, triangles, np.asarray(pieces))
     return CoarseMesh(vertices, *_paired(vertices, triangles, np.asarray(pieces), tip_vertices(body, vertices)))
+
+
+def _evened(body: Any, vertices: FloatArray, triangles: IntArray, pieces: IntArray) -> FloatArray:
+    """Vertices (n, 3) of which those inside pieces have moved to the middle of their neighbours: no slivers there."""
+    from scipy.sparse import coo_array
+
+    n = len(vertices)
+    owner = np.full(n, -1)
+    owner[triangles] = pieces[:, None]
+    shared = np.zeros(n, dtype=bool)
+    np.logical_or.at(shared, triangles, owner[triangles] != pieces[:, None])
+    free = np.flatnonzero(~shared & (owner >= 0) & ~tip_vertices(body, vertices))
+    ends = triangles[:, [0, 1, 2, 1, 2, 0]].reshape(-1, 2, 3).swapaxes(1, 2).reshape(-1, 2)
+    beside = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n)).tocsr()
+    beside.data[:] = 1.0
+    count = np.asarray(beside.sum(axis=1)).ravel()[free, None]
+    every = pieces_of(body)
+    for _ in range(EVENED if len(free) else 0):
+        moved = (beside @ vertices)[free] / count
+        for number in np.unique(owner[free]):
+            mine = owner[free] == number
+            moved[mine] = nearest_points(every[number], moved[mine])[0]
+        # a place that the piece does not have stays as it was
+        there = np.all(np.isfinite(moved), axis=1)
+        vertices = vertices.copy()
+        vertices[free[there]] = moved[there]
+    return vertices
 
 
 def tip_vertices(body: Any, vertices: FloatArray) -> BoolArray:

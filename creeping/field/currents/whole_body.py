@@ -203,7 +203,7 @@ class SurfaceCurrents:
     def extinction(self) -> float:
         """Rms of what is left of the incident wave inside, as a share of it; NaN if the body is nowhere thick enough.
 
-        Of solved currents at least 1e-4.
+        Of solved currents at least 5e-5.
 
         It is the error of the far field, rms over all directions, as a share of the field's rms, within a factor of
         about 2. Of a conductor it is the mean of both polarisations, in the square.

@@ -36,11 +36,13 @@ APART = 0.12
 e^(-2 pi distance/spacing), to 1e-5 there."""
 THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 """Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
-ON_BODY = 5.0
+ON_BODY = 10.0
 """Error of currents at a point and of the field next to the body, in what they leave inside."""
-LEAST = 1e-4
+LEAST = 5e-5
 """What is left inside, at least: a few times what is left of the equation and what integrals over tiles err by."""
-LEVEL, LEVEL_VECTOR = 1.3, 2.0
+UNRESOLVED = 2.0
+"""Error by what tiles do not resolve, in what two rules differ by."""
+LEVEL, LEVEL_VECTOR = 1.5, 1.7
 """Error of the far field over what is found of it, and that of a conductor, with which it holds in 95 of 100 directions
 (`studies.edges`)."""
 ABOVE = 1e-5
@@ -113,7 +115,7 @@ class _OnTiles(SurfaceCurrents):
         edges = self.matrix.edge_term.far(self.values, self.boundary.kind, r)
         # the same integral by two rules: what they differ by the polynomials of tiles do not resolve
         finer = self._finer._radiated(self.matrix.tiles.interpolated(self.values), self._finer.lit, r)
-        unknown = np.hypot(edges[:, 0] if known.ndim == 1 else edges[:, None], np.abs(self.far(r) - finer))
+        unknown = np.hypot(edges[:, 0] if known.ndim == 1 else edges[:, None], UNRESOLVED * np.abs(self.far(r) - finer))
         return np.asarray((LEVEL_VECTOR if known.ndim > 1 else LEVEL) * np.hypot(known, unknown))
 
     def _off_the_body(self, points: ArrayLike) -> FloatArray:

@@ -13,7 +13,9 @@ from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.solution import SECONDS, Solution, cost, solve
 from creeping.field.equation.tiles import tiles_for
+from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.covering import patches_of
+from creeping.geometry.creased import is_creased
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface
 from creeping.storage.memory import budget
@@ -42,6 +44,8 @@ class Solved(NamedTuple):
 
 def solution_for(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
     """The solution of an incidence, if the equation of the body costs less than SECONDS and resolves it, else None."""
+    if _is_rough(body):
+        return None
     found = _found(body, direction, wavenumber, boundary)
     if found is None and not too_much(body, wavenumber, boundary, SECONDS):
         solve_together(body, direction[None], wavenumber, boundary)
@@ -100,6 +104,14 @@ def expected_seconds_of(body: Surface, wavenumber: float, boundary: BoundaryLike
         return 0.0
     kinds = scalar_boundaries(boundary)
     return cost(_nodes(body, wavenumber), CONDUCTOR if len(kinds) == 2 else kinds[0], 1)[0]
+
+
+def _is_rough(body: Surface) -> bool:
+    """Whether a body says of itself that it is somewhere not smooth enough for rays: what it is there is not known."""
+    rough = getattr(body, "non_smooth", None)
+    if rough is None or is_creased(body):
+        return False
+    return kept(body, "rough somewhere", lambda: bool(np.any(rough(points_of_charts(body)))))
 
 
 def _nodes(body: Surface, wavenumber: float) -> int:

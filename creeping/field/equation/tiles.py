@@ -23,7 +23,7 @@ POINTS = 5
 """p, nodes along a side of a tile."""
 SIDE = 0.9
 """Longest sides of tiles, in wavelengths."""
-TURN = 0.8
+TURN = 0.7
 """Angle by which the normal turns along a side, radians, at most: currents are no smoother than the body."""
 SLACK = 0.1
 """Share of a tile by which tiles may be too long before there is one more."""
@@ -37,8 +37,8 @@ APART, RULE = 1.0, 5
 """Distance of the middles of parts of a tile from a point, over their size, at least; and the points of their rule."""
 BESIDE, STEPS = 12, 8
 """Nodes next to a point whose tiles may be its own, and Newton steps to its place there."""
-ANGLES, RADII = 8, 6
-"""Angles and radii of a quarter about a node of its own."""
+ANGLES, RADII = 12, 6
+"""Places along a side and radii of each of the four triangles about a node of its own."""
 
 
 def gauss(points: int) -> tuple[FloatArray, FloatArray]:
@@ -300,10 +300,11 @@ def _boxes(
     for side, v in breaks.items():
         key, (start, end) = float(patches.sides[number, side]), patches.spans[number, side]
         if side < 2:
-            across, along = (0.0, a) if side == 0 else (b, 1.0), v
+            across, on_edge = (0.0, a) if side == 0 else (b, 1.0), v
         else:
-            across, along = (0.0, c) if side == 2 else (d, 1.0), np.union1d([a, b], v[(v > a + 1e-9) & (v < b - 1e-9)])
-        for one, two in pairwise(along):
+            across = (0.0, c) if side == 2 else (d, 1.0)
+            on_edge = np.union1d([a, b], v[(v > a + 1e-9) & (v < b - 1e-9)])
+        for one, two in pairwise(on_edge):
             where = key, float(side), start + one * (end - start), start + two * (end - start)
             out.append((*across, one, two, *where) if side < 2 else (one, two, *across, *where))
     u = _between(a, b, counts[0])

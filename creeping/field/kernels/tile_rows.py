@@ -156,12 +156,14 @@ def _around(table, grid, bary, u0, v0, angles, share, radii, weight, room, by, a
         t0, t1 = (p1 - p0) / length, (q1 - q0) / length
         low, high = p0 * t0 + q0 * t1, p1 * t0 + q1 * t1
         far = p0 * t1 - q0 * t0
-        first, last = math.atan2(low, far), math.atan2(high, far)
         # next to a side the triangle between is so thin that rounding is all that would be integrated
         thin = 0.0 if far < BESIDE * length else 1.0
+        far = max(far, BESIDE * length)
+        # places along the side are far sinh(w): as many points next to the node's foot as far along a long side
+        first, last = math.asinh(low / far), math.asinh(high / far)
         for a in range(angles.shape[0]):
-            angle = first + (last - first) * angles[a]
-            c0, s0 = math.cos(angle), math.sin(angle)
+            w = first + (last - first) * angles[a]
+            c0, s0 = 1.0 / math.cosh(w), math.tanh(w)
             reach = far / c0
             dp, dq = c0 * t1 + s0 * t0, -c0 * t0 + s0 * t1
             dv = dq / across
@@ -172,7 +174,7 @@ def _around(table, grid, bary, u0, v0, angles, share, radii, weight, room, by, a
                 _cardinal(grid, bary, at[0, count], at_u[0])
                 _cardinal(grid, bary, at[1, count], at_v[0])
                 _place(table, at_u[0], at_v[0], q)
-                _set(q, thin * (last - first) * share[a] * reach * weight[b] * r / (along * across), count, by)
+                _set(q, thin * (last - first) * share[a] * c0 * reach * weight[b] * r / (along * across), count, by)
                 count += 1
 
 

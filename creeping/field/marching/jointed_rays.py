@@ -4,7 +4,7 @@ Between the states of a common lattice and those at joints a ray is the cubic of
 stretch is on one piece, whose curvatures hold up to both its ends. A ray that has ended at an edge or a tip stays
 where it is.
 
-Sources: Derivations, R1 and F22.
+Sources: Derivations, R1, F22 and F30.
 """
 
 from itertools import pairwise

@@ -38,8 +38,7 @@ def test_a_static_double_layer_of_one_is_minus_one_half_on_the_body(name):
     matrix = Matrix(tiles, 1e-9, HARD)
     one = np.ones((len(tiles.points), 1), dtype=complex)
     off = np.abs(matrix.received(matrix.nodes, one)[:, 0] + 1)
-    # of a box the mesh has squares that are nearly triangles
-    assert np.median(off) < 1e-4 and np.quantile(off, 0.99) < 4e-3 and np.max(off) < 0.05
+    assert np.median(off) < 1e-5 and np.quantile(off, 0.99) < 1e-3 and np.max(off) < 5e-3
     # 0 outside and -1 inside, close to the surface, at its middle and at an edge alike
     some = np.arange(0, len(tiles.points), 37)
     for height, value in ((1e-4, 0.0), (-1e-4, -2.0)):
@@ -49,10 +48,10 @@ def test_a_static_double_layer_of_one_is_minus_one_half_on_the_body(name):
 
 
 def test_tiles_on_both_faces_of_an_edge_are_parted_at_the_same_places():
-    tiles = tiles_for(patches_of(sc.Cone(1.0, 2.0)), 9.0)
+    tiles = tiles_for(patches_of(sc.Cone(1.0, 2.0)), 14.0)
     corners = tiles.shapes[:, ::6, ::6].reshape(-1, 4, 3)
     base = np.all(np.abs(corners[..., 2]) < 1e-9, axis=1)
-    on_rim = np.hypot(np.hypot(corners[..., 0], corners[..., 1]) - 1, corners[..., 2]) < 1e-6
+    on_rim = np.hypot(np.hypot(corners[..., 0], corners[..., 1]) - 1, corners[..., 2]) < 1e-5
     angles = [
         np.unique(np.round(np.arctan2(corners[of, 1], corners[of, 0]), 4))
         for of in (on_rim & base[:, None], on_rim & ~base[:, None])
@@ -72,4 +71,4 @@ def test_single_and_double_layers_of_a_harmonic_function():
         for part, kind in ((slope, "single"), (u, "double"))
     )
     single, double = layers
-    assert_allclose((single - double)[:, 0], u, atol=2e-3)
+    assert_allclose((single - double)[:, 0], u, atol=5e-4)
