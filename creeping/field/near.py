@@ -48,7 +48,7 @@ from creeping.shadow.occlusion import occluded
 
 ON_BODY = 1e-7
 """Distance from the body, in its sizes, below which a point counts as on it."""
-OFF = 3.5
+OFF = 4.5
 """Error of solved currents off the body in that of expansions, which leave more inside of what is wrong with them."""
 FINE = 0.01
 """Error of rays up to which currents are not asked."""

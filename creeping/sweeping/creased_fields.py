@@ -11,7 +11,6 @@ from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.equation.kept import solve_together
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
-from creeping.geometry.creased import has_edges
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.transport import Flow
@@ -49,8 +48,8 @@ def fill_creased(
     there = {row: line for row, line in enumerate(lines) if line is not None}
     rows = list(there)
     asked = list(product(request.problems, enumerate(request.wavenumbers)))
-    # the equation of a body with edges is solved for all incidences at once, and these come before the next one
-    together = has_edges(flow.body) and request.order == 2 and request.method in ("auto", "equation")
+    # the equation is solved for all incidences at once, and these come before the next one
+    together = request.order == 2 and request.method in ("auto", "equation")
     jobs = [(row, one) for one in asked for row in rows] if together else [(r, one) for r in rows for one in asked]
     directions = np.array([line.direction for line in there.values()])
     fans: dict[int, RayFan] = {}
@@ -76,16 +75,9 @@ def fill_creased(
 def _field(
     fan: RayFan, observers: FloatArray, wavenumber: float, boundary: BoundaryLike, request: SweepRequest
 ) -> FarField:
-    """Far field of one incidence; by its equation a conductor has that of "auto" where rays do not resolve it."""
+    """Far field of one incidence; what no mesh of the body resolves is as rays have it, and says so."""
     asked: dict[str, Any] = {"wavenumber": wavenumber, "boundary": boundary, "order": request.order}
-    plain = boundary == "pec" and not has_edges(fan.body)
-    by_rays = request.method == "rays" or (request.method == "auto" and plain)
-    if by_rays:
-        field = far_field(fan, observers, method="rays", **asked)
-        if request.method == "rays" or not len(FieldArrays.of(field, 1).unclear):
-            return field
     try:
         return far_field(fan, observers, method=request.method, **asked)
     except SurfaceError:
-        # what no mesh of the body resolves is as rays have it, and says so
-        return field if by_rays else far_field(fan, observers, method="rays", **asked)
+        return far_field(fan, observers, method="rays", **asked)

@@ -20,7 +20,7 @@ from creeping.field.echo import Echo
 from creeping.field.labelled import PARTS
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, whole_number
-from creeping.geometry.creased import has_edges, is_creased
+from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.tuning.flow_choice import choose_flow
@@ -33,8 +33,8 @@ from creeping.sweeping.run import Progress, sweep_directions
 if TYPE_CHECKING:
     import xarray
 
-TASK, CREASED_TASK = 32, 2
-"""Incidences of one task where they are many; those of a body with creases are computed one by one."""
+TASK = 32
+"""Incidences of one task where they are many."""
 MOST = 10_000_000
 """Values of one call."""
 
@@ -62,7 +62,8 @@ def backscatter(
         Where the radar is, as seen from the body; one may be a number.
     boundary : "pec", "soft", "hard" or ImpedanceBoundary
     method : {"auto", "rays", "currents", "equation"}
-        As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more.
+        As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more, and the
+        integral equation of a body with edges, joints or tips.
     n_rays : int
         Rays of an incidence.
     cache : bool
@@ -159,7 +160,7 @@ def seconds_of_currents(
 
     ``azimuths``, ``elevations`` (n,), degrees, are the radar's; ``observers`` directions belong to each.
     """
-    if is_creased(body) and (has_edges(body) or boundary != "pec"):
+    if is_creased(body):
         return 0.0
     radar = directions_from_azimuth_elevation(np.radians(azimuths[0]), np.radians(elevations[0]))
     try:
@@ -210,7 +211,7 @@ def _swept(
     flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
     # small enough that progress is told in time, large enough that a task is not all overhead
     options: dict[str, Any] = {
-        "chunk": CREASED_TASK if is_creased(body) and not has_edges(body) else TASK,
+        "chunk": TASK,
         "progress": progress,
         "length": length,
     }
