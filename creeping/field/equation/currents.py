@@ -94,7 +94,7 @@ class _OnTiles(SurfaceCurrents):
         x, normals = tiles.on(tile, u, v)
         places = Places.at(x, normals, (tile, u, v))
         sums = self._received(places, self.values, "slope" if soft else "double")
-        magnetic = np.atleast_3d(self._incident)[None] if self._incident.ndim else np.zeros((1, 3, 0))
+        magnetic = self._incident[None] if self._incident.ndim else np.zeros((1, 3, 0))
         wave = twice_incident(self.boundary, places, self.direction[None], self.wavenumber, magnetic)
         values = _vectors(places, wave[:, :, 0]) if self._incident.ndim else wave[:, 0]
         lit = lit_ground(self.body, x, normals, self.direction)
