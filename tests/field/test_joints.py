@@ -48,7 +48,7 @@ def test_far_field_is_by_currents_and_better_than_rays():
         far = cr.far_field(fan, r, wavenumber=12.0, boundary="soft", method=method)
         off[method] = np.abs(far.total - f)
         assert np.mean(off[method] <= far.error) > 0.9
-        assert set(far.method) == {"currents" if method == "auto" else "rays+optics"}
+        assert set(far.method) == {"equation" if method == "auto" else "rays+optics"}
     assert np.max(off["auto"]) < 0.02 * np.max(np.abs(f))
     assert np.max(off["rays"]) > 3 * np.max(off["auto"])
 
