@@ -62,8 +62,8 @@ def backscatter(
         Where the radar is, as seen from the body; one may be a number.
     boundary : "pec", "soft", "hard" or ImpedanceBoundary
     method : {"auto", "rays", "currents", "equation"}
-        As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more, and the
-        integral equation of a body with edges, joints or tips.
+        As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more, and
+        the integral equation of a body with edges, joints or tips.
     n_rays : int
         Rays of an incidence.
     cache : bool

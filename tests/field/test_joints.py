@@ -36,7 +36,7 @@ def test_errors_and_what_is_stated(name, boundary, theta):
 
 
 @pytest.mark.slow
-def test_far_field_is_by_currents_and_better_than_rays():
+def test_far_field_is_by_the_equation_and_better_than_rays():
     d = np.array([np.sin(1.1), 0, np.cos(1.1)])
     exact = joints.scatter_by_rings(joints.CASES["capsule 4"][1], 12.0, [1.1], "soft")
     fan = fan_of(PILL, d)
