@@ -9,7 +9,7 @@ from studies.reference.generatrix import pieces_profile
 from studies.reference.mirrored_box import scatter_box
 from studies.reference.modal_conductor import scatter_conductor
 from studies.reference.modal_equation import scatter_by_modes
-from studies.reference.revolution import Profile
+from studies.reference.revolution import Profile, wave_directions
 from studies.reference.stored import Arrays
 
 HEIGHTS = (0.05, 0.08, 0.11, 0.14)
@@ -215,7 +215,7 @@ def edged_cube() -> Arrays:
 
 def _edged(profile: Profile, polar: FloatArray, kinds: dict[str, Boundary | None]) -> Arrays:
     """Far fields of a body of revolution by the names of its boundaries: (m, d), of a conductor (m, d, 2, 2)."""
-    d = np.stack([np.sin(polar), 0 * polar, np.cos(polar)], axis=-1)
+    d = wave_directions(polar)
     r, k = _about(d), 10.0
     found: Arrays = {"incident": d, "directions": r}
     for name, kind in kinds.items():

@@ -30,7 +30,7 @@ from studies.reference.dipoles import frames
 from studies.reference.fundamental import least_squares
 from studies.reference.generatrix import Azimuth, Panels, modal_matrix, waves
 from studies.reference.modal_equation import order_count
-from studies.reference.revolution import Profile
+from studies.reference.revolution import Profile, wave_directions
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class ModalConductor:
     @property
     def directions(self) -> FloatArray:
         """Unit vectors (d, 3), where the waves go."""
-        return np.stack([np.sin(self.polar), 0 * self.polar, np.cos(self.polar)], axis=-1)
+        return wave_directions(self.polar)
 
     def far_field(self, r: ArrayLike) -> ComplexArray:
         """Far field, L, theta and phi scattered by theta and phi incident (last axis): (m, 3) to (m, d, 2, 2)."""

@@ -23,7 +23,7 @@ from scipy.special import jv, jvp
 from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
 from studies.reference.fundamental import least_squares
 from studies.reference.generatrix import Azimuth, Panels, modal_matrix, waves
-from studies.reference.revolution import Profile
+from studies.reference.revolution import Profile, wave_directions
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class ModalSolution:
     @property
     def directions(self) -> FloatArray:
         """Unit vectors (d, 3), where the waves go."""
-        return np.stack([np.sin(self.polar), 0 * self.polar, np.cos(self.polar)], axis=-1)
+        return wave_directions(self.polar)
 
     def far_field(self, r: ArrayLike) -> ComplexArray:
         """Far field f, L, u_s ~ f e^{ikR}/R, in unit directions: (m, 3) to (m, d)."""

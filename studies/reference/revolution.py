@@ -123,6 +123,11 @@ class Revolved:
         return Cloud(np.concatenate(points), np.concatenate(normals))
 
 
+def wave_directions(polar: FloatArray) -> FloatArray:
+    """Unit vectors (d, 3) of waves along (sin theta, 0, cos theta)."""
+    return np.stack([np.sin(polar), 0 * polar, np.cos(polar)], axis=-1)
+
+
 @dataclass(frozen=True)
 class RingSolution:
     """Scattered fields of a body of revolution for several plane waves.
@@ -149,7 +154,7 @@ class RingSolution:
     @property
     def directions(self) -> FloatArray:
         """Unit vectors (d, 3), where the waves go."""
-        return np.stack([np.sin(self.polar), 0 * self.polar, np.cos(self.polar)], axis=-1)
+        return wave_directions(self.polar)
 
     def total(self, points: ArrayLike) -> ComplexArray:
         """Incident and scattered field on and outside the body: (n, 3), L, to (n, d)."""
