@@ -6,6 +6,7 @@ The equation: `creeping.field.equation.kept`. What either costs is reckoned here
 Sources: Derivations, F16 to F18 and F36.
 """
 
+from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,7 +21,7 @@ from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, ray_
 from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.waves import lit_waves, ray_waves
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.kept import asked_solution, expected_seconds_of, solution_for
+from creeping.field.equation.kept import Solved, asked_solution, expected_seconds_of, solution_for
 from creeping.geometry.arguments import one_of
 from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.quadrature import node_count
@@ -96,11 +97,11 @@ def surface_currents(
     k = checked(wavenumber, 2)
     problem = fan.body, fan.line.direction, k, boundary
     if solve:
-        return asked_solution(*problem).currents
+        return _of_line(fan, asked_solution(*problem))
     # expansions know little of joints and tips, and nothing of edges
     found = solution_for(*problem) if solve is None and is_creased(fan.body) else None
     if found:
-        return found.currents
+        return _of_line(fan, found)
     if not has_expansions(fan.body, boundary):
         raise InvalidInputError(
             "a body with edges, or a conductor with joints, has no currents but those of its integral equation, not "
@@ -114,14 +115,24 @@ def surface_currents(
         found = solution_for(*problem) if solve is None else None
         if not found:
             raise
-        return found.currents
+        return _of_line(fan, found)
     poor = facing or currents.unserved > CUT or currents.stepped > 0 or not currents.extinction <= POOR
     found = solution_for(*problem) if solve is None and poor else None
     if found:
-        return found.currents
+        return _of_line(fan, found)
     if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
         currents.values[currents.lit] += currents.thrown(lit.points, lit.normals)
     return currents
+
+
+def _of_line(fan: RayFan, solved: Solved) -> SurfaceCurrents:
+    """Solved currents that tell which share of the fan's line launches no ray."""
+    currents: SurfaceCurrents = replace(solved.currents, unserved=_unserved(fan))
+    return currents
+
+
+def _unserved(fan: RayFan) -> float:
+    return 1.0 - float(fan.line.fractions["attached"])
 
 
 def has_expansions(body: Surface, boundary: BoundaryLike) -> bool:
@@ -156,7 +167,7 @@ def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...])
         lit=np.arange(len(values)) < len(lit.points),
         rim=_rim(fan.line, k),
         rim_length=fan.line.length,
-        unserved=1.0 - float(fan.line.fractions["attached"]),
+        unserved=_unserved(fan),
         wavenumber=k,
         boundary=kind,
     )
@@ -188,7 +199,7 @@ def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boun
     """About what currents of one incidence at wavenumbers (k,), 1/L, and their far field cost, where they are taken."""
     known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
     plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
-    solved = 1.0 - fan.line.fractions["attached"] > CUT or not has_expansions(fan.body, boundary)
+    solved = _unserved(fan) > CUT or not has_expansions(fan.body, boundary)
     if not (solved or may_face_itself(fan.body)):
         return plain
     return plain + sum(expected_seconds_of(fan.body, k, boundary) for k in known)

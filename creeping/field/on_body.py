@@ -26,7 +26,7 @@ from creeping.field.currents.nodes import TAKEN_OVER, lit_part
 from creeping.field.currents.waves import lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.currents import ON_BODY, TileCurrents
+from creeping.field.equation.currents import TileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error, without_tips
 from creeping.field.marched_sum import marched_sum, marches
@@ -195,7 +195,7 @@ def total_on(
     if not currents and not alone:
         currents = _currents_of(fan, k, kind)
     if isinstance(currents, TileCurrents) and order == 2:
-        return _solved_on(currents, points, unit)
+        return _solved_on(currents, points)
     checked_plain(fan.body, edgeless="the field at points of the body")
     currents = None if alone else currents
     lit = _lit_at(fan, points, k, kind, order)
@@ -209,11 +209,10 @@ def total_on(
     return without_tips(field) if jointed else field
 
 
-def _solved_on(currents: TileCurrents, points: FloatArray, unit: float) -> Served:
-    """Total field of solved currents at points of the body (n, 3); ``unit`` is the size of the incident wave's."""
+def _solved_on(currents: TileCurrents, points: FloatArray) -> Served:
+    """Total field of solved currents at points of the body (n, 3)."""
     found = currents.on_body(points)
-    error = np.full(len(points), ON_BODY * unit * currents.extinction)
-    field = measured_field(found.values, error, "equation", "extinction")
+    field = measured_field(found.values, found.error, "equation", "extinction")
     return replace(field, wave=np.where(found.lit, found.values, 0.0), creeping=np.where(found.lit, 0.0, found.values))
 
 

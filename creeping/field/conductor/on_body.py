@@ -111,7 +111,7 @@ def _solved_on(
     served = []
     for i, share in enumerate(left):
         J = total[:count, :, i]
-        one = measured_field(J, np.full(count, ON_BODY * float(share)), "equation", "extinction")
+        one = measured_field(J, np.maximum(found.error[:count, i], ON_BODY * float(share)), "equation", "extinction")
         one = replace(one, wave=np.where(lit[:, None], J, 0.0), creeping=np.where(lit[:, None], 0.0, J))
         served.append(one)
     return served, total

@@ -39,7 +39,6 @@ from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.depth import inner_points
-from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import Surface
 
 DEPTH = 0.25
@@ -133,11 +132,6 @@ class SurfaceCurrents:
         names = ["points", "normals", "weights", "travel", "values", "change", "lit"]
         found: SurfaceCurrents = replace(self, **{name: getattr(self, name)[which] for name in names})
         return found
-
-    @property
-    def even(self) -> BoolArray:
-        """Nodes whose current is one function of place (n,); to a place on rays several may come."""
-        return np.ones(len(self.lit), dtype=bool) if self.solved else self.lit
 
     def far(self, directions: ArrayLike) -> ComplexArray:
         """Far-field amplitude f, L, in directions (m, 3): (m,)."""
@@ -254,20 +248,6 @@ class SurfaceCurrents:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.points)
-
-    @cached_property
-    def mean_curvature(self) -> FloatArray:
-        """(kappa_1 + kappa_2)/2 of the body at the nodes (n,), 1/L."""
-        return 0.5 * self._body_nodes.total_curvature
-
-    @property
-    def shapes(self) -> FloatArray:
-        """Shape operator of the body at the nodes on tangents (6, n), 1/L: xx, yy, zz, yz, xz, xy."""
-        return np.ascontiguousarray(self._body_nodes.hessians.T)
-
-    @cached_property
-    def _body_nodes(self) -> BodyNodes:
-        return nodes_at(self.body, self.points, self.normals)
 
     @cached_property
     def _left(self) -> FloatArray:

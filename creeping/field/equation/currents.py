@@ -37,11 +37,11 @@ e^(-2 pi distance/spacing), to 1e-5 there."""
 THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 """Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
 ON_BODY = 10.0
-"""Error of currents at a point and of the field next to the body, in what they leave inside."""
+"""Error of currents at a point and of the field next to the body by what they leave inside of the incident wave."""
 LEAST = 5e-5
 """What is left inside, at least: a few times what is left of the equation and what integrals over tiles err by."""
 UNRESOLVED = 2.0
-"""Error by what tiles do not resolve, in what two rules differ by."""
+"""Error by what tiles do not resolve, in what two ways to the same value differ by."""
 LEVEL, LEVEL_VECTOR = 1.5, 1.7
 """Error of the far field over what is found of it, and that of a conductor, with which it holds in 95 of 100 directions
 (`studies.edges`)."""
@@ -73,9 +73,13 @@ def twice_incident(
 
 
 class OnBody(NamedTuple):
-    """Current at places of the body (m, ...), their points and normals (m, 3), and whether they are lit (m,)."""
+    """Current at places of the body (m, ...), their points and normals (m, 3), and whether they are lit (m,).
+
+    Its error is (m,), of a conductor (m, p) for each polarisation.
+    """
 
     values: ComplexArray
+    error: FloatArray
     points: FloatArray
     normals: FloatArray
     lit: BoolArray
@@ -88,7 +92,11 @@ class _OnTiles(SurfaceCurrents):
     _least: ClassVar[float] = LEAST
 
     def on_body(self, points: ArrayLike) -> OnBody:
-        """Current at the places of the body nearest to points (m, 3), L; it errs by ON_BODY times `extinction`."""
+        """Current at the places of the body nearest to points (m, 3), L, as the equation gives it there.
+
+        What it differs by from the polynomial of its tile that does not resolve; that and what is left inside are its
+        error.
+        """
         tiles, soft = self.matrix.tiles, self.boundary.kind == "soft"
         tile, u, v, _ = tiles.located(as_points(points).reshape(-1, 3))
         x, normals = tiles.on(tile, u, v)
@@ -98,7 +106,12 @@ class _OnTiles(SurfaceCurrents):
         wave = twice_incident(self.boundary, places, self.direction[None], self.wavenumber, magnetic)
         values = _vectors(places, wave[:, :, 0]) if self._incident.ndim else wave[:, 0]
         lit = lit_ground(self.body, x, normals, self.direction)
-        return OnBody(values - sums if soft else values + sums, x, normals, lit)
+        values = values - sums if soft else values + sums
+        apart = np.abs(values - self.matrix.tiles.interpolated_at(self.values, tile, u, v))
+        unit = self.wavenumber if soft else 1.0
+        if apart.ndim > 1:
+            apart = np.linalg.norm(apart, axis=1)
+        return OnBody(values, np.hypot(ON_BODY * unit * self._left, UNRESOLVED * apart), x, normals, lit)
 
     def _received(self, places: Places, values: ComplexArray, kind: str = "double") -> ComplexArray:
         """What places (m,) receive of values at the nodes, as of `Matrix.received`: (m, ...), J as vectors."""

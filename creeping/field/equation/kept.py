@@ -9,10 +9,10 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.boundary import CONDUCTOR, BoundaryLike, scalar_boundaries
+from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.solution import SECONDS, Solution, cost, solve
-from creeping.field.equation.tiles import tiles_for
+from creeping.field.equation.tiles import tiles_of
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.covering import patches_of
 from creeping.geometry.creased import is_creased
@@ -87,12 +87,12 @@ def solve_together(body: Surface, directions: FloatArray, wavenumber: float, bou
 
 def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float) -> str:
     """Why the equation of one incidence takes too much time or memory, or cannot be; nothing if it does not."""
-    kinds = scalar_boundaries(boundary)
+    kind = _kind(boundary)
     try:
-        nodes = _nodes(body, wavenumber)
+        nodes = _nodes(body, wavenumber, kind)
     except SurfaceError as error:
         return str(error)
-    takes, memory = cost(nodes, CONDUCTOR if len(kinds) == 2 else kinds[0], 1)
+    takes, memory = cost(nodes, kind, 1)
     if takes > seconds:
         return f"{nodes} nodes take about {takes:.2g} s, more than {seconds:g}"
     return f"{nodes} nodes take {memory / 1e9:.2g} GB" if memory > budget() else ""
@@ -102,8 +102,14 @@ def expected_seconds_of(body: Surface, wavenumber: float, boundary: BoundaryLike
     """About what the equation of one incidence costs, 0 where it is not solved by itself."""
     if too_much(body, wavenumber, boundary, SECONDS):
         return 0.0
+    kind = _kind(boundary)
+    return cost(_nodes(body, wavenumber, kind), kind, 1)[0]
+
+
+def _kind(boundary: BoundaryLike) -> Boundary:
+    """The boundary of the equation: of a conductor one, not two scalar ones."""
     kinds = scalar_boundaries(boundary)
-    return cost(_nodes(body, wavenumber), CONDUCTOR if len(kinds) == 2 else kinds[0], 1)[0]
+    return CONDUCTOR if len(kinds) == 2 else kinds[0]
 
 
 def _is_rough(body: Surface) -> bool:
@@ -114,11 +120,12 @@ def _is_rough(body: Surface) -> bool:
     return kept(body, "rough somewhere", lambda: bool(np.any(rough(points_of_charts(body)))))
 
 
-def _nodes(body: Surface, wavenumber: float) -> int:
-    known: dict[float, int] = kept(body, "nodes of tiles", dict)
-    if wavenumber not in known:
-        known[wavenumber] = len(tiles_for(patches_of(body), wavenumber).points)
-    return known[wavenumber]
+def _nodes(body: Surface, wavenumber: float, kind: Boundary) -> int:
+    known: dict[tuple[float, bool, bool], int] = kept(body, "nodes of tiles", dict)
+    key = wavenumber, kind.varies, kind.kind == "conductor"
+    if key not in known:
+        known[key] = len(tiles_of(patches_of(body), wavenumber, kind).points)
+    return known[key]
 
 
 def _found(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:

@@ -27,7 +27,7 @@ from creeping.field.equation.block_gmres import STEPS, TOLERANCE, block_gmres
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
 from creeping.field.equation.matrix import EACH, VECTOR, Matrix
 from creeping.field.equation.split_product import SplitProduct
-from creeping.field.equation.tiles import Tiles, tiles_for
+from creeping.field.equation.tiles import Tiles, tiles_of
 from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
 from creeping.field.polarisation import spherical_frame
@@ -106,8 +106,8 @@ def solve(
     k = checked(wavenumber, 2)
     d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
     tell = progress or (lambda words: None)
-    tiles = tiles_for(patches_of(body), k)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
+    tiles = tiles_of(patches_of(body), k, kind)
     takes, memory = cost(len(tiles.points), kind, len(d))
     told = f"{len(tiles.points)} nodes, about {takes:.2g} s and {memory / 1e9:.2g} GB"
     if takes > seconds:
@@ -318,8 +318,7 @@ class Solution:
         y = as_points(points)
         currents, unit = self.currents(incidence), self.wavenumber if self._kind.kind == "soft" else 1.0
         found = currents.on_body(y)
-        error = np.full(len(found.values), ON_BODY * unit * currents.extinction)
-        lanes = self._lanes(y, found.values, error, unit)
+        lanes = self._lanes(y, found.values, found.error, unit)
         lit, nothing = found.lit.reshape(y.shape[:-1]), np.zeros_like(lanes["values"])
         return SurfaceField(
             **lanes, lit=np.where(lit, lanes["values"], nothing), creeping=np.where(lit, nothing, lanes["values"])

@@ -15,16 +15,19 @@ from itertools import pairwise
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
+from creeping.field.boundary import Boundary
 from creeping.geometry.patches import DEGREE, Patches
 from creeping.geometry.squares import barycentric, interpolation, lobatto, on_squares
 from creeping.kernels.threads import in_threads
 
 POINTS = 5
 """p, nodes along a side of a tile."""
-SIDE = 0.9
+SIDE = 0.82
 """Longest sides of tiles, in wavelengths."""
-TURN = 0.7
+TURN = 0.52
 """Angle by which the normal turns along a side, radians, at most: currents are no smoother than the body."""
+SIDE_OF_CHARGE, VARYING = 0.72, 0.5
+"""Longest sides where a conductor's charge is asked for; and shares of sides and turns where the admittance varies."""
 SLACK = 0.1
 """Share of a tile by which tiles may be too long before there is one more."""
 FINE = 12
@@ -154,6 +157,13 @@ class Tiles:
         found = np.einsum("ai,bj,tijc->tabc", rows, rows, each, optimize=True)
         return np.asarray(found.reshape(-1, *values.shape[1:]))
 
+    def interpolated_at(self, values: ComplexArray, tile: IntArray, u: FloatArray, v: FloatArray) -> ComplexArray:
+        """Values (n, ...) at the nodes, by the polynomials of tiles (m,) at u and v: (m, ...)."""
+        nodes = gauss(self.p)[0]
+        each = values.reshape(self.count, self.p, self.p, -1)[tile]
+        found = np.einsum("mi,mj,mijc->mc", interpolation(nodes, u), interpolation(nodes, v), each, optimize=True)
+        return np.asarray(found.reshape(-1, *values.shape[1:]))
+
     @property
     def own_places(self) -> tuple[IntArray, FloatArray, FloatArray]:
         """Tile of each node, and u and v there: (n,) each."""
@@ -193,10 +203,20 @@ class Tiles:
         return x, n / np.linalg.norm(n, axis=1, keepdims=True)
 
 
-def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, p: int = POINTS) -> Tiles:
-    """Tiles of a body's squares for a wavenumber, 1/L."""
-    longest = side * 2 * np.pi / wavenumber
-    steps = _parts(patches, longest)
+def tiles_of(patches: Patches, wavenumber: float, boundary: Boundary) -> Tiles:
+    """Tiles of a body's squares for a wavenumber, 1/L, and a boundary.
+
+    An admittance that varies is known at nodes alone, so these are closer. So are those of a conductor without edges,
+    whose current and charge are asked for between nodes: there its equation errs as the polynomials of tiles do.
+    """
+    side = SIDE_OF_CHARGE if boundary.kind == "conductor" and not patches.edges.any() else SIDE
+    share = VARYING if boundary.varies else 1.0
+    return tiles_for(patches, wavenumber, side=share * side, turn=share * TURN)
+
+
+def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, turn: float = TURN, p: int = POINTS) -> Tiles:
+    """Tiles of a body's squares for a wavenumber, 1/L, of sides and turns no longer than these."""
+    steps = _parts(patches, side * 2 * np.pi / wavenumber, turn)
     along = _edge_breaks(patches, steps)
     boxes = [_boxes(patches, number, [lane[number] for lane in steps], along) for number in range(len(patches.off))]
     owner = np.repeat(np.arange(len(boxes)), [len(box) for box in boxes])
@@ -224,7 +244,7 @@ NEXT = ((0, 2, 0), (0, 3, 1), (1, 2, 0), (1, 3, 1), (2, 0, 0), (2, 1, 1), (3, 0,
 """Of sides, the sides that meet them, and at which of their ends."""
 
 
-def _parts(patches: Patches, longest: float) -> tuple[FloatArray, FloatArray]:
+def _parts(patches: Patches, longest: float, most: float) -> tuple[FloatArray, FloatArray]:
     """How many tiles each step between Lobatto's places asks for, along u (m, q, q + 1) and along v (m, q + 1, q)."""
     at = np.broadcast_to(lobatto(DEGREE), (len(patches.off), DEGREE + 1))
     _, along, across = on_squares(patches.places, at, at)
@@ -235,7 +255,7 @@ def _parts(patches: Patches, longest: float) -> tuple[FloatArray, FloatArray]:
     lanes = []
     for axis in (1, 2):
         step, turn = (np.linalg.norm(np.diff(part, axis=axis), axis=-1) for part in (patches.places, n))
-        lanes.append(np.maximum(step / longest, turn / TURN))
+        lanes.append(np.maximum(step / longest, turn / most))
     return lanes[0], lanes[1]
 
 
