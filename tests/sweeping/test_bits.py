@@ -9,7 +9,7 @@ import pytest
 SWEEPS = """
 import hashlib
 import creeping as cr
-import shared_bodies as sc
+import scatterers as sc
 directions = cr.fibonacci_directions(5)
 body = sc.TwistedEllipsoid()
 asked = {"rays": {"n_steps": 2}, "monostatic": {"wavenumbers": [20.0], "boundary": ["soft", "pec"]}}
