@@ -184,7 +184,7 @@ def cut_grid(
 def _checked(fan: RayFan, wavenumber: float, boundary: BoundaryLike, order: int, method: str) -> tuple[float, bool]:
     """The wavenumber, and whether the body is a conductor."""
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, edgeless="the near field")
+    checked_plain(fan.body)
     conductor = isinstance(boundary, str) and boundary == "pec"
     k = checked(wavenumber, order)
     if conductor and (order != 2 or method not in PLAIN):

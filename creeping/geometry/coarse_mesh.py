@@ -31,11 +31,15 @@ MOST = 4000
 
 
 class CoarseMesh(NamedTuple):
-    """Corners of squares at (0, 0), (1, 0), (1, 1), (0, 1); the first is the last again of a triangle."""
+    """Corners of squares at (0, 0), (1, 0), (1, 1), (0, 1); the first is the last again of a triangle.
+
+    ``places`` are points of the squares (m, n, n, 3) at Lobatto's, of a body that knows them.
+    """
 
     vertices: FloatArray
     corners: IntArray
     pieces: IntArray
+    places: FloatArray | None = None
 
 
 def coarse_mesh(body: Any, share: float) -> CoarseMesh:

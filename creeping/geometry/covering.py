@@ -35,6 +35,8 @@ WORST = 1e-3
 ROUNDS, TURNS, PARTS = 5, 2.0, 2
 """Times that a square is parted at most, and ratio of the turns of its normal from which it is along one side; and
 parts along a side of a chart before."""
+BETTER = 0.5
+"""What may be amiss of a part, over what was of the whole, at most: else it is not parted again."""
 SIDES_OF_PIECES = (1.0, 0.7, 0.5, 0.3)
 """Longest sides of the triangles of a body of pieces, in its sizes, of the meshes that are tried."""
 WELL, CLOSED = 1e-5, 1e-6
@@ -76,6 +78,9 @@ def _made(body: Surface) -> Patches | str:
         if np.max(found.off) < WORST * ground.size:
             return found
     failure: Exception | None = None
+    if hasattr(body, "squares"):
+        vertices, places, corners, pieces = body.squares(lobatto(DEGREE))
+        return _refined(ground, CoarseMesh(vertices, corners, pieces, places))
     for share in SIDES_OF_PIECES if is_creased(body) else (0.0,):
         try:
             found = _refined(ground, coarse_mesh(body, share))
@@ -93,15 +98,17 @@ def _made(body: Surface) -> Patches | str:
 def _refined(ground: "_Ground", mesh: "CoarseMesh") -> Patches:
     """Squares of a mesh, parted until they are the body."""
     current = _first(ground, mesh)
-    done = []
+    done, before = [], np.full(len(current.off), np.inf)
     for turn in range(ROUNDS + 1):
         off, turned = ground.misfit(current)
-        current = replace(current, off=off)
-        poor = ~((off < POSITION * ground.size) & (turned < NORMAL)) & (turn < ROUNDS)
-        done.append(current[~poor])
+        amiss = np.maximum(off / (POSITION * ground.size), turned / NORMAL)
+        # what is amiss along a side that a neighbour has too stays with the parts
+        poor = ~(amiss < 1) & ~(amiss > BETTER * before) & (turn < ROUNDS)
+        done.append(replace(current, off=off)[~poor])
         if not np.any(poor):
             break
-        current = _parted(ground, current[poor])
+        current = _parted(ground, replace(current, off=amiss)[poor])
+        before = current.off
     made = Patches.joined(done)
     wrong = np.flatnonzero(~(made.off < WORST * ground.size))
     if len(wrong):
@@ -195,9 +202,10 @@ def _first(ground: _Ground, mesh: CoarseMesh) -> Patches:
             f"{apart} sides of the body's squares are not shared by two, or a piece has an edge with itself"
         )
     plain = long & (least == most)
-    inside[plain] = ground.onto(inside[plain].reshape(-1, 3), np.repeat(least[plain], DEGREE - 1)).reshape(
-        -1, DEGREE - 1, 3
-    )
+    if mesh.places is None:
+        inside[plain] = ground.onto(inside[plain].reshape(-1, 3), np.repeat(least[plain], DEGREE - 1)).reshape(
+            -1, DEGREE - 1, 3
+        )
     for one, two in np.unique(np.stack([least, most], axis=1)[long & (least != most)], axis=0):
         mine = np.flatnonzero(long & (least == one) & (most == two))
         sides = np.broadcast_to([one, two], (len(mine), 2))
@@ -205,14 +213,16 @@ def _first(ground: _Ground, mesh: CoarseMesh) -> Patches:
         for number in np.unique(crease):
             rows = mine[crease == number]
             edge[rows] = ground.body.creases[number].kind == "edge"
-            inside[rows] = _on_crease(ground, ground.body.creases[number], lines[rows], int(one), int(two))[:, 1:-1]
-    lines[:, 1:-1] = inside
-    along = lines[numbers].reshape(m, 4, DEGREE + 1, 3)
+            if mesh.places is None:
+                inside[rows] = _on_crease(ground, ground.body.creases[number], lines[rows], int(one), int(two))[:, 1:-1]
     backward = (ends[..., 0] > ends[..., 1])[..., None, None]
-    along = np.where(backward, along[:, :, ::-1], along)
-    places = _coons(along)
+    places = mesh.places
+    if places is None:
+        lines[:, 1:-1] = inside
+        along = lines[numbers].reshape(m, 4, DEGREE + 1, 3)
+        places = _coons(np.where(backward, along[:, :, ::-1], along))
+        places[:, 1:-1, 1:-1] = _onto_within(ground, places, mesh.pieces)
     pointed = mesh.corners[:, 0] == mesh.corners[:, 3]
-    places[:, 1:-1, 1:-1] = _onto_within(ground, places, mesh.pieces)
     tip = tip_vertices(ground.body, mesh.vertices)[mesh.corners[:, 0]] & pointed
     spans = np.where(backward[..., 0], [1.0, 0.0], [0.0, 1.0])
     sides = numbers.reshape(m, 4)
@@ -323,7 +333,10 @@ def _long(patches: Patches) -> BoolArray:
 
 
 def _parted(ground: _Ground, patches: Patches) -> Patches:
-    """Squares halved along the sides over which they turn more, or along both, and brought onto the body again."""
+    """Squares halved along the sides over which they turn more, or along both, and brought onto the body again.
+
+    Each has ``off`` of the one that it is a part of.
+    """
     halved, parts = _long(patches), []
     for which, mine in enumerate((~halved[:, 1], ~halved[:, 0], np.all(halved, axis=1))):
         mine = np.flatnonzero(mine)
@@ -354,4 +367,4 @@ def _half(ground: _Ground, patches: Patches, right: bool | None, upper: bool | N
     for part, lanes in ((upper, [0, 1]), (right, [2, 3])):
         if part is not None:
             spans[:, lanes, 0 if part else 1] = patches.spans[:, lanes].mean(axis=2)
-    return Patches(x, patches.pieces, edges, patches.sides, spans, pointed, patches.tips & pointed, np.zeros(m))
+    return Patches(x, patches.pieces, edges, patches.sides, spans, pointed, patches.tips & pointed, patches.off)

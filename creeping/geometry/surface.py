@@ -87,7 +87,8 @@ class Surface(Protocol):
     given), ``non_smooth(points)`` (where it is not smooth enough for creeping rays, (..., 3) -> (...)),
     ``axis_of_revolution`` (a unit vector (3,) along the axis, through the origin, of a body of revolution, whose phase
     map then has no azimuth; None of others), ``tiling`` (charts whose unit squares cover the body once and meet along
-    their sides, if it has such), ``coarse_fit`` (the same body known less well, a `Surface`: what differs
+    their sides, if it has such), ``squares(at)`` (of a body of pieces: squares that cover it, for
+    `creeping.geometry.covering`), ``coarse_fit`` (the same body known less well, a `Surface`: what differs
     on it is uncertain) and ``coarse_factor`` (the error of the body over that difference, 1 if not given).
     """
 

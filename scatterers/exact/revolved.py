@@ -21,6 +21,7 @@ from scatterers.base.body import positive
 from scatterers.exact.body import SHARP, CreasedBody, NoCharts, Piece
 from scatterers.exact.profile import Segment
 from scatterers.exact.rings import ring_angles, ring_sizes, strip
+from scatterers.exact.squares import Squares, revolved_squares
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
 from scatterers.kernels.spline_constants import HEADER
@@ -39,6 +40,8 @@ ON_CREASE = 360
 """Points on a circle that is a crease."""
 SIDE = 0.75
 """Steps along and across the profile in edges of tiles: the third side is then 1.06 edges at most."""
+SECTORS = 6
+"""Squares about the axis, of affine images twice as many."""
 MOST_TILES = 1e7
 DENSE = 513
 """Points of a segment by which its length is measured."""
@@ -202,6 +205,11 @@ class Revolved(CreasedBody):
                 normals.append(self._normal(n))
                 pieces.append(np.full(len(x), number, dtype=np.int64))
         return np.concatenate(corners), np.concatenate(normals), np.concatenate(pieces)
+
+    def squares(self, at: FloatArray) -> Squares:
+        """Few squares that cover the body, and their points at u and v ``at`` (n,), from 0 to 1."""
+        found = revolved_squares(self._profile, SECTORS if self._stretch == 1.0 else 2 * SECTORS, at)
+        return found._replace(vertices=self._placed(found.vertices), places=self._placed(found.places))
 
     def _normal(self, local: FloatArray) -> FloatArray:
         iu, iv, iw = self._axes

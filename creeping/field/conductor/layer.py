@@ -46,8 +46,6 @@ def lowest_height(currents: ConductorCurrents) -> float:
     SurfaceError
         If the wavenumber is too high for any mesh of the body.
     """
-    if currents.solved:
-        return LOWEST
     nodes = body_nodes(currents.body, 2 * currents.wavenumber)
     return max(LOWEST, SPACED * nodes.spacing / 2 * currents.wavenumber / (2 * np.pi))
 
@@ -94,6 +92,7 @@ def _between(
     """E and H (n, 6) of a polarisation, and the larger error of the two (n,), from fields at heights (n, 6)."""
     n, total = nodes.normals, nodes.total_curvature / k
     J, off = surface.current[i].values, surface.current[i].error
+    assert surface.slope is not None
     on, slope = layer_terms(c, 0.0), np.tile([0.0, 1.0, 0.0, 0.0], (len(c), 1))
     above, terms = [layer_terms(c, 2 * np.pi * share) for share in heights], layer_terms(c, t)
     w, v = solved([on, slope, *above[:2]], terms), solved([on, *above], terms)
@@ -114,7 +113,7 @@ def _between(
     shared = [w[:, 2] * errors[0], w[:, 3] * errors[1]]
     of_charge = (w[:, 0] - w[:, 1] * total) * surface.charge_error[:, i]
     across = [v[:, j + 1] * error for j, error in enumerate(errors)]
-    of_H = np.linalg.norm([*shared, w[:, 0] * off, w[:, 1] * surface.slope_error[:, i], LEFT_OUT * left_out], axis=0)
+    of_H = np.linalg.norm([*shared, w[:, 0] * off, w[:, 1] * off, LEFT_OUT * left_out], axis=0)
     of_E = np.linalg.norm([*shared, *across, of_charge, LEFT_OUT * left_out, LEFT_OUT_ACROSS * left_out], axis=0)
     return field, np.maximum(of_E, of_H)
 

@@ -3,6 +3,7 @@
     on the body              E = (n.E) n,  H = J x n, by J and its divergence     `creeping.field.conductor.on_body`
     a quarter wavelength off the radiation of the whole body's currents           `creeping.field.conductor.total`
     nearer                   between the two                                      `creeping.field.conductor.layer`
+    anywhere, solved         tiles of the integral equation                       `creeping.field.equation.charge`
     in the shadow            creeping rays, where they state the smaller error    `creeping.field.conductor.shed`
 
 Sources: [CK13, sec. 6.2]; Derivations, F18, F20 and F26.
@@ -27,8 +28,9 @@ from creeping.field.conductor.total import incident_fields, total_fields
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.total import far_enough
 from creeping.field.currents.whole_body import POINTS as INNER
+from creeping.field.equation.currents import ConductorTileCurrents
 from creeping.field.lit_ground import LEFT, UNKNOWN, convex
-from creeping.field.near import MISSING, ON_BODY, checked_height, rays_alone
+from creeping.field.near import MISSING, OFF, ON_BODY, checked_height, rays_alone
 from creeping.field.point_result import FieldStatus, judged
 from creeping.field.polarisation import incident_mix, spherical_frame
 from creeping.field.served import Served, measured_field, zero_field
@@ -78,8 +80,8 @@ def conductor_field(
     Raises
     ------
     InvalidInputError
-        On points inside the body or not finite, a bad wavenumber, polarisation or method, for a weighted body
-        or one with edges, and for one with joints, or if the equation is asked for, where it cannot be solved.
+        On points inside the body or not finite, a bad wavenumber, polarisation or method, for a weighted body, and for
+        one with edges or joints, or if the equation is asked for, where it cannot be solved.
     SurfaceError
         If the equation must be solved and the wavenumber is too high for any mesh of the body.
 
@@ -155,8 +157,8 @@ def conductor_current(
     Raises
     ------
     InvalidInputError
-        On points off the body or not finite, a bad wavenumber, polarisation or method, for a weighted body or one with
-        edges, and for one with joints, or if the equation is asked for, where it cannot be solved.
+        On points off the body or not finite, a bad wavenumber, polarisation or method, for a weighted body, and for one
+        with edges or joints, or if the equation is asked for, where it cannot be solved.
     SurfaceError
         If the equation must be solved and the wavenumber is too high for any mesh of the body.
 
@@ -199,7 +201,7 @@ def _checked(
 ) -> tuple[float, ComplexArray]:
     """The wavenumber and the polarisations' components along theta and phi (2, p), if they and the body will do."""
     one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body, edgeless="the near field")
+    checked_plain(fan.body)
     checked_method(method, 2, PLAIN)
     return checked(wavenumber, 2), incident_mix(polarisation, fan.line.direction)
 
@@ -296,18 +298,32 @@ def _with_currents(
     """Fields with those of currents, or of the layer, at the points asked for where they must be or are better."""
     if currents is None:
         return fields
-    k, by = currents.wavenumber, "equation" if currents.solved else "currents"
+    if isinstance(currents, ConductorTileCurrents):
+        solution = _solved_at(currents, points[asked], dark[asked])
+        return [one.put_better(asked, its, must=must) for one, its in zip(fields, solution, strict=True)]
+    k = currents.wavenumber
     far = far_enough(fan.body, k, points[asked], lowest_height(currents))
     at, close = asked[far], asked[~far]
     if len(at):
         incident, scattered, error = total_fields(currents, points[at], dark[at])
         total = incident + scattered
-        new = [measured_field(total[..., i], error[:, i], by, "extinction") for i in range(len(fields))]
+        new = [measured_field(total[..., i], error[:, i], "currents", "extinction") for i in range(len(fields))]
         fields = [one.put_better(at, its, must=must) for one, its in zip(fields, new, strict=True)]
     if len(close):
         rows, layer = layer_fields(fan, currents, points[close], left)
         fields = [one.put_better(close[rows], its, must=must) for one, its in zip(fields, layer, strict=True)]
     return fields
+
+
+def _solved_at(currents: ConductorTileCurrents, points: FloatArray, dark: BoolArray) -> list[Served]:
+    """E and H (n, 6) of each polarisation by solved currents at points (n, 3), L, off the body."""
+    incident, scattered, error = total_fields(currents, points, dark)
+    error *= OFF
+    close = np.flatnonzero(currents.next_to(points))
+    if len(close):
+        error[close] = currents.error_next_to(points[close])
+    total = incident + scattered
+    return [measured_field(total[..., i], error[:, i], "equation", "extinction") for i in range(error.shape[1])]
 
 
 def _result(

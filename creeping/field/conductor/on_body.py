@@ -5,11 +5,10 @@
 
 J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
 the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
-(`creeping.field.conductor.mode_beams`). Where the integral equation is solved its solution stands for all of it
-(`creeping.field.equation`). Divergences are by `creeping.field.conductor.divergence`.
+(`creeping.field.conductor.mode_beams`). Where the integral equation is solved its solution stands for all of it, and
+n.E is that of `creeping.field.equation.charge`. Divergences are by `creeping.field.conductor.divergence`.
 Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
-ground BEYOND |J_thrown| stands besides, for what comes to it later. The charge of expansions has the error of J; that
-of the solution has it over kh, h the step of differences, and what two steps tell.
+ground BEYOND |J_thrown| stands besides, for what comes to it later. The charge of expansions has the error of J.
 
 Sources: [CK13, sec. 6.2]; Derivations, F18 and F26.
 """
@@ -62,16 +61,15 @@ class OnConductor:
         J (n, 3) of each polarisation.
     charge : (n, p) complex
         n.E, in units of the incident E.
-    slope : (n, p) complex
-        (1/k) dH_n/dn.
-    charge_error, slope_error : (n, p)
+    charge_error : (n, p)
+    slope : (n, p) complex, optional
+        (1/k) dH_n/dn of expansions, whose error is that of J.
     """
 
     current: list[Served]
     charge: ComplexArray
-    slope: ComplexArray
     charge_error: FloatArray
-    slope_error: FloatArray
+    slope: ComplexArray | None = None
 
 
 def on_conductor(
@@ -82,39 +80,29 @@ def on_conductor(
     left: FloatArray,
     currents: ConductorCurrents | None,
 ) -> OnConductor:
-    """J, n.E and dH_n/dn at points of the body (n, 3), for incident E0 (3, p).
+    """J and n.E, of expansions dH_n/dn too, at points of the body (n, 3), for incident E0 (3, p).
 
     ``left`` (p,) is what ``currents`` of the whole body leave inside of each incident wave, 0 on a body that is convex.
     """
-    solved = isinstance(currents, ConductorTileCurrents)
-    cross = crosses(fan.body, fan.line.direction, points, k, rough=solved)
     if isinstance(currents, ConductorTileCurrents):
-        served, total = _solved_on(currents, points, cross, left)
-    else:
-        served, total = _by_expansions(fan, cross, k, electric, left, currents)
+        return _solved_on(currents, points, left)
+    cross = crosses(fan.body, fan.line.direction, points, k)
+    served, total = _by_expansions(fan, cross, k, electric, left, currents)
     magnetic = np.cross(total, cross.normals[:, :, None], axis=1)
-    (charge, rough), (turned, uneven) = cross.divergence(total), cross.divergence(magnetic)
-    own = np.stack([one.error for one in served], axis=1)
-    if solved:
-        own = own / (k * cross.step)[:, None]
-    off, slope_off = np.hypot(own, rough / k), np.hypot(own, uneven / k)
-    return OnConductor(served, charge / (1j * k), -turned / k, off, slope_off)
+    charge, turned = cross.divergence(total), cross.divergence(magnetic)
+    error = np.stack([one.error for one in served], axis=1)
+    return OnConductor(served, charge / (1j * k), error, -turned / k)
 
 
-def _solved_on(
-    currents: ConductorTileCurrents, points: FloatArray, cross: Crosses, left: FloatArray
-) -> tuple[list[Served], ComplexArray]:
-    """J of solved currents at points (n,) for each polarisation, and at them and around them (9n, 3, p)."""
-    found = currents.on_body(cross.points)
-    total, count = found.values, len(points)
-    lit = found.lit[:count]
+def _solved_on(currents: ConductorTileCurrents, points: FloatArray, left: FloatArray) -> OnConductor:
+    """J and the charge of solved currents at points (n, 3), L."""
+    found = currents.on_body(points)
     served = []
     for i, share in enumerate(left):
-        J = total[:count, :, i]
-        one = measured_field(J, np.maximum(found.error[:count, i], ON_BODY * float(share)), "equation", "extinction")
-        one = replace(one, wave=np.where(lit[:, None], J, 0.0), creeping=np.where(lit[:, None], 0.0, J))
-        served.append(one)
-    return served, total
+        J, error = found.values[:, :, i], np.maximum(found.error[:, i], ON_BODY * float(share))
+        one, lit = measured_field(J, error, "equation", "extinction"), found.lit[:, None]
+        served.append(replace(one, wave=np.where(lit, J, 0.0), creeping=np.where(lit, 0.0, J)))
+    return OnConductor(served, *currents.charge_on_body(points))
 
 
 def _by_expansions(
@@ -127,7 +115,7 @@ def _by_expansions(
 ) -> tuple[list[Served], ComplexArray]:
     """J of expansions at points (n,) for each polarisation, and at them and around them (5n, 3, p)."""
     around, normals = cross.points, cross.normals
-    count = len(around) // cross.blocks
+    count = len(around) // 5
     lit, lit_off, share = _lit_at(fan, around, normals, k, electric)
     if currents is not None and not convex(fan):
         at = np.flatnonzero(share > 0)

@@ -18,11 +18,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.whole_body import DEPTH, POINTS, SHALLOW, SurfaceCurrents
+from creeping.field.equation.charge import scattered_electric, twice_normal
 from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.tiles import Tiles
 from creeping.geodesics.bundle import as_points
@@ -42,9 +43,10 @@ LEAST = 5e-5
 """What is left inside, at least: a few times what is left of the equation and what integrals over tiles err by."""
 UNRESOLVED = 2.0
 """Error by what tiles do not resolve, in what two ways to the same value differ by."""
-LEVEL, LEVEL_VECTOR = 1.5, 1.7
-"""Error of the far field over what is found of it, and that of a conductor, with which it holds in 95 of 100 directions
-(`studies.edges`)."""
+LEVELS = {"hard": 1.2, "soft": 1.2, "impedance": 0.9, "conductor": 1.5}
+"""Error of the far field over what is found of it, with which it holds in 95 of 100 directions (`studies.edges`)."""
+CLOSEST = 1e-6
+"""Distance from an edge, over that of the nodes next to it, at least: on the edge itself currents are infinite."""
 ABOVE = 1e-5
 """Height of points just above the nodes, in body sizes: polynomials of tiles may pass under the body."""
 
@@ -72,6 +74,11 @@ def twice_incident(
     return np.asarray(np.stack(rows, axis=1) * wave[:, None, :, None])
 
 
+def along_body(normals: FloatArray, vectors: ComplexArray) -> ComplexArray:
+    """Vectors (m, 3, c) without their parts along normals (m, 3)."""
+    return np.asarray(vectors - normals[:, :, None] * np.einsum("mx,mxc->mc", normals, vectors)[:, None])
+
+
 class OnBody(NamedTuple):
     """Current at places of the body (m, ...), their points and normals (m, 3), and whether they are lit (m,).
 
@@ -97,21 +104,41 @@ class _OnTiles(SurfaceCurrents):
         What it differs by from the polynomial of its tile that does not resolve; that and what is left inside are its
         error.
         """
-        tiles, soft = self.matrix.tiles, self.boundary.kind == "soft"
-        tile, u, v, _ = tiles.located(as_points(points).reshape(-1, 3))
-        x, normals = tiles.on(tile, u, v)
-        places = Places.at(x, normals, (tile, u, v))
+        return self._at(self._places(points))
+
+    def _at(self, places: Places) -> OnBody:
+        """The current at places of tiles."""
+        soft = self.boundary.kind == "soft"
         sums = self._received(places, self.values, "slope" if soft else "double")
         magnetic = self._incident[None] if self._incident.ndim else np.zeros((1, 3, 0))
         wave = twice_incident(self.boundary, places, self.direction[None], self.wavenumber, magnetic)
         values = _vectors(places, wave[:, :, 0]) if self._incident.ndim else wave[:, 0]
-        lit = lit_ground(self.body, x, normals, self.direction)
+        lit = lit_ground(self.body, places.points, places.normals, self.direction)
         values = values - sums if soft else values + sums
-        apart = np.abs(values - self.matrix.tiles.interpolated_at(self.values, tile, u, v))
-        unit = self.wavenumber if soft else 1.0
-        if apart.ndim > 1:
-            apart = np.linalg.norm(apart, axis=1)
-        return OnBody(values, np.hypot(ON_BODY * unit * self._left, UNRESOLVED * apart), x, normals, lit)
+        error = self._unresolved(places, self.values, values, self.wavenumber if soft else 1.0)
+        return OnBody(values, error, places.points, places.normals, lit)
+
+    def _places(self, points: ArrayLike) -> Places:
+        """Places of the body nearest to points (m, 3), L."""
+        tile, u, v, _ = self.matrix.tiles.located(as_points(points).reshape(-1, 3))
+        return _on_tiles(self.matrix.tiles, (tile, u, v))
+
+    def _unresolved(self, places: Places, nodes: ComplexArray, values: ComplexArray, unit: float) -> FloatArray:
+        """Error of values (m, ...) at places by what the polynomials of those at the nodes differ from them by."""
+        assert places.own is not None
+        between, large = self.matrix.tiles.interpolated_at(nodes, *places.own), values
+        if values.ndim == 3:
+            between = along_body(places.normals, between)
+            apart, large = (np.linalg.norm(part, axis=1) for part in (values - between, values))
+        else:
+            apart = values - between
+        error = np.hypot(ON_BODY * unit * self._left, UNRESOLVED * np.abs(apart))
+        if self.boundary.kind in ("soft", "conductor"):
+            # polynomials are bounded at edges, where these grow like the root of the distance at most
+            near = np.minimum(self.matrix.tiles.from_edge(*places.own), 1.0)
+            grown = np.sqrt(1 / np.maximum(near, CLOSEST)) - 1
+            error = np.hypot(error, (grown * np.abs(large).T).T)
+        return np.asarray(error)
 
     def _received(self, places: Places, values: ComplexArray, kind: str = "double") -> ComplexArray:
         """What places (m,) receive of values at the nodes, as of `Matrix.received`: (m, ...), J as vectors."""
@@ -127,9 +154,14 @@ class _OnTiles(SurfaceCurrents):
         r = observers_of(directions)
         edges = self.matrix.edge_term.far(self.values, self.boundary.kind, r)
         # the same integral by two rules: what they differ by the polynomials of tiles do not resolve
-        finer = self._finer._radiated(self.matrix.tiles.interpolated(self.values), self._finer.lit, r)
+        finer = self._finer._radiated(self._at_fine(self.values), self._finer.lit, r)
         unknown = np.hypot(edges[:, 0] if known.ndim == 1 else edges[:, None], UNRESOLVED * np.abs(self.far(r) - finer))
-        return np.asarray((LEVEL_VECTOR if known.ndim > 1 else LEVEL) * np.hypot(known, unknown))
+        return np.asarray(LEVELS[self.boundary.kind] * np.hypot(known, unknown))
+
+    def _at_fine(self, values: ComplexArray) -> ComplexArray:
+        """Values at the nodes, at the finer ones."""
+        found = self.matrix.tiles.interpolated(values)
+        return found if values.ndim == 1 else along_body(self.matrix.tiles.fine[1], found)
 
     def _off_the_body(self, points: ArrayLike) -> FloatArray:
         return as_points(points).reshape(-1, 3)
@@ -137,7 +169,7 @@ class _OnTiles(SurfaceCurrents):
     def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         far = ~self.next_to(points)
         out = np.empty((len(points), *values.shape[1:]), dtype=complex)
-        out[far] = self._finer._field(self.matrix.tiles.interpolated(values), points[far])
+        out[far] = self._finer._field(self._at_fine(values), points[far])
         out[~far] = self._next_to(values, points[~far])
         return out
 
@@ -191,6 +223,12 @@ class _OnTiles(SurfaceCurrents):
         )
 
 
+def _on_tiles(tiles: Tiles, own: tuple[IntArray, FloatArray, FloatArray]) -> Places:
+    """Places of tiles (m,) at u and v."""
+    x, normals = tiles.on(*own)
+    return Places.at(x, normals, own)
+
+
 def _inside(body: Surface, tiles: Tiles, wavelength: float) -> FloatArray:
     """Points inside a body (m, 3), L, evenly spread, as deep as it is thick enough for."""
     x = box_points(body)
@@ -227,12 +265,56 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
     ----------
     matrix : Matrix
         Of the equation that they satisfy.
+    charges : callable
+        Gives n.E at the nodes of E0 along theta and phi (n, 2).
     """
 
     matrix: Any = None
+    charges: Any = None
+
+    @cached_property
+    def charge(self) -> ComplexArray:
+        """n.E at the nodes (n, p), in units of the incident E."""
+        return np.asarray(self.charges() @ self.mix)
+
+    def charge_on_body(self, points: ArrayLike) -> tuple[ComplexArray, FloatArray]:
+        """n.E and its error, as `on_body`: (m, p) each."""
+        return self._charge_at(self._places(points))
+
+    def _charge_at(self, places: Places) -> tuple[ComplexArray, FloatArray]:
+        """n.E and its error at places of tiles."""
+        matrix, d = self.matrix.soft_one, self.direction[None]
+        J, electric = self.values[:, :, None], self.incident_electric[None]
+        given = twice_normal(matrix, places, J, d, electric)[:, 0]
+        values = given - matrix.received(places, self.charge, "slope")
+        return values, self._unresolved(places, self.charge, values, 1.0)
+
+    def scattered_electric(self, points: ArrayLike) -> ComplexArray:
+        """Scattered E at points (m, 3), L, at any distance from the body: (m, 3, p)."""
+        x = self._off_the_body(points)
+        near = self.next_to(x)
+        out = np.empty((len(x), 3, self.values.shape[2]), dtype=complex)
+        out[~near] = self._electric(self.values, x[~near])
+        if np.any(near):
+            out[near] = scattered_electric(self.matrix.soft_one, x[near], self.values, self.charge)
+        return out
+
+    def error_next_to(self, points: FloatArray) -> FloatArray:
+        """Error of E and H at points (m, 3), L, next to the body: (m, p).
+
+        It is that of J and n.E beneath, which fades as what tiles do not resolve does, by the square of their width
+        over the height, down to what is left inside.
+        """
+        tiles = self.matrix.tiles
+        tile, u, v, height = tiles.located(points)
+        own = tiles.aside(tile, u, v, height)
+        places = _on_tiles(tiles, own)
+        beneath = np.maximum(self._at(places).error, self._charge_at(places)[1])
+        faded = np.minimum(1.0, tiles.widths[tile] / np.maximum(height, 1e-300)) ** 2
+        return np.asarray(np.maximum(faded[:, None] * beneath, ON_BODY * np.max(self.left_of_each, axis=0)))
 
     def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
-        found: ComplexArray = self._finer._electric(self.matrix.tiles.interpolated(values), points)
+        found: ComplexArray = self._finer._electric(self._at_fine(values), points)
         return found
 
     def changed_electric(self, points: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ u(x) - M u and M u (x') are what the field that u gives inside the body is, at i
 one of them lets waves stand inside at resonances, the two together see what goes in and throw nothing back.
 
 In the unknowns u sqrt(w) the transpose in the weights is that of the matrix. What a tile sends to points near it is
-integrated with the polynomials through its nodes, of J by Cartesian components.
+integrated with the polynomials through its nodes, of J by Cartesian components less their part along the normal.
 
 Sources: [WY94], [SS86]; Derivations, F32 and F36.
 """
@@ -21,15 +21,18 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
-from creeping.field.boundary import Boundary
+from creeping.field.boundary import SOFT, Boundary
 from creeping.field.equation.edge_term import EdgeTerm
-from creeping.field.equation.tiles import Tiles
+from creeping.field.equation.tiles import Tiles, gauss
+from creeping.geometry.squares import interpolation
 from creeping.kernels.threads import in_threads
 
 DEPTH, SHALLOWER, LEAST = np.pi / 2, 0.6, 0.15
 """Depth of the second surface over 1/k, the factor by which it is less where the body is thin, and least share."""
 CLEAR = 0.7
 """Least distance of its points from all nodes, over the depth."""
+TANGENT = 7
+"""Nodes along a side of a tile at which J is made tangent to the body."""
 EACH, VECTOR = 2.5e-9, 4.0
 """Seconds of a pair, and what a pair of a conductor takes of that."""
 BLOCK = 512
@@ -84,6 +87,11 @@ class Matrix:
         self.root = np.sqrt(tiles.weights)
         self.columns = 2 if self.vector else 1
         self.inside: FloatArray | None = None
+
+    @cached_property
+    def soft_one(self) -> "Matrix":
+        """That of soft bodies on the same tiles."""
+        return self if self.soft else Matrix(self.tiles, self.k, SOFT)
 
     @cached_property
     def edge_term(self) -> EdgeTerm:
@@ -170,21 +178,52 @@ class Matrix:
         near = tiles.near(places.points)
         starts, targets = near
         columns = np.repeat(np.arange(tiles.count), np.diff(starts))[:, None] * pp + np.arange(pp)
-        mode = 2 if self.vector or kind == "slope" else (1 if len(single) else 0)
+        if self.vector:
+            return targets, columns, self._near_vectors(places, near)
+        mode = 2 if kind == "slope" else (1 if len(single) else 0)
         found = tiles.rows(places.points, near, self.k, mode, places.own)
         if mode < 2:
             double = found[:, 0] if kind == "double" else 0.0
             return targets, columns, np.asarray(double + single[columns] * found[:, 1] if mode else double)
-        lean = np.einsum("pc,pcj->pj", places.normals[targets], found)
-        if not self.vector:
-            return targets, columns, lean
-        out = np.empty((len(targets), 2, pp, 2), dtype=complex)
-        for row, p in enumerate((places.a[targets], places.b[targets])):
-            along = np.einsum("pc,pcj->pj", p, found)
-            for column, q in enumerate((self.nodes.a[columns], self.nodes.b[columns])):
-                out[:, row, :, column] = along * np.einsum("pc,pjc->pj", places.normals[targets], q)
-                out[:, row, :, column] -= np.einsum("pc,pjc->pj", p, q) * lean
-        return targets, columns, out
+        return targets, columns, np.einsum("pc,pcj->pj", places.normals[targets], found)
+
+    def _near_vectors(self, places: Places, near: tuple[IntArray, IntArray]) -> ComplexArray:
+        """The integrals of a conductor over tiles near places, of polynomials without their part along the normal.
+
+        Between nodes Cartesian components of J have one, and n_x.J of it is no smaller next to x than elsewhere. The
+        polynomials are those through TANGENT x TANGENT nodes, where it is taken away.
+        """
+        tiles, finer, (starts, targets) = self.tiles, self._finer, near
+        found = finer.rows(places.points, near, self.k, 2, places.own)
+        normals = finer.normals.reshape(tiles.count, -1, 3)
+        q = np.stack([self.nodes.a, self.nodes.b], axis=1).reshape(tiles.count, -1, 2, 3)
+        out = np.empty((len(targets), 2, tiles.p**2, 2), dtype=complex)
+        for tile in np.flatnonzero(np.diff(starts)):
+            at = slice(starts[tile], starts[tile + 1])
+            of = places.part(targets[at])
+            # J_f = sum_j l_j(y_f) [q_j - n_f (n_f.q_j)] at the finer nodes
+            n, along = normals[tile], q[tile]
+            tangent = along[None] - np.einsum("fjc,fx->fjcx", np.einsum("fx,jcx->fjc", n, along), n)
+            tangent = (self._at_finer[:, :, None, None] * tangent).reshape(len(n), -1, 3)
+            lean = np.einsum("pc,pcf->pf", of.normals, found[at])
+            for row, p in enumerate((of.a, of.b)):
+                part = np.einsum("pc,pcf->pf", p, found[at])
+                values = sum(
+                    (part * of.normals[:, x, None] - lean * p[:, x, None]) @ tangent[:, :, x] for x in range(3)
+                )
+                out[at, row] = values.reshape(-1, tiles.p**2, 2)
+        return out
+
+    @cached_property
+    def _finer(self) -> Tiles:
+        """The same tiles with TANGENT x TANGENT nodes."""
+        return self.tiles.with_nodes(TANGENT)
+
+    @cached_property
+    def _at_finer(self) -> FloatArray:
+        """What the polynomials of nodes (p p,) are at the finer ones of a tile (TANGENT^2, p p)."""
+        rows = interpolation(gauss(self.tiles.p)[0], gauss(TANGENT)[0])
+        return np.asarray(np.kron(rows, rows))
 
 
 def second_surface(tiles: Tiles, wavenumber: float) -> tuple[IntArray, FloatArray]:

@@ -23,10 +23,10 @@ from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.block_gmres import STEPS, TOLERANCE, block_gmres
+from creeping.field.equation.charge import charges
+from creeping.field.equation.columns import TOGETHER, is_dense, solved_columns
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
 from creeping.field.equation.matrix import EACH, VECTOR, Matrix
-from creeping.field.equation.split_product import SplitProduct
 from creeping.field.equation.tiles import Tiles, tiles_of
 from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
@@ -37,12 +37,8 @@ from creeping.geometry.directions import unit_directions
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.unit import unit_of
 from creeping.kernels.threads import thread_count
-from creeping.storage.memory import budget, within_budget
+from creeping.storage.memory import within_budget
 
-TOGETHER = 2e8
-"""Bytes of what GMRES keeps of incidences that are solved together."""
-DENSE = 4e9
-"""Bytes of a matrix, and of its transpose, that are kept at most."""
 PRODUCTS = 25
 """Products with the matrix, about, that an incidence takes."""
 PER_NODE, NEAR_VECTOR = 5e-4, 2.0
@@ -138,11 +134,6 @@ def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]
     return near / thread_count() + PRODUCTS * columns * each * nodes, memory * nodes + kept
 
 
-def is_dense(nodes: int, boundary: Boundary) -> bool:
-    """Whether the matrix is kept: else its products are sums (`creeping.field.equation.split_product`)."""
-    return 16.0 * nodes**2 * (4 if boundary.kind == "conductor" else 1) <= min(DENSE, budget())
-
-
 class Solution:
     """What `solve` found: currents of the whole body for m incidences, and the fields that they give.
 
@@ -187,25 +178,9 @@ class Solution:
         right, under = (
             twice_incident(kind, places, directions, wavenumber, magnetic) for places in (matrix.nodes, matrix.inner)
         )
-        right = right.reshape(*right.shape[: matrix.columns], -1)
-        right[matrix.at] -= 1j * under.reshape(-1, *right.shape[1:])
-        n, columns = len(right) * matrix.columns, right.shape[-1]
-        right = (right.reshape(self.nodes, -1) * matrix.root[:, None]).reshape(n, columns)
-        product = matrix.product if is_dense(self.nodes, kind) else SplitProduct(matrix)
-        found, left = [], []
-        many = max(1, min(columns, int(TOGETHER / (16 * n * (STEPS + 1)))))
-        self.steps = 0
-        for first in range(0, columns, many):
-            if first:
-                tell(f"incidence {first // (2 if matrix.vector else 1)} of {len(directions)}")
-            part = right[:, first : first + many]
-            values, off, steps = block_gmres(product, part, TOLERANCE, STEPS)
-            found.append(np.stack([values, part - product(values)]))
-            left.append(off)
-            self.steps = max(self.steps, steps)
-        both = np.concatenate(found, axis=2).reshape(2, self.nodes, matrix.columns, columns)
-        both = both / matrix.root[:, None, None]
-        self.left = np.concatenate(left)
+        found = solved_columns(matrix, right, under, tell)
+        self.steps, self.left = found.steps, found.left
+        both = np.stack([found.values, found.change])
         if matrix.vector:
             a, b = matrix.nodes.a[:, :, None], matrix.nodes.b[:, :, None]
             # (n, 3, m, 2)
@@ -215,8 +190,6 @@ class Solution:
             both = both[:, :, 0]
         self._values: ComplexArray = both[0]
         self._change: ComplexArray = both[1]
-        # fields at points make rows of their own
-        matrix.__dict__.pop("whole", None)
 
     def __repr__(self) -> str:
         worst = max(float(self.currents(number).extinction) for number in range(min(len(self.directions), 8)))
@@ -232,7 +205,8 @@ class Solution:
             tiles, d = self._matrix.tiles, self.directions[incidence]
             vector = self._kind.kind == "conductor"
             at = (slice(None),) * (2 if vector else 1) + (incidence,)
-            make = ConductorTileCurrents if vector else TileCurrents
+            known: dict[str, Any] = {"charges": lambda: self._charges[:, incidence]} if vector else {}
+            make: Any = ConductorTileCurrents if vector else TileCurrents
             found = self._made[incidence] = make(
                 body=self.body,
                 direction=d,
@@ -250,8 +224,14 @@ class Solution:
                 boundary=self._kind,
                 solved=True,
                 matrix=self._matrix,
+                **known,
             )
         return found
+
+    @cached_property
+    def _charges(self) -> ComplexArray:
+        """n.E at the nodes (n, m, 2)."""
+        return charges(self._matrix.soft_one, self._values, self.directions)
 
     @cached_property
     def _made(self) -> dict[int, TileCurrents | ConductorTileCurrents]:

@@ -26,8 +26,8 @@ SIDE = 0.82
 """Longest sides of tiles, in wavelengths."""
 TURN = 0.52
 """Angle by which the normal turns along a side, radians, at most: currents are no smoother than the body."""
-SIDE_OF_CHARGE, VARYING = 0.72, 0.5
-"""Longest sides where a conductor's charge is asked for; and shares of sides and turns where the admittance varies."""
+VARYING = 0.5
+"""Share of sides and turns where the admittance varies."""
 SLACK = 0.1
 """Share of a tile by which tiles may be too long before there is one more."""
 FINE = 12
@@ -138,6 +138,10 @@ class Tiles:
         in_threads(work, self.count, least=4, multiple=1, seconds=1e-3)
         return np.asarray(out[:, :3] + 1j * out[:, 3:])
 
+    def with_nodes(self, p: int) -> "Tiles":
+        """The same tiles with p x p nodes."""
+        return Tiles(self.shapes, *_nodes(self.shapes, p), p, self.edges)
+
     @cached_property
     def fine(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """FINE x FINE nodes of every tile: x and n (t FINE^2, 3), and weights, L^2."""
@@ -196,6 +200,29 @@ class Tiles:
                 lane[closer] = values[closer]
         return best[0], best[1], best[2], best[3]
 
+    @cached_property
+    def widths(self) -> FloatArray:
+        """Shorter sides of the tiles (t,), L, about."""
+        return np.asarray(self.weights.reshape(self.count, -1).sum(axis=1) / self.sizes)
+
+    def from_edge(self, tile: IntArray, u: FloatArray, v: FloatArray) -> FloatArray:
+        """Distance of places of tiles (m,) from their edge over that of the nodes next to it; infinite on others."""
+        side = self.edges[tile, 1]
+        along = np.where(side < 2, u, v)
+        away = np.where(side % 2 == 0, along, 1 - along)
+        return np.where(side < 0, np.inf, away / gauss(self.p)[0][0])
+
+    def aside(
+        self, tile: IntArray, u: FloatArray, v: FloatArray, away: FloatArray
+    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Places of tiles (m,) moved away from their edge to a distance (m,), L, or half of a tile: as given."""
+        side, least = self.edges[tile, 1], np.minimum(away / self.widths[tile], 0.5)
+        u, v = (
+            np.clip(at, np.where(side == one, least, 0.0), 1 - np.where(side == one + 1, least, 0.0))
+            for at, one in ((u, 0), (v, 2))
+        )
+        return tile, u, v
+
     def on(self, tile: IntArray, u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Points of tiles (m,) at u and v, and unit normals there: (m, 3) each."""
         x, along, across = (part[:, 0, 0] for part in on_squares(self.shapes[tile], u[:, None], v[:, None]))
@@ -206,12 +233,10 @@ class Tiles:
 def tiles_of(patches: Patches, wavenumber: float, boundary: Boundary) -> Tiles:
     """Tiles of a body's squares for a wavenumber, 1/L, and a boundary.
 
-    An admittance that varies is known at nodes alone, so these are closer. So are those of a conductor without edges,
-    whose current and charge are asked for between nodes: there its equation errs as the polynomials of tiles do.
+    An admittance that varies is known at nodes alone, so these are closer.
     """
-    side = SIDE_OF_CHARGE if boundary.kind == "conductor" and not patches.edges.any() else SIDE
     share = VARYING if boundary.varies else 1.0
-    return tiles_for(patches, wavenumber, side=share * side, turn=share * TURN)
+    return tiles_for(patches, wavenumber, side=share * SIDE, turn=share * TURN)
 
 
 def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, turn: float = TURN, p: int = POINTS) -> Tiles:

@@ -39,41 +39,23 @@ def test_sphere_at_all_angles(ball, mie, rng, k, limit):
 
 @pytest.mark.slow
 def test_charge_where_the_equation_is_solved(ball, mie, rng):
-    """Anywhere, between nodes and on them: sums over nodes are rough from one point to the next."""
-    nodes = body_nodes(ball.body, 1.5 * 8.0).points[::101]
-    x = np.concatenate([directions(rng, 50), nodes, nodes + 1e-3 * rng.normal(size=nodes.shape)])
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    x = directions(rng, 200)
     found = cr.conductor_current(ball, x, wavenumber=8.0, method="equation")
-    _, charge = wrong(found, x, *mie(8.0, x))
+    off, charge = wrong(found, x, *mie(8.0, x))
     assert set(found.method.ravel()) == {"equation"}
-    assert np.quantile(charge, 0.99) < 0.02
-    assert np.mean(charge <= found.charge_error) > 0.97
-    assert np.all(found.charge_error >= found.error)
+    assert off.max() < 1e-3 and charge.max() < 2e-3
+    assert np.all(off <= found.error) and np.all(charge <= found.charge_error)
     field = cr.conductor_field(ball, x[:5], wavenumber=8.0, method="equation")
-    np.testing.assert_array_equal(field.error, found.charge_error[:5])
+    np.testing.assert_array_equal(field.error, np.maximum(found.error, found.charge_error)[:5])
 
 
-def test_divergence_is_of_fourth_order_between_wide_steps(rng):
-    """Of v = c - (c.n) n on a sphere, whose divergence is -2 c.n; and what two steps tell is more than is left."""
+def test_divergence_of_a_field_on_a_sphere(rng):
+    """v = c - (c.n) n has div v = -2 c.n."""
     x, c = directions(rng, 60), np.array([0.3, -0.5, 0.8])
-    ball = sc.Sphere()
-    left = []
-    for k in (2.0, 4.0):
-        cross = crosses(ball, OBLIQUE, x, k, rough=True)
-        assert cross.blocks == 9
-        assert len(cross.points) == 9 * len(x)
-        n = cross.normals
-        v = (c - (n @ c)[:, None] * n)[:, :, None] * np.array([1.0, 2j])
-        found, off = cross.divergence(v)
-        wrong = np.abs(found - np.outer(-2 * x @ c, [1.0, 2j]))
-        assert np.all(wrong <= off + 1e-12)
-        left.append(wrong.max())
-    assert left[1] < left[0] / 12
-    close = crosses(ball, OBLIQUE, x, 2.0, rough=False)
-    n = close.normals
-    found, off = close.divergence((c - (n @ c)[:, None] * n)[:, :, None])
-    np.testing.assert_allclose(found[:, 0], -2 * x @ c, atol=1e-3)
-    assert not np.any(off)
+    cross = crosses(sc.Sphere(), OBLIQUE, x, 2.0)
+    n = cross.normals
+    v = (c - (n @ c)[:, None] * n)[:, :, None] * np.array([1.0, 2j])
+    np.testing.assert_allclose(cross.divergence(v), np.outer(-2 * x @ c, [1.0, 2j]), atol=1e-3)
 
 
 def test_the_focus_behind_a_sphere(ball, mie):

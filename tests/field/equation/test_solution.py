@@ -102,9 +102,9 @@ def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
 
 def test_squares_that_do_not_share_their_sides_are_refused():
     class Torn(sc.Cylinder):
-        def tiles(self, edge):
-            corners, normals, pieces = super().tiles(edge)
-            return corners[1:], normals[1:], pieces[1:]
+        def squares(self, at):
+            found = super().squares(at)
+            return found._replace(**{name: getattr(found, name)[1:] for name in ("places", "corners", "pieces")})
 
     with pytest.raises(SurfaceError, match="sides of the body's squares are not shared by two"):
         cr.solve(Torn(1.0, 2.0), (1, 0, 0), wavenumber=2.0, boundary="hard")

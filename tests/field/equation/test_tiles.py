@@ -10,12 +10,16 @@ from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.tiles import tiles_for
 from creeping.geometry.covering import patches_of
 
+HALF = 25 * 29 / 150 * (np.sqrt(1 - (np.linspace(0, 7 / 25, 2001)) ** 2) - 0.96)
+ALMOND = np.pi / 3 * (2 / 3 * 5 / 12 * (29 / 150) ** 2 + np.trapezoid(HALF**2, dx=7 / 12 / 2000))
+"""Volume of half an ellipsoid and of a half ogive whose cross-sections are ellipses."""
 BODIES = {
     "sphere": (lambda: sc.Sphere(1.5), 9 * np.pi, 4.5 * np.pi),
     "torus": (lambda: sc.Torus(R=1.0, r=0.4), 1.6 * np.pi**2, 0.32 * np.pi**2),
     "cylinder": (lambda: sc.Cylinder(0.5, 2.0), 2.5 * np.pi, 0.5 * np.pi),
     "cone": (lambda: sc.Cone(1.0, 2.0), np.pi * (1 + 5**0.5), 2 / 3 * np.pi),
     "capsule": (lambda: sc.Capsule(0.5, 3.0), 3 * np.pi, 2 / 3 * np.pi),
+    "almond": (lambda: sc.Almond(1.0), None, ALMOND),
     "box": (lambda: sc.Implicit("max(x-1,-x-1,y-1,-y-1,z-1,-z-1)", bounds=((-1.1,) * 3, (1.1,) * 3)), 24.0, 8.0),
 }
 """Bodies, their areas and their volumes."""
@@ -27,7 +31,7 @@ def test_squares_close_and_have_the_area_and_volume_of_the_body(name):
     patches = patches_of(body())
     tiles = tiles_for(patches, 4.0)
     assert patches.gap < 1e-8
-    assert_allclose(tiles.weights.sum(), area, rtol=2e-5)
+    assert area is None or np.isclose(tiles.weights.sum(), area, rtol=2e-5)
     assert_allclose((tiles.weights @ np.sum(tiles.points * tiles.normals, axis=1)) / 3, volume, rtol=2e-5)
 
 

@@ -18,6 +18,14 @@ def test_every_case_has_its_file_and_every_file_its_case():
 def test_computed_anew_they_are_the_same(name):
     now, then = stored.cases()[name](), stored.read(name)
     assert set(now) == set(then)
+    # the limit of sources at some heights, which multiplies what another LAPACK differs by
+    spread = then.pop("spread", None)
     for key, values in now.items():
+        if key == "spread":
+            assert 0.5 < np.median(values) / np.median(spread) < 2
+            continue
         # least squares of ill-conditioned sources: another LAPACK differs by more than rounding
-        np.testing.assert_allclose(then[key], values, rtol=0, atol=1e-6 * np.abs(values).max())
+        off, most = np.abs(then[key] - values), 1e-6 * np.abs(values).max()
+        if spread is not None and key == "values":
+            most = 1e3 * most + 3 * spread.reshape(*spread.shape, *(1,) * (values.ndim - 2))
+        assert np.all(off <= most), np.max(off - most)

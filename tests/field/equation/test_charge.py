@@ -1,0 +1,74 @@
+"""Charge and electric field of solved conductors: Mie's series, Gauss's law, what holds on faces, edges."""
+
+import numpy as np
+import pytest
+import shared_bodies as sc
+from body_checks import directions
+
+import creeping as cr
+from creeping.field.body_currents import kept_currents
+from creeping.field.equation.currents import ON_BODY
+from creeping.field.polarisation import incident_mix
+from studies.reference.sphere import pec_total_field
+
+D = np.array([0.48, 0.6, -0.64])
+
+
+@pytest.mark.parametrize("k", [0.1, 3.0])
+def test_sphere(k, rng):
+    """At no height, and at no wavenumber, is there a place where the equation does not hold."""
+    along, electric = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    solution = cr.solve(sc.Sphere(), along, wavenumber=k, boundary="pec")
+    currents = solution.currents().polarised(incident_mix(electric, along))
+    n = directions(rng, 12)
+    E, H = pec_total_field(k, 1.0, n, along, electric)
+    charge, error = currents.charge_on_body(n)
+    off = np.abs(charge[:, 0] - np.sum(n * E, axis=1))
+    assert off.max() < 1e-3 and np.all(off <= error[:, 0])
+    J = currents.on_body(n)
+    off = np.linalg.norm(J.values[:, :, 0] - np.cross(n, H), axis=1)
+    assert off.max() < 2e-4 and np.all(off <= J.error[:, 0])
+    for height in (1e-4, 0.3):
+        x = (1 + height) * n
+        E, H = pec_total_field(k, 1.0, x, along, electric)
+        wave = np.exp(1j * k * (x @ along))[:, None]
+        np.testing.assert_allclose(currents.scattered_electric(x)[:, :, 0], E - wave * electric, atol=1e-3)
+        np.testing.assert_allclose(currents.scattered(x)[:, :, 0], H - wave * np.cross(along, electric), atol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def flat():
+    """A cylinder with flat ends, and its fan."""
+    body = sc.Cylinder(0.5, 1.0)
+    line = cr.shadow_line(body, direction=D)
+    return cr.launch(cr.DirectFlow(body, rtol=1e-6), line, length=1.0, n_rays=16)
+
+
+def test_next_to_faces_and_edges(flat):
+    k, up, out = 4.0, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    x = np.array([[0.1, 0.2, 0.5 + 1e-4], [-0.3, 0.1, 0.5 + 1e-4], [0.5 + 1e-4, 0.0, 0.2]])
+    n = np.stack([up, up, out])
+    field = cr.conductor_field(flat, x, wavenumber=k)
+    assert np.all(field.ok) and set(field.method.ravel()) == {"equation"}
+    # E along the normal and H across it
+    across = np.linalg.norm(np.cross(n[:, :, None], field.E, axis=1), axis=1)
+    along = np.abs(np.einsum("mx,mxp->mp", n, field.H))
+    assert np.all(across < 0.02) and np.all(along < 0.02) and np.all(np.maximum(across, along) <= field.error)
+    found = cr.conductor_current(flat, x - 1e-4 * n, wavenumber=k)
+    np.testing.assert_allclose(found.charge, np.einsum("mx,mxp->mp", n, field.E), atol=0.02)
+    np.testing.assert_allclose(found.values, np.cross(n[:, :, None], field.H, axis=1), atol=0.02)
+    # the nearer to the rim the larger is the field, and what is not known of it
+    rim = np.array([0.5, 0.0, 0.5]) + np.array([1e-4, 1e-3, 1e-2, 0.1])[:, None] * (up + out)
+    field = cr.conductor_field(flat, rim, wavenumber=k, polarisation=np.cross(D, np.cross(D, up)))
+    size = np.linalg.norm(field.E, axis=1)
+    assert np.all(np.diff(size) < 0) and np.all(np.diff(field.error) < 0) and not field.ok[0] and field.ok[3]
+
+
+def test_no_charge_is_made_and_units_scale(flat):
+    currents = kept_currents(flat, 4.0, "pec")
+    area = currents.weights.sum()
+    assert np.all(np.abs(currents.weights @ currents.charge) < 1e-3 * area)
+    small = cr.solve(sc.Cylinder(0.5e-3, 1e-3), D, wavenumber=4e3, boundary="pec").currents()
+    x = np.array([[0.1, 0.0, 0.501], [0.6, 0.0, 0.3]])
+    np.testing.assert_allclose(small.scattered_electric(1e-3 * x), currents.scattered_electric(x), atol=1e-4)
+    assert ON_BODY * currents.extinction <= currents.error_next_to(x).max()
