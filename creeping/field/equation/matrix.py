@@ -102,7 +102,7 @@ class Matrix:
     def whole(self) -> np.ndarray:
         """All entries, single precision."""
         own = self.rows(self.nodes, self.root)
-        own = own.T.copy() if self.soft else np.negative(own, out=own)
+        own = _transposed(own) if self.soft else np.negative(own, out=own)
         own[np.diag_indices(len(own))] += 1.0
         factor = np.complex64(-1j if self.soft else 1j)
         for first in range(0, len(self.at), BLOCK):
@@ -224,6 +224,16 @@ class Matrix:
         """What the polynomials of nodes (p p,) are at the finer ones of a tile (TANGENT^2, p p)."""
         rows = interpolation(gauss(self.tiles.p)[0], gauss(TANGENT)[0])
         return np.asarray(np.kron(rows, rows))
+
+
+def _transposed(square: np.ndarray) -> np.ndarray:
+    """A square matrix (n, n) transposed in its place, by blocks that a cache holds."""
+    starts = range(0, len(square), BLOCK)
+    for i in starts:
+        for j in range(i, len(square), BLOCK):
+            upper, lower = square[i : i + BLOCK, j : j + BLOCK], square[j : j + BLOCK, i : i + BLOCK]
+            upper[:], lower[:] = lower.T.copy(), upper.T.copy()
+    return square
 
 
 def second_surface(tiles: Tiles, wavenumber: float) -> tuple[IntArray, FloatArray]:

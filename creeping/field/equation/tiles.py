@@ -117,7 +117,7 @@ class Tiles:
         mode: int,
         own: tuple[IntArray, FloatArray, FloatArray] | None = None,
     ) -> ComplexArray:
-        """Integrals of modes of `creeping.field.kernels.tile_rows` over tiles near points: (pairs, 3, p p).
+        """Integrals of modes of `creeping.field.kernels.tile_rows` over tiles near points: (pairs, mode + 1, p p).
 
         ``own`` is the tile that each point is on, and u and v there, as of `located` and `own_places`.
         """
@@ -136,7 +136,7 @@ class Tiles:
             tile_rows(*given, *rest, part.start, part.stop, out)
 
         in_threads(work, self.count, least=4, multiple=1, seconds=1e-3)
-        return np.asarray(out[:, :3] + 1j * out[:, 3:])
+        return np.asarray(out[:, : mode + 1] + 1j * out[:, 3 : mode + 4])
 
     def with_nodes(self, p: int) -> "Tiles":
         """The same tiles with p x p nodes."""
