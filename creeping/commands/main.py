@@ -171,7 +171,7 @@ def run(
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with _Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
-        planes = _plane_run.asked_planes(plane, job, shape)
+        planes = _plane_run.asked_planes(plane, job)
         if job:
             job = job.fitted(shape)
         progress("shadow line")

@@ -18,7 +18,6 @@ from creeping.field.conductor.near import conductor_field
 from creeping.field.cut_result import FieldCut
 from creeping.field.near import near_field
 from creeping.field.plane_cut import cut_grid, field_cut
-from creeping.geometry.creased import has_edges, is_creased
 from creeping.rays.fan import RayFan
 
 PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -57,7 +56,7 @@ def parse_plane(text: str) -> Plane:
     return Plane(text, None if numbers is None else np.eye(3)[list(numbers)], step)
 
 
-def asked_planes(texts: Sequence[str] | None, job: Job | None, body: Any) -> list[Plane]:
+def asked_planes(texts: Sequence[str] | None, job: Job | None) -> list[Plane]:
     """Planes that are asked for.
 
     Raises
@@ -68,11 +67,6 @@ def asked_planes(texts: Sequence[str] | None, job: Job | None, body: Any) -> lis
     planes = [parse_plane(text) for text in texts or ()]
     if planes and job is None:
         raise InvalidInputError("--plane needs --wavenumber or --frequency, which ask for the field")
-    if planes and (has_edges(body) or (is_creased(body) and job is not None and job.boundary == "pec")):
-        raise InvalidInputError(
-            "--plane is of bodies without edges, of conductors without joints and tips too; leave it out: the far "
-            "field of this one is known"
-        )
     return planes
 
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
 from creeping.explorer.preview import Preview
 from creeping.explorer.request import ViewRequest
-from creeping.field.body_currents import affordable, kept_currents
+from creeping.field.body_currents import affordable, has_expansions, kept_currents
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
-from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.speed import speed_of
 from creeping.plotting.coloured_body import current_levels
@@ -98,17 +98,20 @@ def _on_body(
 ) -> tuple[FloatArray | None, ComplexArray | None]:
     """Levels of the total field at points of the body (n, 3), and its values, which a conductor does not have here.
 
-    Neither with edges, and of currents that cost too much.
+    Nothing where currents cost too much, or the equation of a body that has no others.
     """
     k = request.wavenumber
-    if has_edges(fan.body) or (is_creased(fan.body) and request.boundary == "pec"):
-        # the rays carry their own; that of all of them at a point needs a body without edges
-        return None, None
-    if request.boundary == "pec":
+    alone = not has_expansions(fan.body, request.kind)
+    if request.boundary == "pec" or alone:
         # the far-field cut takes the same currents
-        if not affordable(fan, 2 * round(360 / CUT_STEP), k, distant=True):
+        if not alone and not affordable(fan, 2 * round(360 / CUT_STEP), k, distant=True):
             return None, None
-        return current_levels(kept_currents(fan, k, "pec"), vertices), None
+        try:
+            currents = kept_currents(fan, k, request.kind)
+        except InvalidInputError:
+            return None, None
+        if request.boundary == "pec":
+            return current_levels(currents, vertices), None
     values = np.empty(len(vertices), dtype=complex)
     for first in range(0, len(vertices), BLOCK):
         part = slice(first, first + BLOCK)

@@ -25,7 +25,6 @@ from creeping.field.body_currents import affordable, kept_currents
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.total import far_enough, total_at
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.currents import ON_BODY as SOLVED
 from creeping.field.equation.currents import TileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_waves import march_alone
@@ -267,6 +266,7 @@ def _with_currents(
 def _solved_at(currents: TileCurrents, points: FloatArray, dark: BoolArray) -> Served:
     """Total field of solved currents at points (n, 3), L, off the body, some of them in the dark."""
     incident, scattered, error = total_at(currents, points, dark)
-    close = currents.next_to(points)
-    error = np.where(close, SOLVED * currents.extinction, OFF * error)
+    close, error = np.flatnonzero(currents.next_to(points)), OFF * error
+    if len(close):
+        error[close] = currents.error_next_to(points[close])
     return measured_field(incident + scattered, error, "equation", "extinction")

@@ -12,6 +12,7 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.decibels import decibels, shown_range
+from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.geometry.surface import Surface, normal
 from creeping.geometry.unit import unit_of
 from creeping.plotting._drawing import Drawing, compose
@@ -107,9 +108,11 @@ def _magnitudes(currents: SurfaceCurrents, points: FloatArray, incident: str | N
 def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[ComplexArray, BoolArray]:
     """Currents at points of the body (n, 3), and whether there are any.
 
-    Nodes about a point are smoothed by a Gaussian, each with its phase carried along to the point: where rays of
-    several sheets pass they add up, as they do in the field.
+    Of expansions nodes about a point are smoothed by a Gaussian, each with its phase carried along to the point: where
+    rays of several sheets pass they add up, as they do in the field. Solved ones are known between nodes.
     """
+    if isinstance(currents, TileCurrents | ConductorTileCurrents):
+        return currents.between_nodes(points), np.ones(len(points), dtype=bool)
     from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
 

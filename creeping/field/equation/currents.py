@@ -106,8 +106,8 @@ class _OnTiles(SurfaceCurrents):
         """
         return self._at(self._places(points))
 
-    def _at(self, places: Places) -> OnBody:
-        """The current at places of tiles."""
+    def _at(self, places: Places, *, edges: bool = True) -> OnBody:
+        """The current at places of tiles; whether its error knows that it grows at ``edges``."""
         soft = self.boundary.kind == "soft"
         sums = self._received(places, self.values, "slope" if soft else "double")
         magnetic = self._incident[None] if self._incident.ndim else np.zeros((1, 3, 0))
@@ -115,7 +115,7 @@ class _OnTiles(SurfaceCurrents):
         values = _vectors(places, wave[:, :, 0]) if self._incident.ndim else wave[:, 0]
         lit = lit_ground(self.body, places.points, places.normals, self.direction)
         values = values - sums if soft else values + sums
-        error = self._unresolved(places, self.values, values, self.wavenumber if soft else 1.0)
+        error = self._unresolved(places, self.values, values, self.wavenumber if soft else 1.0, edges=edges)
         return OnBody(values, error, places.points, places.normals, lit)
 
     def _places(self, points: ArrayLike) -> Places:
@@ -123,22 +123,31 @@ class _OnTiles(SurfaceCurrents):
         tile, u, v, _ = self.matrix.tiles.located(as_points(points).reshape(-1, 3))
         return _on_tiles(self.matrix.tiles, (tile, u, v))
 
-    def _unresolved(self, places: Places, nodes: ComplexArray, values: ComplexArray, unit: float) -> FloatArray:
+    def _unresolved(
+        self, places: Places, nodes: ComplexArray, values: ComplexArray, unit: float, *, edges: bool = True
+    ) -> FloatArray:
         """Error of values (m, ...) at places by what the polynomials of those at the nodes differ from them by."""
-        assert places.own is not None
-        between, large = self.matrix.tiles.interpolated_at(nodes, *places.own), values
+        apart, large = values - self._between(places, nodes), values
         if values.ndim == 3:
-            between = along_body(places.normals, between)
-            apart, large = (np.linalg.norm(part, axis=1) for part in (values - between, values))
-        else:
-            apart = values - between
+            apart, large = (np.linalg.norm(part, axis=1) for part in (apart, large))
         error = np.hypot(ON_BODY * unit * self._left, UNRESOLVED * np.abs(apart))
-        if self.boundary.kind in ("soft", "conductor"):
+        if edges and self.boundary.kind in ("soft", "conductor"):
             # polynomials are bounded at edges, where these grow like the root of the distance at most
+            assert places.own is not None
             near = np.minimum(self.matrix.tiles.from_edge(*places.own), 1.0)
             grown = np.sqrt(1 / np.maximum(near, CLOSEST)) - 1
             error = np.hypot(error, (grown * np.abs(large).T).T)
         return np.asarray(error)
+
+    def between_nodes(self, points: ArrayLike) -> ComplexArray:
+        """Current at the places of the body nearest to points (m, 3), L, by the polynomials of tiles: (m, ...)."""
+        return self._between(self._places(points), self.values)
+
+    def _between(self, places: Places, nodes: ComplexArray) -> ComplexArray:
+        """What the polynomials of values at the nodes (n, ...) are at places of tiles: (m, ...)."""
+        assert places.own is not None
+        found = self.matrix.tiles.interpolated_at(nodes, *places.own)
+        return along_body(places.normals, found) if nodes.ndim == 3 else found
 
     def _received(self, places: Places, values: ComplexArray, kind: str = "double") -> ComplexArray:
         """What places (m,) receive of values at the nodes, as of `Matrix.received`: (m, ...), J as vectors."""
@@ -177,6 +186,31 @@ class _OnTiles(SurfaceCurrents):
         """Whether points (m, 3), L, are so near to the body that tiles are integrated (m,)."""
         away, _ = self.matrix.tiles.fine_tree.query(points)
         return np.asarray(away * self.wavenumber <= 2 * np.pi * APART)
+
+    def error_next_to(self, points: FloatArray) -> FloatArray:
+        """Error of the total field at points (m, 3), L, next to the body: (m,), of E and H (m, p).
+
+        It is that of what is on the body beneath, which fades as what tiles do not resolve does, by the square of their
+        width over the height, down to what is left inside. What p nodes do not resolve of du/dn gives a field of
+        about width/p times that.
+        """
+        tiles = self.matrix.tiles
+        tile, u, v, height = tiles.located(points)
+        width = tiles.widths[tile]
+        faded = np.minimum(1.0, width / np.maximum(height, 1e-300)) ** 2
+        if self.boundary.kind == "soft":
+            faded = faded * width / tiles.p
+        beneath = self._beneath(_on_tiles(tiles, tiles.aside(tile, u, v, height)))
+        return np.asarray(np.maximum((faded * beneath.T).T, ON_BODY * self._left_next_to))
+
+    def _beneath(self, places: Places) -> FloatArray:
+        """Error of what is on the body at places of tiles: u is bounded at edges, whatever the boundary."""
+        return self._at(places, edges=False).error
+
+    @property
+    def _left_next_to(self) -> FloatArray:
+        """What is left inside of the incident wave."""
+        return np.asarray(self._left)
 
     def _next_to(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         """Scattered field, of a conductor H, at points (m, 3) next to the body, of values at the nodes: (m, ...)."""
@@ -299,19 +333,12 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
             out[near] = scattered_electric(self.matrix.soft_one, x[near], self.values, self.charge)
         return out
 
-    def error_next_to(self, points: FloatArray) -> FloatArray:
-        """Error of E and H at points (m, 3), L, next to the body: (m, p).
+    def _beneath(self, places: Places) -> FloatArray:
+        return np.maximum(self._at(places).error, self._charge_at(places)[1])
 
-        It is that of J and n.E beneath, which fades as what tiles do not resolve does, by the square of their width
-        over the height, down to what is left inside.
-        """
-        tiles = self.matrix.tiles
-        tile, u, v, height = tiles.located(points)
-        own = tiles.aside(tile, u, v, height)
-        places = _on_tiles(tiles, own)
-        beneath = np.maximum(self._at(places).error, self._charge_at(places)[1])
-        faded = np.minimum(1.0, tiles.widths[tile] / np.maximum(height, 1e-300)) ** 2
-        return np.asarray(np.maximum(faded[:, None] * beneath, ON_BODY * np.max(self.left_of_each, axis=0)))
+    @property
+    def _left_next_to(self) -> FloatArray:
+        return np.asarray(np.max(self.left_of_each, axis=0))
 
     def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         found: ComplexArray = self._finer._electric(self._at_fine(values), points)

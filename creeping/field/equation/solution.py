@@ -279,6 +279,9 @@ class Solution:
             total = 0.0 if self._kind.kind == "soft" else currents.on_body(x[on]).values
             scattered[on] = total - incident[on]
         error = np.full(len(x), ON_BODY * currents.extinction)
+        close = np.flatnonzero(currents.next_to(x))
+        if len(close):
+            error[close] = currents.error_next_to(x[close])
         lanes = self._lanes(y, incident + scattered, error, 1.0)
         shape = y.shape[:-1]
         nothing = np.zeros(shape, dtype=complex)

@@ -40,6 +40,10 @@ APART, RULE = 1.0, 5
 """Distance of the middles of parts of a tile from a point, over their size, at least; and the points of their rule."""
 BESIDE, STEPS = 12, 8
 """Nodes next to a point whose tiles may be its own, and Newton steps to its place there."""
+ASIDE = 1e-5
+"""Least u of places: where the side u = 0 is one point there is no normal on it."""
+TOGETHER = 2000
+"""Points that are brought onto tiles at once."""
 ANGLES, RADII = 12, 6
 """Places along a side and radii of each of the four triangles about a node of its own."""
 
@@ -179,26 +183,47 @@ class Tiles:
         """The tile nearest to points (m, 3), u and v there, and the distance, L: (m,) each."""
         from scipy.spatial import cKDTree
 
+        m, middles = len(points), self.middles
         beside = cKDTree(self.points).query(points, min(BESIDE, len(self.points)))[1] // self.p**2
-        best = [np.zeros(len(points), dtype=np.int64), *np.zeros((2, len(points))), np.full(len(points), np.inf)]
-        for column in beside.T:
-            shapes = self.shapes[column]
-            u, v = np.full((2, len(points)), 0.5)
-            for _ in range(STEPS):
-                x, along, across = (part[:, 0, 0] for part in on_squares(shapes, u[:, None], v[:, None]))
-                away = points - x
-                T = np.stack([along, across], axis=2)
-                A = np.swapaxes(T, 1, 2) @ T
-                # where a square is one point x_v is 0
-                A[:, [0, 1], [0, 1]] += 1e-12 * np.trace(A, axis1=1, axis2=2)[:, None]
-                step = np.linalg.solve(A, np.einsum("mxc,mx->mc", T, away)[..., None])[..., 0]
-                u, v = np.clip(u + step[:, 0], 0.0, 1.0), np.clip(v + step[:, 1], 0.0, 1.0)
-            x = on_squares(shapes, u[:, None], v[:, None])[0][:, 0, 0]
-            off = np.linalg.norm(points - x, axis=1)
-            closer = off < best[3]
-            for lane, values in zip(best, (column, u, v, off), strict=True):
-                lane[closer] = values[closer]
-        return best[0], best[1], best[2], best[3]
+        best = np.zeros(m, dtype=np.int64), np.zeros(m), np.zeros(m), np.full(m, np.inf)
+        self._bring(points, np.repeat(np.arange(m), beside.shape[1]), beside.ravel(), best)
+        # nodes of a narrow tile may hide a wide one next to it
+        radii = np.linalg.norm(self.shapes - middles[:, None, None], axis=3).max(axis=(1, 2))
+        for first in range(0, m, TOGETHER):
+            some, off = points[first : first + TOGETHER], best[3][first : first + TOGETHER]
+            reach = np.where((off > 0) & (off < self.sizes[best[0][first : first + TOGETHER]]), off, 0.0)
+            nearer = np.linalg.norm(some[:, None] - middles, axis=2) - radii < reach[:, None]
+            row, tile = np.nonzero(nearer & (reach > 0)[:, None])
+            self._bring(points, first + row, tile, best)
+        return best
+
+    def _bring(
+        self,
+        points: FloatArray,
+        row: IntArray,
+        tile: IntArray,
+        best: tuple[IntArray, FloatArray, FloatArray, FloatArray],
+    ) -> None:
+        """Put into ``best``, as of `located`, what is nearer of points with numbers (n,) on tiles (n,)."""
+        if not len(row):
+            return
+        row, tile = np.unique(np.stack([row, tile]), axis=1)
+        x, shapes = points[row], self.shapes[tile]
+        u, v = np.full((2, len(row)), 0.5)
+        for _ in range(STEPS):
+            there, along, across = (part[:, 0, 0] for part in on_squares(shapes, u[:, None], v[:, None]))
+            T = np.stack([along, across], axis=2)
+            A = np.swapaxes(T, 1, 2) @ T
+            # where a square is one point x_v is 0
+            A[:, [0, 1], [0, 1]] += 1e-12 * np.trace(A, axis1=1, axis2=2)[:, None]
+            step = np.linalg.solve(A, np.einsum("mxc,mx->mc", T, x - there)[..., None])[..., 0]
+            u, v = np.clip(u + step[:, 0], ASIDE, 1.0), np.clip(v + step[:, 1], 0.0, 1.0)
+        off = np.linalg.norm(x - on_squares(shapes, u[:, None], v[:, None])[0][:, 0, 0], axis=1)
+        order = np.lexsort([off, row])
+        first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
+        closer = first[off[first] < best[3][row[first]]]
+        for lane, values in zip(best, (tile, u, v, off), strict=True):
+            lane[row[closer]] = values[closer]
 
     @cached_property
     def widths(self) -> FloatArray:

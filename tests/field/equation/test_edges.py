@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+import shared_bodies as sc
 
+import creeping as cr
+from creeping.field.equation import tiles
 from studies import edges
 
 LIMITS = {("cylinder", "hard"): 0.001, ("cylinder", "soft"): 0.001, ("cylinder", "pec"): 0.0015}
@@ -28,3 +31,22 @@ def test_far_fields_and_their_stated_errors():
     assert not off
     covered = np.concatenate([row.true <= row.stated for row in found.values()])
     assert np.mean(covered) >= COVERED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hard", "soft"])
+def test_fields_next_to_edges_and_faces_are_those_of_finer_tiles(kind, rng, monkeypatch):
+    body, d = sc.Cone(1.0, 2.0), (0.48, 0.6, -0.64)
+    corners, normals, _ = body.tiles(0.1)
+    some = rng.choice(len(corners), 150)
+    faces = corners.mean(axis=1)[some] + 10 ** rng.uniform(-4, 0.5, (150, 1)) * normals.mean(axis=1)[some]
+    phi, away = rng.uniform(0, 2 * np.pi, 150), 10 ** rng.uniform(-4, -0.5, (150, 1)) * rng.normal(size=(150, 3))
+    x = np.concatenate([faces, np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1) + away])
+    x = x[body.level(x) > 0]
+    u = cr.solve(body, d, wavenumber=8.0, boundary=kind).near_field(x)
+    for name, share in (("SIDE", 0.6), ("TURN", 0.6), ("CUT", 0.3)):
+        monkeypatch.setattr(tiles, name, share * getattr(tiles, name))
+    finer = cr.solve(sc.Cone(1.0, 2.0), d, wavenumber=8.0, boundary=kind, seconds=100.0).near_field(x)
+    off = np.abs(u.values - finer.values)
+    assert np.quantile(off, 0.95) < 0.015 and off.max() < 0.05
+    assert np.mean(off <= u.error) > 0.9 and np.median(u.error / off) < 8

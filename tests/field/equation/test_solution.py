@@ -123,6 +123,13 @@ def test_backscatter_is_the_far_field_of_each_incidence(flat):
         assert back.total[number] == one.total[0] and back.error[number] == one.error[0]
 
 
+def test_on_the_axis_of_a_capsule_and_of_an_end_the_field_is_that_beside_it(flat):
+    solution = cr.solve(sc.Capsule(0.5, 2.0), (0.48, 0.6, -0.64), wavenumber=2.0, boundary="hard")
+    for found, top in ((solution, [0.0, 0.0, 1.0]), (flat, [0.0, 0.0, 1.0])):
+        u = found.surface_field([top, np.add(top, [1e-5, 0.0, 0.0])], 0)
+        assert np.all(u.ok) and abs(u.values[1] - u.values[0]) < 1e-3 and u.error.max() < 0.02
+
+
 def test_next_to_edges_and_faces_the_field_is_continuous(flat):
     rim = np.array([1.0, 0.0, 1.0])
     out = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)

@@ -76,3 +76,16 @@ def test_single_and_double_layers_of_a_harmonic_function():
     )
     single, double = layers
     assert_allclose((single - double)[:, 0], u, atol=5e-4)
+
+
+def test_places_are_found_next_to_narrow_tiles_and_on_the_axis():
+    """Nodes of the strip along an edge are nearer to some points of the tile beside it than its own."""
+    body = sc.Cylinder(1.0, 2.0)
+    tiles = tiles_for(patches_of(body), 4.0, side=0.5, turn=0.3)
+    r, phi = np.meshgrid([0.0, 0.5, 0.9, 0.95, 0.97, 0.98, 0.99, 1.0], np.linspace(0.1, 6.2, 23))
+    x = np.stack([r * np.cos(phi), r * np.sin(phi), 1 + 0 * r], axis=-1).reshape(-1, 3)
+    tile, u, v, off = tiles.located(x)
+    assert off.max() < 1e-5
+    there, normals = tiles.on(tile, u, v)
+    assert_allclose(there, x, atol=1e-5)
+    assert np.all(np.isfinite(normals))
