@@ -16,7 +16,7 @@ import numpy as np
 from creeping._presenting import Drawn, brief
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.conductor.result import ConductorField
+from creeping.field.conductor_result import ConductorField
 from creeping.field.point_result import FieldStatus, NearField
 from creeping.geometry.surface import Surface, project
 from creeping.shadow.line import ShadowLine

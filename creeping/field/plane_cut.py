@@ -18,7 +18,7 @@ from creeping.field.arguments import PLAIN, checked, checked_plain
 from creeping.field.body_currents import affordable
 from creeping.field.boundary import BoundaryLike
 from creeping.field.conductor.near import VECTOR, conductor_field
-from creeping.field.conductor.result import ConductorField
+from creeping.field.conductor_result import ConductorField
 from creeping.field.cut_result import FieldCut, grid_points
 from creeping.field.near import near_field
 from creeping.field.point_result import NearField

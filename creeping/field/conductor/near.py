@@ -22,9 +22,9 @@ from creeping.field.arguments import PLAIN, checked, checked_method, checked_pla
 from creeping.field.body_currents import affordable, kept_currents
 from creeping.field.conductor.layer import layer_fields, lowest_height
 from creeping.field.conductor.on_body import OnConductor, on_conductor
-from creeping.field.conductor.result import ConductorCurrent, ConductorField, Fields
 from creeping.field.conductor.shed import shed_sums
 from creeping.field.conductor.total import incident_fields, total_fields
+from creeping.field.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.total import far_enough
 from creeping.field.currents.whole_body import POINTS as INNER
@@ -182,13 +182,14 @@ def conductor_current(
     shape, single = y.shape[:-1], polarisation is not None
     fields = found.current
     values, lit, creeping = (
-        _vectors([getattr(one, name) for one in fields], shape, single) for name in ("values", "wave", "creeping")
+        by_polarisation([getattr(one, name) for one in fields], shape, single=single)
+        for name in ("values", "wave", "creeping")
     )
     return ConductorCurrent(
         points=y.copy(),
         values=values,
-        charge=_scalars(list(found.charge.T), shape, single),
-        charge_error=_scalars(list(found.charge_error.T), shape, single),
+        charge=by_polarisation(list(found.charge.T), shape, single=single),
+        charge_error=by_polarisation(list(found.charge_error.T), shape, single=single),
         lit=lit,
         creeping=creeping,
         **_judgement(fields, [np.linalg.norm(one.values, axis=1) for one in fields], shape, single),
@@ -338,7 +339,12 @@ def _result(
         for part, value in zip(parts, (incident, one.wave - incident, one.creeping), strict=True):
             part.append(np.asarray(value))
     incident_, scattered, creeping = (
-        Fields(*(_vectors([v[:, part] for v in values], shape, single) for part in (slice(0, 3), slice(3, 6))))
+        Fields(
+            *(
+                by_polarisation([v[:, part] for v in values], shape, single=single)
+                for part in (slice(0, 3), slice(3, 6))
+            )
+        )
         for values in parts
     )
     sizes = [
@@ -359,7 +365,7 @@ def _judgement(fields: list[Served], sizes: list[FloatArray], shape: tuple[int, 
     """Error, its source, status and method (..., p) of values so large."""
     status = [judged(v.status, s, v.error, v.error_by, 1.0) for v, s in zip(fields, sizes, strict=True)]
     arrays = {name: [getattr(v, name) for v in fields] for name in ("error", "error_by", "method")} | {"status": status}
-    return {name: _scalars(values, shape, single) for name, values in arrays.items()}
+    return {name: by_polarisation(values, shape, single=single) for name, values in arrays.items()}
 
 
 def _facts(fan: RayFan, k: float, electric: ComplexArray, single: bool) -> dict[str, Any]:
@@ -371,13 +377,3 @@ def _facts(fan: RayFan, k: float, electric: ComplexArray, single: bool) -> dict[
         "validity": validity(fan, wavenumber=k),
         "length_unit": unit_of(fan.body),
     }
-
-
-def _scalars(values: list[Any], shape: tuple[int, ...], single: bool) -> Any:
-    """Values (n,) of each polarisation as (...) or (..., 2)."""
-    return values[0].reshape(shape) if single else np.stack(values, axis=-1).reshape(*shape, len(values))
-
-
-def _vectors(values: list[ComplexArray], shape: tuple[int, ...], single: bool) -> ComplexArray:
-    """Vectors (n, 3) of each polarisation as (..., 3) or (..., 3, 2)."""
-    return values[0].reshape(*shape, 3) if single else np.stack(values, axis=-1).reshape(*shape, 3, len(values))

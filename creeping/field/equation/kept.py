@@ -11,7 +11,8 @@ from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
-from creeping.field.equation.solution import SECONDS, Solution, cost, solve
+from creeping.field.equation.solution import Solution
+from creeping.field.equation.solving import SECONDS, cost, solve
 from creeping.field.equation.tiles import tiles_of
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.covering import patches_of

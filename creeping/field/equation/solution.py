@@ -1,11 +1,9 @@
 """The field of a body by its integral equation alone: for as many incidences as there are, no creeping ray is needed.
 
-Tiles of the body (`creeping.field.equation.tiles`), the matrix of the equation on two surfaces
-(`creeping.field.equation.matrix`), GMRES for all incidences together, and what the currents radiate. Edges and tips
-diffract as they do: the equation knows them. What the currents leave of the incident wave inside the body is their
-error (`creeping.field.currents.whole_body`).
+Edges and tips diffract as they do: the equation knows them. What the currents leave of the incident wave inside the
+body is their error (`creeping.field.currents.whole_body`).
 
-Sources: [CK13, sec. 3.2 and 6.2], [SS86]; Derivations, F36.
+Sources: [CK13, sec. 3.2 and 6.2]; Derivations, F36.
 """
 
 # help() shows names of types instead of what they stand for
@@ -17,121 +15,27 @@ from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import checked, checked_plain, observers_of
-from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.arguments import observers_of
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
+from creeping.field.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.charge import charges
-from creeping.field.equation.columns import TOGETHER, is_dense, solved_columns
+from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
-from creeping.field.equation.matrix import EACH, VECTOR, Matrix
-from creeping.field.equation.tiles import Tiles, tiles_of
+from creeping.field.equation.matrix import Matrix
+from creeping.field.equation.tiles import Tiles
 from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
-from creeping.field.polarisation import spherical_frame
+from creeping.field.polarisation import incident_mix, spherical_frame
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.covering import patches_of
-from creeping.geometry.directions import unit_directions
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.unit import unit_of
-from creeping.kernels.threads import thread_count
-from creeping.storage.memory import within_budget
 
-PRODUCTS = 25
-"""Products with the matrix, about, that an incidence takes."""
-PER_NODE, NEAR_VECTOR = 5e-4, 2.0
-"""Seconds of a core that integrals over tiles near to a node take, and what those of a conductor take of that."""
-PER_ENTRY = 4e-10
-"""Seconds of an entry of the matrix in a product with one of several columns."""
-SUM, SUM_VECTOR = 1e-5, 4e-5
-"""Seconds of a node in a split sum for one column."""
-SECONDS = 30.0
-"""What the equation may take, unless the caller says."""
 TOUCHING = 1e-6
 """Distance from the body, in its sizes, up to which a point is on it."""
-
-
-def solve(
-    body: Surface,
-    directions: ArrayLike,
-    *,
-    wavenumber: float,
-    boundary: BoundaryLike,
-    seconds: float = SECONDS,
-    progress: Callable[[str], None] | None = None,
-) -> Solution:
-    """The field that a body scatters, by its integral equation: no shadow line and no rays are needed.
-
-    Parameters
-    ----------
-    body : Surface
-        Smooth, or of pieces with edges, joints and tips.
-    directions : (3,) or (m, 3)
-        Of incidence; need not be unit. All are solved together.
-    wavenumber : float, 1/L
-    boundary : "soft", "hard", "pec" or ImpedanceBoundary
-    seconds : float
-        What it may take, about, with all cores; more is refused before it starts.
-    progress : callable, optional
-        Is told in words what is done, with the number of nodes, the time and the memory that it takes.
-
-    Returns
-    -------
-    Solution
-
-    Raises
-    ------
-    InvalidInputError
-        On bad arguments, for a weighted body, and if it would take more time or memory than it may.
-    SurfaceError
-        If the body has no mesh.
-
-    Examples
-    --------
-    >>> import creeping as cr
-    >>> import scatterers as sc
-    >>> solution = cr.solve(sc.Cylinder(1.0, 2.0), (1, 0, 0), wavenumber=3.0, boundary="hard")
-    >>> far = solution.far_field([(1, 0, 0), (-1, 0, 0)])
-    >>> far.method.tolist(), bool(far.error.max() < 0.01 * abs(far.total).max())
-    (['equation', 'equation'], True)
-    """
-    checked_plain(body)
-    kinds = scalar_boundaries(boundary)
-    k = checked(wavenumber, 2)
-    d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
-    tell = progress or (lambda words: None)
-    kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
-    tiles = tiles_of(patches_of(body), k, kind)
-    takes, memory = cost(len(tiles.points), kind, len(d))
-    told = f"{len(tiles.points)} nodes, about {takes:.2g} s and {memory / 1e9:.2g} GB"
-    if takes > seconds:
-        raise InvalidInputError(
-            f"the integral equation at wavenumber {k:g} has {told}, more than the {seconds:g} s that it may take; "
-            "give seconds=, or a lower wavenumber, or let rays serve (creeping.far_field)"
-        )
-    what = f"the integral equation between {len(tiles.points)} nodes for {len(d)} incidences"
-    within_budget(memory, what, "lower the wavenumber or give fewer")
-    tell(f"{told}: integrals between the nodes")
-    return Solution(body, d, k, boundary, kind, tiles, tell)
-
-
-def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]:
-    """Seconds and bytes, about, that the equation between nodes takes, of one incidence or of several."""
-    vector = boundary.kind == "conductor"
-    columns = incidences * (2 if vector else 1)
-    # of incidences their values and changes, and what GMRES keeps
-    kept = 64.0 * nodes * incidences * (6 if vector else 1) + TOGETHER
-    near = 2 * nodes * PER_NODE * (NEAR_VECTOR if vector else 1.0)
-    if is_dense(nodes, boundary):
-        entries = float(nodes) ** 2 * (4 if vector else 1)
-        pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if vector else 1.0)
-        products = PRODUCTS * entries * PER_ENTRY * columns
-        # the matrix and its transpose
-        return (pairs + near + products) / thread_count(), 16 * entries + kept
-    each, memory = (SUM_VECTOR, 2e4 * 4) if vector else (SUM, 2e4)
-    return near / thread_count() + PRODUCTS * columns * each * nodes, memory * nodes + kept
 
 
 class Solution:
@@ -262,17 +166,8 @@ class Solution:
         """
         self._scalar("near_field")
         y = as_points(points)
-        x = y.reshape(-1, 3)
-        inside = np.flatnonzero(self.body.level(x) < 0)
-        currents = self.currents(incidence)
-        off = self._matrix.tiles.located(x)[3]
-        on = off < TOUCHING * size(self.body)
-        inside = inside[off[inside] > TOUCHING * size(self.body)]
-        if len(inside):
-            raise InvalidInputError(
-                f"{len(inside)} of {len(x)} points are inside the body (deepest: row "
-                f"{inside[np.argmax(off[inside])]}, {off[inside].max():.3g}); give points on it or outside"
-            )
+        x, currents = y.reshape(-1, 3), self.currents(incidence)
+        on = self._on(x)
         incident, scattered = np.exp(1j * self.wavenumber * (x @ currents.direction)), np.zeros(len(x), dtype=complex)
         scattered[~on] = currents.scattered(x[~on])
         if np.any(on):
@@ -287,6 +182,77 @@ class Solution:
         nothing = np.zeros(shape, dtype=complex)
         return NearField(
             **lanes, incident=incident.reshape(shape), scattered=scattered.reshape(shape), creeping=nothing
+        )
+
+    def conductor_field(
+        self, points: ArrayLike, incidence: int = 0, polarisation: str | ArrayLike | None = None
+    ) -> ConductorField:
+        """Total E and H at points (..., 3), L, on a conductor or off it at any distance, of one incidence.
+
+        ``polarisation`` is E0 as of `creeping.conductor_field`; both theta and phi if it is not given.
+
+        Raises
+        ------
+        InvalidInputError
+            If points are inside the body, on a bad polarisation, and of what is no conductor.
+        """
+        y, single = as_points(points), polarisation is not None
+        x, currents = y.reshape(-1, 3), self._polarised("conductor_field", incidence, polarisation)
+        on = self._on(x)
+        wave, E0 = np.exp(1j * self.wavenumber * (x @ currents.direction))[:, None, None], currents.incident_electric
+        incident = np.stack([wave * E0, wave * np.cross(currents.direction, E0, axisb=0).T])
+        scattered = np.empty_like(incident)
+        scattered[0, ~on], scattered[1, ~on] = currents.scattered_electric(x[~on]), currents.scattered(x[~on])
+        if np.any(on):
+            found = currents.on_body(x[on])
+            n = found.normals[:, :, None]
+            scattered[0, on] = n * currents.charge_on_body(x[on])[0][:, None] - incident[0, on]
+            scattered[1, on] = np.cross(found.values, n, axis=1) - incident[1, on]
+        error = np.tile(ON_BODY * np.max(currents.left_of_each, axis=0), (len(x), 1))
+        close = np.flatnonzero(currents.next_to(x))
+        if len(close):
+            error[close] = currents.error_next_to(x[close])
+        size = np.max(np.linalg.norm(incident + scattered, axis=2), axis=0)
+
+        def fields(parts: ComplexArray) -> Fields:
+            return Fields(*(by_polarisation(list(np.moveaxis(v, 2, 0)), y.shape[:-1], single=single) for v in parts))
+
+        return ConductorField(
+            **self._vector_lanes(y, size, error, single, E0),
+            incident=fields(incident),
+            scattered=fields(scattered),
+            creeping=fields(np.zeros_like(incident)),
+        )
+
+    def conductor_current(
+        self, points: ArrayLike, incidence: int = 0, polarisation: str | ArrayLike | None = None
+    ) -> ConductorCurrent:
+        """J and n.E at the places of a conductor nearest to points (..., 3), L, of one incidence.
+
+        ``polarisation`` as of `conductor_field`.
+
+        Raises
+        ------
+        InvalidInputError
+            On a bad polarisation, and of what is no conductor.
+        """
+        y, single = as_points(points), polarisation is not None
+        currents = self._polarised("conductor_current", incidence, polarisation)
+        found, charge = currents.on_body(y), currents.charge_on_body(y)
+        lit = found.lit[:, None, None]
+
+        def lanes(values: np.ndarray) -> Any:
+            return by_polarisation(list(np.moveaxis(values, -1, 0)), y.shape[:-1], single=single)
+
+        return ConductorCurrent(
+            **self._vector_lanes(
+                y, np.linalg.norm(found.values, axis=1), found.error, single, currents.incident_electric
+            ),
+            values=lanes(found.values),
+            charge=lanes(charge[0]),
+            charge_error=lanes(charge[1]),
+            lit=lanes(np.where(lit, found.values, 0.0)),
+            creeping=lanes(np.where(lit, 0.0, found.values)),
         )
 
     def surface_field(self, points: ArrayLike, incidence: int = 0) -> SurfaceField:
@@ -307,11 +273,50 @@ class Solution:
             **lanes, lit=np.where(lit, lanes["values"], nothing), creeping=np.where(lit, nothing, lanes["values"])
         )
 
+    def _on(self, x: FloatArray) -> BoolArray:
+        """Whether points (m, 3), L, are on the body (m,); none may be inside."""
+        inside = np.flatnonzero(self.body.level(x) < 0)
+        off, least = self._matrix.tiles.located(x)[3], TOUCHING * size(self.body)
+        inside = inside[off[inside] > least]
+        if len(inside):
+            raise InvalidInputError(
+                f"{len(inside)} of {len(x)} points are inside the body (deepest: row "
+                f"{inside[np.argmax(off[inside])]}, {off[inside].max():.3g}); give points on it or outside"
+            )
+        return np.asarray(off < least)
+
+    def _polarised(self, name: str, incidence: int, polarisation: str | ArrayLike | None) -> ConductorTileCurrents:
+        """Currents of a conductor for E0."""
+        currents = self.currents(incidence)
+        if not isinstance(currents, ConductorTileCurrents):
+            other = name.replace("conductor_field", "near_field").replace("conductor_current", "surface_field")
+            raise InvalidInputError(f"{name} is of conductors; the {boundary_name(self.boundary)} body has {other}")
+        found = currents.polarised(incident_mix(polarisation, currents.direction))
+        assert isinstance(found, ConductorTileCurrents)
+        return found
+
     def _scalar(self, name: str) -> None:
         """Refuse a conductor."""
         if self._kind.kind == "conductor":
             other = "conductor_current" if name == "surface_field" else "conductor_field"
-            raise InvalidInputError(f"{name} is of scalar fields; a conductor's are by creeping.{other}")
+            raise InvalidInputError(f"{name} is of scalar fields; a conductor has {other}")
+
+    def _vector_lanes(
+        self, points: FloatArray, size: FloatArray, error: FloatArray, single: bool, electric: ComplexArray
+    ) -> dict[str, Any]:
+        """What E and H of sizes (m, p) at points (..., 3) have in common."""
+        shape, by = points.shape[:-1], np.full(size.shape, "extinction")
+        status = judged(np.full(size.shape, int(FieldStatus.OK)), size, error, by, 1.0)
+        each = {"error": error, "error_by": by, "status": status, "method": np.full(size.shape, "equation")}
+        lanes = {name: by_polarisation(list(values.T), shape, single=single) for name, values in each.items()}
+        return lanes | {
+            "points": points.copy(),
+            "incident_electric": electric[:, 0] if single else electric,
+            "wavenumber": self.wavenumber,
+            "boundary": boundary_name(self.boundary),
+            "order": 2,
+            "length_unit": unit_of(self.body),
+        }
 
     def _lanes(self, points: FloatArray, values: ComplexArray, error: FloatArray, unit: float) -> dict[str, Any]:
         """What fields at points (..., 3) have in common."""

@@ -6,6 +6,7 @@ import shared_bodies as sc
 from body_checks import directions
 
 import creeping as cr
+from creeping.errors import InvalidInputError
 from creeping.field.body_currents import kept_currents
 from creeping.field.equation.currents import ON_BODY
 from creeping.field.polarisation import incident_mix
@@ -72,3 +73,25 @@ def test_no_charge_is_made_and_units_scale(flat):
     x = np.array([[0.1, 0.0, 0.501], [0.6, 0.0, 0.3]])
     np.testing.assert_allclose(small.scattered_electric(1e-3 * x), currents.scattered_electric(x), atol=1e-4)
     assert ON_BODY * currents.extinction <= currents.error_next_to(x).max()
+
+
+def test_a_solution_has_the_fields_of_a_fan(flat):
+    solution = cr.solve(flat.body, D, wavenumber=4.0, boundary="pec")
+    x = np.array([[0.1, 0.0, 0.55], [0.5, 0.0, 0.2], [1.0, 0.4, 0.3]])
+    for polarisation in (None, "phi"):
+        mine = solution.conductor_field(x, polarisation=polarisation)
+        its = cr.conductor_field(flat, x, wavenumber=4.0, polarisation=polarisation)
+        np.testing.assert_allclose(mine.E, its.E, atol=1e-6)
+        np.testing.assert_allclose(mine.H, its.H, atol=1e-6)
+        np.testing.assert_allclose(mine.error[0], its.error[0], rtol=1e-4)
+        assert mine.status.shape == its.status.shape and np.all(mine.ok)
+        mine = solution.conductor_current(x[1:2], polarisation=polarisation)
+        its = cr.conductor_current(flat, x[1:2], wavenumber=4.0, polarisation=polarisation)
+        np.testing.assert_allclose(mine, its, atol=1e-6)
+        np.testing.assert_allclose(mine.charge_error, its.charge_error, rtol=1e-3)
+    with pytest.raises(InvalidInputError, match="conductor has conductor_field"):
+        solution.near_field(x)
+    with pytest.raises(InvalidInputError, match="1 of 1 points are inside the body"):
+        solution.conductor_field([(0.0, 0.0, 0.0)])
+    with pytest.raises(InvalidInputError, match="the soft body has near_field"):
+        cr.solve(sc.Sphere(), D, wavenumber=0.5, boundary="soft").conductor_field(x)

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.equation import kept, solution
+from creeping.field.equation import kept, solving
 from studies.reference import sphere
 
 D = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, -0.8]])
@@ -156,4 +156,4 @@ def test_what_cannot_be_solved_is_told(flat, monkeypatch):
     assert "nodes, about" in told[0]
     monkeypatch.setattr(kept, "SECONDS", 1e-9)
     assert kept.solution_for(CYLINDER, D[0], 2.9, "hard") is None
-    assert solution.cost(10_000, solution.CONDUCTOR, 1) > solution.cost(10_000, kept.scalar_boundaries("soft")[0], 1)
+    assert solving.cost(10_000, solving.CONDUCTOR, 1) > solving.cost(10_000, kept.scalar_boundaries("soft")[0], 1)

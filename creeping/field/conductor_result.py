@@ -6,12 +6,13 @@ Both incident polarisations, theta and phi, have the last axis of vectors, error
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.field.array_result import ArrayResult
 from creeping.field.point_result import PointData
 
@@ -165,3 +166,9 @@ class ConductorCurrent(ArrayResult, PointData):
 
         parts = {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
         return vector_dataset(self, parts | {"charge_error": self.charge_error})
+
+
+def by_polarisation(values: Sequence[np.ndarray], shape: tuple[int, ...], *, single: bool) -> Any:
+    """Values (n, ...) of each polarisation at points of a shape: (*shape, ...), or (*shape, ..., p) unless single."""
+    each = [one.reshape((*shape, *one.shape[1:])) for one in values]
+    return each[0] if single else np.stack(each, axis=-1)
