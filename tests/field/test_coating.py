@@ -150,3 +150,8 @@ def test_each_ray_is_marched(fan, monkeypatch):
     whole = cr.surface_field(fan, fan.points[ok, step], wavenumber=K, boundary=BOUNDARY)
     assert ok.any() and set(own.method[own.ok]) == {"march"}
     np.testing.assert_allclose(own.values[ok, step], whole.values, atol=0.02)
+
+
+def test_a_fingerprint_tells_admittances_apart():
+    prints = {sc.Coating(*of).fingerprint for of in (("0.3",), ("0.3", "0.2"), ("0.3", "0.1"), ("0.3 + 0.1*z",))}
+    assert len(prints) == 4 and sc.Coating("0.3").fingerprint == sc.Coating("0.3", "0").fingerprint

@@ -31,6 +31,8 @@ def test_line_in_the_plane_of_parameters(ball_fan):
     ax = line.plot()
     assert "phi" in ax.get_xlabel() and "degrees" in ax.get_xlabel()
     assert "theta" in ax.get_ylabel() and "degrees" in ax.get_ylabel()
+    # the upper pole is above
+    assert ax.get_xlim() == (-180, 180) and ax.get_ylim() == (180, 0)
     found = drawn(ax, "shadow line, attached")
     expected = in_degrees(line.curves[0].points)
     assert farthest(expected, found) < 1e-9
