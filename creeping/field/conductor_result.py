@@ -119,7 +119,7 @@ class ConductorCurrent(ArrayResult, PointData):
     charge : (...) or (..., 2) complex
         n.E = div J/(ik), the surface charge over the permittivity of free space, in units of the incident E.
     charge_error : (...) or (..., 2)
-        Of the charge, in the sense of the error: that of J by expansions, larger where the integral equation is solved.
+        Of the charge, in the sense of the error: that of J by expansions, its own where they are solved.
     lit, creeping : as values
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
     incident_electric : (3,) or (3, 2) complex

@@ -187,6 +187,14 @@ class _OnTiles(SurfaceCurrents):
         away, _ = self.matrix.tiles.fine_tree.query(points)
         return np.asarray(away * self.wavenumber <= 2 * np.pi * APART)
 
+    def error_around(self, points: FloatArray) -> FloatArray:
+        """Error of the total field at points (m, 3), L, at any distance, as `error_next_to`."""
+        left = ON_BODY * self._left_next_to
+        error, close = np.broadcast_to(left, (len(points), *left.shape)).copy(), np.flatnonzero(self.next_to(points))
+        if len(close):
+            error[close] = self.error_next_to(points[close])
+        return error
+
     def error_next_to(self, points: FloatArray) -> FloatArray:
         """Error of the total field at points (m, 3), L, next to the body: (m,), of E and H (m, p).
 

@@ -24,7 +24,7 @@ from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.charge import charges
 from creeping.field.equation.columns import solved_columns
-from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
+from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.tiles import Tiles
 from creeping.field.far_result import FarField
@@ -173,11 +173,7 @@ class Solution:
         if np.any(on):
             total = 0.0 if self._kind.kind == "soft" else currents.on_body(x[on]).values
             scattered[on] = total - incident[on]
-        error = np.full(len(x), ON_BODY * currents.extinction)
-        close = np.flatnonzero(currents.next_to(x))
-        if len(close):
-            error[close] = currents.error_next_to(x[close])
-        lanes = self._lanes(y, incident + scattered, error, 1.0)
+        lanes = self._lanes(y, incident + scattered, currents.error_around(x), 1.0)
         shape = y.shape[:-1]
         nothing = np.zeros(shape, dtype=complex)
         return NearField(
@@ -208,17 +204,13 @@ class Solution:
             n = found.normals[:, :, None]
             scattered[0, on] = n * currents.charge_on_body(x[on])[0][:, None] - incident[0, on]
             scattered[1, on] = np.cross(found.values, n, axis=1) - incident[1, on]
-        error = np.tile(ON_BODY * np.max(currents.left_of_each, axis=0), (len(x), 1))
-        close = np.flatnonzero(currents.next_to(x))
-        if len(close):
-            error[close] = currents.error_next_to(x[close])
         size = np.max(np.linalg.norm(incident + scattered, axis=2), axis=0)
 
         def fields(parts: ComplexArray) -> Fields:
             return Fields(*(by_polarisation(list(np.moveaxis(v, 2, 0)), y.shape[:-1], single=single) for v in parts))
 
         return ConductorField(
-            **self._vector_lanes(y, size, error, single, E0),
+            **self._vector_lanes(y, size, currents.error_around(x), single, E0),
             incident=fields(incident),
             scattered=fields(scattered),
             creeping=fields(np.zeros_like(incident)),
