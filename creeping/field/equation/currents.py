@@ -43,7 +43,7 @@ LEAST = 5e-5
 """What is left inside, at least: a few times what is left of the equation and what integrals over tiles err by."""
 UNRESOLVED = 2.0
 """Error by what tiles do not resolve, in what two ways to the same value differ by."""
-LEVELS = {"hard": 1.2, "soft": 1.2, "impedance": 0.9, "conductor": 1.5}
+LEVELS = {"hard": 1.7, "soft": 1.5, "impedance": 0.9, "conductor": 1.5}
 """Error of the far field over what is found of it, with which it holds in 95 of 100 directions (`studies.edges`)."""
 CLOSEST = 1e-6
 """Distance from an edge, over that of the nodes next to it, at least: on the edge itself currents are infinite."""
