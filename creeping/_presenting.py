@@ -55,8 +55,8 @@ class Drawn(Shown):
               degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;
               ``rays=``, ``until=``, ``view=``.
             - `IsoPhaseCurve` (``plot_curve``): ``kind=``.
-            - `FarField` (``plot_far``): ``quantity="rcs"``, in dBsm, or ``"amplitude"``; ``parts=True`` for the
-              creeping, reflected and forward part; ``components=``, ``angles=``, ``unit=``, ``span=``.
+            - `FarField` (``plot_far``): ``quantity="rcs"``, in dBsm, or ``"amplitude"``; ``parts=True`` for its
+              ``parts``; ``components=``, ``angles=``, ``unit=``, ``span=``.
             - `FieldCut` (``plot_field_cut``): ``show="level"``, ``"magnitude"`` or ``"wave"``, Re(u e^{-i phase});
               ``quantity=``, ``fronts=``, ``phase=``, ``span=``.
             - `PhaseMap` (``plot_growth``): ``tolerance=``.

@@ -58,7 +58,7 @@ def row(name: str, quantity: str, directions: FloatArray, few: int) -> Row:
     found = found.isel(incidence=some)
     inside = found.interpolated.values
     for part, pair in (
-        ("total", [(ds.creeping + ds.reflected).values for ds in (known, found)]),
+        ("total", [ds.total.values for ds in (known, found)]),
         ("creeping", [ds.creeping.values for ds in (known, found)]),
     ):
         off = (np.abs(pair[0] - pair[1]) / np.median(np.abs(pair[0]), axis=0))[inside]

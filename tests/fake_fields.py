@@ -21,9 +21,8 @@ def far_of(directions, total, **changes):
     total = np.asarray(total, dtype=complex)
     values = {
         "directions": np.asarray(directions, dtype=float),
-        "creeping": total,
-        "reflected": 0 * total,
-        "forward": 0 * total,
+        "total": total,
+        "parts": {"creeping": total, "reflected": 0 * total, "forward": 0 * total},
         "method": np.full(len(total), "rays"),
         "unresolved": np.zeros(len(total), dtype=bool),
         "error": 0.01 * np.abs(total),
@@ -48,6 +47,7 @@ def echo_of(amplitude, error, quantity="rcs"):
         0 * angles,
         None,
         np.array([20.0]),
+        f,
         {"creeping": 0.25 * f, "reflected": 0.75 * f},
         np.full(f.shape, error),
         flags,

@@ -47,7 +47,7 @@ class FakeSweeper:
         out["incidence_status"][:] = OK
         out["line_length"][:] = 2 * np.pi + z
         k = np.array(self.request.wavenumbers)
-        out["creeping"][:] = np.exp(1j * k * z[:, None, None])
+        out["total"][:] = out["creeping"][:] = np.exp(1j * k * z[:, None, None])
         out["unresolved"][:] = False
         return out
 

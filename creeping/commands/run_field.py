@@ -18,7 +18,6 @@ from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.decibels import cross_section_decibels
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
-from creeping.field.labelled import PARTS
 from creeping.field.lobes import lobe_step
 from creeping.field.polarisation import turned_to_azimuth
 from creeping.field.uncertainty import far_field_uncertainty
@@ -110,10 +109,10 @@ class Job:
         far = far_field(fan, directions, wavenumber=self.wavenumber, boundary=self.boundary, order=ORDER)
         if far.total.ndim == 3:
             turn = np.concatenate([target.frames for target in self.targets])
-            parts: dict[str, Any] = {name: np.einsum("nab,nbc->nac", turn, getattr(far, name)) for name in PARTS}
+            parts = {name: np.einsum("nab,nbc->nac", turn, values) for name, values in far.parts.items()}
             # of a component and of the other at a pole, which the turn may exchange
             error = np.sqrt(np.einsum("nab,nbc->nac", turn**2, far.error**2))
-            far = replace(far, **parts, error=error)
+            far = replace(far, total=np.einsum("nab,nbc->nac", turn, far.total), parts=parts, error=error)
         far = replace(far, unit=self.unit or far.unit)
         return far, round(time.perf_counter() - started, 2)
 
@@ -171,7 +170,7 @@ class Job:
     def _pieces(self, far: FarField) -> list[FarField]:
         """The far field of each target."""
         ends = np.cumsum([len(target.directions) for target in self.targets])
-        return [_part(far, end - len(t.directions), end) for t, end in zip(self.targets, ends, strict=True)]
+        return [far.take(slice(end - len(t.directions), end)) for t, end in zip(self.targets, ends, strict=True)]
 
     def _tables(self, far: FarField, fan: RayFan, output: Path, formats: Sequence[str]) -> list[str]:
         texts = [target.text for target in self.targets for _ in target.directions]
@@ -366,9 +365,3 @@ def _stated_error(far: FarField) -> dict[str, Any]:
 def _named(found: Validity) -> dict[str, float | None]:
     """By name; None where there is no number."""
     return {name: float(value) if np.isfinite(value) else None for name, value in found._asdict().items()}
-
-
-def _part(far: FarField, start: int, end: int) -> FarField:
-    rows = slice(int(start), int(end))
-    names = ("directions", "creeping", "reflected", "forward", "method", "unresolved", "error")
-    return replace(far, **{name: getattr(far, name)[rows] for name in names})

@@ -28,7 +28,7 @@ WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 34.0, 8.0, 8.0, 30.0
 """Of a picture and its margins, in units of the drawing."""
 DRAWN = 48
 """Rays drawn at most."""
-PARTS = ("creeping", "reflected")
+PARTS = ("creeping", "reflected", "dark", "lit")
 """Curves of a cut that are parts of another."""
 DASHES = ("", "5,2", "1.5,1.5")
 STATUS_DASHES = {"attached": "", "occluded": "6,2", "concave": "2,2"}
@@ -181,7 +181,7 @@ def _cut_curves(far: FarField) -> dict[str, ComplexArray]:
     """What a cut draws: of a conductor both copolarised components."""
     if far.total.ndim > 1:
         return {component_name("tt"): far.total[:, 0, 0], component_name("pp"): far.total[:, 1, 1]}
-    return {"total": far.total, "creeping": far.creeping, "reflected": far.reflected}
+    return {"total": far.total} | {name: far.parts[name] for name in PARTS if name in far.parts}
 
 
 def _broken(parameters: FloatArray) -> list[FloatArray]:

@@ -72,9 +72,8 @@ def creased_far_field(fan: RayFan, r: FloatArray, k: float, boundary: BoundaryLi
         parts.add(number, kind)
     return FarField(
         directions=r.copy(),
-        creeping=parts.creeping,
-        reflected=parts.reflected,
-        forward=parts.forward,
+        total=parts.creeping + parts.reflected,
+        parts={"creeping": parts.creeping, "reflected": parts.reflected},
         method=np.full(len(r), "rays+optics", dtype="<U16"),
         unresolved=parts.unresolved(),
         error=parts.error(),
@@ -95,7 +94,7 @@ class CreasedParts(Parts):
         self.incident, self.vector = geometry.direction, len(kinds) == 2
         self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
         r, m, body = geometry.directions, len(geometry.directions), fan.body
-        self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
+        self.creeping, self.reflected = (self._zeros() for _ in range(2))
         self.doubt, self.sizes, self.failing_size = self._zeros().real, np.zeros(m), np.zeros(m)
         self.shed_waves, self.specular_waves = [], []
         theta = geometry.angle

@@ -45,8 +45,10 @@ class Echo(Drawn):
     incidence : (azimuth, elevation), degrees, or None
         Of the radar of a bistatic cut; None in backscatter.
     wavenumbers : (k,), 1/m
+    total : (c, n, k) complex, m
+        Amplitude f.
     parts : dict of str to (c, n, k) complex, m
-        Whose sum the amplitude is.
+        What waves it is the sum of, NaN where rays do not serve.
     error : (c, n, k), m
         Of the amplitude's magnitude.
     unresolved, by_currents : (c, n, k) of bool
@@ -77,6 +79,7 @@ class Echo(Drawn):
     elevation: FloatArray
     incidence: tuple[float, float] | None
     wavenumbers: FloatArray
+    total: ComplexArray
     parts: dict[str, ComplexArray]
     error: FloatArray
     unresolved: BoolArray
@@ -89,7 +92,7 @@ class Echo(Drawn):
             raise InvalidInputError(f"quantity {self.quantity!r} is none of {', '.join(LEVELS)}")
         shape = (len(self.channels), len(self.azimuth), len(self.wavenumbers))
         flags = {"error": self.error, "unresolved": self.unresolved, "by_currents": self.by_currents}
-        for name, values in {**self.parts, **flags}.items():
+        for name, values in {"total": self.total, **self.parts, **flags}.items():
             if values.shape != shape:
                 raise InvalidInputError(f"{name} of an echo has shape {values.shape}, not {shape}")
         if self.elevation.shape != self.azimuth.shape:
@@ -102,11 +105,6 @@ class Echo(Drawn):
             f"Echo({told['quantity']}, {told['angles']} angles x {told['frequencies']} frequencies)\n"
             f"  {tops} {told['unit']}; {told['unresolved']} of {told['values']} values unresolved"
         )
-
-    @property
-    def total(self) -> ComplexArray:
-        """Amplitude f, m (c, n, k)."""
-        return np.asarray(sum(self.parts.values()))
 
     @property
     def angles(self) -> FloatArray:

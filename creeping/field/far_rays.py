@@ -148,9 +148,8 @@ class Parts:
         """The far field of all parts."""
         return FarField(
             directions=self.geometry.directions.copy(),
-            creeping=self.creeping,
-            reflected=self.reflected,
-            forward=self.forward,
+            total=self.creeping + self.reflected + self.forward,
+            parts={"creeping": self.creeping, "reflected": self.reflected, "forward": self.forward},
             method=_methods(self.in_forward, self.in_fan),
             unresolved=self.unresolved(),
             error=self.error(),

@@ -3,19 +3,24 @@
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._presenting import Drawn
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.decibels import cross_section_decibels, decibels
 from creeping.field.validity_range import Validity, validity_numbers
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+
+BY_DIRECTION = ("directions", "total", "method", "unresolved", "error")
+"""Arrays of a far field whose first axis is the direction, its parts apart."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,12 +31,16 @@ class FarField(Drawn):
     ----------
     directions : (m, 3)
         Unit r, from the body to the observer.
-    creeping, reflected, forward : (m,) or (m, 2, 2) complex, L
-        Parts; where parts are blended each carries its weight. With currents they are what the creeping rays' currents
-        radiate, what the lit side's do, and nothing.
+    total : (m,) or (m, 2, 2) complex, L
+        The amplitude f.
+    parts : dict of str to complex, L
+        What ``total`` is the sum of. Of rays "creeping", "reflected" and "forward": what creeping rays shed, what the
+        lit side reflects, the forward lobe; where they are blended each carries its weight. Of currents "lit" and
+        "dark": what the currents of both sides of the shadow line radiate, which are no rays.
     method : (m,) of str
-        What served: "currents", "equation" where the body's integral equation gave them, or for the creeping part
-        "forward", "rays", "fan", or several joined by "+".
+        What gave the field: "currents" by expansions, "equation" where the body's integral equation gave them,
+        "rays+optics" of a body with edges, or what gave the part of the creeping rays, "forward", "rays", "fan", or
+        several joined by "+".
     unresolved : (m,) of bool
         Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
         fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
@@ -69,9 +78,8 @@ class FarField(Drawn):
     """
 
     directions: FloatArray
-    creeping: ComplexArray
-    reflected: ComplexArray
-    forward: ComplexArray
+    total: ComplexArray
+    parts: dict[str, ComplexArray]
     method: np.ndarray[Any, np.dtype[np.str_]]
     unresolved: BoolArray
     error: FloatArray
@@ -83,10 +91,41 @@ class FarField(Drawn):
     unit: str = "L"
     validity: Validity | None = None
 
+    def __post_init__(self) -> None:
+        for name, values in self.parts.items():
+            if values.shape != self.total.shape:
+                raise ValueError(f"part {name} of a far field has shape {values.shape}, the total {self.total.shape}")
+
     @property
-    def total(self) -> ComplexArray:
-        """Sum of the parts."""
-        return np.asarray(self.creeping + self.reflected + self.forward)
+    def creeping(self) -> ComplexArray:
+        """What creeping rays shed, L; NaN where the method does not know it apart, as `reflected` and `forward`."""
+        return self._part("creeping")
+
+    @property
+    def reflected(self) -> ComplexArray:
+        """What the lit side reflects, L; NaN where it is not known apart."""
+        return self._part("reflected")
+
+    @property
+    def forward(self) -> ComplexArray:
+        """The forward lobe, L; NaN where it is not known apart."""
+        return self._part("forward")
+
+    def _part(self, name: str) -> ComplexArray:
+        known = self.parts.get(name)
+        return np.full(self.total.shape, complex(np.nan, np.nan)) if known is None else known
+
+    def take(self, rows: slice | IntArray) -> FarField:
+        """The field in some of its directions."""
+        parts = {name: values[rows] for name, values in self.parts.items()}
+        return replace(self, parts=parts, **{name: getattr(self, name)[rows] for name in BY_DIRECTION})
+
+    @staticmethod
+    def joined(fields: Sequence[FarField]) -> FarField:
+        """Fields of one kind in the directions of all, one after the other."""
+        parts = {name: np.concatenate([one.parts[name] for one in fields]) for name in fields[0].parts}
+        lanes: dict[str, Any] = {n: np.concatenate([getattr(one, n) for one in fields]) for n in BY_DIRECTION}
+        return replace(fields[0], parts=parts, **lanes)
 
     @property
     def cross_section(self) -> FloatArray:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
-PARTS = ("creeping", "reflected", "forward")
-"""Parts of a far field, whose sum it is."""
 
 
 def power(unit: str, exponent: int) -> str:
@@ -63,10 +61,9 @@ def far_dataset(far: "FarField") -> "xarray.Dataset":
     coordinates = _directed(far.directions, far.wavenumber, unit)
     if far.total.ndim == 3:
         coordinates |= {name: ((name,), list(COMPONENTS)) for name in dims[1:]}
-    names = {"total": "far-field amplitude f", **{name: f"{name} part of f" for name in PARTS}}
-    variables: dict[str, Any] = {
-        name: (dims, getattr(far, name), {"units": unit, "long_name": text}) for name, text in names.items()
-    }
+    variables: dict[str, Any] = {"total": (dims, far.total, {"units": unit, "long_name": "far-field amplitude f"})}
+    for name, values in far.parts.items():
+        variables[name] = (dims, values, {"units": unit, "long_name": f"{name} part of f"})
     variables["error"] = (dims, far.error, {"units": unit, "long_name": f"error of |f|, by {far.error_source}"})
     area = {"units": power(unit, 2), "long_name": "cross section 4 pi |f|^2"}
     variables["cross_section"] = (dims, far.cross_section, area)

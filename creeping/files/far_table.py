@@ -8,7 +8,6 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.field.decibels import cross_section_decibels, decibels
-from creeping.field.labelled import PARTS
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
@@ -44,10 +43,10 @@ def notes(far: "FarField", *, observed: bool = False) -> dict[str, str]:
         area = "dBsm" if unit == "m" else f"dB re 1 {unit}^2"
         columns[f"rcs_dB{suffix}"] = f"10 log10(4 pi |f|^2), {area}"
         columns[f"error{suffix}"] = f"error of f, {unit}, {_error_of(far)}"
-        for part in PARTS:
+        for part in far.parts:
             columns[f"{part}_re{suffix}"] = f"part of f, {unit}{name}"
             columns[f"{part}_im{suffix}"] = "imaginary part"
-    columns["method"] = "what served the creeping part"
+    columns["method"] = "what gave the field, or its part of creeping rays"
     columns["unresolved"] = "1 where a part was not found, its expansion fails or the error is large"
     if observed:
         columns["observe"] = "what was asked for, its commas blanks"
@@ -61,8 +60,7 @@ def rows(far: "FarField", observed: "tuple[Sequence[str], FloatArray] | None" = 
     for k in range(len(_suffixes(far))):
         total = _component(far.total, k)
         columns += [total.real, total.imag, decibels(total), cross_section_decibels(total), _component(far.error, k)]
-        for part in PARTS:
-            values = _component(getattr(far, part), k)
+        for values in (_component(part, k) for part in far.parts.values()):
             columns += [values.real, values.imag]
     numbers = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
     texts, angles = observed or ((), np.zeros(0))

@@ -12,7 +12,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
-from creeping.field.labelled import PARTS, power
+from creeping.field.labelled import power
 from creeping.geometry.incident import PointSource
 from creeping.geometry.speed import speed_of
 from creeping.geometry.unit import UNKNOWN, unit_of
@@ -201,7 +201,7 @@ def _far(far: FarField) -> Content:
         "theta": angles[:, 0],
         "phi": angles[:, 1],
         "f": far.total,
-        **{name: getattr(far, name) for name in PARTS},
+        **far.parts,
         "error": far.error,
         "cross_section": far.cross_section,
         "cross_section_dB": far.dbsm,
@@ -212,7 +212,7 @@ def _far(far: FarField) -> Content:
         "order": far.order,
     }
     units = {"directions": "1", "theta": "degree", "phi": "degree", "wavenumber": power(length, -1)}
-    units |= dict.fromkeys(("f", *PARTS, "error"), length)
+    units |= dict.fromkeys(("f", *far.parts, "error"), length)
     area = "dBsm" if length == "m" else f"dB re 1 {length}^2"
     return content, units | {"cross_section": power(length, 2), "cross_section_dB": area}
 

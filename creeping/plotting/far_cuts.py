@@ -27,7 +27,8 @@ QUANTITIES = {
 COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
 """Scattered by incident component of a vector field: t is θ̂, p is φ̂."""
 _GREEK, _RADAR = str.maketrans("tp", "θφ"), str.maketrans("tp", "VH")
-PARTS = {"creeping": "--", "reflected": "-.", "forward": ":"}
+PARTS = {"creeping": "--", "reflected": "-.", "forward": ":", "dark": "--", "lit": "-."}
+"""Line of each part of a far field."""
 HATCHED: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
 """Of angles at which a field is unresolved."""
 
@@ -93,7 +94,7 @@ def far_cut_picture(
     exact : complex (m,) or (m, 2, 2), L, optional
         Reference, drawn thin and black under the others.
     parts : bool
-        Whether to draw the creeping, reflected and forward parts of each FarField as thin lines.
+        Whether to draw the ``parts`` of each FarField as thin lines.
     components : sequence of str
         Of vector fields: "tt", "tp", "pt", "pp", scattered by incident, t for θ̂ and p for φ̂.
     span : float, dB
@@ -210,11 +211,11 @@ def cut_curves(
             doubt = getattr(field, "unresolved", None)
             levels, band = _levels(pick(whole), quantity), _band(field, pick, quantity)
             thick.append(Curve(label + suffix, levels, style, band, doubt))
-            for number, (part, dashes) in enumerate(PARTS.items() if parts and hasattr(field, "total") else ()):
+            for number, (part, values) in enumerate(getattr(field, "parts", {}).items() if parts else ()):
                 # of one curve alone the parts have colours of their own, of several that of their curve
                 own = COLOURS[1 + number] if len(fields) == 1 and not suffix else colour
-                style = {"color": own, "linewidth": 0.7, "linestyle": dashes}
-                levels = _levels(pick(getattr(field, part)), quantity)
+                style = {"color": own, "linewidth": 0.7, "linestyle": PARTS[part]}
+                levels = _levels(pick(values), quantity)
                 # a part that is nowhere has no line
                 if np.any(np.isfinite(levels)):
                     thin.append(Curve(f"{label}{suffix}, {part}", levels, style))

@@ -48,7 +48,7 @@ def plot_far(
     quantity : {"rcs", "amplitude"}
         10 log10(4π|f|²), dBsm where lengths are known to be metres, or 20 log10 |f|.
     parts : bool
-        Whether to draw the creeping, reflected and forward part as thin lines.
+        Whether to draw the field's ``parts`` as thin lines.
     components : sequence of str
         Of vector fields: "tt", "tp", "pt", "pp", scattered by incident, t for θ̂ and p for φ̂.
     angles : (m,), radians, optional

@@ -1,6 +1,6 @@
 """What one wants of the fields of a sweep, as ``dataset.field``: totals, cross sections, decibels, polarisations.
 
-The dataset holds the parts of each field; sums and logarithms are made when they are asked for.
+The dataset holds amplitudes; sizes and logarithms are made when they are asked for.
 """
 
 from typing import TYPE_CHECKING
@@ -9,7 +9,7 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.field.labelled import PARTS, power
+from creeping.field.labelled import power
 from creeping.storage.extras import required
 
 if TYPE_CHECKING:
@@ -43,7 +43,10 @@ class SweepFields:
     @property
     def total(self) -> "xarray.DataArray":
         """Far-field amplitude, L; of a conductor, which stands apart if there are scalar boundaries too, see `pec`."""
-        return self._summed("" if "creeping" in self.dataset else "_pec")
+        name = next((name for name in ("total", "total_pec") if name in self.dataset), None)
+        if name is None:
+            raise InvalidInputError("the dataset has no field; ask for quantity 'monostatic' or 'bistatic'")
+        return self.dataset[name].assign_attrs(units=self.unit, long_name="far-field amplitude f")
 
     @property
     def pec(self) -> "SweepFields":
@@ -100,13 +103,6 @@ class SweepFields:
     @property
     def _boundaries(self) -> str:
         return str(self.dataset.attrs.get("boundaries", "none"))
-
-    def _summed(self, suffix: str) -> "xarray.DataArray":
-        names = [part + suffix for part in PARTS if part + suffix in self.dataset]
-        if not names:
-            raise InvalidInputError("the dataset has no field; ask for quantity 'monostatic' or 'bistatic'")
-        found: xarray.DataArray = sum((self.dataset[name] for name in names[1:]), self.dataset[names[0]])
-        return found.assign_attrs(units=self.unit, long_name="far-field amplitude f")
 
     def _decibels(self, values: "xarray.DataArray", factor: float, units: str, text: str) -> "xarray.DataArray":
         with np.errstate(divide="ignore"):

@@ -17,7 +17,6 @@ from creeping.field.arguments import checked, checked_method, checked_plain
 from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
-from creeping.field.labelled import PARTS
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.creased import is_creased
@@ -28,6 +27,7 @@ from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
 from creeping.shadow.line import shadow_line
 from creeping.sweeping.accessor import SweepFields
+from creeping.sweeping.request import AMPLITUDES
 from creeping.sweeping.run import Progress, sweep_directions
 
 if TYPE_CHECKING:
@@ -236,7 +236,7 @@ def echo_of(
 
     ``channels`` are polarisations of a conductor, or the one boundary; a value counts as unresolved in all of them.
     """
-    conductor = "creeping_pec" in dataset
+    conductor = "total_pec" in dataset
     bistatic_cut = "observer" in dataset.dims
     order = ("observer", "wavenumber") if bistatic_cut else ("incidence", "wavenumber")
     first = dataset.isel(incidence=0) if bistatic_cut else dataset
@@ -246,8 +246,9 @@ def echo_of(
         return np.asarray(values.transpose(*order).values)
 
     picked = [fields.polarisation(name) if conductor else SweepFields(first.sel(boundary=name)) for name in channels]
-    parts = [name for name in PARTS if name in picked[0].dataset]
+    amplitudes = [name for name in AMPLITUDES if name in picked[0].dataset]
     flags = {name: np.stack([array(one.dataset[name]) for one in picked]) for name in ("unresolved", "error")}
+    found = {name: np.stack([array(one.dataset[name]) for one in picked]) for name in amplitudes}
     served = np.stack(
         [
             array(one.dataset["by_currents"])
@@ -268,7 +269,8 @@ def echo_of(
         elevation=dataset["elevation"].values,
         incidence=radar,
         wavenumbers=dataset["wavenumber"].values,
-        parts={name: np.stack([array(one.dataset[name]) for one in picked]) for name in parts},
+        total=found.pop("total"),
+        parts=found,
         error=flags["error"],
         unresolved=flags["unresolved"],
         by_currents=served,

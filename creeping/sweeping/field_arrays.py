@@ -8,7 +8,7 @@ from creeping._typing import Any, IntArray
 from creeping.field.arguments import UNRESOLVED
 from creeping.field.far_result import FarField
 
-PARTS = ("creeping", "reflected", "forward", "error", "unresolved")
+BY_OBSERVER = ("total", "creeping", "reflected", "forward", "error", "unresolved")
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +18,7 @@ class FieldArrays:
     Attributes
     ----------
     arrays : dict
-        Parts of the field, L, its error, L, ``unresolved`` and ``by_currents``.
+        Field and its parts, L, NaN where they are not known apart, its error, L, ``unresolved``, ``by_currents``.
     """
 
     arrays: dict[str, np.ndarray[Any, Any]]
@@ -26,7 +26,7 @@ class FieldArrays:
     @classmethod
     def of(cls, field: FarField, incidences: int) -> "FieldArrays":
         """Arrays of a far field whose rows are the observers of one incidence after the other."""
-        arrays = {name: getattr(field, name) for name in PARTS}
+        arrays = {name: getattr(field, name) for name in BY_OBSERVER}
         arrays = {name: np.array(v).reshape(incidences, -1, *v.shape[1:]) for name, v in arrays.items()}
         by_currents = np.isin(field.method, ("currents", "equation")).reshape(arrays["unresolved"].shape)
         return cls(arrays | {"by_currents": by_currents})
@@ -34,7 +34,7 @@ class FieldArrays:
     @property
     def unclear(self) -> IntArray:
         """Incidences with an observer that is unresolved, or whose error is large or not known."""
-        total = np.abs(self.arrays["creeping"] + self.arrays["reflected"] + self.arrays["forward"])
+        total = np.abs(self.arrays["total"])
         size, error = (v.reshape(*v.shape[:2], -1).max(axis=2, initial=0.0) for v in (total, self.arrays["error"]))
         off = ~(error < UNRESOLVED * size.max(axis=1, keepdims=True, initial=0.0))
         return np.flatnonzero(np.any(off | self.arrays["unresolved"], axis=1))
@@ -46,6 +46,6 @@ class FieldArrays:
 
     def replace(self, number: int, field: FarField) -> None:
         """Put another far field in the place of one incidence's."""
-        for name in PARTS:
+        for name in BY_OBSERVER:
             self.arrays[name][number] = getattr(field, name)
         self.arrays["by_currents"][number] = True

@@ -79,10 +79,11 @@ VALID = {
     "least_k_rho": Variable(("wavenumber",), "float64", "1", "least k rho on the rays, as creeping.validity"),
     "largest_transverse": Variable(("wavenumber",), "float64", "1", "largest kappa_t rho/m^2, as creeping.validity"),
 }
-PARTS = {
-    "creeping": "far-field amplitude of the creeping rays",
-    "reflected": "far-field amplitude of the reflected rays",
-    "forward": "far-field amplitude of the forward lobe",
+AMPLITUDES = {
+    "total": "far-field amplitude f",
+    "creeping": "far-field amplitude of the creeping rays, where rays serve",
+    "reflected": "far-field amplitude of the reflected rays, where rays serve",
+    "forward": "far-field amplitude of the forward lobe, where rays serve",
 }
 
 
@@ -228,17 +229,17 @@ class SweepRequest:
         if self.quantity == "rays":
             return LINE | CURVED | RAYS
         observer = ("observer",) if self.quantity == "bistatic" else ()
-        parts = PARTS if self.quantity == "bistatic" else {k: v for k, v in PARTS.items() if k != "forward"}
+        waves = {name: text for name, text in AMPLITUDES.items() if name != "forward" or self.quantity == "bistatic"}
         found = dict(LINE)
         if self.scalar_boundaries:
             dims = ("boundary", "wavenumber", *observer)
-            found |= {name: Variable(dims, "complex128", "L", text) for name, text in parts.items()}
+            found |= {name: Variable(dims, "complex128", "L", text) for name, text in waves.items()}
             found |= {name: Variable(dims, *of) for name, of in self._judged.items()}
         if "pec" in self.boundaries:
             dims = ("wavenumber", *observer)
             matrix = (*dims, "scattered", "incident")
             words = ", theta and phi scattered by theta and phi incident"
-            found |= {f"{name}_pec": Variable(matrix, "complex128", "L", text + words) for name, text in parts.items()}
+            found |= {f"{name}_pec": Variable(matrix, "complex128", "L", text + words) for name, text in waves.items()}
             sizes = {name: matrix if name == "error" else dims for name in self._judged}
             found |= {f"{name}_pec": Variable(sizes[name], *of) for name, of in self._judged.items()}
         return found | VALID

@@ -33,6 +33,7 @@ def test_shapes_and_names_are_checked():
             np.zeros(1),
             None,
             np.ones(2),
+            np.ones((1, 1, 1)),
             {"a": np.ones((1, 1, 1))},
             np.ones(1),
             np.ones(1),
@@ -148,6 +149,6 @@ def test_resolution_of_long_bands():
 
 def test_one_failed_row_does_not_hide_the_others():
     echo = echo_of(0.5, 0.1)
-    echo.parts["creeping"][0, 0, 0] = np.nan
+    echo.total[0, 0, 0] = np.nan
     summary = echo.summary()
     assert summary["largest"]["VV"] == pytest.approx(4.971, abs=1e-3) and summary["not_finite"] == 1

@@ -12,7 +12,7 @@ from creeping.shadow.line import shadow_line
 from creeping.shadow.nodes import shares_of
 from creeping.shadow.status import NO_RAY, OK, SINGULAR
 
-PARTS_OF_FIELD = ("creeping", "reflected", "forward", "unresolved", "error")
+PARTS_OF_FIELD = ("total", "creeping", "reflected", "forward", "unresolved", "error")
 
 
 class PlainSweeper:

@@ -23,13 +23,16 @@ def two_channels(second):
     one = echo_of(0.5, 0.01)
     both = {name: np.concatenate([v, second * v]) for name, v in one.parts.items()}
     twice = {name: np.concatenate([getattr(one, name)] * 2) for name in ("error", "unresolved", "by_currents")}
-    return replace(one, channels=("HH", "VV"), parts=both, **twice)
+    total = np.concatenate([one.total, second * one.total])
+    return replace(one, channels=("HH", "VV"), total=total, parts=both, **twice)
 
 
 def several(echo):
     """The same at two wavenumbers."""
     parts = {name: np.repeat(v, 2, axis=2) for name, v in echo.parts.items()}
-    flags = {name: np.repeat(getattr(echo, name), 2, axis=2) for name in ("error", "unresolved", "by_currents")}
+    flags = {
+        name: np.repeat(getattr(echo, name), 2, axis=2) for name in ("total", "error", "unresolved", "by_currents")
+    }
     return replace(echo, wavenumbers=np.array([20.0, 21.0]), parts=parts, **flags)
 
 

@@ -39,9 +39,9 @@ def test_parts_are_drawn_on_request(ball_cut):
 def test_what_is_not_to_be_trusted_is_marked(ball_cut):
     lost = np.zeros(len(ball_cut.total), dtype=bool)
     lost[[3, 30]] = True
-    creeping = ball_cut.creeping.copy()
-    creeping[10] = np.nan
-    ax = replace(ball_cut, unresolved=lost, creeping=creeping).plot()
+    total = ball_cut.total.copy()
+    total[10] = np.nan
+    ax = replace(ball_cut, unresolved=lost, total=total).plot()
     marks = {line.get_label(): line for line in ax.lines}
     # hatched half a step to both sides
     spans = [patch.get_extents().transformed(ax.transData.inverted()) for patch in ax.patches if patch.get_hatch()]

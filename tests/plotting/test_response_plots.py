@@ -102,6 +102,7 @@ def test_an_echo_draws_what_varies():
     both = replace(
         echo,
         wavenumbers=np.array([10.0, 20.0, 30.0]),
+        total=np.repeat(echo.total, 3, axis=2),
         parts=wide,
         error=np.repeat(echo.error, 3, axis=2),
         unresolved=flags,

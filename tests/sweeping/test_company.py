@@ -19,6 +19,6 @@ def test_impedances_know_nothing_of_their_company():
     together = cr.sweep_directions(flow, d, **options)
     for some in (slice(7, 8), slice(None, None, 3)):
         alone = cr.sweep_directions(flow, d[some], **options)
-        for name in ("creeping", "reflected", "forward", "error"):
+        for name in ("total", "creeping", "reflected", "forward", "error"):
             one, other = together[name].isel(incidence=some).values, alone[name].values
             np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-14)

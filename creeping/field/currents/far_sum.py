@@ -20,9 +20,8 @@ def far_by_currents(
     off = ~(error < UNRESOLVED * largest)
     return FarField(
         directions=r.copy(),
-        creeping=dark,
-        reflected=lit,
-        forward=np.zeros(lit.shape, dtype=complex),
+        total=lit + dark,
+        parts={"lit": lit, "dark": dark},
         method=np.full(len(r), "equation" if currents.solved else "currents", dtype="<U16"),
         unresolved=off.any(axis=tuple(range(1, off.ndim))),
         error=error,

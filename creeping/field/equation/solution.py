@@ -10,7 +10,6 @@ Sources: [CK13, sec. 3.2 and 6.2]; Derivations, F36.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -151,10 +150,7 @@ class Solution:
     def backscatter(self) -> FarField:
         """Far field of each incidence back to where it comes from, in directions -d (m,)."""
         each = [self._far(-d[None], self.currents(number)) for number, d in enumerate(self.directions)]
-        first = each[0]
-        lanes = ("directions", "creeping", "reflected", "forward", "method", "unresolved", "error")
-        joined: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in each]) for name in lanes}
-        return replace(first, **joined)
+        return FarField.joined(each)
 
     def near_field(self, points: ArrayLike, incidence: int = 0) -> NearField:
         """Field u at points (..., 3), L, outside the body at any distance from it, of one incidence.

@@ -166,7 +166,8 @@ class FieldsBetween(Between):
             reflected, creeping = (fields[:, :, part, first:last].reshape(shape) for part in (0, 1))
             difference = (differences[:, :, 0, first:last] + differences[:, :, 1, first:last]).reshape(shape)
             error, unresolved = (results[name + suffix][(inside, *which)] for name in ("error", "unresolved"))
-            arrays = {"creeping": creeping, "reflected": reflected, "forward": np.zeros(shape, dtype=complex)}
+            arrays = {"total": reflected + creeping, "creeping": creeping, "reflected": reflected}
+            arrays["forward"] = np.zeros(shape, dtype=complex)
             arrays["error"] = np.hypot(error.max(axis=1).reshape(shape), difference)
             arrays["unresolved"] = unresolved.any(axis=1).reshape(n, self._many)
             arrays["by_currents"] = np.zeros((n, self._many), dtype=bool)
