@@ -1,4 +1,4 @@
-"""Parts of far fields: creeping, reflected and forward waves where rays tell them apart, else of lit and dark currents."""
+"""Parts of far fields: waves of rays, creeping, reflected and forward, or of lit and of dark currents."""
 
 import numpy as np
 import pytest
