@@ -1,6 +1,7 @@
 """Bodies for `creeping`, one a file; each satisfies the Surface protocol by its structure alone."""
 
 from scatterers.almond import Almond
+from scatterers.bodies import Bodies
 from scatterers.cad import Cad
 from scatterers.capsule import Capsule
 from scatterers.coating import Coating
@@ -8,6 +9,7 @@ from scatterers.cone import Cone
 from scatterers.cone_sphere import ConeSphere
 from scatterers.cylinder import Cylinder
 from scatterers.ellipsoid import Ellipsoid
+from scatterers.facets import Facets
 from scatterers.gridded import Gridded
 from scatterers.implicit import Implicit
 from scatterers.mesh import Mesh, examined_mesh
@@ -20,6 +22,7 @@ from scatterers.twisted_ellipsoid import TwistedEllipsoid
 
 __all__ = [
     "Almond",
+    "Bodies",
     "Cad",
     "Capsule",
     "Coating",
@@ -29,6 +32,7 @@ __all__ = [
     "DoubleOgive",
     "Ellipsoid",
     "ExpressionSpeed",
+    "Facets",
     "Gridded",
     "Implicit",
     "Mesh",

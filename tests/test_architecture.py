@@ -42,7 +42,7 @@ def kernels():
 
 PACKAGES = (creeping, creeping.files, creeping.plotting, scatterers)
 COMPILERS = ("numba", "llvmlite")
-CAP = 400
+CAP = 500
 AT_ROOT = (*FOLDERS, "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", "constraints*.txt", ".*")
 
 

@@ -33,6 +33,7 @@ Body = Annotated[
         "or an expression F(x, y, z), negative inside, e.g. 'x**2 + y**4 + z**2 - 1'."
     ),
 ]
+SURFACES = ("auto", "smooth", "facets")
 FILE_OPTIONS = ("units", "strict", "part", "cap", "union")
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
 
@@ -56,6 +57,13 @@ class FileOptions:
     ] = False
     subdivide: Annotated[
         str | None, Parameter(help="Loop's subdivision of a coarse smooth mesh: auto, or 1, 2 or 3 times.")
+    ] = None
+    surface: Annotated[
+        str | None,
+        Parameter(
+            help="smooth: a smooth surface through a mesh, on which rays creep; facets: its triangles as they are, all "
+            "parts, without rays; auto: facets where no smooth surface fits."
+        ),
     ] = None
     sew: Annotated[float | None, Parameter(help="Sew faces of a CAD file that are so far apart at most, m.")] = None
 
@@ -104,7 +112,7 @@ def parse_body(
         )
     try:
         if of_file:
-            kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
+            kind: Any = _mesh if suffix in MESHES else scatterers.Cad
             return _with_charts(kind(text, **given, cache=cache, speed=speed, progress=progress), progress)
         if name in BODIES:
             return _with_charts(_named(name, rest, speed), None)
@@ -121,10 +129,43 @@ def parse_body(
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
+def _mesh(
+    text: str, *, surface: str = "auto", cache: bool, speed: str | None, progress: Progress | None, **given: Any
+) -> Any:
+    """The body of a mesh file: smooth, on its facets, or what of the two is there."""
+    import scatterers
+    from creeping.errors import InvalidInputError
+
+    if surface not in SURFACES:
+        raise InvalidInputError(f"--surface {surface!r} is none of {', '.join(SURFACES)}")
+    tell = progress or (lambda _: None)
+    # of a smooth surface alone
+    only = [name for name in ("strict", "subdivide") if name in given] + ["speed"] * (speed is not None)
+    reason: Exception | None = None
+    if surface != "facets":
+        try:
+            return scatterers.Mesh(text, cache=cache, speed=speed, progress=progress, **given)
+        except ValueError as error:
+            if surface == "smooth" or only:
+                raise
+            reason = error
+    elif only:
+        raise InvalidInputError(f"--{only[0]} is of a smooth surface; leave it out with --surface facets")
+    try:
+        body = scatterers.Facets(text, progress=progress, **given)
+    except ValueError as error:
+        # what is wrong with the file itself is told once
+        raise error if reason is None else reason from None
+    if reason is not None:
+        body.without_rays = f"no smooth surface fits its mesh, which is taken on its facets: {reason}"
+        tell(f"taken on its facets ({len(body.triangles)} triangles), without creeping rays: {reason}")
+    return body
+
+
 def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:
     """Options that a kind of body has."""
     if of_file:
-        return FILE_OPTIONS + (("subdivide",) if suffix in MESHES else ("sew",))
+        return FILE_OPTIONS + (("subdivide", "surface") if suffix in MESHES else ("sew",))
     return () if named else ("strict",)
 
 
@@ -141,7 +182,7 @@ def title_of(text: str) -> str:
 
 def _with_charts(shape: Any, progress: Progress | None) -> Any:
     """Body whose charts are made: flows need them, and of thin parts there may be none; bodies of pieces have none."""
-    if len(getattr(shape, "creases", ())):
+    if any(getattr(shape, name, ()) for name in ("creases", "without_rays")):
         return shape
     if progress:
         progress("charts")

@@ -157,6 +157,8 @@ def run(
     from creeping.commands import run_field as _field_run
     from creeping.commands import run_plane as _plane_run
     from creeping.commands import run_report as _run_results
+    from creeping.commands import run_solved as _run_solved
+    from creeping.geometry.parts import why_no_rays
     from creeping.rays.reach import ray_length
 
     started = time.perf_counter()
@@ -174,6 +176,12 @@ def run(
         planes = _plane_run.asked_planes(plane, job)
         if job:
             job = job.fitted(shape)
+        if why_no_rays(shape):
+            result = _run_solved.run_solved(
+                shape, job, incident, output, body, planes, tables, pictures, backend, progress
+            )
+            print(json.dumps(result, indent=1) if json_ else _run_solved.readable(result, output))
+            return 0
         progress("shadow line")
         line = cr.shadow_line(shape, source=incident)
         length = ray_length(line, length, wavenumber=job.wavenumber if job else None)
@@ -198,8 +206,8 @@ def run(
             summary["field"]["seconds"] = field_seconds
             summary["files"][-1:-1] = names
         if job and planes:
-            asked = planes, job, fan, output, title_of(body), progress
-            summary["planes"], names = _plane_run.write_planes(*asked, **written)
+            told = planes, job, fan, output, title_of(body), progress
+            summary["planes"], names = _plane_run.write_planes(*told, **written)
             summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)
         from creeping.files import write_text

@@ -1,7 +1,7 @@
 """The field of one ``creeping run``: what its options ask for, and the files that come of it. Angles in degrees."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from creeping import files, plotting
-from creeping._typing import FloatArray
+from creeping._typing import ArrayLike, FloatArray
 from creeping.commands.formats import write_tables
 from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import kept_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.decibels import cross_section_decibels
+from creeping.field.equation.kept import ASKED
+from creeping.field.equation.solution import Solution
+from creeping.field.equation.solving import solve
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.field.lobes import lobe_step
@@ -105,21 +108,36 @@ class Job:
     def far_field(self, fan: RayFan) -> tuple[FarField, float]:
         """Far field in the directions of all targets, one after the other, and the seconds that it took."""
         started = time.perf_counter()
-        directions = np.concatenate([target.directions for target in self.targets])
-        far = far_field(fan, directions, wavenumber=self.wavenumber, boundary=self.boundary, order=ORDER)
+        far = far_field(fan, self.directions, wavenumber=self.wavenumber, boundary=self.boundary, order=ORDER)
+        return self._turned(far), round(time.perf_counter() - started, 2)
+
+    def solved(self, body: Any, direction: ArrayLike, tell: Callable[[str], None]) -> tuple[Solution, FarField, float]:
+        """The same of a body without rays, by its integral equation, whose solution comes first."""
+        started = time.perf_counter()
+        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary}
+        solution = solve(body, direction, seconds=ASKED, progress=tell, **asked)
+        far = self._turned(solution.far_field(self.directions))
+        return solution, far, round(time.perf_counter() - started, 2)
+
+    @property
+    def directions(self) -> FloatArray:
+        """Directions of all targets (m, 3), one after the other."""
+        return np.concatenate([target.directions for target in self.targets])
+
+    def _turned(self, far: FarField) -> FarField:
+        """A far field in the frames of the targets and the unit that was asked for."""
         if far.total.ndim == 3:
             turn = np.concatenate([target.frames for target in self.targets])
             parts = {name: np.einsum("nab,nbc->nac", turn, values) for name, values in far.parts.items()}
             # of a component and of the other at a pole, which the turn may exchange
             error = np.sqrt(np.einsum("nab,nbc->nac", turn**2, far.error**2))
             far = replace(far, total=np.einsum("nab,nbc->nac", turn, far.total), parts=parts, error=error)
-        far = replace(far, unit=self.unit or far.unit)
-        return far, round(time.perf_counter() - started, 2)
+        return replace(far, unit=self.unit or far.unit)
 
     def write(
         self,
         far: FarField,
-        fan: RayFan,
+        of: RayFan | Solution,
         output: Path,
         backend: str,
         name: str,
@@ -128,9 +146,10 @@ class Job:
         formats: Sequence[str] = ("csv",),
     ) -> tuple[dict[str, Any], list[str]]:
         """Write the files of a far field of the body ``name``; returns the entry of the summary and their names."""
-        names = self._tables(far, fan, output, formats)
+        direction = of.line.direction if isinstance(of, RayFan) else of.directions[0]
+        names = self._tables(far, direction, output, formats)
         if pictures:
-            names += self._pictures(far, fan, output, backend, name)
+            names += self._pictures(far, of, output, backend, name)
         methods, counts = np.unique(far.method, return_counts=True)
         size = np.abs(far.total)
         finite = np.isfinite(size)
@@ -148,10 +167,11 @@ class Job:
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
             "error": _stated_error(far),
-            "validity": _named(validity(fan, wavenumber=self.wavenumber)),
         }
-        if hasattr(fan.body, "coarse_fit"):
-            entry["uncertain_by"] = self._uncertainty(far, fan)
+        if isinstance(of, RayFan):
+            entry["validity"] = _named(validity(of, wavenumber=self.wavenumber))
+            if hasattr(of.body, "coarse_fit"):
+                entry["uncertain_by"] = self._uncertainty(far, of)
         return entry, names
 
     def _uncertainty(self, far: FarField, fan: RayFan) -> dict[str, Any]:
@@ -172,7 +192,7 @@ class Job:
         ends = np.cumsum([len(target.directions) for target in self.targets])
         return [far.take(slice(end - len(t.directions), end)) for t, end in zip(self.targets, ends, strict=True)]
 
-    def _tables(self, far: FarField, fan: RayFan, output: Path, formats: Sequence[str]) -> list[str]:
+    def _tables(self, far: FarField, direction: FloatArray, output: Path, formats: Sequence[str]) -> list[str]:
         texts = [target.text for target in self.targets for _ in target.directions]
         angles = np.concatenate([target.angles for target in self.targets])
         names = write_tables(output / "far", formats, far, observed=(texts, angles), far=far)
@@ -180,11 +200,11 @@ class Job:
             # a .ffe file holds no infinity; the table does
             if target.kind == "grid" and np.all(np.isfinite(piece.total)):
                 where = output / "far.ffe"
-                files.write_ffe(where, piece, target.theta, target.phi, direction=fan.line.direction)
+                files.write_ffe(where, piece, target.theta, target.phi, direction=direction)
                 names.append(where.name)
         return names
 
-    def _pictures(self, far: FarField, fan: RayFan, output: Path, backend: str, name: str) -> list[str]:
+    def _pictures(self, far: FarField, of: RayFan | Solution, output: Path, backend: str, name: str) -> list[str]:
         names = []
         title = f"{name}\n{self.told(far.unit)}, {far.boundary}".replace("$", r"\$")
         # cuts of one step are one picture
@@ -199,16 +219,16 @@ class Job:
             names.append("far.png" if number == 1 else f"far_{number}.png")
             plotting.far_cut_picture(output / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
         if far.error_by == "extinction":
-            currents = kept_currents(fan, self.wavenumber, self.boundary)
+            currents = kept_currents(of, self.wavenumber, self.boundary) if isinstance(of, RayFan) else of.currents()
             plotting.currents_picture(
                 output / "field.png", currents, wave=self.told(far.unit), backend=backend, dpi=DPI
             )
             names.append("field.png")
         # at points between rays the field needs a smooth body
-        elif self.boundary != "pec" and not is_creased(fan.body):
+        elif isinstance(of, RayFan) and self.boundary != "pec" and not is_creased(of.body):
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
             options["wave"] = self.told(far.unit)
-            plotting.surface_field_picture(output / "field.png", fan, backend=backend, dpi=DPI, **options)
+            plotting.surface_field_picture(output / "field.png", of, backend=backend, dpi=DPI, **options)
             names.append("field.png")
         return names
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import checked_extent
 from creeping.storage.memory import within_budget
@@ -201,6 +202,14 @@ def one_of(value: Any, name: str, kind: type, made_by: str) -> None:
         raise InvalidInputError(f"{name} = {shown(value)} is no {kind.__name__}; make one by {made_by}")
 
 
+def rays_refused(body: Any) -> str:
+    """What is said where rays are asked of a body without any."""
+    return (
+        f"there are no creeping rays on this body: {why_no_rays(body)}; its field is given by creeping.solve, "
+        "backscatter and bistatic, and by the commands rcs, ts, run and sweep"
+    )
+
+
 def checked_body(body: Surface, *, charts: bool = True) -> None:
     """Refuse what lacks the members of a body; whether they fit each other is not looked at.
 
@@ -210,6 +219,8 @@ def checked_body(body: Surface, *, charts: bool = True) -> None:
     ------
     InvalidInputError
     """
+    if why_no_rays(body):
+        raise InvalidInputError(rays_refused(body))
     # a property such as the atlas is expensive, so it is sought in the class first
     needed = MEMBERS if charts else MEMBERS[:-1]
     missing = [name for name in needed if not (hasattr(type(body), name) or hasattr(body, name))]

@@ -13,7 +13,9 @@ from scipy.spatial import ConvexHull
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.facet_patches import halved
 from creeping.geometry.kept import kept
+from creeping.geometry.parts import is_faceted, why_no_rays
 from creeping.geometry.surface import jet, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 
@@ -148,12 +150,33 @@ def is_convex(body: Any) -> bool:
 
 def drawn_mesh(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:
     """A body as it is drawn, with the normals of its vertices (n, 3), 1; along edges these are there once a side."""
+    if why_no_rays(body):
+        return _drawn_parts(body, cells)
     if is_creased(body):
         tiles = tiles_of(body, 2.0 / cells)
         corners = tiles.corners.reshape(-1, 3)
         return Triangulation(corners, np.arange(len(corners)).reshape(-1, 3)), tiles.normals.reshape(-1, 3)
     mesh = triangulate(body.level, body.gradient, body.bounds, cells=cells)
     return mesh, normal(body, mesh.vertices)
+
+
+def _drawn_parts(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:
+    """The same of a body without rays: its facets, or all its parts."""
+    if is_faceted(body):
+        fine = halved(body.vertices, body.triangles, 2.0 / cells * size(body))
+        corners = fine.vertices[fine.triangles]
+        n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        n /= np.linalg.norm(n, axis=1, keepdims=True)
+        flat = Triangulation(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        return flat, np.repeat(n, 3, axis=0)
+    vertices, triangles, normals, count = [], [], [], 0
+    for part, turn, shift in zip(body.parts, body.turns, body.shifts, strict=True):
+        mesh, n = drawn_mesh(part, cells)
+        vertices.append(mesh.vertices @ turn.T + shift)
+        triangles.append(mesh.triangles + count)
+        normals.append(n @ turn.T)
+        count += len(mesh.vertices)
+    return Triangulation(np.concatenate(vertices), np.concatenate(triangles)), np.concatenate(normals)
 
 
 def pieces_of(body: Any) -> tuple[Any, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.geometry.kept import kept
+from creeping.geometry.parts import inside
 from creeping.geometry.quadrature import body_nodes
 from creeping.geometry.surface import Surface, size
 
@@ -38,7 +39,7 @@ def box_points(body: Surface) -> FloatArray:
 
     low, high = np.asarray(body.bounds, dtype=float)
     x = low + (high - low) * qmc.Halton(3, scramble=False).random(TRIED)
-    return np.asarray(x[body.level(x) < 0])
+    return np.asarray(x[inside(body, x)])
 
 
 def _depths(body: Surface) -> tuple[FloatArray, FloatArray]:

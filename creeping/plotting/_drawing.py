@@ -200,6 +200,12 @@ def _source_view(body: Surface, source: FloatArray, towards: FloatArray) -> View
     return next((view for view in tried if view.visible(body, source[None])[0]), first)
 
 
+def bare(body: Any, direction: FloatArray, *, view: View | None = None, cells: int = 80) -> Drawing:
+    """Compose the picture of a body and a wave alone."""
+    mesh, normals = drawn_mesh(body, cells)
+    return Drawing(body, direction, view or shadow_view(direction), mesh, normals, [], LevelColours.of(()))
+
+
 def compose(
     line: ShadowLine,
     fan: RayFan | None = None,

@@ -13,9 +13,10 @@ from creeping.errors import InvalidInputError
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.decibels import decibels, shown_range
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
+from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, normal
 from creeping.geometry.unit import unit_of
-from creeping.plotting._drawing import Drawing, compose
+from creeping.plotting._drawing import Drawing, bare, compose
 from creeping.plotting._view import View
 from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.pictures import chosen_backend, drawn_page, save_figure
@@ -72,9 +73,10 @@ def currents_picture(
     """
     backend = chosen_backend(backend)
     k = currents.wavenumber
-    drawing = compose(
-        shadow_line(currents.body, currents.direction), view=view, cells=cells or cells_of(currents.body, k)
-    )
+    body: Any = currents.body
+    asked: Any = {"view": view, "cells": cells or cells_of(body, k)}
+    direction = currents.direction
+    drawing = bare(body, direction, **asked) if why_no_rays(body) else compose(shadow_line(body, direction), **asked)
     levels = current_levels(currents, drawing.mesh.vertices, incident)
     name = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
     wave = wave or f"k = {k:g}/{unit_of(currents.body)}"

@@ -21,6 +21,7 @@ from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
+from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.tuning.flow_choice import choose_flow
 from creeping.rays.fan import launch
@@ -160,7 +161,7 @@ def seconds_of_currents(
 
     ``azimuths``, ``elevations`` (n,), degrees, are the radar's; ``observers`` directions belong to each.
     """
-    if is_creased(body):
+    if is_creased(body) or why_no_rays(body):
         return 0.0
     radar = directions_from_azimuth_elevation(np.radians(azimuths[0]), np.radians(elevations[0]))
     try:
@@ -194,7 +195,8 @@ def _swept(
     progress: Progress | None,
 ) -> xarray.Dataset:
     """Sweep of checked arguments."""
-    checked_body(body, charts=not is_creased(body))
+    if not why_no_rays(body):
+        checked_body(body, charts=not is_creased(body))
     checked_plain(body)
     checked_method(asked["method"], 2)
     asked["n_rays"] = whole_number(asked["n_rays"], "n_rays")
@@ -207,6 +209,8 @@ def _swept(
     count = len(incidences) * len(k) * len(asked.get("observation", (None,)))
     if count > MOST:
         raise InvalidInputError(f"{count} values are asked for at once; {MOST} are the most: give a coarser step")
+    if why_no_rays(body):
+        return sweep_directions(body, incidences, wavenumbers=k, progress=progress, **asked)
     length = body_length(body, float(k.min()))
     flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
     # small enough that progress is told in time, large enough that a task is not all overhead

@@ -27,6 +27,7 @@ from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
 from creeping.sweeping.between.choice import sweeper_of
 from creeping.sweeping.request import SweepRequest
+from creeping.sweeping.solved_fields import NoFlow
 
 MOST_IN_TASK, MOST_AT_ONCE, MOST_BETWEEN = 1024, 256, 4096
 """Incidences of a task, of one that nobody else waits for, and of one whose results are interpolated."""
@@ -226,6 +227,8 @@ def describe_flow(flow: Flow) -> dict[str, Any]:
             "tables": flow.digest,
             "error": measured,
         }
+    if isinstance(flow, NoFlow):
+        return {"kind": "none", "error": None}
     if isinstance(flow, DirectFlow):
         return {"kind": "direct", "horizon": flow.horizon, "rtol": flow.rtol, "step": flow.step, "error": measured}
     return {"kind": "other", "repr": repr(flow), "horizon": flow.horizon, "error": measured}
@@ -241,11 +244,11 @@ def save_flow(flow: Flow, folder: Path) -> None:
     """
     if isinstance(flow, PhaseMap):
         flow.save(folder / "map")
-    elif not isinstance(flow, DirectFlow):
+    elif not isinstance(flow, DirectFlow | NoFlow):
         raise InvalidInputError(f"a {type(flow).__name__} cannot be stored; give a PhaseMap or a DirectFlow")
 
 
-def open_flow(content: dict[str, Any], folder: Path, body: Surface) -> PhaseMap | DirectFlow:
+def open_flow(content: dict[str, Any], folder: Path, body: Surface) -> PhaseMap | DirectFlow | NoFlow:
     """Make the flow of a description; a map from its folder, its tables mapped from the files.
 
     Raises
@@ -258,6 +261,8 @@ def open_flow(content: dict[str, Any], folder: Path, body: Surface) -> PhaseMap 
     if content["kind"] == "direct":
         error = content["error"] and ErrorEstimate(*content["error"])
         return DirectFlow(body, content["rtol"], content["horizon"], content["step"], error)
+    if content["kind"] == "none":
+        return NoFlow(body)
     raise CreepingError(f"{folder} holds a flow of kind {content['kind']!r}, which is neither 'map' nor 'direct'")
 
 

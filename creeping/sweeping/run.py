@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.geometry.arguments import flag, folder_path, shown, whole_number
 from creeping.geometry.directions import unit_directions
+from creeping.geometry.parts import why_no_rays
+from creeping.geometry.surface import Surface
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
@@ -24,6 +26,7 @@ from creeping.sweeping.between.worth import with_paying_lattice
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request
 from creeping.sweeping.results import as_dataset, require
+from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.mending import mended
 from creeping.sweeping.storage.store import SweepStore
@@ -41,7 +44,7 @@ EVERY = 1.0
 
 
 def sweep_directions(
-    flow: Flow,
+    flow: Flow | Surface,
     directions: ArrayLike,
     *,
     wavenumbers: ArrayLike = (),
@@ -52,7 +55,7 @@ def sweep_directions(
     n_rays: int = 256,
     n_steps: int = 1,
     order: int = 2,
-    method: str = "rays",
+    method: str | None = None,
     accuracy: float | None = None,
     store: str | Path | None = None,
     resume: bool = False,
@@ -65,6 +68,7 @@ def sweep_directions(
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
+        Or a body that has no rays, on facets or of several: its fields are solved for.
     directions : (n, 3)
         Directions of incidence, where the waves travel; need not be unit.
     wavenumbers : float or (k,), 1/L
@@ -86,10 +90,10 @@ def sweep_directions(
     order : 2 or 1
         Of the creeping waves.
     method : {"rays", "auto", "currents", "equation"}
-        Of the fields. "auto" computes an incidence again by the currents of the whole body where isolated rays leave a
-        direction unresolved, a tenth of a second or so for each boundary and wavenumber, "currents" every one that a
-        mesh of the body resolves: ``by_currents`` says which. "equation" solves the body's integral equation for every
-        one, in seconds to minutes each (`creeping.surface_currents` with ``solve=True``).
+        Of the fields, "rays" if not given. "auto" computes an incidence again by the currents of the whole body where
+        isolated rays leave a direction unresolved, a tenth of a second or so for each boundary and wavenumber,
+        "currents" every one that a mesh of the body resolves: ``by_currents`` says which. "equation" solves the body's
+        integral equation for every one, in seconds to minutes each (`creeping.surface_currents` with ``solve=True``).
     accuracy : float, optional
         Interpolate between incidences, where they are dense and that is known to err by less than this share of the
         field's size, ten times it of the creeping part's own; 1e-3 is a good one. Each incidence that cannot be had so
@@ -128,7 +132,13 @@ def sweep_directions(
     {'incidence': 2, 'ray': 4, 'step': 1, 'axis': 3}
     """
     require("xarray")
-    checked_flow(flow)
+    if why_no_rays(flow):
+        flow, method, length = NoFlow(flow), method or "auto", 1.0
+    flow, length = cast(Flow, flow), cast(float, length)
+    if not isinstance(flow, NoFlow):
+        checked_flow(flow)
+        leap = flow.horizon if isinstance(flow, PhaseMap) else 0.0
+        length = sweep_length(flow.body, length, wavenumbers, leap=leap)
     _checked_options(store, progress, resume)
     _refuse(flow, quantity, store, resume, client)
     if boundary is None:
@@ -136,14 +146,14 @@ def sweep_directions(
     several: Any = list(boundary) if isinstance(boundary, (list, tuple)) else [boundary]
     request = sweep_request(
         quantity,
-        length=sweep_length(flow.body, length, wavenumbers, leap=flow.horizon if isinstance(flow, PhaseMap) else 0.0),
+        length=length,
         n_rays=n_rays,
         n_steps=n_steps,
         wavenumbers=wavenumbers,
         boundary=several,
         observation=observation,
         order=order,
-        method=method,
+        method=method or "rays",
         accuracy=accuracy,
     )
     unit = unit_directions(directions, "directions")
@@ -189,7 +199,7 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray
     order = np.arange(count) if order is None else order
     for task in range(plan.tasks):
         rows = plan.rows(task)
-        if progress and isinstance(sweeper, Sweeper):
+        if progress and isinstance(sweeper, Sweeper | SolvedSweeper):
             sweeper.passed = _within(rows, count, started, progress)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():

@@ -29,12 +29,15 @@ class Choice:
         The outer surface of all parts is taken.
     subdivide : "auto", int or None
         Loop's subdivision, so many times.
+    every : bool
+        All closed parts are the body, where none is chosen.
     """
 
     part: str | int | None = None
     cap: float | None = None
     union: bool = False
     subdivide: str | int | None = None
+    every: bool = False
 
     def __post_init__(self) -> None:
         part, cap, times = self.part, self.cap, self.subdivide

@@ -21,6 +21,7 @@ from scatterers.triangles.crossings import crossings
 from scatterers.triangles.cutting import uncrossed
 from scatterers.triangles.form import check_whole
 from scatterers.triangles.off import with_triangles
+from scatterers.triangles.parts import every_part
 from scatterers.triangles.subdivision import Subdivision
 from scatterers.triangles.threemf import read_3mf
 from scatterers.triangles.topology import cleaned, oriented
@@ -127,7 +128,11 @@ def read_mesh(
     # digits are lost to the offset in any sum of products of coordinates, so it goes first
     offset = 0.5 * (vertices.min(0) + vertices.max(0))
     local = vertices - offset
-    triangles = oriented(raw.name, local, triangles, note)
+    if choice.every and choice.part is None:
+        local, triangles = every_part(raw.name, local, triangles, note)
+        vertices = local + offset
+    else:
+        triangles = oriented(raw.name, local, triangles, note)
     _check_rounding(raw.name, vertices, triangles)
     if choice.cap is not None:
         local, triangles = uncrossed(raw.name, local, triangles, choice.cap, scale, note)

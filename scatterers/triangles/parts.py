@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.triangles.topology import components, edges_of
+from scatterers.triangles.topology import components, edges_of, oriented
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -38,6 +38,45 @@ def parts_of(vertices: FloatArray, triangles: IntArray) -> IntArray:
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return np.asarray(rank[label.ravel()], dtype=np.int64)
+
+
+def every_part(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> tuple[FloatArray, IntArray]:
+    """All parts, each turned outwards, without those that are inside others.
+
+    Raises
+    ------
+    ValueError
+        If one of them is not closed.
+    """
+    label = parts_of(vertices, triangles)
+    count = int(label.max()) + 1
+    if count == 1:
+        return vertices, oriented(name, vertices, triangles, note)
+    outside: list[int] = []
+    corners = np.empty_like(triangles)
+    for k in range(count):
+        mine = triangles[label == k]
+        used, own = np.unique(mine, return_inverse=True)
+        turned = oriented(f"part {k + 1} of {name}", vertices[used], own.reshape(-1, 3).astype(np.int64), note)
+        corners[label == k] = used[turned]
+        # the largest area first: what holds a part comes before it
+        if not any(_holds(vertices[corners[label == j]], vertices[used[0]]) for j in outside):
+            outside.append(k)
+    note(
+        f"{name} has {count} parts"
+        + (f", {count - len(outside)} of them inside others; left out" * (len(outside) < count))
+    )
+    return compact(vertices, corners[np.isin(label, outside)])
+
+
+def _holds(corners: FloatArray, point: FloatArray) -> bool:
+    """Whether a closed surface of triangles (m, 3, 3) holds a point, by the solid angle that it fills."""
+    if np.any(point < corners.min(axis=(0, 1))) or np.any(point > corners.max(axis=(0, 1))):
+        return False
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    below = la * lb * lc + np.sum(a * b, axis=1) * lc + np.sum(b * c, axis=1) * la + np.sum(c * a, axis=1) * lb
+    return bool(abs(np.sum(np.arctan2(np.sum(a * np.cross(b, c), axis=1), below))) > np.pi)
 
 
 def listed(vertices: FloatArray, triangles: IntArray, parts: IntArray, scale: float) -> str:

@@ -11,6 +11,7 @@ from studies.reference.modal_conductor import scatter_conductor
 from studies.reference.modal_equation import scatter_by_modes
 from studies.reference.revolution import Profile, wave_directions
 from studies.reference.stored import Arrays
+from studies.reference.two_spheres import Kind, scatter_spheres
 
 HEIGHTS = (0.05, 0.08, 0.11, 0.14)
 """Of sources above their ports, L."""
@@ -210,6 +211,17 @@ def edged_cube() -> Arrays:
     r = _about(d)
     kinds: tuple[Boundary, ...] = ("hard", "soft")
     far = {str(kind): scatter_box((1, 1, 1), 5.0, d, kind).far_field(r) for kind in kinds}
+    return {"incident": d, "directions": r} | far
+
+
+def two_spheres() -> Arrays:
+    """Far fields of spheres of radii 1 and 0.7, a wavelength apart, the origin halfway, k = 6."""
+    k, axis, d = 6.0, np.array([0.48, 0.6, 0.64]), np.array([[0.5, -0.3, 0.7]])
+    d /= np.linalg.norm(d)
+    r = _about(d)
+    kinds: tuple[Kind, ...] = ("hard", "soft", "pec")
+    centres = np.stack([-(1.0 + np.pi / k) * axis, (0.7 + np.pi / k) * axis])
+    far = {str(kind): scatter_spheres(centres, (1.0, 0.7), k, d, kind).far_field(r) for kind in kinds}
     return {"incident": d, "directions": r} | far
 
 

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.fft import dct
+from scipy.integrate import cumulative_simpson
+from scipy.interpolate import CubicSpline
 from scipy.special import jv
 
 from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
@@ -40,6 +42,8 @@ DENSER = 2.2
 """Points at which the condition is imposed, over rings."""
 DIGITS = 30.0
 """-ln of the error of the sum over the azimuth."""
+SPLINED = 100_001
+"""Places by which the arc length of a spheroid is kept: to 1e-12 of it."""
 STRIPS = 2000
 """Of a body, whose areas are added."""
 
@@ -78,6 +82,23 @@ def capsule_profile(radius: float, length: float) -> Profile:
         return a * n + np.stack([np.zeros_like(s), middle], axis=-1), n
 
     return Profile(at, 2 * quarter + flat, (quarter, quarter + flat), (), a)
+
+
+def spheroid_profile(radius: float, half: float) -> Profile:
+    """Spheroid of a radius and a half-axis along z, about the origin; its arc length is kept by a spline."""
+    positive(radius=radius, half=half)
+    t = np.linspace(0.0, np.pi, SPLINED)
+    speed = np.hypot(radius * np.cos(t), half * np.sin(t))
+    s = np.concatenate([[0.0], cumulative_simpson(speed, x=t)])
+    angle = CubicSpline(s, t)
+
+    def at(where: FloatArray) -> tuple[FloatArray, FloatArray]:
+        turn = angle(where)
+        n = np.stack([half * np.sin(turn), radius * np.cos(turn)], axis=-1)
+        x = np.stack([radius * np.sin(turn), half * np.cos(turn)], axis=-1)
+        return x, n / np.linalg.norm(n, axis=-1, keepdims=True)
+
+    return Profile(at, float(s[-1]), (), (), min(radius**2 / half, half**2 / radius))
 
 
 def cone_sphere_profile(radius: float, length: float) -> Profile:

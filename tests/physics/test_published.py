@@ -13,6 +13,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
+from studies.reference.modal_equation import scatter_by_modes
+from studies.reference.revolution import spheroid_profile
 
 TABLES = Path(__file__).parents[3] / "shared" / "benchmarks"
 pytestmark = pytest.mark.skipif(not TABLES.is_dir(), reason="the published tables are not beside the repository")
@@ -21,8 +23,9 @@ SPEED = 1477.3
 """Of sound, m/s."""
 SMALL = 0.01
 """Radius of the sphere and of the spheroid's waist, m; the spheroid is seven times as long."""
-ROUNDING = 0.005
-"""Of published target strengths, dB."""
+ROUNDING = {"sphere": 0.005, "spheroid": 0.01}
+"""Of published target strengths, dB; those of spheroids by boundary elements are off by up to a unit of their last
+digit (`test_published_spheroids_are_right_to_a_digit`)."""
 AUSTIN = 0.05
 """Mean of the suite's error measure, dB; 0.007 by currents, 0.03 and 0.05 by rays."""
 BACK = 0.05
@@ -94,7 +97,7 @@ def back(shape, kind, frequency, degrees=90.0, method="auto"):
         fan, -fan.line.direction, wavenumber=2e3 * np.pi * frequency / SPEED, boundary=kind, method=method
     )
     size, exact = abs(far.total[0]), 10 ** (level / 20)
-    share = (abs(size - exact) - exact * (10 ** (ROUNDING / 20) - 1)) / far.error[0]
+    share = (abs(size - exact) - exact * (10 ** (ROUNDING[shape] / 20) - 1)) / far.error[0]
     return 20 * np.log10(size / exact), share, bool(far.unresolved[0])
 
 
@@ -115,7 +118,7 @@ def test_backscatter_of_high_frequencies(shape, kind):
     assert waist(HIGH[0]) > 12
     rays = np.array([back(shape, kind, f, method="rays")[0] for f in HIGH])
     currents = np.array([back(shape, kind, f)[0] for f in HIGH])
-    assert np.abs(rays).max() < BACK + ROUNDING
+    assert np.abs(rays).max() < BACK + ROUNDING[shape]
     assert np.abs(currents).mean() < BACK and np.abs(currents).max() < WORST
 
 
@@ -128,5 +131,17 @@ def test_errors_stated_for_backscatter(shape, kind):
     assert np.mean(shares <= 1) > 0.9 and shares.max() < 1.5
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "frequency"), [("hard", 20.0), ("hard", 100.0), ("soft", 30.0)])
+def test_published_spheroids_are_right_to_a_digit(kind, frequency):
+    """By Fourier modes on the generatrix; rounded they are not: -30.0719 dB is told as -30.08."""
+    k = 2e3 * np.pi * frequency / SPEED
+    modes = scatter_by_modes(spheroid_profile(SMALL, 7 * SMALL), k, [np.pi / 2], kind)
+    exact = modes.far_field(np.array([[-1.0, 0.0, 0.0]]))[0, 0]
+    assert abs(20 * np.log10(abs(exact)) - published("spheroid", kind)[frequency]) < ROUNDING["spheroid"]
+    far = cr.solve(sc.Ellipsoid(SMALL, SMALL, 7 * SMALL), (1, 0, 0), wavenumber=k, boundary=kind).far_field([-1, 0, 0])
+    assert abs(far.total[0] - exact) < 2e-4 * abs(exact)
+
+
 def test_a_high_frequency_by_rays():
-    assert abs(back("sphere", "hard", HIGH[0], method="rays")[0]) < BACK + ROUNDING
+    assert abs(back("sphere", "hard", HIGH[0], method="rays")[0]) < BACK + ROUNDING["sphere"]

@@ -39,6 +39,7 @@ from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.depth import inner_points
+from creeping.geometry.parts import inside
 from creeping.geometry.surface import Surface
 
 DEPTH = 0.25
@@ -181,7 +182,7 @@ class SurfaceCurrents:
             If a point is outside, or too near to the body (`scattered`).
         """
         x = as_points(points).reshape(-1, 3)
-        out = np.flatnonzero(self.body.level(x) > 0)
+        out = np.flatnonzero(~inside(self.body, x))
         if len(out):
             raise InvalidInputError(f"{len(out)} of {len(x)} points are outside the body (first: row {out[0]})")
         return self._remainder(x, self.scattered(x))
@@ -197,7 +198,7 @@ class SurfaceCurrents:
     def extinction(self) -> float:
         """Rms of what is left of the incident wave inside, as a share of it; NaN if the body is nowhere thick enough.
 
-        Of solved currents at least 5e-5.
+        Of solved currents at least 2e-5.
 
         It is the error of the far field, rms over all directions, as a share of the field's rms, within a factor of
         about 2. Of a conductor it is the mean of both polarisations, in the square.

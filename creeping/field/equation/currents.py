@@ -4,7 +4,7 @@
     u(x) = u_inc + M u/2,   u(x) = u_inc - int du/dn G dS,   n x H = n x H_inc + M J/2      next to it
 
 with the integrals over tiles of `creeping.field.equation.matrix`. Farther off than APART wavelengths fields are sums
-over FINE x FINE nodes of each tile, where a current is what the polynomial through its own p x p nodes says.
+over the fine nodes of each tile, where a current is what the polynomial through its own p x p nodes says.
 
 Sources: [CK13, sec. 3.2 and 6.2]; Derivations, F36.
 """
@@ -29,6 +29,7 @@ from creeping.field.equation.tiles import Tiles
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.creased import is_convex, is_creased
 from creeping.geometry.depth import box_points
+from creeping.geometry.parts import is_faceted, why_no_rays
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.occlusion import occluded
 
@@ -37,13 +38,16 @@ APART = 0.12
 e^(-2 pi distance/spacing), to 1e-5 there."""
 THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 """Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
+DEEPEST = 50
+"""Points inside a body that is thinner everywhere."""
 ON_BODY = 10.0
 """Error of currents at a point and of the field next to the body by what they leave inside of the incident wave."""
-LEAST = 5e-5
-"""What is left inside, at least: a few times what is left of the equation and what integrals over tiles err by."""
+LEAST, LEAST_NEAR = 2e-5, 5e-5
+"""What is left inside, at least, for the far field, where errors of tiles cancel, and on the body and near it: a few
+times what is left of the equation and what integrals over tiles err by (`studies.edges`)."""
 UNRESOLVED = 2.0
 """Error by what tiles do not resolve, in what two ways to the same value differ by."""
-LEVELS = {"hard": 1.7, "soft": 1.5, "impedance": 0.9, "conductor": 1.5}
+LEVELS = {"hard": 1.1, "soft": 0.9, "impedance": 0.9, "conductor": 1.1}
 """Error of the far field over what is found of it, with which it holds in 95 of 100 directions (`studies.edges`)."""
 CLOSEST = 1e-6
 """Distance from an edge, over that of the nodes next to it, at least: on the edge itself currents are infinite."""
@@ -51,13 +55,25 @@ ABOVE = 1e-5
 """Height of points just above the nodes, in body sizes: polynomials of tiles may pass under the body."""
 
 
-def lit_ground(body: Surface, points: FloatArray, normals: FloatArray, direction: FloatArray) -> BoolArray:
+def lit_ground(body: Any, points: FloatArray, normals: FloatArray, direction: FloatArray) -> BoolArray:
     """Whether the wave comes straight to points of the body with normals (m, 3): (m,)."""
     lit = np.asarray(normals @ direction < 0)
     if not (is_creased(body) and is_convex(body)):
         above = points[lit] + ABOVE * size(body) * normals[lit]
-        lit[lit] = ~occluded(body, above, direction)
+        lit[lit] = ~_hidden(body, above, direction)
     return lit
+
+
+def _hidden(body: Any, points: FloatArray, direction: FloatArray) -> BoolArray:
+    """Whether a body of any kind stands before points (m, 3) of the wave (m,)."""
+    if not why_no_rays(body):
+        return occluded(body, points, direction)
+    if is_faceted(body):
+        return np.asarray(body.hidden(points, direction))
+    found = np.zeros(len(points), dtype=bool)
+    for number, part in enumerate(body.parts):
+        found |= _hidden(part, body.own(number, points), direction @ body.turns[number])
+    return found
 
 
 def twice_incident(
@@ -130,7 +146,7 @@ class _OnTiles(SurfaceCurrents):
         apart, large = values - self._between(places, nodes), values
         if values.ndim == 3:
             apart, large = (np.linalg.norm(part, axis=1) for part in (apart, large))
-        error = np.hypot(ON_BODY * unit * self._left, UNRESOLVED * np.abs(apart))
+        error = np.hypot(ON_BODY * unit * np.maximum(self._left, LEAST_NEAR), UNRESOLVED * np.abs(apart))
         if edges and self.boundary.kind in ("soft", "conductor"):
             # polynomials are bounded at edges, where these grow like the root of the distance at most
             assert places.own is not None
@@ -218,7 +234,7 @@ class _OnTiles(SurfaceCurrents):
     @property
     def _left_next_to(self) -> FloatArray:
         """What is left inside of the incident wave."""
-        return np.asarray(self._left)
+        return np.maximum(self._left, LEAST_NEAR)
 
     def _next_to(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         """Scattered field, of a conductor H, at points (m, 3) next to the body, of values at the nodes: (m, ...)."""
@@ -278,7 +294,9 @@ def _inside(body: Surface, tiles: Tiles, wavelength: float) -> FloatArray:
     # half of what the nodes next to it are apart
     depth = np.sqrt(np.maximum(away**2 - tiles.fine[2][nearest], 0.0))
     each = (x[depth > least * wavelength][:POINTS] for least in THIN)
-    return next((points for points in each if len(points)), np.zeros((0, 3)))
+    found = next((points for points in each if len(points)), np.zeros((0, 3)))
+    # of a thin or small body the deepest there are: what is left is integrated over tiles
+    return found if len(found) else x[np.argsort(-depth, kind="stable")[:DEEPEST]][: int(np.sum(depth > 0))]
 
 
 def _vectors(places: Places, both: ComplexArray) -> ComplexArray:
@@ -346,7 +364,7 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
 
     @property
     def _left_next_to(self) -> FloatArray:
-        return np.asarray(np.max(self.left_of_each, axis=0))
+        return np.asarray(np.maximum(np.max(self.left_of_each, axis=0), LEAST_NEAR))
 
     def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         found: ComplexArray = self._finer._electric(self._at_fine(values), points)

@@ -12,7 +12,8 @@ edge radiates
 
     f(r) = (1/pi) int C' e^{-ik r.x} dl   times a function of the angle about it, cos(nu phi), 1/sqrt(2) in the mean
 
-C is read off the nodes of the tiles along the edge.
+C is read off the nodes of the tiles along the edge, where there are three or more away from it. Of flat triangles it
+is known beforehand as well: of B rho^nu they lack about C = lacks B w^(2 nu), w their width (`Tiles.lacks`).
 
 Source: [M72]; Derivations, F36.
 """
@@ -96,9 +97,13 @@ class EdgeTerm:
         self._normals = n[there]
         self._distance = np.linalg.norm(x[there] - self.rings.points[:, None, None], axis=3)
         self._nu = np.pi / (np.pi + np.where(convex, turned, -turned)[there])
+        self._lacks, self._reach = tiles.lacks, 1 - tiles.places[0][0]
 
     def of(self, values: ComplexArray, kind: str) -> ComplexArray:
-        """C' dl at the places along edges (m, c), of values at the nodes (n,), or (n, 3, c) of a conductor."""
+        """C' dl at the places along edges (2, m, c), of values at the nodes (n,), or (n, 3, c) of a conductor.
+
+        As it is read off, and as it is known beforehand.
+        """
         here = values[self.rings.nodes]
         if kind == "soft":
             return self._forbidden(here[..., None], soft=True)
@@ -115,26 +120,32 @@ class EdgeTerm:
         """Size of the far field, L, in unit directions (r, 3), and of its mean over all: (r, c)."""
         if not len(self.rings.points):
             return np.zeros((len(directions), values.shape[-1] if kind == "conductor" else 1))
-        strength = self.of(values, kind)
         every = np.concatenate([directions, fibonacci_directions(DIRECTIONS)])
-        f = np.abs(phase_sums(self.rings.points, np.ascontiguousarray(strength.T), every, self._k)) / np.pi
+        both = [
+            phase_sums(self.rings.points, np.ascontiguousarray(strength.T), every, self._k)
+            for strength in self.of(values, kind)
+        ]
+        f = np.linalg.norm(both, axis=0) / np.pi
         mean = np.mean(f[len(directions) :] ** 2, axis=0)
         return np.asarray(np.sqrt(0.5 * (f[: len(directions)] ** 2 + mean)))
 
     def _forbidden(self, values: ComplexArray, *, soft: bool) -> ComplexArray:
-        """C' dl (m, c) of values on both faces (m, 2, p, c)."""
-        nu, wide = self._nu[:, None, None], self._distance.max(axis=(1, 2))
+        """C' dl (2, m, c) of values on both faces (m, 2, p, c)."""
+        p, nu, wide = values.shape[2], self._nu[:, None, None], self._distance.max(axis=(1, 2))
         rho = self._distance / wide[:, None, None]
         less = 1.0 if soft else 0.0
-        powers = [2 * nu, 4 * nu] if soft else [0 * nu, 2 * nu, 2 + 0 * nu]
+        powers = ([2 * nu, 4 * nu] if soft else [0 * nu, 2 * nu, 2 + 0 * nu])[:p]
         # those of one sign on both faces, and those that change it
         face = np.array([1.0, -1.0])[:, None]
         even = [rho ** (q - less) * (face if soft else 1.0) for q in powers]
-        odd = [rho ** (q * nu - less) * (1.0 if soft else face) for q in (1, 3, -1)]
+        odd = [rho ** (q * nu - less) * (1.0 if soft else face) for q in (1, 3, -1)[:p]]
         columns = np.stack([*even, *odd], axis=-1)
         m = len(rho)
-        fit = np.linalg.pinv(columns.reshape(m, -1, columns.shape[-1]))[:, -1]
-        C = np.einsum("ms,msc->mc", fit, values.reshape(m, fit.shape[1], -1))
+        fit = np.linalg.pinv(columns.reshape(m, -1, columns.shape[-1]))
+        found = np.einsum("mqs,msc->mqc", fit[:, [len(even), -1]], values.reshape(m, fit.shape[2], -1))
+        # rho is over its largest: B rho^nu and C rho^-nu are B and C times powers of that
+        lacks = self._lacks[1 if soft else 0] / self._reach ** (2 * self._nu)
+        B, C = found[:, 0] * lacks[:, None], found[:, 1] * (p > 2)
         nu, size = self._nu, wide ** (self._nu + less)
         of_wave = np.pi / gamma(nu) * (self._k / 2) ** nu / (nu if soft else 1.0)
-        return np.asarray(C * (size * of_wave * self.rings.lengths)[:, None])
+        return np.asarray(np.stack([C, B]) * (size * of_wave * self.rings.lengths)[:, None])

@@ -10,12 +10,11 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.solution import Solution
 from creeping.field.equation.solving import SECONDS, cost, solve
-from creeping.field.equation.tiles import tiles_of
 from creeping.geodesics.equations import points_of_charts
-from creeping.geometry.covering import patches_of
 from creeping.geometry.creased import is_creased
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface
@@ -125,7 +124,7 @@ def _nodes(body: Surface, wavenumber: float, kind: Boundary) -> int:
     known: dict[tuple[float, bool, bool], int] = kept(body, "nodes of tiles", dict)
     key = wavenumber, kind.varies, kind.kind == "conductor"
     if key not in known:
-        known[key] = len(tiles_of(patches_of(body), wavenumber, kind).points)
+        known[key] = len(body_tiles(body, wavenumber, kind).points)
     return known[key]
 
 

@@ -23,8 +23,7 @@ import numpy as np
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import SOFT, Boundary
 from creeping.field.equation.edge_term import EdgeTerm
-from creeping.field.equation.tiles import Tiles, gauss
-from creeping.geometry.squares import interpolation
+from creeping.field.equation.tiles import Tiles
 from creeping.kernels.threads import in_threads
 
 DEPTH, SHALLOWER, LEAST = np.pi / 2, 0.6, 0.15
@@ -33,8 +32,8 @@ CLEAR = 0.7
 """Least distance of its points from all nodes, over the depth."""
 PAIRS = 4096
 """Pairs of a place and a tile near to it that are made tangent at once."""
-TANGENT = 7
-"""Nodes along a side of a tile at which J is made tangent to the body."""
+TANGENT = 2
+"""Nodes more along a side of a curved tile than it has, at which J is made tangent to the body."""
 EACH, VECTOR = 2.5e-9, 4.0
 """Seconds of a pair, and what a pair of a conductor takes of that."""
 BLOCK = 512
@@ -193,7 +192,7 @@ class Matrix:
         """The integrals of a conductor over tiles near places, of polynomials without their part along the normal.
 
         Between nodes Cartesian components of J have one, and n_x.J of it is no smaller next to x than elsewhere. The
-        polynomials are those through TANGENT x TANGENT nodes, where it is taken away.
+        polynomials are those through the finer nodes, where it is taken away.
         """
         tiles, finer, (starts, targets) = self.tiles, self._finer, near
         found = finer.rows(places.points, near, self.k, 2, places.own)
@@ -226,14 +225,14 @@ class Matrix:
 
     @cached_property
     def _finer(self) -> Tiles:
-        """The same tiles with TANGENT x TANGENT nodes."""
-        return self.tiles.with_nodes(TANGENT)
+        """The same tiles with nodes enough that J is tangent between its own: as many where they are flat."""
+        tiles = self.tiles
+        return tiles if tiles.flat else tiles.with_nodes(tiles.p + TANGENT)
 
     @cached_property
     def _at_finer(self) -> FloatArray:
-        """What the polynomials of nodes (p p,) are at the finer ones of a tile (TANGENT^2, p p)."""
-        rows = interpolation(gauss(self.tiles.p)[0], gauss(TANGENT)[0])
-        return np.asarray(np.kron(rows, rows))
+        """What the polynomials of nodes (p p,) are at the finer ones of a tile (f, p p)."""
+        return np.asarray(np.kron(*self.tiles.onto(self._finer.p)))
 
 
 def _transposed(square: np.ndarray) -> np.ndarray:

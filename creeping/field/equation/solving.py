@@ -16,11 +16,10 @@ from creeping._typing import ArrayLike
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.columns import TOGETHER, is_dense
 from creeping.field.equation.matrix import EACH, VECTOR
 from creeping.field.equation.solution import Solution
-from creeping.field.equation.tiles import tiles_of
-from creeping.geometry.covering import patches_of
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import thread_count
@@ -88,7 +87,7 @@ def solve(
     d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
     tell = progress or (lambda words: None)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
-    tiles = tiles_of(patches_of(body), k, kind)
+    tiles = body_tiles(body, k, kind)
     takes, memory = cost(len(tiles.points), kind, len(d))
     told = f"{len(tiles.points)} nodes, about {takes:.2g} s and {memory / 1e9:.2g} GB"
     if takes > seconds:

@@ -1,18 +1,20 @@
 """Tiles of a body for a wavenumber: parts of its squares, with p x p nodes each, and integrals next to them.
 
-Nodes are those of Gauss's product rule in u and v, x_u x x_v = n dS/(du dv). Squares are parted until their sides are
-no longer than SIDE wavelengths, and their normals turn by no more than TURN. Next to an edge, where currents go like a
-broken power of the distance, there is a strip of CUT of their width, parted along the edge at the same places on both
-faces; next to a tip they are cut twice.
+Nodes are those of Gauss's product rule in u and v, x_u x x_v = n dS/(du dv); on triangles of a few nodes, squares whose
+side u = 0 is one point, where dS goes like u, the rule in u is Jacobi's for the weight u. Squares are parted until
+their sides are no longer than SIDE wavelengths, and their normals turn by no more than TURN. Next to an edge, where
+currents go like a broken power of the distance, there is a strip of CUT of their width, parted along the edge at the
+same places on both faces; next to a tip they are cut twice.
 
 Sources: [DR84, sec. 2.7]; Derivations, F36.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import roots_jacobi
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
@@ -48,8 +50,19 @@ ANGLES, RADII = 12, 6
 """Places along a side and radii of each of the four triangles about a node of its own."""
 
 
-def gauss(points: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss's rule on 0 < u < 1."""
+@cache
+def gauss(points: int, *, conical: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Gauss's rule on 0 < u < 1, places and weights; the ``conical`` one is exact for u times polynomials.
+
+    Examples
+    --------
+    >>> u, w = gauss(1, conical=True)
+    >>> u.round(12), w.round(12)                    # the centroid of a triangle: int u du = 1/2
+    (array([0.66666667]), array([0.75]))
+    """
+    if conical:
+        u, w = roots_jacobi(points, 0.0, 1.0)
+        return 0.5 * (1 + u), 0.5 * w / (1 + u)
     u, w = np.polynomial.legendre.leggauss(points)
     return 0.5 * (1 + u), 0.5 * w
 
@@ -60,8 +73,8 @@ class Tiles:
 
     Attributes
     ----------
-    shapes : (t, DEGREE + 1, DEGREE + 1, 3), L
-        Points of each by u and v, at Lobatto's places.
+    shapes : (t, q + 1, q + 1, 3), L
+        Points of each by u and v, at Lobatto's places of degree q; q = 1 of flat ones.
     points, normals : (t p p, 3), L and 1
         Nodes, tile by tile.
     weights : (t p p,), L^2
@@ -69,6 +82,11 @@ class Tiles:
     edges : (t, 4)
         Of tiles along an edge its number, the side u = 0, u = 1, v = 0 or v = 1 that lies on it, by 0 to 3, and where
         on the edge, 0 to 1, that side begins and ends; -1 throughout of others. On both faces tiles meet there.
+    conical : bool
+        Whether all are triangles with the conical rule in u.
+    lacks : (float, float)
+        What tiles of width w along an edge lack there, C = lacks B w^(2 nu) in terms of `edge_term`, of a hard and of
+        a soft body, where that is known beforehand.
     """
 
     shapes: FloatArray
@@ -77,17 +95,42 @@ class Tiles:
     weights: FloatArray
     p: int
     edges: FloatArray
+    conical: bool = False
+    lacks: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def of(
+        cls,
+        shapes: FloatArray,
+        p: int,
+        edges: FloatArray,
+        *,
+        conical: bool = False,
+        lacks: tuple[float, float] = (0.0, 0.0),
+    ) -> "Tiles":
+        """Tiles of these shapes with p x p nodes."""
+        return cls(shapes, *_nodes(shapes, p, conical), p, edges, conical, lacks)
 
     @property
     def count(self) -> int:
         """Number of tiles."""
         return len(self.shapes)
 
+    @property
+    def flat(self) -> bool:
+        """Whether their points are linear in u and in v."""
+        return bool(self.shapes.shape[1] == 2)
+
+    @property
+    def places(self) -> tuple[FloatArray, FloatArray]:
+        """u and v of the nodes (p,)."""
+        return gauss(self.p, conical=self.conical)[0], gauss(self.p)[0]
+
     @cached_property
     def middles(self) -> FloatArray:
         """Middles of the tiles (t, 3), L."""
-        half = DEGREE // 2
-        return np.ascontiguousarray(self.shapes[:, half, half])
+        half = np.full((self.count, 1), 0.5)
+        return np.ascontiguousarray(on_squares(self.shapes, half, half)[0][:, 0, 0])
 
     @cached_property
     def sizes(self) -> FloatArray:
@@ -95,12 +138,17 @@ class Tiles:
         u, v = (np.linalg.norm(np.diff(self.shapes, axis=axis), axis=-1).sum(axis=axis) for axis in (1, 2))
         return np.asarray(np.maximum(u.max(axis=1), v.max(axis=1)))
 
+    @property
+    def _grid(self) -> FloatArray:
+        """Places of the shapes."""
+        return lobatto(self.shapes.shape[1] - 1)
+
     @cached_property
     def _tables(self) -> FloatArray:
         """x, x_u, x_v at the places of the shapes (t, n, n, 9)."""
         from creeping.geometry.squares import differentiation
 
-        slope = differentiation(lobatto(DEGREE))
+        slope = differentiation(self._grid)
         u, v = np.einsum("ai,tijx->tajx", slope, self.shapes), np.einsum("bj,tijx->tibx", slope, self.shapes)
         return np.ascontiguousarray(np.concatenate([self.shapes, u, v], axis=-1))
 
@@ -128,13 +176,14 @@ class Tiles:
         from creeping.field.kernels.tile_rows import tile_rows
 
         starts, targets = near
-        nodes, grid = gauss(self.p)[0], lobatto(DEGREE)
+        grid, (at_u, at_v) = self._grid, self.places
         rules = (*gauss(RULE), *gauss(ANGLES), *gauss(RADII))
         nowhere = np.zeros(len(points))
         places = own or (np.full(len(points), -1), nowhere, nowhere)
         out = np.empty((len(targets), 6, self.p**2))
         given = (np.ascontiguousarray(points), starts, targets, self._tables, grid, barycentric(grid))
-        rest = (nodes, barycentric(nodes), *rules, wavenumber, mode, APART, *places)
+        nodes = at_u, barycentric(at_u), at_v, barycentric(at_v)
+        rest = (*nodes, *rules, wavenumber, mode, APART, *places)
 
         def work(part: slice) -> None:
             tile_rows(*given, *rest, part.start, part.stop, out)
@@ -144,12 +193,17 @@ class Tiles:
 
     def with_nodes(self, p: int) -> "Tiles":
         """The same tiles with p x p nodes."""
-        return Tiles(self.shapes, *_nodes(self.shapes, p), p, self.edges)
+        return Tiles.of(self.shapes, p, self.edges, conical=self.conical)
+
+    @property
+    def finer(self) -> int:
+        """Fine nodes along a side of a tile: FINE of POINTS, tiles of fewer nodes are smaller."""
+        return max(self.p + 2, FINE * self.p // POINTS)
 
     @cached_property
     def fine(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """FINE x FINE nodes of every tile: x and n (t FINE^2, 3), and weights, L^2."""
-        return _nodes(self.shapes, FINE)
+        """The fine nodes of every tile: x and n (t finer^2, 3), and weights, L^2."""
+        return _nodes(self.shapes, self.finer, self.conical)
 
     @cached_property
     def fine_tree(self) -> Any:
@@ -159,24 +213,28 @@ class Tiles:
         return cKDTree(self.fine[0])
 
     def interpolated(self, values: ComplexArray) -> ComplexArray:
-        """Values (n, ...) at the nodes, by the polynomials of tiles at the fine nodes (t FINE^2, ...)."""
-        rows = interpolation(gauss(self.p)[0], gauss(FINE)[0])
+        """Values (n, ...) at the nodes, by the polynomials of tiles at the fine nodes (t finer^2, ...)."""
+        by_u, by_v = self.onto(self.finer)
         each = values.reshape(self.count, self.p, self.p, -1)
-        found = np.einsum("ai,bj,tijc->tabc", rows, rows, each, optimize=True)
+        found = np.einsum("ai,bj,tijc->tabc", by_u, by_v, each, optimize=True)
         return np.asarray(found.reshape(-1, *values.shape[1:]))
+
+    def onto(self, points: int) -> tuple[FloatArray, FloatArray]:
+        """What the polynomials of nodes are at ``points`` of them along u and along v (points, p)."""
+        u, v = self.places
+        return interpolation(u, gauss(points, conical=self.conical)[0]), interpolation(v, gauss(points)[0])
 
     def interpolated_at(self, values: ComplexArray, tile: IntArray, u: FloatArray, v: FloatArray) -> ComplexArray:
         """Values (n, ...) at the nodes, by the polynomials of tiles (m,) at u and v: (m, ...)."""
-        nodes = gauss(self.p)[0]
+        at_u, at_v = self.places
         each = values.reshape(self.count, self.p, self.p, -1)[tile]
-        found = np.einsum("mi,mj,mijc->mc", interpolation(nodes, u), interpolation(nodes, v), each, optimize=True)
+        found = np.einsum("mi,mj,mijc->mc", interpolation(at_u, u), interpolation(at_v, v), each, optimize=True)
         return np.asarray(found.reshape(-1, *values.shape[1:]))
 
     @property
     def own_places(self) -> tuple[IntArray, FloatArray, FloatArray]:
         """Tile of each node, and u and v there: (n,) each."""
-        u = gauss(self.p)[0]
-        at_u, at_v = (part.ravel() for part in np.meshgrid(u, u, indexing="ij"))
+        at_u, at_v = (part.ravel() for part in np.meshgrid(*self.places, indexing="ij"))
         return np.repeat(np.arange(self.count), self.p**2), np.tile(at_u, self.count), np.tile(at_v, self.count)
 
     def located(self, points: FloatArray) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
@@ -277,17 +335,17 @@ def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, turn: 
     t = lobatto(DEGREE)
     u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
     shapes = on_squares(places, u, v)[0]
-    return Tiles(shapes, *_nodes(shapes, p), p, edges)
+    return Tiles.of(shapes, p, edges)
 
 
-def _nodes(shapes: FloatArray, points: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _nodes(shapes: FloatArray, points: int, conical: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Gauss's nodes of tiles (t, n, n, 3), ``points`` along a side: x and n (t points^2, 3), and weights, L^2."""
-    u, w = gauss(points)
-    x, along, across = on_squares(shapes, *(np.broadcast_to(u, (len(shapes), points)),) * 2)
+    (u, by_u), (v, by_v) = gauss(points, conical=conical), gauss(points)
+    x, along, across = on_squares(shapes, *(np.broadcast_to(at, (len(shapes), points)) for at in (u, v)))
     area = np.cross(along, across)
     scale = np.linalg.norm(area, axis=-1)
     normals = (area / scale[..., None]).reshape(-1, 3)
-    return np.ascontiguousarray(x.reshape(-1, 3)), normals, (scale * np.outer(w, w)).ravel()
+    return np.ascontiguousarray(x.reshape(-1, 3)), normals, (scale * np.outer(by_u, by_v)).ravel()
 
 
 NEXT = ((0, 2, 0), (0, 3, 1), (1, 2, 0), (1, 3, 1), (2, 0, 0), (2, 1, 1), (3, 0, 0), (3, 1, 1))

@@ -92,7 +92,9 @@ def _terms(x, by, count, k, mode, out):
 
 
 @njit(**strict_options)
-def _part(table, grid, bary, nodes, weights, rule, share, box, room, by, by_u, by_v, spot):
+def _part(
+    table, grid, bary, nodes_u, weights_u, nodes_v, weights_v, rule, share, box, room, by, by_u, by_v, spot
+):  # fmt: skip
     """Fill points and n dS (6, g g) of a part (u0, u1, v0, v1), the nodes' polynomials there, and its middle and sides.
 
     ``spot`` (5,) is the middle and the lengths along u and v.
@@ -110,8 +112,8 @@ def _part(table, grid, bary, nodes, weights, rule, share, box, room, by, by_u, b
         u, v = box[0] + width * rule[a], box[2] + height * rule[a]
         _cardinal(grid, bary, u, at_u[a])
         _cardinal(grid, bary, v, at_v[a])
-        _cardinal(nodes, weights, u, by_u[a])
-        _cardinal(nodes, weights, v, by_v[a])
+        _cardinal(nodes_u, weights_u, u, by_u[a])
+        _cardinal(nodes_v, weights_v, v, by_v[a])
     for a in range(g):
         for b in range(g):
             _place(table, at_u[a], at_v[b], q)
@@ -180,8 +182,8 @@ def _around(table, grid, bary, u0, v0, angles, share, radii, weight, room, by, a
 
 @njit(**entry_options)
 def tile_rows(
-    points, starts, targets, tables, grid, bary, nodes, weights, rule, share, angles, angle_share, radii, radius_share,
-    k, mode, apart, own, own_u, own_v, first, last, out,
+    points, starts, targets, tables, grid, bary, nodes_u, weights_u, nodes_v, weights_v, rule, share, angles,
+    angle_share, radii, radius_share, k, mode, apart, own, own_u, own_v, first, last, out,
 ):  # fmt: skip
     """Fill out (pairs, 6, p p) for the points that tiles first..last are near to.
 
@@ -191,7 +193,7 @@ def tile_rows(
     starts : (t + 1,), targets : (pairs,)
         Points near tile number t: targets[starts[t]:starts[t + 1]].
     tables : (t, n, n, 9)
-        x, x_u, x_v at the places of the grid (n,), with barycentric weights; nodes (p,) and theirs.
+        x, x_u, x_v at the places of the grid (n,), with barycentric weights; nodes (p,) along u and v and theirs.
     rule, share : (g,)
         Gauss's rule; likewise of angles and radii.
     apart : float
@@ -199,7 +201,7 @@ def tile_rows(
     own : (m,)
         Number of the tile that a point is on, at ``own_u`` and ``own_v`` (m,); -1 if it is on none.
     """
-    n, p, g = grid.shape[0], nodes.shape[0], rule.shape[0]
+    n, p, g = grid.shape[0], nodes_u.shape[0], rule.shape[0]
     polar = 4 * angles.shape[0] * radii.shape[0]
     room = (np.empty((max(g, 1), n)), np.empty((max(g, 1), n)), np.empty(9))
     made = np.zeros(SLOTS + 1, dtype=np.bool_)
@@ -220,8 +222,8 @@ def tile_rows(
                 _around(table, grid, bary, u, v, angles, angle_share, radii, radius_share, room, around, at)
                 _terms(x, around, polar, k, mode, terms)
                 for q in range(polar):
-                    _cardinal(nodes, weights, at[0, q], one_u)
-                    _cardinal(nodes, weights, at[1, q], one_v)
+                    _cardinal(nodes_u, weights_u, at[0, q], one_u)
+                    _cardinal(nodes_v, weights_v, at[1, q], one_v)
                     for c in range(6):
                         if c % 3 >= kinds:
                             continue
@@ -243,8 +245,8 @@ def tile_rows(
                         width, height = 1.0 / (1 << lu), 1.0 / (1 << lv)
                         box = (iu * width, (iu + 1) * width, iv * height, (iv + 1) * height)
                         _part(
-                            table, grid, bary, nodes, weights, rule, share, box, room, by[slot], by_u[slot], by_v[slot],
-                            spots[slot],
+                            table, grid, bary, nodes_u, weights_u, nodes_v, weights_v, rule, share, box, room, by[slot],
+                            by_u[slot], by_v[slot], spots[slot],
                         )  # fmt: skip
                         made[slot] = slot < SLOTS
                     spot = spots[slot]

@@ -22,6 +22,7 @@ from creeping.rays.transport import Flow
 from creeping.sweeping.between.choice import sweeper_of
 from creeping.sweeping.lattice import Lattice
 from creeping.sweeping.request import SweepRequest, with_lattice
+from creeping.sweeping.solved_fields import SolvedSweeper
 from creeping.sweeping.sweeper import Sweeper
 
 FEWEST, MOST, SHARE = 2, 12, 2000
@@ -42,7 +43,7 @@ def with_paying_lattice(flow: Flow, request: SweepRequest, incidences: FloatArra
     if lattice is None or lattice.dimensions == 1:
         return request
     sweeper = sweeper_of(flow, request)
-    if isinstance(sweeper, Sweeper):
+    if isinstance(sweeper, Sweeper | SolvedSweeper):
         return request
     some = representatives(lattice, incidences)
     left = np.ones((len(some), lattice.levels))

@@ -1,0 +1,66 @@
+"""Tiles of a body of any kind: of its squares, of its facets, or of all its parts together."""
+
+import numpy as np
+
+from creeping._typing import Any, FloatArray, IntArray
+from creeping.errors import SurfaceError
+from creeping.field.boundary import Boundary
+from creeping.field.equation.facet_tiles import facet_tiles
+from creeping.field.equation.tiles import POINTS, Tiles, tiles_of
+from creeping.geometry.covering import patches_of
+from creeping.geometry.parts import inside, is_faceted, why_no_rays
+from creeping.geometry.patches import DEGREE
+from creeping.geometry.squares import lobatto, on_squares
+
+
+def body_tiles(body: Any, wavenumber: float, boundary: Boundary) -> Tiles:
+    """Tiles of a body for a wavenumber, 1/L, and a boundary.
+
+    Raises
+    ------
+    SurfaceError
+        If no mesh of squares is the body, or one of several bodies reaches into another.
+    """
+    if is_faceted(body):
+        return facet_tiles(body, wavenumber, boundary)
+    if not why_no_rays(body):
+        return tiles_of(patches_of(body), wavenumber, boundary)
+    made = [_of_part(part, wavenumber, boundary) for part in body.parts]
+    whole = _joined(made, body.turns, body.shifts)
+    _checked_apart(body, whole.points, np.repeat(np.arange(len(made)), [len(tiles.points) for tiles in made]))
+    return whole
+
+
+def _of_part(part: Any, wavenumber: float, boundary: Boundary) -> Tiles:
+    if is_faceted(part):
+        return facet_tiles(part, wavenumber, boundary, POINTS)
+    return body_tiles(part, wavenumber, boundary)
+
+
+def _joined(made: list[Tiles], turns: FloatArray, shifts: FloatArray) -> Tiles:
+    """Tiles of several bodies, turned and shifted; their edges keep apart."""
+    shapes, edges, count = [], [], 0.0
+    for tiles, turn, shift in zip(made, turns, shifts, strict=True):
+        at = np.broadcast_to(lobatto(DEGREE), (tiles.count, DEGREE + 1))
+        x = on_squares(tiles.shapes, at, at)[0] if tiles.flat else tiles.shapes
+        shapes.append(x @ turn.T + shift)
+        known = (tiles.edges[:, :1] >= 0) & (np.arange(4) == 0)
+        edges.append(np.where(known, tiles.edges + count, tiles.edges))
+        count += tiles.edges[:, 0].max(initial=-1.0) + 1
+    lacks = np.max([tiles.lacks for tiles in made], axis=0)
+    return Tiles.of(np.concatenate(shapes), POINTS, np.concatenate(edges), lacks=(float(lacks[0]), float(lacks[1])))
+
+
+def _checked_apart(body: Any, points: FloatArray, owner: IntArray) -> None:
+    """Refuse bodies that reach into each other, by their nodes (n, 3)."""
+    for number, part in enumerate(body.parts):
+        x = points[owner != number]
+        y = body.own(number, x)
+        low, high = np.asarray(part.bounds, dtype=float)
+        near = np.flatnonzero(np.all((y > low) & (y < high), axis=1))
+        crossed = near[inside(part, y[near])] if len(near) else near
+        if len(crossed):
+            raise SurfaceError(
+                f"bodies reach into each other: {len(crossed)} nodes of others are inside body {number + 1} (one near "
+                f"{np.array2string(x[crossed[0]], precision=4)}); put them apart, or give their union as one mesh"
+            )

@@ -1,0 +1,102 @@
+"""Several bodies at once, each where it is put: their field is that of all together."""
+
+import hashlib
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+class Bodies:
+    """Bodies that scatter together, none of which touches another.
+
+    Parameters
+    ----------
+    parts : sequence of bodies
+        Of any kind: smooth, of pieces, on facets.
+    at : (n, 3), L, optional
+        Where the origin of each is put.
+    turned : (n, 3, 3), optional
+        Rotation of each about its origin, before it is put there.
+
+    Attributes
+    ----------
+    parts : tuple of bodies
+        As they were given.
+    shifts : (n, 3), L
+    turns : (n, 3, 3)
+    bounds : (2, 3), L
+
+    Raises
+    ------
+    ValueError
+        If there are none, shapes do not fit, a matrix is no rotation, or units differ.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> two = sc.Bodies([sc.Sphere(1.0), sc.Sphere(0.5)], at=[(0, 0, 0), (0, 0, 2)])
+    >>> solution = cr.solve(two, (1, 0, 0), wavenumber=2.0, boundary="soft")
+    >>> solution.far_field([(1, 0, 0), (0, 0, 1)]).total.shape
+    (2,)
+    """
+
+    without_rays = "it is of several bodies, which throw rays on each other"
+    """Why there are no creeping rays on it."""
+
+    def __init__(self, parts: Sequence[Any], *, at: ArrayLike | None = None, turned: ArrayLike | None = None) -> None:
+        self.parts = tuple(parts)
+        n = len(self.parts)
+        if not n:
+            raise ValueError("there are no bodies; give one at least")
+        self.shifts = np.zeros((n, 3)) if at is None else np.array(at, dtype=float)
+        self.turns = np.tile(np.eye(3), (n, 1, 1)) if turned is None else np.array(turned, dtype=float)
+        if self.shifts.shape != (n, 3) or self.turns.shape != (n, 3, 3) or not np.all(np.isfinite(self.shifts)):
+            raise ValueError(
+                f"at has shape {self.shifts.shape} and turned {self.turns.shape}; give finite (n, 3) and (n, 3, 3) "
+                f"of n = {n} bodies"
+            )
+        off = np.abs(self.turns @ np.swapaxes(self.turns, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        if np.any(bad := ~(off < 1e-9) | ~(np.linalg.det(self.turns) > 0)):
+            raise ValueError(f"turned[{int(np.argmax(bad))}] is no rotation")
+        units = {getattr(part, "unit", "L") for part in self.parts}
+        if len(units) > 1:
+            raise ValueError("some of the bodies are in metres and some are not; give units= to all that are files")
+        self.unit = units.pop()
+        corners = []
+        for part, turn, shift in zip(self.parts, self.turns, self.shifts, strict=True):
+            box = np.asarray(part.bounds, dtype=float)
+            ends = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+            corners.append(ends @ turn.T + shift)
+        self.bounds = np.stack([np.min(corners, axis=(0, 1)), np.max(corners, axis=(0, 1))])
+
+    def __repr__(self) -> str:
+        return f"Bodies({len(self.parts)}: {', '.join(type(part).__name__ for part in self.parts[:6])})"
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Text that tells bodies apart."""
+        text = [getattr(part, "fingerprint", None) or repr(part) for part in self.parts]
+        digest = hashlib.blake2b(repr([text, self.shifts.tolist(), self.turns.tolist()]).encode(), digest_size=16)
+        return f"Bodies:{digest.hexdigest()}"
+
+    def own(self, number: int, points: FloatArray) -> FloatArray:
+        """Points (m, 3) as one of the bodies has them."""
+        return np.asarray((points - self.shifts[number]) @ self.turns[number])
+
+    def inside(self, points: FloatArray) -> BoolArray:
+        """Whether points (m, 3) are inside one of them (m,)."""
+        found = np.zeros(len(points), dtype=bool)
+        for number, part in enumerate(self.parts):
+            x = self.own(number, points)
+            low, high = np.asarray(part.bounds, dtype=float)
+            near = np.flatnonzero(np.all((x >= low) & (x <= high), axis=1))
+            mine = x[near]
+            found[near] |= part.inside(mine) if hasattr(part, "inside") else np.asarray(part.level(mine)) < 0
+        return found
