@@ -87,11 +87,11 @@ class Bodies:
         return f"Bodies:{digest.hexdigest()}"
 
     def own(self, number: int, points: FloatArray) -> FloatArray:
-        """Points (m, 3) as one of the bodies has them."""
+        """Points (m, 3), L, as one of the bodies has them, (m, 3), L."""
         return np.asarray((points - self.shifts[number]) @ self.turns[number])
 
     def inside(self, points: FloatArray) -> BoolArray:
-        """Whether points (m, 3) are inside one of them (m,)."""
+        """Whether points (m, 3), L, are inside one of them (m,)."""
         found = np.zeros(len(points), dtype=bool)
         for number, part in enumerate(self.parts):
             x = self.own(number, points)

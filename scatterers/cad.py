@@ -84,6 +84,9 @@ class Cad(FittedBody):
     >>> hull = sc.Cad("hull.step")                              # doctest: +SKIP
     """
 
+    tessellated = True
+    """Its triangles stand for curved faces."""
+
     def __init__(
         self,
         path: str | Path,

@@ -6,11 +6,13 @@ There are no creeping rays on flat triangles; the field is that of the integral 
 import hashlib
 from collections.abc import Callable
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.cad_file.files import SUFFIXES, CadReading, cad_triangles
 from scatterers.triangles.choice import Choice
 from scatterers.triangles.files import read_mesh
 
@@ -19,6 +21,8 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 SOMEWHERE = np.array([0.3602, 0.5413, 0.7597])
 """Direction of the rays that tell inside from outside: along no axis or plane of symmetry."""
+POINTS = 20_000
+"""Of a CAD file."""
 CELLS = 512
 """Cells along a side of the plane across rays, at most."""
 MOST = 10_000_000
@@ -31,7 +35,8 @@ class Facets:
     Parameters
     ----------
     source : path, or object with ``vertices`` and ``faces``
-        STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh; each of its parts is closed.
+        STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh; each of its parts is closed. Or a STEP, IGES or
+        BREP file, whose triangles have their corners on it.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
     part : str or int, optional
@@ -52,6 +57,8 @@ class Facets:
     bounds : (2, 3), m
     repairs : tuple of str
         What was changed in the mesh.
+    tessellated : bool
+        Whether the triangles stand for curved faces, as of a CAD file: errors know of what they differ by.
 
     Raises
     ------
@@ -83,8 +90,12 @@ class Facets:
         progress: Callable[[str], None] | None = None,
     ) -> None:
         in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
-        choice = Choice(part, cap, union, every=True)
-        mesh = read_mesh(source, units, choice, progress=progress or (lambda _: None))
+        choice, tell = Choice(part, cap, union, every=True), progress or (lambda _: None)
+        if not in_memory and Path(str(source)).suffix.lower() in SUFFIXES:
+            mesh = cad_triangles(Path(source), CadReading(units, POINTS, choice), progress=tell)
+        else:
+            mesh = read_mesh(source, units, choice, progress=tell)
+        self.tessellated = not in_memory and Path(str(source)).suffix.lower() in SUFFIXES
         self.vertices, self.triangles, self.repairs = mesh.vertices, mesh.triangles, mesh.repairs
         self.unit = "L" if in_memory and units is None and getattr(source, "units", None) is None else "m"
         self.bounds = np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
@@ -101,12 +112,12 @@ class Facets:
         return f"Facets:{digest.hexdigest()}"
 
     def inside(self, points: FloatArray) -> BoolArray:
-        """Whether points (m, 3) are inside (m,)."""
+        """Whether points (m, 3), L, are inside (m,)."""
         along = SOMEWHERE / np.linalg.norm(SOMEWHERE)
         return np.asarray(self._crossed(points, along, 0.0, len(self.triangles)) % 2 == 1)
 
     def hidden(self, points: FloatArray, direction: FloatArray) -> BoolArray:
-        """Whether the body stands before points (m, 3) of a wave in a unit direction (m,)."""
+        """Whether the body stands before points (m, 3), L, of a wave in a unit direction (m,)."""
         least = 1e-9 * float(np.linalg.norm(np.ptp(self.bounds, axis=0)))
         return np.asarray(self._crossed(points, -direction, least, 1) > 0)
 

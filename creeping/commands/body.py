@@ -112,8 +112,7 @@ def parse_body(
         )
     try:
         if of_file:
-            kind: Any = _mesh if suffix in MESHES else scatterers.Cad
-            return _with_charts(kind(text, **given, cache=cache, speed=speed, progress=progress), progress)
+            return _with_charts(_of_file(text, cache=cache, speed=speed, progress=progress, **given), progress)
         if name in BODIES:
             return _with_charts(_named(name, rest, speed), None)
         if progress:
@@ -129,10 +128,10 @@ def parse_body(
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
-def _mesh(
+def _of_file(
     text: str, *, surface: str = "auto", cache: bool, speed: str | None, progress: Progress | None, **given: Any
 ) -> Any:
-    """The body of a mesh file: smooth, on its facets, or what of the two is there."""
+    """The body of a file: smooth, on its facets, or what of the two is there."""
     import scatterers
     from creeping.errors import InvalidInputError
 
@@ -140,11 +139,12 @@ def _mesh(
         raise InvalidInputError(f"--surface {surface!r} is none of {', '.join(SURFACES)}")
     tell = progress or (lambda _: None)
     # of a smooth surface alone
-    only = [name for name in ("strict", "subdivide") if name in given] + ["speed"] * (speed is not None)
+    only = [name for name in ("strict", "subdivide", "sew") if name in given] + ["speed"] * (speed is not None)
     reason: Exception | None = None
     if surface != "facets":
         try:
-            return scatterers.Mesh(text, cache=cache, speed=speed, progress=progress, **given)
+            kind: Any = scatterers.Mesh if Path(text).suffix.lower() in MESHES else scatterers.Cad
+            return kind(text, cache=cache, speed=speed, progress=progress, **given)
         except ValueError as error:
             if surface == "smooth" or only:
                 raise
@@ -157,7 +157,7 @@ def _mesh(
         # what is wrong with the file itself is told once
         raise error if reason is None else reason from None
     if reason is not None:
-        body.without_rays = f"no smooth surface fits its mesh, which is taken on its facets: {reason}"
+        body.without_rays = f"no smooth surface fits it, and it is taken on its facets: {reason}"
         tell(f"taken on its facets ({len(body.triangles)} triangles), without creeping rays: {reason}")
     return body
 
@@ -165,7 +165,7 @@ def _mesh(
 def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:
     """Options that a kind of body has."""
     if of_file:
-        return FILE_OPTIONS + (("subdivide", "surface") if suffix in MESHES else ("sew",))
+        return (*FILE_OPTIONS, "surface", "subdivide" if suffix in MESHES else "sew")
     return () if named else ("strict",)
 
 

@@ -64,6 +64,11 @@ class FarField(Drawn):
     validity : Validity, optional
         Least k rho and largest kappa_t rho/m^2 on the fan's rays; of `far_field`.
 
+    Raises
+    ------
+    ValueError
+        If a part is of another shape than the total.
+
     Examples
     --------
     >>> import numpy as np

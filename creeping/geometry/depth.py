@@ -5,9 +5,11 @@ A point is as deep as the nearest of many nodes of the body is far, less what th
 Sources: Derivations, B11.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import BoolArray, FloatArray
 from creeping.geometry.kept import kept
 from creeping.geometry.parts import inside
 from creeping.geometry.quadrature import body_nodes
@@ -33,13 +35,16 @@ def inner_points(body: Surface, depth: float, count: int) -> FloatArray:
     return np.asarray(x[distance > depth][:count])
 
 
-def box_points(body: Surface) -> FloatArray:
-    """Points inside, evenly spread over the body's box (n, 3), L; the same ones at every call."""
+def box_points(body: Surface, within: Callable[[FloatArray], BoolArray] | None = None) -> FloatArray:
+    """Points inside, evenly spread over the body's box (n, 3), L; the same ones at every call.
+
+    ``within`` tells which are, if it is not the body that does.
+    """
     from scipy.stats import qmc
 
     low, high = np.asarray(body.bounds, dtype=float)
     x = low + (high - low) * qmc.Halton(3, scramble=False).random(TRIED)
-    return np.asarray(x[inside(body, x)])
+    return np.asarray(x[inside(body, x) if within is None else within(x)])
 
 
 def _depths(body: Surface) -> tuple[FloatArray, FloatArray]:

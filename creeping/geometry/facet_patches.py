@@ -1,4 +1,4 @@
-"""Squares that cover a body on flat facets: pairs of triangles in one plane, and thirds of what is left.
+"""Triangles of a body on flat facets, and squares that cover it.
 
 Two triangles that share a side and lie in one plane are a quadrilateral, if it is convex; the longest shared sides go
 first, so that rectangles come back. A triangle that stays alone is three quadrilaterals about its middle, each with a
@@ -38,6 +38,27 @@ def turns_of(vertices: FloatArray, triangles: IntArray, number: IntArray) -> tup
     beside = np.argsort(number.ravel(), kind="stable").reshape(-1, 2) // 3
     one, other = n[beside.T]
     return np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1)), beside
+
+
+def chordal(vertices: FloatArray, triangles: IntArray) -> float:
+    """Mean distance, L, of flat triangles from the smooth surface that they stand for, whose corners are on it.
+
+    Of a sphere a quarter of the angle between neighbours times the height of a triangle.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> ball = trimesh.creation.icosphere(subdivisions=3)              # 1 - (V/V_ball)^(1/3) is 0.0029
+    >>> round(chordal(ball.vertices, ball.faces), 4)
+    0.0029
+    """
+    _, number = sides_of(triangles)
+    turned = turns_of(vertices, triangles, number)[0][number]
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    twice = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    opposite = np.stack([np.linalg.norm(v, axis=1) for v in (c - b, a - c, b - a)], axis=1)
+    each = np.where(turned < SHARP, turned, 0.0) * twice[:, None] / opposite
+    return float(0.25 * np.sum(each.mean(axis=1) * twice) / np.sum(twice))
 
 
 class Halved(NamedTuple):
@@ -86,6 +107,16 @@ def _parted(triangles: IntArray, middles: IntArray, vertices: FloatArray) -> Int
     for those, parts in ((two & short, ((a, ab, bc), (a, bc, c))), (two & ~short, ((a, ab, c), (ab, bc, c)))):
         out += [np.stack(part, axis=1)[those] for part in parts]
     return np.concatenate(out)
+
+
+def own_triangles(body: Any) -> Halved | None:
+    """Triangles of the mesh that a body of pieces was made of, ``corners`` (m, 3, 3); None where they do not close."""
+    corners = getattr(body, "corners", None)
+    if corners is None:
+        return None
+    vertices, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    found = Halved(vertices, number.reshape(-1, 3))
+    return found if np.all(np.bincount(sides_of(found.triangles)[1].ravel()) == 2) else None
 
 
 def facet_patches(body: Any) -> Patches:

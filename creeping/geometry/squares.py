@@ -46,10 +46,9 @@ def interpolation(nodes: FloatArray, at: FloatArray) -> FloatArray:
     away = np.asarray(at, dtype=float)[:, None] - nodes
     hit = away == 0
     terms = barycentric(nodes) / np.where(hit, 1.0, away)
-    out = terms / terms.sum(axis=1, keepdims=True)
     on = hit.any(axis=1)
-    out[on] = hit[on]
-    return np.asarray(out)
+    terms[on] = hit[on]
+    return np.asarray(terms / terms.sum(axis=1, keepdims=True))
 
 
 def differentiation(nodes: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, IntArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
-from creeping.geometry.arguments import flag, folder_path, shown, whole_number
+from creeping.geometry.arguments import flag, folder_path, rays_refused, shown, whole_number
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface
@@ -133,6 +133,8 @@ def sweep_directions(
     """
     require("xarray")
     if why_no_rays(flow):
+        if quantity == "rays":
+            raise InvalidInputError(rays_refused(flow))
         flow, method, length = NoFlow(flow), method or "auto", 1.0
     flow, length = cast(Flow, flow), cast(float, length)
     if not isinstance(flow, NoFlow):

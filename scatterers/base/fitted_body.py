@@ -77,6 +77,11 @@ class SplineBody(LevelBody):
         """The smooth pieces, none of a body that is smooth as a whole."""
         return () if self._parts is None else self._parts.surfaces
 
+    @property
+    def corners(self) -> FloatArray | None:
+        """Triangles (m, 3, 3), L, that pieces were fitted to; None of a body that is smooth as a whole."""
+        return None if self._parts is None else self._parts.corners
+
     def piece(self, points: FloatArray) -> NDArray[np.int64]:
         """Number of the piece that bounds the body nearest to points (..., 3), L, near it: (...)."""
         if self._parts is None:

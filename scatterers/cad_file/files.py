@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,8 +111,62 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
         If gmsh is not installed.
     """
     from scatterers.cad_file.joints import curvature_jumps
-    from scatterers.cad_file.solids import cleaned_apart
     from scatterers.triangles.topology import oriented
+
+    of_file = _chosen(path, reading, curved)
+    found, number, used, before, vertices, triangles, scale, repairs = of_file
+    triangles = oriented(path.name, vertices - vertices.mean(0), triangles, repairs.append)
+    # an even mesh of a clean file needs no merging; if it was done, points are found again by their place
+    place = {tuple(p): k for k, p in enumerate(vertices)}
+    row = np.full(len(number), -1, dtype=np.int64)
+    row[found["nodes"][used]] = [place.get(tuple(p), -1) for p in before]
+    mesh = TriangleMesh(vertices * scale, triangles, tuple(repairs))
+    of = _faces_of(triangles, row[found["triangles"].astype(np.int64)], found["of"].astype(np.int64))
+    at = row[found["at"]]
+    # faces of solids that are left out may touch the body
+    known = (at >= 0) & np.isin(found["face"], of)
+    normals, edges, sharp = _joined(mesh, at[known], found["face"][known], found["normals"][known])
+    for line in repairs:
+        progress(line)
+    corners = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
+    creases, level = _creases(mesh, of, corners)
+    jumps = curvature_jumps(mesh.vertices, mesh.triangles, of, corners, level)
+    return CadPoints(mesh, normals, corners, creases, level, jumps, edges, mesh.vertices[sharp])
+
+
+def cad_triangles(path: Path, reading: CadReading, *, progress: Callable[[str], None]) -> TriangleMesh:
+    """All closed parts of a CAD file as triangles between points of it, or the one that is chosen; see `read_cad`."""
+    from scatterers.triangles.parts import every_part
+    from scatterers.triangles.topology import oriented
+
+    of_file = _chosen(path, reading, 0)
+    repairs, vertices = of_file.repairs, of_file.vertices
+    local = vertices - vertices.mean(axis=0)
+    if reading.choice.every and reading.choice.part is None:
+        local, triangles = every_part(path.name, local, of_file.triangles, repairs.append)
+    else:
+        triangles = oriented(path.name, local, of_file.triangles, repairs.append)
+    for line in repairs:
+        progress(line)
+    return TriangleMesh((local + vertices.mean(axis=0)) * of_file.scale, triangles, tuple(repairs))
+
+
+class _Chosen(NamedTuple):
+    """Triangles of what is chosen of a file, in its unit, and what they come from."""
+
+    found: Any
+    number: IntArray
+    used: IntArray
+    before: FloatArray
+    vertices: FloatArray
+    triangles: IntArray
+    scale: float
+    repairs: list[str]
+
+
+def _chosen(path: Path, reading: CadReading, curved: int) -> _Chosen:
+    """Triangles of a file by gmsh, more where little of it is chosen."""
+    from scatterers.cad_file.solids import cleaned_apart
 
     kind = kind_of(path)
     if importlib.util.find_spec("gmsh") is None:
@@ -136,23 +191,7 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
             break
         # points were for all bodies of the file together
         found = _meshed(path, int(reading.points * min(lacking, MOST_LACKING)), reading.sew, curved)
-    triangles = oriented(path.name, vertices - vertices.mean(0), triangles, repairs.append)
-    # an even mesh of a clean file needs no merging; if it was done, points are found again by their place
-    place = {tuple(p): k for k, p in enumerate(vertices)}
-    row = np.full(len(number), -1, dtype=np.int64)
-    row[found["nodes"][used]] = [place.get(tuple(p), -1) for p in before]
-    mesh = TriangleMesh(vertices * scale, triangles, tuple(repairs))
-    of = _faces_of(triangles, row[found["triangles"].astype(np.int64)], found["of"].astype(np.int64))
-    at = row[found["at"]]
-    # faces of solids that are left out may touch the body
-    known = (at >= 0) & np.isin(found["face"], of)
-    normals, edges, sharp = _joined(mesh, at[known], found["face"][known], found["normals"][known])
-    for line in repairs:
-        progress(line)
-    corners = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
-    creases, level = _creases(mesh, of, corners)
-    jumps = curvature_jumps(mesh.vertices, mesh.triangles, of, corners, level)
-    return CadPoints(mesh, normals, corners, creases, level, jumps, edges, mesh.vertices[sharp])
+    return _Chosen(found, number, used, before, vertices, triangles, scale, repairs)
 
 
 def kind_of(path: Path) -> str:

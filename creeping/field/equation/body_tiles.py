@@ -1,5 +1,7 @@
 """Tiles of a body of any kind: of its squares, of its facets, or of all its parts together."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
@@ -8,6 +10,9 @@ from creeping.field.boundary import Boundary
 from creeping.field.equation.facet_tiles import facet_tiles
 from creeping.field.equation.tiles import POINTS, Tiles, tiles_of
 from creeping.geometry.covering import patches_of
+from creeping.geometry.creased import is_creased
+from creeping.geometry.facet_patches import chordal, own_triangles
+from creeping.geometry.kept import kept
 from creeping.geometry.parts import inside, is_faceted, why_no_rays
 from creeping.geometry.patches import DEGREE
 from creeping.geometry.squares import lobatto, on_squares
@@ -19,21 +24,33 @@ def body_tiles(body: Any, wavenumber: float, boundary: Boundary) -> Tiles:
     Raises
     ------
     SurfaceError
-        If no mesh of squares is the body, or one of several bodies reaches into another.
+        If neither squares nor triangles of its own are the body, or one of several bodies reaches into another.
     """
     if is_faceted(body):
         return facet_tiles(body, wavenumber, boundary)
     if not why_no_rays(body):
-        return tiles_of(patches_of(body), wavenumber, boundary)
+        return _of_surface(body, wavenumber, boundary)
     made = [_of_part(part, wavenumber, boundary) for part in body.parts]
     whole = _joined(made, body.turns, body.shifts)
     _checked_apart(body, whole.points, np.repeat(np.arange(len(made)), [len(tiles.points) for tiles in made]))
     return whole
 
 
+def _of_surface(body: Any, wavenumber: float, boundary: Boundary) -> Tiles:
+    """Tiles of a body with rays: of squares, or of its own triangles where it is of more pieces than squares cover."""
+    try:
+        return tiles_of(patches_of(body), wavenumber, boundary)
+    except SurfaceError:
+        facets = kept(body, "own triangles", lambda: own_triangles(body)) if is_creased(body) else None
+        if facets is None:
+            raise
+        off = chordal(*facets) if getattr(body, "tessellated", False) else 0.0
+        return replace(facet_tiles(facets, wavenumber, boundary), off=off, alone=True)
+
+
 def _of_part(part: Any, wavenumber: float, boundary: Boundary) -> Tiles:
     if is_faceted(part):
-        return facet_tiles(part, wavenumber, boundary, POINTS)
+        return facet_tiles(part, wavenumber, boundary, finest=True)
     return body_tiles(part, wavenumber, boundary)
 
 
@@ -48,7 +65,13 @@ def _joined(made: list[Tiles], turns: FloatArray, shifts: FloatArray) -> Tiles:
         edges.append(np.where(known, tiles.edges + count, tiles.edges))
         count += tiles.edges[:, 0].max(initial=-1.0) + 1
     lacks = np.max([tiles.lacks for tiles in made], axis=0)
-    return Tiles.of(np.concatenate(shapes), POINTS, np.concatenate(edges), lacks=(float(lacks[0]), float(lacks[1])))
+    return Tiles.of(
+        np.concatenate(shapes),
+        POINTS,
+        np.concatenate(edges),
+        lacks=(float(lacks[0]), float(lacks[1])),
+        off=max(tiles.off for tiles in made),
+    )
 
 
 def _checked_apart(body: Any, points: FloatArray, owner: IntArray) -> None:

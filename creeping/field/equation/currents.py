@@ -180,8 +180,12 @@ class _OnTiles(SurfaceCurrents):
         edges = self.matrix.edge_term.far(self.values, self.boundary.kind, r)
         # the same integral by two rules: what they differ by the polynomials of tiles do not resolve
         finer = self._finer._radiated(self._at_fine(self.values), self._finer.lit, r)
-        unknown = np.hypot(edges[:, 0] if known.ndim == 1 else edges[:, None], UNRESOLVED * np.abs(self.far(r) - finer))
-        return np.asarray(LEVELS[self.boundary.kind] * np.hypot(known, unknown))
+        far = self.far(r)
+        unknown = np.hypot(edges[:, 0] if known.ndim == 1 else edges[:, None], UNRESOLVED * np.abs(far - finer))
+        error = LEVELS[self.boundary.kind] * np.hypot(known, unknown)
+        # phases of waves that come back from ground that is elsewhere
+        moved = 2 * self.wavenumber * self.matrix.tiles.off
+        return np.asarray(np.hypot(error, moved * np.hypot(np.abs(far), self._amplitude)))
 
     def _at_fine(self, values: ComplexArray) -> ComplexArray:
         """Values at the nodes, at the finer ones."""
@@ -289,7 +293,7 @@ def _on_tiles(tiles: Tiles, own: tuple[IntArray, FloatArray, FloatArray]) -> Pla
 
 def _inside(body: Surface, tiles: Tiles, wavelength: float) -> FloatArray:
     """Points inside a body (m, 3), L, evenly spread, as deep as it is thick enough for."""
-    x = box_points(body)
+    x = box_points(body, tiles.inside if tiles.alone else None)
     away, nearest = tiles.fine_tree.query(x)
     # half of what the nodes next to it are apart
     depth = np.sqrt(np.maximum(away**2 - tiles.fine[2][nearest], 0.0))

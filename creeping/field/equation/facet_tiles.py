@@ -1,69 +1,117 @@
-"""Tiles of a body on its facets, which are flat: small triangles as they are, or squares of large ones.
+"""Tiles of a body on its facets, which are flat: squares of large ones, or small triangles as they are.
 
-A small triangle with corners c, a, b is the square x = c + u [(1 - v)(a - c) + v (b - c)], whose side u = 0 is the
-corner c, with one or two nodes a side by the conical rule. Sides longer than SIDES[p] wavelengths are halved, each for
-both triangles that it has. Where the normal turns by more than SHARP across a side, that is u = 1 of a tile on both
-faces: triangles with several edges are parted about their middle. Large triangles are covered by squares
-(`creeping.geometry.facet_patches`), cut into tiles as those of any body. What takes the fewest nodes serves.
+Large triangles are covered by squares (`creeping.geometry.facet_patches`), cut into tiles as those of any body. A small
+triangle with corners c, a, b is the square x = c + u [(1 - v)(a - c) + v (b - c)], whose side u = 0 is the corner c,
+with one or two nodes a side by the conical rule. Sides that are too long are halved, each for both triangles that it
+has. Where the normal turns by more than SHARP across a side, that is u = 1 of a tile on both faces: triangles with
+several edges are parted about their middle.
 
 Sources: [DR84]; Derivations, F36.
 """
 
-from typing import Protocol
+from dataclasses import replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
-from creeping.field.equation.tiles import POINTS, SIDE, VARYING, Tiles, tiles_of
-from creeping.geometry.facet_patches import SHARP, facet_patches, halved, sides_of, turns_of
+from creeping.field.equation.tiles import POINTS, SIDE, VARYING, Tiles, tiles_for
+from creeping.geometry.facet_patches import SHARP, chordal, facet_patches, halved, sides_of, turns_of
 from creeping.geometry.patches import Patches
 
-SIDES = {1: 0.15, 2: 0.38}
-"""Longest sides of triangles, in wavelengths, by p: 10 and 8 nodes a wavelength."""
-LACKS = {1: (0.06, 0.015), 2: (0.01, 0.0022)}
-"""What they lack at edges (`Tiles.lacks`), by p: of cubes of 12 to 3072 irregular triangles, k = 5 and 9, against
-`studies.reference.mirrored_box`, each within a factor of 1.5."""
-POORER = 3.0
-"""How many times as many nodes a body with edges may have in squares, whose strips along edges err a tenth as much."""
+
+class Rule(NamedTuple):
+    """How a body is cut into tiles.
+
+    Attributes
+    ----------
+    squares : bool
+        Whether into squares, else into triangles.
+    p : int
+        Nodes along a side.
+    side : float
+        Longest sides, in wavelengths.
+    lacks : (float, float)
+        What tiles lack at edges, as `Tiles.lacks`: of cubes of 12 to 3072 irregular triangles, k = 5 and 9, against
+        `studies.reference.mirrored_box`, each within a factor of 1.5; of five nodes it is read off.
+    poorer : float
+        What a node of it is worth on a body with edges: fields there err by 0.8 and 0.3 % of the largest with
+        triangles of one and two nodes, by 0.25, 0.06 and 0.01 % with squares.
+    """
+
+    squares: bool
+    p: int
+    side: float
+    lacks: tuple[float, float]
+    poorer: float
+
+
+FINEST = Rule(True, POINTS, SIDE, (0.0, 0.0), 1.0)
+"""Of bodies for which nodes cost nothing, and beside bodies of other kinds."""
+RULES = (
+    Rule(False, 1, 0.15, (0.06, 0.015), 3.0),
+    Rule(False, 2, 0.38, (0.01, 0.0022), 2.0),
+    Rule(True, 2, 0.38, (0.085, 0.032), 1.5),
+    Rule(True, 3, 0.55, (0.01, 0.004), 1.0),
+    FINEST,
+)
 CHEAP = 4000
-"""Nodes up to which squares serve in any case: of a body that is small against the wavelength it is its own shape that
+"""Nodes up to which those of five a side serve: of a body that is small against the wavelength it is its own shape that
 currents follow."""
 MOST_SQUARES = 20_000
-"""Squares of a body at most: more are small triangles."""
+"""Triangles up to which squares are thought of: more are small."""
 
 
 class Faceted(Protocol):
     """A body on its facets."""
 
-    vertices: FloatArray
-    triangles: IntArray
+    @property
+    def vertices(self) -> FloatArray:
+        """Corners (n, 3), L."""
+        ...
+
+    @property
+    def triangles(self) -> IntArray:
+        """Numbers of their corners (t, 3), counter-clockwise seen from outside."""
+        ...
 
 
-def facet_tiles(body: Faceted, wavenumber: float, boundary: Boundary, p: int | None = None) -> Tiles:
-    """Tiles of a body on its facets for a wavenumber, 1/L, and a boundary; with p = POINTS those of squares."""
+def facet_tiles(body: Faceted, wavenumber: float, boundary: Boundary, *, finest: bool = False) -> Tiles:
+    """Tiles of a body on its facets for a wavenumber, 1/L, and a boundary: of the rule with the fewest nodes."""
     wavelength = (VARYING if boundary.varies else 1.0) * 2 * np.pi / wavenumber
+    rule = FINEST if finest else _chosen(body, wavelength)
+    if rule.squares:
+        made = tiles_for(facet_patches(body), 2 * np.pi / wavelength, side=rule.side, p=rule.p, lacks=rule.lacks)
+    else:
+        shapes, edges = _triangles(*halved(body.vertices, body.triangles, rule.side * wavelength))
+        made = Tiles.of(shapes, rule.p, edges, conical=True, lacks=rule.lacks)
+    return replace(made, off=chordal(body.vertices, body.triangles)) if getattr(body, "tessellated", False) else made
+
+
+def _chosen(body: Faceted, wavelength: float) -> Rule:
+    """The rule that takes the fewest nodes, each as much as it is worth."""
+    corners = body.vertices[body.triangles]
     _, number = sides_of(body.triangles)
     edged = bool(np.any(turns_of(body.vertices, body.triangles, number)[0] > SHARP))
-    if p is None:
-        corners = body.vertices[body.triangles]
-        nodes = {q: q**2 * _halves(corners, SIDES[q] * wavelength) * (POORER if edged else 1.0) for q in SIDES}
-        p = min(nodes, key=lambda q: nodes[q])
-        if len(corners) < MOST_SQUARES:
-            squares = POINTS**2 * _parts_of(facet_patches(body), SIDE * wavelength)
-            p = POINTS if squares < max(nodes[p], CHEAP) else p
-    if p == POINTS:
-        return tiles_of(facet_patches(body), wavenumber, boundary)
-    shapes, edges = _triangles(*halved(body.vertices, body.triangles, SIDES[p] * wavelength))
-    return Tiles.of(shapes, p, edges, conical=True, lacks=LACKS[p])
+    patches = facet_patches(body) if len(corners) < MOST_SQUARES else None
+    nodes: dict[Rule, float] = {}
+    for rule in RULES:
+        if not rule.squares:
+            nodes[rule] = rule.p**2 * _halves(corners, rule.side * wavelength)
+        elif patches is not None:
+            nodes[rule] = rule.p**2 * _parts_of(patches, rule.side * wavelength)
+    if nodes.get(FINEST, np.inf) < CHEAP:
+        return FINEST
+    return min(nodes, key=lambda rule: nodes[rule] * (rule.poorer if edged else 1.0))
 
 
 def _halves(corners: FloatArray, longest: float) -> float:
     """About how many triangles there are once their sides are short enough."""
     sides = np.sort(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), axis=1)
-    # sides are halved, and a triangle is parted along the two longer ones
-    halvings = np.ceil(np.log2(np.maximum(1.0, sides[:, 1:] / longest)))
-    return float(np.sum(2.0 ** halvings.sum(axis=1)))
+    # sides are halved: along the longest, across it by the shortest, and a thin one into two rows
+    least, _, most = np.ceil(np.log2(np.maximum(1.0, sides / longest))).T
+    return float(np.sum(2.0 ** (most + least + (least < most))))
 
 
 def _parts_of(patches: Patches, longest: float) -> float:

@@ -85,25 +85,38 @@ def solve_together(body: Surface, directions: FloatArray, wavenumber: float, bou
             return
 
 
-def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float) -> str:
-    """Why the equation of one incidence takes too much time or memory, or cannot be; nothing if it does not."""
+class Plan(NamedTuple):
+    """Nodes, seconds and bytes that the equation of one incidence takes, about; why it is not solved, or nothing."""
+
+    nodes: int
+    seconds: float
+    memory: float
+    refused: str
+
+
+def plan_of(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float = SECONDS) -> Plan:
+    """What the equation of one incidence takes, and whether that is too much time or memory, or cannot be."""
     kind = _kind(boundary)
     try:
         nodes = _nodes(body, wavenumber, kind)
     except SurfaceError as error:
-        return str(error)
+        return Plan(0, np.inf, np.inf, str(error))
     takes, memory = cost(nodes, kind, 1)
+    refused = f"{nodes} nodes take {memory / 1e9:.2g} GB" if memory > budget() else ""
     if takes > seconds:
-        return f"{nodes} nodes take about {takes:.2g} s, more than {seconds:g}"
-    return f"{nodes} nodes take {memory / 1e9:.2g} GB" if memory > budget() else ""
+        refused = f"{nodes} nodes take about {takes:.2g} s, more than {seconds:g}"
+    return Plan(nodes, takes, memory, refused)
+
+
+def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float) -> str:
+    """Why the equation of one incidence takes too much time or memory, or cannot be; nothing if it does not."""
+    return plan_of(body, wavenumber, boundary, seconds).refused
 
 
 def expected_seconds_of(body: Surface, wavenumber: float, boundary: BoundaryLike) -> float:
     """About what the equation of one incidence costs, 0 where it is not solved by itself."""
-    if too_much(body, wavenumber, boundary, SECONDS):
-        return 0.0
-    kind = _kind(boundary)
-    return cost(_nodes(body, wavenumber, kind), kind, 1)[0]
+    plan = plan_of(body, wavenumber, boundary)
+    return 0.0 if plan.refused else plan.seconds
 
 
 def _kind(boundary: BoundaryLike) -> Boundary:

@@ -30,7 +30,6 @@ from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
 from creeping.field.polarisation import incident_mix, spherical_frame
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.parts import inside as inside_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.unit import unit_of
 
@@ -264,8 +263,9 @@ class Solution:
 
     def _on(self, x: FloatArray) -> BoolArray:
         """Whether points (m, 3), L, are on the body (m,); none may be inside."""
-        inside = np.flatnonzero(inside_of(self.body, x))
-        off, least = self._matrix.tiles.located(x)[3], TOUCHING * size(self.body)
+        tiles = self._matrix.tiles
+        inside = np.flatnonzero(tiles.inside(x))
+        off, least = tiles.located(x)[3], TOUCHING * size(self.body)
         inside = inside[off[inside] > least]
         if len(inside):
             raise InvalidInputError(

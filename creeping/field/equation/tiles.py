@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import roots_jacobi
 
-from creeping._typing import Any, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.geometry.patches import DEGREE, Patches
 from creeping.geometry.squares import barycentric, interpolation, lobatto, on_squares
@@ -46,6 +46,8 @@ ASIDE = 1e-5
 """Least u of places: where the side u = 0 is one point there is no normal on it."""
 TOGETHER = 2000
 """Points that are brought onto tiles at once."""
+CLOSE = 3.0
+"""Distance from fine nodes, in what they are apart, from which the solid angle is that of the nodes."""
 ANGLES, RADII = 12, 6
 """Places along a side and radii of each of the four triangles about a node of its own."""
 
@@ -87,6 +89,10 @@ class Tiles:
     lacks : (float, float)
         What tiles of width w along an edge lack there, C = lacks B w^(2 nu) in terms of `edge_term`, of a hard and of
         a soft body, where that is known beforehand.
+    off : float, L
+        Mean distance from the body that they stand for.
+    alone : bool
+        Whether they, and not the body's F, tell what is inside: the body has more pieces than F knows apart.
     """
 
     shapes: FloatArray
@@ -97,6 +103,8 @@ class Tiles:
     edges: FloatArray
     conical: bool = False
     lacks: tuple[float, float] = (0.0, 0.0)
+    off: float = 0.0
+    alone: bool = False
 
     @classmethod
     def of(
@@ -107,9 +115,10 @@ class Tiles:
         *,
         conical: bool = False,
         lacks: tuple[float, float] = (0.0, 0.0),
+        off: float = 0.0,
     ) -> "Tiles":
         """Tiles of these shapes with p x p nodes."""
-        return cls(shapes, *_nodes(shapes, p, conical), p, edges, conical, lacks)
+        return cls(shapes, *_nodes(shapes, p, conical), p, edges, conical, lacks, off)
 
     @property
     def count(self) -> int:
@@ -193,7 +202,7 @@ class Tiles:
 
     def with_nodes(self, p: int) -> "Tiles":
         """The same tiles with p x p nodes."""
-        return Tiles.of(self.shapes, p, self.edges, conical=self.conical)
+        return Tiles.of(self.shapes, p, self.edges, conical=self.conical, lacks=self.lacks)
 
     @property
     def finer(self) -> int:
@@ -254,6 +263,24 @@ class Tiles:
             row, tile = np.nonzero(nearer & (reach > 0)[:, None])
             self._bring(points, first + row, tile, best)
         return best
+
+    def inside(self, points: FloatArray) -> BoolArray:
+        """Whether points (m, 3), L, are inside (m,): by the solid angle of the nodes, next to them by normals."""
+        found = np.zeros(len(points), dtype=bool)
+        away, nearest = self.fine_tree.query(points)
+        close = away < CLOSE * np.sqrt(self.fine[2][nearest])
+        if np.any(close):
+            tile, u, v, _ = self.located(points[close])
+            x, n = self.on(tile, u, v)
+            found[close] = np.sum((points[close] - x) * n, axis=1) < 0
+        apart = np.flatnonzero(~close)
+        strength = (self.normals * self.weights[:, None]).T
+        for first in range(0, len(apart), TOGETHER // 10):
+            some = apart[first : first + TOGETHER // 10]
+            y = self.points.T[:, None] - points[some].T[:, :, None]
+            angle = np.einsum("xn,xmn->mn", strength, y) / np.sum(y**2, axis=0) ** 1.5
+            found[some] = angle.sum(axis=1) > 2 * np.pi
+        return found
 
     def _bring(
         self,
@@ -322,7 +349,15 @@ def tiles_of(patches: Patches, wavenumber: float, boundary: Boundary) -> Tiles:
     return tiles_for(patches, wavenumber, side=share * SIDE, turn=share * TURN)
 
 
-def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, turn: float = TURN, p: int = POINTS) -> Tiles:
+def tiles_for(
+    patches: Patches,
+    wavenumber: float,
+    *,
+    side: float = SIDE,
+    turn: float = TURN,
+    p: int = POINTS,
+    lacks: tuple[float, float] = (0.0, 0.0),
+) -> Tiles:
     """Tiles of a body's squares for a wavenumber, 1/L, of sides and turns no longer than these."""
     steps = _parts(patches, side * 2 * np.pi / wavenumber, turn)
     along = _edge_breaks(patches, steps)
@@ -335,7 +370,7 @@ def tiles_for(patches: Patches, wavenumber: float, *, side: float = SIDE, turn: 
     t = lobatto(DEGREE)
     u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
     shapes = on_squares(places, u, v)[0]
-    return Tiles.of(shapes, p, edges)
+    return Tiles.of(shapes, p, edges, lacks=lacks)
 
 
 def _nodes(shapes: FloatArray, points: int, conical: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
