@@ -54,6 +54,8 @@ class Cad(FittedBody):
         Take the outer surface of all bodies, which may cross each other; needs the library manifold3d.
     sew : float, optional
         Faces whose borders are at most so far apart are sewn together first, m.
+    surface : {"smooth", "facets", "auto"}
+        "facets" gives a `Facets` of the same source; "auto" does where no smooth surface fits.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -98,10 +100,14 @@ class Cad(FittedBody):
         cap: float | None = None,
         union: bool = False,
         sew: float | None = None,
+        surface: str = "smooth",
         cache: bool | str | Path = True,
         speed: Any = None,
         progress: Callable[[str], None] | None = None,
     ) -> None:
+        if surface == "auto":
+            # made already
+            return
         if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or not 500 <= points <= 200_000:
             raise ValueError(f"points = {points!r}; give a whole number from 500 to 200000")
         points = int(points)

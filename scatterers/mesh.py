@@ -74,6 +74,8 @@ class Mesh(FittedBody):
     subdivide : {"auto", 1, 2, 3}, optional
         Loop's subdivision of a coarse mesh of a smooth body, whose surface passes by its vertices; "auto" where the
         mesh is too coarse. `repairs` tell by how much vertices moved. Meshes with edges or joints are not subdivided.
+    surface : {"smooth", "facets", "auto"}
+        "facets" gives a `Facets` of the same source; "auto" does where no smooth surface fits.
     cache : bool or path
         True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -118,10 +120,14 @@ class Mesh(FittedBody):
         cap: float | None = None,
         union: bool = False,
         subdivide: str | int | None = None,
+        surface: str = "smooth",
         cache: bool | str | Path = True,
         speed: Any = None,
         progress: Callable[[str], None] | None = None,
     ) -> None:
+        if surface == "auto":
+            # made already
+            return
         report = checked_options(units, strict, cache, progress)
         in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
         if in_memory and units is None and getattr(source, "units", None) is None:

@@ -33,7 +33,6 @@ Body = Annotated[
         "or an expression F(x, y, z), negative inside, e.g. 'x**2 + y**4 + z**2 - 1'."
     ),
 ]
-SURFACES = ("auto", "smooth", "facets")
 FILE_OPTIONS = ("units", "strict", "part", "cap", "union")
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
 
@@ -112,7 +111,9 @@ def parse_body(
         )
     try:
         if of_file:
-            return _with_charts(_of_file(text, cache=cache, speed=speed, progress=progress, **given), progress)
+            kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
+            given = {"surface": "auto"} | given
+            return _with_charts(kind(text, **given, cache=cache, speed=speed, progress=progress), progress)
         if name in BODIES:
             return _with_charts(_named(name, rest, speed), None)
         if progress:
@@ -126,40 +127,6 @@ def parse_body(
         if error.name in ("gmsh", "manifold3d"):
             raise InvalidInputError(f"this file: {error}") from error
         raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
-
-
-def _of_file(
-    text: str, *, surface: str = "auto", cache: bool, speed: str | None, progress: Progress | None, **given: Any
-) -> Any:
-    """The body of a file: smooth, on its facets, or what of the two is there."""
-    import scatterers
-    from creeping.errors import InvalidInputError
-
-    if surface not in SURFACES:
-        raise InvalidInputError(f"--surface {surface!r} is none of {', '.join(SURFACES)}")
-    tell = progress or (lambda _: None)
-    # of a smooth surface alone
-    only = [name for name in ("strict", "subdivide", "sew") if name in given] + ["speed"] * (speed is not None)
-    reason: Exception | None = None
-    if surface != "facets":
-        try:
-            kind: Any = scatterers.Mesh if Path(text).suffix.lower() in MESHES else scatterers.Cad
-            return kind(text, cache=cache, speed=speed, progress=progress, **given)
-        except ValueError as error:
-            if surface == "smooth" or only:
-                raise
-            reason = error
-    elif only:
-        raise InvalidInputError(f"--{only[0]} is of a smooth surface; leave it out with --surface facets")
-    try:
-        body = scatterers.Facets(text, progress=progress, **given)
-    except ValueError as error:
-        # what is wrong with the file itself is told once
-        raise error if reason is None else reason from None
-    if reason is not None:
-        body.without_rays = f"no smooth surface fits it, and it is taken on its facets: {reason}"
-        tell(f"taken on its facets ({len(body.triangles)} triangles), without creeping rays: {reason}")
-    return body
 
 
 def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:

@@ -171,7 +171,7 @@ def _mesh(
     from scatterers import examined_mesh
 
     try:
-        mesh, quality = examined_mesh(body, **{k: v for k, v in file.given().items() if k != "strict"})
+        mesh, quality = examined_mesh(body, **{k: v for k, v in file.given().items() if k not in ("strict", "surface")})
     except (ValueError, ModuleNotFoundError) as error:
         raise InvalidInputError(f"{body}: {error}") from error
     answer |= {"quality": quality.to_json(), "repairs": list(mesh.repairs)}

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +112,13 @@ class SplineBody(LevelBody):
         return f"{type(self).__name__}({self._digest}, speed={self.speed!r})"
 
 
+SURFACES = ("smooth", "facets", "auto")
+OF_FACETS = ("part", "cap", "union", "progress")
+"""Options that a body on its facets has as well,"""
+OF_ALL = ("cache",)
+"""and those that mean nothing there."""
+
+
 class FittedBody(SplineBody):
     """Base of Mesh and Cad.
 
@@ -126,6 +133,35 @@ class FittedBody(SplineBody):
     unit : str
         "m": lengths are metres, whatever the unit in the file; "L" of a mesh in memory that states none.
     """
+
+    def __new__(cls, source: Any = None, units: str | None = None, *, surface: str = "smooth", **options: Any) -> Self:
+        """The fitted body, or one on its facets: where that is asked for, or with "auto" where no smooth one fits."""
+        if surface not in SURFACES:
+            raise ValueError(f"surface = {surface!r} is none of {', '.join(SURFACES)}")
+        if surface == "smooth":
+            return super().__new__(cls)
+        from scatterers.facets import Facets
+
+        shared = {name: options[name] for name in OF_FACETS if name in options}
+        only = [name for name, value in options.items() if value and name not in (*OF_FACETS, *OF_ALL)]
+        if surface == "facets":
+            if only:
+                raise ValueError(f"{only[0]} is of a smooth surface; leave it out of one on its facets")
+            return Facets(source, units, **shared)  # type: ignore[return-value]
+        try:
+            return cls(source, units, **options)
+        except ValueError as error:
+            if only:
+                raise
+            try:
+                body = Facets(source, units, **shared)
+            except ValueError:
+                # what is wrong with the source itself is told once
+                raise error from None
+            body.without_rays = f"no smooth surface fits it, and it is taken on its facets: {error}"
+            if tell := options.get("progress"):
+                tell(f"taken on its facets ({len(body.triangles)} triangles), without creeping rays: {error}")
+            return body  # type: ignore[return-value]
 
     unit = "m"
 

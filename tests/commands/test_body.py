@@ -145,7 +145,7 @@ def balls(tmp_path_factory):
 
 
 def test_options_of_files_reach_the_body(balls, capsys):
-    code, _, err = creeping("check", balls, "--units", "m", "--surface", "smooth", "--strict", capsys=capsys)
+    code, _, err = creeping("check", balls, "--units", "m", "--surface", "smooth", capsys=capsys)
     assert code == 3 and "holds 2 separate surfaces" in err and "union" in err
     for part, size in (("largest", 2.0), (2, 1.0)):
         code, out, _ = creeping("check", balls, "--units", "m", "--part", part, "--json", capsys=capsys)
