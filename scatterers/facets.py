@@ -21,7 +21,7 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 SOMEWHERE = np.array([0.3602, 0.5413, 0.7597])
 """Direction of the rays that tell inside from outside: along no axis or plane of symmetry."""
-POINTS = 20_000
+POINTS = 10_000
 """Of a CAD file."""
 CELLS = 512
 """Cells along a side of the plane across rays, at most."""

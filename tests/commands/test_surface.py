@@ -72,6 +72,6 @@ def test_run_and_echoes_of_facets(two_boxes, tmp_path, capsys):
     code, _, said = creeping("run", *words, "--direction", 1, 0, 0, "-o", out, capsys=capsys)
     assert code == 3 and "no creeping rays" in said and "--wavenumber" in said
     echo = tmp_path / "ts"
-    asked = ["--sound-speed", 1500, "--frequency", "955Hz", "--monostatic", "az:0:40:40", "--boundary", "hard"]
+    asked = ["--sound-speed", 1500, "--frequency", "955Hz", "--incidence", "40,0", "--boundary", "hard"]
     assert ran("ts", *words, *asked, "-o", echo) == 0
-    assert [row["unresolved"] for row in table(echo / "ts.csv")] == ["0", "0"]
+    assert [row["unresolved"] for row in table(echo / "ts.csv")] == ["0"]

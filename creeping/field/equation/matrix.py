@@ -209,6 +209,8 @@ class Matrix:
 
         With J_f = sum_j l_j(y_f) [q_j - n_f (n_f.q_j)] they are those of q_j less those of its part along n_f.
         """
+        if self.tiles.planar:
+            return _across(found, of, q)
         m, finer = len(found), self._at_finer.shape[0]
         # few large products: many small ones wait for each other where a machine is busy
         coarse = (found.reshape(-1, finer) @ self._at_finer).reshape(m, 3, -1)
@@ -227,12 +229,22 @@ class Matrix:
     def _finer(self) -> Tiles:
         """The same tiles with nodes enough that J is tangent between its own: as many where they are flat."""
         tiles = self.tiles
-        return tiles if tiles.flat else tiles.with_nodes(tiles.p + TANGENT)
+        return tiles if tiles.planar else tiles.with_nodes(tiles.p + TANGENT)
 
     @cached_property
     def _at_finer(self) -> FloatArray:
         """What the polynomials of nodes (p p,) are at the finer ones of a tile (f, p p)."""
         return np.asarray(np.kron(*self.tiles.onto(self._finer.p)))
+
+
+def _across(found: ComplexArray, of: Places, q: FloatArray) -> ComplexArray:
+    """Entries (m, 2, p p, 2) of integrals (m, 3, p p) over flat tiles, where a and b at nodes q (m, p p, 2, 3) stay."""
+    leaning = np.einsum("pc,pcj->pj", of.normals, found)[:, :, None]
+    through, out = np.einsum("px,pjcx->pjc", of.normals, q), []
+    for p in (of.a, of.b):
+        along = np.einsum("pc,pcj->pj", p, found)[:, :, None]
+        out.append(along * through - np.einsum("px,pjcx->pjc", p, q) * leaning)
+    return np.stack(out, axis=1)
 
 
 def _transposed(square: np.ndarray) -> np.ndarray:

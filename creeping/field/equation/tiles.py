@@ -48,6 +48,8 @@ TOGETHER = 2000
 """Points that are brought onto tiles at once."""
 CLOSE = 3.0
 """Distance from fine nodes, in what they are apart, from which the solid angle is that of the nodes."""
+FLAT = 1e-6
+"""Difference of normals on a tile in a plane: thin ones have them to fewer digits."""
 ANGLES, RADII = 12, 6
 """Places along a side and radii of each of the four triangles about a node of its own."""
 
@@ -129,6 +131,12 @@ class Tiles:
     def flat(self) -> bool:
         """Whether their points are linear in u and in v."""
         return bool(self.shapes.shape[1] == 2)
+
+    @cached_property
+    def planar(self) -> bool:
+        """Whether each lies in a plane."""
+        n = self.normals.reshape(self.count, -1, 3)
+        return bool(np.max(np.ptp(n, axis=1), initial=0.0) < FLAT)
 
     @property
     def places(self) -> tuple[FloatArray, FloatArray]:
