@@ -11,7 +11,7 @@ from creeping.field.body_currents import kept_currents
 from creeping.field.equation.currents import ON_BODY
 from creeping.field.equation.kept import asked_solution
 from creeping.field.polarisation import incident_mix
-from studies.reference.sphere import pec_total_field
+from studies.reference.sphere import pec_far_field, pec_total_field
 
 D = np.array([0.48, 0.6, -0.64])
 
@@ -30,6 +30,10 @@ def test_sphere(k, rng):
     J = currents.on_body(n)
     off = np.linalg.norm(J.values[:, :, 0] - np.cross(n, H), axis=1)
     assert off.max() < 2e-4 and np.all(off <= J.error[:, 0])
+    meridian = np.array([[np.sin(t), 0.0, np.cos(t)] for t in np.linspace(0.3, 2.9, 12)])
+    f = solution.far_field(meridian).total
+    for found, exact in zip((f[:, 1, 1], f[:, 0, 0]), pec_far_field(k, 1.0, meridian @ along), strict=True):
+        np.testing.assert_allclose(found, exact, atol=2e-4)
     for height in (1e-4, 0.3):
         x = (1 + height) * n
         E, H = pec_total_field(k, 1.0, x, along, electric)
