@@ -59,7 +59,7 @@ def _joined(made: list[Tiles], turns: FloatArray, shifts: FloatArray) -> Tiles:
     shapes, edges, count = [], [], 0.0
     for tiles, turn, shift in zip(made, turns, shifts, strict=True):
         at = np.broadcast_to(lobatto(DEGREE), (tiles.count, DEGREE + 1))
-        x = on_squares(tiles.shapes, at, at)[0] if tiles.flat else tiles.shapes
+        x = on_squares(tiles.shapes, at, at)[0] if len(tiles.shapes[0]) == 2 else tiles.shapes
         shapes.append(x @ turn.T + shift)
         known = (tiles.edges[:, :1] >= 0) & (np.arange(4) == 0)
         edges.append(np.where(known, tiles.edges + count, tiles.edges))

@@ -30,6 +30,7 @@ from creeping.field.far_result import FarField
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
 from creeping.field.polarisation import incident_mix, spherical_frame
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.parts import inside as inside_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.unit import unit_of
 
@@ -264,7 +265,7 @@ class Solution:
     def _on(self, x: FloatArray) -> BoolArray:
         """Whether points (m, 3), L, are on the body (m,); none may be inside."""
         tiles = self._matrix.tiles
-        inside = np.flatnonzero(tiles.inside(x))
+        inside = np.flatnonzero(tiles.inside(x) if tiles.alone else inside_of(self.body, x))
         off, least = tiles.located(x)[3], TOUCHING * size(self.body)
         inside = inside[off[inside] > least]
         if len(inside):

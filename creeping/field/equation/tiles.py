@@ -48,8 +48,8 @@ TOGETHER = 2000
 """Points that are brought onto tiles at once."""
 CLOSE = 3.0
 """Distance from fine nodes, in what they are apart, from which the solid angle is that of the nodes."""
-FLAT = 1e-6
-"""Difference of normals on a tile in a plane: thin ones have them to fewer digits."""
+FLAT, AT_EDGE = 1e-6, 1e-6
+"""Difference of normals on a tile in a plane; distance of places on an edge, over that of the nodes next to it."""
 ANGLES, RADII = 12, 6
 """Places along a side and radii of each of the four triangles about a node of its own."""
 
@@ -126,11 +126,6 @@ class Tiles:
     def count(self) -> int:
         """Number of tiles."""
         return len(self.shapes)
-
-    @property
-    def flat(self) -> bool:
-        """Whether their points are linear in u and in v."""
-        return bool(self.shapes.shape[1] == 2)
 
     @cached_property
     def planar(self) -> bool:
@@ -277,10 +272,18 @@ class Tiles:
         found = np.zeros(len(points), dtype=bool)
         away, nearest = self.fine_tree.query(points)
         close = away < CLOSE * np.sqrt(self.fine[2][nearest])
+        points = np.array(points)
         if np.any(close):
-            tile, u, v, _ = self.located(points[close])
+            tile, u, v, off = self.located(points[close])
             x, n = self.on(tile, u, v)
-            found[close] = np.sum((points[close] - x) * n, axis=1) < 0
+            out = points[close] - x
+            found[close] = np.sum(out * n, axis=1) < 0
+            # before an acute edge there are places beneath the plane of one face: farther out it is clear
+            edge = self.from_edge(tile, u, v) < AT_EDGE
+            there = np.flatnonzero(close)[edge]
+            reach = CLOSE * np.sqrt(self.fine[2][nearest[there]]) / np.maximum(off[edge], 1e-300)
+            points[there] = x[edge] + np.maximum(reach, 1.0)[:, None] * out[edge]
+            close[there] = False
         apart = np.flatnonzero(~close)
         strength = (self.normals * self.weights[:, None]).T
         for first in range(0, len(apart), TOGETHER // 10):

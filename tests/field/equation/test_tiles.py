@@ -89,3 +89,18 @@ def test_places_are_found_next_to_narrow_tiles_and_on_the_axis():
     there, normals = tiles.on(tile, u, v)
     assert_allclose(there, x, atol=1e-5)
     assert np.all(np.isfinite(normals))
+
+
+@pytest.mark.parametrize("body", [sc.Cone(1.0, 2.0), sc.Cylinder(1.0, 0.2)], ids=["cone", "disc"])
+def test_tiles_know_what_is_inside(body):
+    tiles = tiles_for(patches_of(body), 6.0)
+    low, high = np.asarray(body.bounds)
+    rng = np.random.default_rng(2)
+    x = low + (high - low) * rng.uniform(-0.1, 1.1, (1500, 3))
+    # next to edges and faces too, on either side of them
+    near = tiles.points[::7] + rng.choice([-0.02, 0.01], (len(tiles.points[::7]), 1)) * rng.normal(
+        size=(len(tiles.points[::7]), 3)
+    )
+    x = np.concatenate([x, near])
+    clear = np.abs(body.level(x)) > 1e-4
+    np.testing.assert_array_equal(tiles.inside(x)[clear], (body.level(x) < 0)[clear])
