@@ -1,8 +1,6 @@
 """Several bodies at once, each where it is put: their field is that of all together."""
 
-import hashlib
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -78,13 +76,6 @@ class Bodies:
 
     def __repr__(self) -> str:
         return f"Bodies({len(self.parts)}: {', '.join(type(part).__name__ for part in self.parts[:6])})"
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """Text that tells bodies apart."""
-        text = [getattr(part, "fingerprint", None) or repr(part) for part in self.parts]
-        digest = hashlib.blake2b(repr([text, self.shifts.tolist(), self.turns.tolist()]).encode(), digest_size=16)
-        return f"Bodies:{digest.hexdigest()}"
 
     def own(self, number: int, points: FloatArray) -> FloatArray:
         """Points (m, 3), L, as one of the bodies has them, (m, 3), L."""

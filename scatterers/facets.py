@@ -91,11 +91,11 @@ class Facets:
     ) -> None:
         in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
         choice, tell = Choice(part, cap, union, every=True), progress or (lambda _: None)
-        if not in_memory and Path(str(source)).suffix.lower() in SUFFIXES:
+        self.tessellated = not in_memory and Path(str(source)).suffix.lower() in SUFFIXES
+        if self.tessellated:
             mesh = cad_triangles(Path(source), CadReading(units, POINTS, choice), progress=tell)
         else:
             mesh = read_mesh(source, units, choice, progress=tell)
-        self.tessellated = not in_memory and Path(str(source)).suffix.lower() in SUFFIXES
         self.vertices, self.triangles, self.repairs = mesh.vertices, mesh.triangles, mesh.repairs
         self.unit = "L" if in_memory and units is None and getattr(source, "units", None) is None else "m"
         self.bounds = np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
@@ -106,8 +106,8 @@ class Facets:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Text that tells bodies apart."""
-        digest = hashlib.blake2b(np.round(self.vertices / np.ptp(self.bounds), 12).tobytes(), digest_size=16)
+        """Text that tells bodies apart, their sizes and places too."""
+        digest = hashlib.blake2b(self.vertices.tobytes(), digest_size=16)
         digest.update(self.triangles.tobytes())
         return f"Facets:{digest.hexdigest()}"
 

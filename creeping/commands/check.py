@@ -9,6 +9,8 @@ from cyclopts import Parameter
 
 from creeping.commands.body import AS_IT_IS, MESHES, Body, FileOptions, SpeedOption, parse_body
 
+WAVELENGTHS = 6.0
+"""Size of a body for which it is told how its field is made, where no wavenumber is given."""
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 Wavenumber = Annotated[
     float | None, Parameter(help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths.")
@@ -75,14 +77,11 @@ def check(
     return 0 if ok else 3
 
 
-WAVELENGTHS = 6.0
-"""Size of a body for which it is told how its field is made, where no wavenumber is given."""
-
-
 def _field(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str]) -> None:
     """What a field of the body is made by, what that takes, and about which error it has."""
     import numpy as np
 
+    from creeping.field.body_currents import POOR
     from creeping.field.equation.kept import plan_of
     from creeping.geometry.creased import has_edges, is_creased
     from creeping.geometry.parts import why_no_rays
@@ -94,17 +93,21 @@ def _field(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: 
     size = float(np.max(np.ptp(np.asarray(shape.bounds, dtype=float), axis=0)))
     k = wavenumber or 2 * np.pi * WAVELENGTHS / size
     plan = plan_of(shape, k, "hard")
-    if not plan.refused:
-        by = (
-            f"the integral equation between {plan.nodes} nodes, about {plan.seconds:.2g} s and "
-            f"{plan.memory / 1e9:.2g} GB an incidence, errors of 0.01 to 1 % of the largest |f|"
-        )
+    equation = (
+        f"the integral equation between {plan.nodes} nodes, about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB "
+        "an incidence, errors of 0.01 to 1 % of the largest |f|"
+    )
+    expansions = "creeping rays and currents by expansions"
+    if not plan.refused and (without or is_creased(shape)):
+        by = equation
+    elif not plan.refused:
+        by = f"{expansions}; where these leave more than {100 * POOR:g} % of the wave inside, {equation}"
     elif without:
         by = f"nothing within half a minute: {plan.refused}; creeping.solve(..., seconds=) takes as long as it may"
     elif has_edges(shape):
         by = f"rays and physical optics, which err by several per cent: the equation is not solved, {plan.refused}"
     else:
-        by = "creeping rays and currents"
+        by = expansions
     answer["field"] = {"body": kind, "wavenumber": k, "nodes": plan.nodes, "by": by}
     texts.insert(0, f"body: {kind}")
     texts.insert(1, f"far field at k = {k:.4g}, {size * k / (2 * np.pi):.3g} wavelengths across: {by}")

@@ -206,8 +206,8 @@ def run(
             summary["field"]["seconds"] = field_seconds
             summary["files"][-1:-1] = names
         if job and planes:
-            told = planes, job, fan, output, title_of(body), progress
-            summary["planes"], names = _plane_run.write_planes(*told, **written)
+            asked = planes, job, fan, output, title_of(body), progress
+            summary["planes"], names = _plane_run.write_planes(*asked, **written)
             summary["files"][-1:-1] = names
         summary["seconds"] = round(time.perf_counter() - started, 2)
         from creeping.files import write_text

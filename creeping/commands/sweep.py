@@ -147,7 +147,11 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
 
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
     import creeping as cr
+    from creeping.geometry.parts import why_no_rays
+    from creeping.sweeping.solved_fields import NoFlow
 
+    if why_no_rays(body):
+        return NoFlow(body)
     if read.flow == "direct":
         # errors of the steps add up and grow along the rays
         return cr.DirectFlow(body, rtol=min(max(1e-4 * read.tolerance, 1e-13), 1e-8))

@@ -23,7 +23,7 @@ from creeping.errors import SurfaceError
 from creeping.geometry.coarse_mesh import CoarseMesh, coarse_mesh, tip_vertices
 from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
 from creeping.geometry.kept import kept
-from creeping.geometry.patches import DEGREE, Patches
+from creeping.geometry.patches import DEGREE, ENDS, Patches
 from creeping.geometry.quadrature import nearest_points
 from creeping.geometry.squares import lobatto, on_squares
 from creeping.geometry.surface import Chart, Surface, normal, size
@@ -174,15 +174,11 @@ class _Ground:
         return np.max(off, axis=(1, 2)), np.max(turned, axis=(1, 2))
 
 
-SIDES = ((0, 3), (1, 2), (0, 1), (3, 2))
-"""Corners at the ends of the sides u = 0, u = 1, v = 0, v = 1."""
-
-
 def _first(ground: _Ground, mesh: CoarseMesh) -> Patches:
     """Squares of a mesh."""
     t = lobatto(DEGREE)
     m = len(mesh.corners)
-    ends = np.stack([mesh.corners[:, side] for side in SIDES], axis=1)
+    ends = np.stack([mesh.corners[:, side] for side in ENDS], axis=1)
     low = np.sort(ends.reshape(-1, 2), axis=1)
     pairs, numbers = np.unique(low, axis=0, return_inverse=True)
     numbers = numbers.ravel()

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.patches import DEGREE, Patches
+from creeping.geometry.patches import DEGREE, ENDS, Patches
 from creeping.geometry.squares import lobatto
 
 PLANE = 1e-5
@@ -61,14 +61,15 @@ def chordal(vertices: FloatArray, triangles: IntArray) -> float:
     return float(0.25 * np.sum(each.mean(axis=1) * twice) / np.sum(twice))
 
 
-class Halved(NamedTuple):
-    """Triangles (t, 3) of vertices (n, 3), L."""
+class Triangles(NamedTuple):
+    """Triangles (t, 3) of vertices (n, 3), L; ``tessellated`` if they stand for curved faces."""
 
     vertices: FloatArray
     triangles: IntArray
+    tessellated: bool = False
 
 
-def halved(vertices: FloatArray, triangles: IntArray, longest: float) -> Halved:
+def halved(vertices: FloatArray, triangles: IntArray, longest: float) -> Triangles:
     """Triangles with sides no longer than this, L: sides are halved, for both triangles alike.
 
     Examples
@@ -86,7 +87,7 @@ def halved(vertices: FloatArray, triangles: IntArray, longest: float) -> Halved:
         middle[long] = len(vertices) + np.arange(int(long.sum()))
         vertices = np.concatenate([vertices, vertices[sides[long]].mean(axis=1)])
         triangles = _parted(triangles, middle[number[:, [2, 0, 1]]], vertices)
-    return Halved(vertices, triangles)
+    return Triangles(vertices, triangles)
 
 
 def _parted(triangles: IntArray, middles: IntArray, vertices: FloatArray) -> IntArray:
@@ -109,13 +110,13 @@ def _parted(triangles: IntArray, middles: IntArray, vertices: FloatArray) -> Int
     return np.concatenate(out)
 
 
-def own_triangles(body: Any) -> Halved | None:
+def own_triangles(body: Any) -> Triangles | None:
     """Triangles of the mesh that a body of pieces was made of, ``corners`` (m, 3, 3); None where they do not close."""
     corners = getattr(body, "corners", None)
     if corners is None:
         return None
     vertices, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    found = Halved(vertices, number.reshape(-1, 3))
+    found = Triangles(vertices, number.reshape(-1, 3), getattr(body, "tessellated", False))
     return found if np.all(np.bincount(sides_of(found.triangles)[1].ravel()) == 2) else None
 
 
@@ -137,7 +138,8 @@ def _paired(
     free, quads = np.ones(len(triangles), dtype=bool), []
     sides = np.flatnonzero(flat)
     length = np.linalg.norm(vertices[pairs[sides, 0]] - vertices[pairs[sides, 1]], axis=1)
-    sides = sides[np.argsort(-length, kind="stable")]
+    # sides of one length in the order of their numbers, however they are rounded
+    sides = sides[np.argsort(-np.round(length / np.max(length, initial=0.0), 9), kind="stable")]
     first, second = beside[sides].T
     # the corners of each opposite to the side that they share
     apex = [triangles[t, np.argmax(number[t] == sides[:, None], axis=1)] for t in (first, second)]
@@ -160,10 +162,6 @@ def _is_convex(corners: FloatArray) -> BoolArray:
     normal = turn.sum(axis=1, keepdims=True)
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-300)
     return np.asarray(np.all(np.sum(turn * normal, axis=2) > LEAN, axis=1))
-
-
-ENDS = ((0, 3), (1, 2), (0, 1), (3, 2))
-"""Corners at the ends of the sides u = 0, u = 1, v = 0, v = 1."""
 
 
 def _of_quads(vertices: FloatArray, quads: IntArray, pairs: IntArray, turned: FloatArray) -> Patches:

@@ -1,6 +1,6 @@
 """Bodies without creeping rays, on flat facets or of several parts: why they have none, and what is inside them.
 
-Such a body has ``bounds``, ``inside(points)``, a fingerprint, and in place of F the corners of its facets
+Such a body has ``bounds``, ``inside(points)``, and in place of F the corners of its facets
 (``vertices``, ``triangles``, with ``hidden(points, direction)``), or ``parts``, bodies of any kind, with ``turns``,
 ``shifts`` and ``own(number, points)``.
 """

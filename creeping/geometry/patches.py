@@ -12,6 +12,8 @@ from creeping.geometry.squares import lobatto, on_squares
 
 DEGREE = 6
 """Degree of the polynomials along u and v."""
+ENDS = ((0, 3), (1, 2), (0, 1), (3, 2))
+"""Of a square's corners (0, 0), (1, 0), (1, 1), (0, 1) those at the ends of its sides u = 0, u = 1, v = 0, v = 1."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
+from creeping.geometry.parts import why_no_rays
 
 
 class Compiled(Protocol):
@@ -261,10 +262,16 @@ def step_onto(level: FloatArray, gradient: FloatArray, reach: float = np.inf) ->
 
 
 def fingerprint(body: Surface) -> str:
-    """Text that tells bodies apart: their own, or a digest of F and the speed at points of the charts."""
+    """Text that tells bodies apart: their own, that of all parts, or a digest of F and speed at points of charts."""
     own = getattr(body, "fingerprint", None)
     if isinstance(own, str):
         return own
+    several: Any = body
+    if why_no_rays(several) and hasattr(several, "parts"):
+        # each, and how it is put
+        each = [fingerprint(part) for part in several.parts]
+        text = repr([each, several.turns.tolist(), several.shifts.tolist()])
+        return f"{type(body).__name__}:{hashlib.blake2b(text.encode(), digest_size=16).hexdigest()}"
     points: FloatArray
     if isinstance(body, CreasedSurface) and len(body.creases):
         # charts are not asked of a body with creases; between the corners of its tiles, as F jumps at creases

@@ -15,6 +15,7 @@ from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
 from creeping.geometry.arguments import real_array
 from creeping.geometry.directions import unit_directions
+from creeping.geometry.parts import why_no_rays
 from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 from creeping.rays.reach import AUTO, asked_length, body_length
@@ -321,8 +322,11 @@ def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: Ar
     """Length of the rays of a sweep asked for as a number or as "auto": then for its lowest wavenumber, if it has any.
 
     An automatic length is one of whole leaps of a map, each of ``leap``, for what is left of one would be traced. What
-    is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes.
+    is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes. A body
+    without rays has none of any length.
     """
+    if why_no_rays(body):
+        return 1.0
     if not (isinstance(length, str) and length == AUTO):
         number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= LARGEST_LENGTH
         return asked_length(body, float(length)) if number else length

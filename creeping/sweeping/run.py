@@ -135,12 +135,10 @@ def sweep_directions(
     if why_no_rays(flow):
         if quantity == "rays":
             raise InvalidInputError(rays_refused(flow))
-        flow, method, length = NoFlow(flow), method or "auto", 1.0
-    flow, length = cast(Flow, flow), cast(float, length)
+        flow, method = NoFlow(flow), method or "auto"
+    flow = cast(Flow, flow)
     if not isinstance(flow, NoFlow):
         checked_flow(flow)
-        leap = flow.horizon if isinstance(flow, PhaseMap) else 0.0
-        length = sweep_length(flow.body, length, wavenumbers, leap=leap)
     _checked_options(store, progress, resume)
     _refuse(flow, quantity, store, resume, client)
     if boundary is None:
@@ -148,7 +146,7 @@ def sweep_directions(
     several: Any = list(boundary) if isinstance(boundary, (list, tuple)) else [boundary]
     request = sweep_request(
         quantity,
-        length=length,
+        length=sweep_length(flow.body, length, wavenumbers, leap=flow.horizon if isinstance(flow, PhaseMap) else 0.0),
         n_rays=n_rays,
         n_steps=n_steps,
         wavenumbers=wavenumbers,

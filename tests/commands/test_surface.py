@@ -2,8 +2,10 @@
 
 import json
 
+import numpy as np
 import pytest
 import trimesh
+import xarray
 from command_line import creeping, ran, table
 
 from creeping.commands.body import FileOptions, parse_body
@@ -77,3 +79,16 @@ def test_echoes_of_facets(two_balls, tmp_path):
     words = [two_balls, "--units", "m", "--no-pictures", "--sound-speed", 1500, "--frequency", "700Hz"]
     assert ran("ts", *words, "--incidence", "40,0", "--boundary", "hard", "-o", tmp_path / "ts") == 0
     assert [row["unresolved"] for row in table(tmp_path / "ts" / "ts.csv")] == ["0"]
+
+
+def test_a_study_of_facets(two_balls, tmp_path, capsys):
+    study = tmp_path / "a.toml"
+    study.write_text(
+        f'[study]\nbody = "{two_balls.name}"\nunits = "m"\nwavenumbers_per_length = [3.0]\nboundary = ["hard"]\n'
+        '[incidences]\nkind = "lebedev"\norder = 3\n[run]\noutput = "out.zarr"\n'
+    )
+    code, out, _ = creeping("sweep", study, capsys=capsys)
+    assert code == 0 and "6 incidences" in out
+    with xarray.open_zarr(tmp_path / "out.zarr", consolidated=False) as ds:
+        assert np.all(np.isfinite(ds.total.values)) and ds.by_currents.values.all() and ds.attrs["flow"] == "none"
+    assert creeping("sweep", study, "--resume", capsys=capsys)[0] == 0

@@ -11,15 +11,13 @@ from creeping.field.equation.facet_tiles import facet_tiles
 from creeping.field.equation.tiles import POINTS, Tiles, tiles_of
 from creeping.geometry.covering import patches_of
 from creeping.geometry.creased import is_creased
-from creeping.geometry.facet_patches import chordal, own_triangles
+from creeping.geometry.facet_patches import own_triangles
 from creeping.geometry.kept import kept
 from creeping.geometry.parts import inside, is_faceted, why_no_rays
-from creeping.geometry.patches import DEGREE
-from creeping.geometry.squares import lobatto, on_squares
 
 
-def body_tiles(body: Any, wavenumber: float, boundary: Boundary) -> Tiles:
-    """Tiles of a body for a wavenumber, 1/L, and a boundary.
+def body_tiles(body: Any, wavenumber: float, boundary: Boundary, *, finest: bool = False) -> Tiles:
+    """Tiles of a body for a wavenumber, 1/L, and a boundary; of facets the ``finest``, which go with other bodies'.
 
     Raises
     ------
@@ -27,51 +25,31 @@ def body_tiles(body: Any, wavenumber: float, boundary: Boundary) -> Tiles:
         If neither squares nor triangles of its own are the body, or one of several bodies reaches into another.
     """
     if is_faceted(body):
-        return facet_tiles(body, wavenumber, boundary)
-    if not why_no_rays(body):
-        return _of_surface(body, wavenumber, boundary)
-    made = [_of_part(part, wavenumber, boundary) for part in body.parts]
-    whole = _joined(made, body.turns, body.shifts)
-    _checked_apart(body, whole.points, np.repeat(np.arange(len(made)), [len(tiles.points) for tiles in made]))
-    return whole
-
-
-def _of_surface(body: Any, wavenumber: float, boundary: Boundary) -> Tiles:
-    """Tiles of a body with rays: of squares, or of its own triangles where it is of more pieces than squares cover."""
+        return facet_tiles(body, wavenumber, boundary, finest=finest)
+    if why_no_rays(body):
+        return _joined(body, [body_tiles(part, wavenumber, boundary, finest=True) for part in body.parts])
     try:
         return tiles_of(patches_of(body), wavenumber, boundary)
     except SurfaceError:
+        # of more pieces than squares cover
         facets = kept(body, "own triangles", lambda: own_triangles(body)) if is_creased(body) else None
         if facets is None:
             raise
-        off = chordal(*facets) if getattr(body, "tessellated", False) else 0.0
-        return replace(facet_tiles(facets, wavenumber, boundary), off=off, alone=True)
+        return replace(facet_tiles(facets, wavenumber, boundary, finest=finest), alone=True)
 
 
-def _of_part(part: Any, wavenumber: float, boundary: Boundary) -> Tiles:
-    if is_faceted(part):
-        return facet_tiles(part, wavenumber, boundary, finest=True)
-    return body_tiles(part, wavenumber, boundary)
-
-
-def _joined(made: list[Tiles], turns: FloatArray, shifts: FloatArray) -> Tiles:
-    """Tiles of several bodies, turned and shifted; their edges keep apart."""
+def _joined(body: Any, made: list[Tiles]) -> Tiles:
+    """Tiles of all parts of a body, turned and shifted; their edges keep apart."""
     shapes, edges, count = [], [], 0.0
-    for tiles, turn, shift in zip(made, turns, shifts, strict=True):
-        at = np.broadcast_to(lobatto(DEGREE), (tiles.count, DEGREE + 1))
-        x = on_squares(tiles.shapes, at, at)[0] if len(tiles.shapes[0]) == 2 else tiles.shapes
-        shapes.append(x @ turn.T + shift)
+    for tiles, turn, shift in zip(made, body.turns, body.shifts, strict=True):
+        shapes.append(tiles.shapes @ turn.T + shift)
         known = (tiles.edges[:, :1] >= 0) & (np.arange(4) == 0)
         edges.append(np.where(known, tiles.edges + count, tiles.edges))
         count += tiles.edges[:, 0].max(initial=-1.0) + 1
-    lacks = np.max([tiles.lacks for tiles in made], axis=0)
-    return Tiles.of(
-        np.concatenate(shapes),
-        POINTS,
-        np.concatenate(edges),
-        lacks=(float(lacks[0]), float(lacks[1])),
-        off=max(tiles.off for tiles in made),
-    )
+    off, alone = max(tiles.off for tiles in made), any(tiles.alone for tiles in made)
+    whole = replace(Tiles.of(np.concatenate(shapes), POINTS, np.concatenate(edges)), off=off, alone=alone)
+    _checked_apart(body, whole.points, np.repeat(np.arange(len(made)), [len(tiles.points) for tiles in made]))
+    return whole
 
 
 def _checked_apart(body: Any, points: FloatArray, owner: IntArray) -> None:

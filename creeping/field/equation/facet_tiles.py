@@ -18,6 +18,7 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.equation.tiles import POINTS, SIDE, VARYING, Tiles, tiles_for
 from creeping.geometry.facet_patches import SHARP, chordal, facet_patches, halved, sides_of, turns_of
+from creeping.geometry.kept import kept
 from creeping.geometry.patches import Patches
 
 
@@ -76,17 +77,28 @@ class Faceted(Protocol):
         """Numbers of their corners (t, 3), counter-clockwise seen from outside."""
         ...
 
+    @property
+    def tessellated(self) -> bool:
+        """Whether they stand for curved faces."""
+        ...
+
 
 def facet_tiles(body: Faceted, wavenumber: float, boundary: Boundary, *, finest: bool = False) -> Tiles:
     """Tiles of a body on its facets for a wavenumber, 1/L, and a boundary: of the rule with the fewest nodes."""
     wavelength = (VARYING if boundary.varies else 1.0) * 2 * np.pi / wavenumber
     rule = FINEST if finest else _chosen(body, wavelength)
     if rule.squares:
-        made = tiles_for(facet_patches(body), 2 * np.pi / wavelength, side=rule.side, p=rule.p, lacks=rule.lacks)
+        made = tiles_for(_patches(body), 2 * np.pi / wavelength, side=rule.side, p=rule.p, lacks=rule.lacks)
     else:
-        shapes, edges = _triangles(*halved(body.vertices, body.triangles, rule.side * wavelength))
+        mesh = halved(body.vertices, body.triangles, rule.side * wavelength)
+        shapes, edges = _triangles(mesh.vertices, mesh.triangles)
         made = Tiles.of(shapes, rule.p, edges, conical=True, lacks=rule.lacks)
-    return replace(made, off=chordal(body.vertices, body.triangles)) if getattr(body, "tessellated", False) else made
+    return replace(made, off=chordal(body.vertices, body.triangles)) if body.tessellated else made
+
+
+def _patches(body: Faceted) -> Patches:
+    """Squares of a body, made once."""
+    return kept(body, "facet patches", lambda: facet_patches(body))
 
 
 def _chosen(body: Faceted, wavelength: float) -> Rule:
@@ -94,7 +106,7 @@ def _chosen(body: Faceted, wavelength: float) -> Rule:
     corners = body.vertices[body.triangles]
     _, number = sides_of(body.triangles)
     edged = bool(np.any(turns_of(body.vertices, body.triangles, number)[0] > SHARP))
-    patches = facet_patches(body) if len(corners) < MOST_SQUARES else None
+    patches = _patches(body) if len(corners) < MOST_SQUARES else None
     nodes: dict[Rule, float] = {}
     for rule in RULES:
         if not rule.squares:

@@ -117,10 +117,9 @@ class Tiles:
         *,
         conical: bool = False,
         lacks: tuple[float, float] = (0.0, 0.0),
-        off: float = 0.0,
     ) -> "Tiles":
         """Tiles of these shapes with p x p nodes."""
-        return cls(shapes, *_nodes(shapes, p, conical), p, edges, conical, lacks, off)
+        return cls(shapes, *_nodes(shapes, p, conical), p, edges, conical, lacks)
 
     @property
     def count(self) -> int:

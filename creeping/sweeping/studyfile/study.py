@@ -10,6 +10,7 @@ from typing import Literal
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, size
 from creeping.rays.reach import AUTO
 from creeping.storage.folder import content_digest
@@ -137,7 +138,9 @@ class Study:
         )
 
     def request_for(self, body: Surface) -> SweepRequest:
-        """Request with the length of the rays in L."""
+        """Request with the length of the rays in L; for a body without rays one that does not ask for them."""
+        if why_no_rays(body) and self.request.method == "rays" and self.request.quantity != "rays":
+            return replace(self.request, method="auto")
         if self.length_in == AUTO:
             return replace(self.request, length=sweep_length(body, AUTO, self.request.wavenumbers))
         unit = 1.0 if self.length_in == "L" else size(body)

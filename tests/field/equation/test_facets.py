@@ -94,6 +94,18 @@ def test_rectangles_come_back():
     assert len(patches.places) == 6 and patches.edges.all()
 
 
+def test_size_and_unit_change_nothing():
+    mesh, d = trimesh.creation.cone(0.5, 1.2, sections=9), (0.2, -0.7, 0.5)
+    large = mesh.copy()
+    large.apply_scale(1e3)
+    one = cr.solve(sc.Facets(mesh), d, wavenumber=6.0, boundary="hard").far_field(R)
+    for body, k, scale in ((sc.Facets(large), 6e-3, 1e3), (sc.Facets(large, units="mm"), 6.0, 1.0)):
+        other = cr.solve(body, d, wavenumber=k, boundary="hard").far_field(R)
+        # the same pairs of triangles, though lengths of sides are equal but for rounding
+        np.testing.assert_allclose(other.total / scale, one.total, atol=1e-6 * np.abs(one.total).max())
+        np.testing.assert_allclose(other.error / scale, one.error, rtol=0.05)
+
+
 @pytest.mark.parametrize("kind", ["soft", "hard", pytest.param("pec", marks=pytest.mark.slow)])
 def test_two_spheres_a_wavelength_apart(kind):
     case, axis, k = stored.read("two_spheres"), np.array([0.48, 0.6, 0.64]), 6.0
