@@ -95,13 +95,13 @@ def turned_to_azimuth(directions: FloatArray, phi: FloatArray) -> FloatArray:
 
 
 def wave_frame(normals: FloatArray, directions: FloatArray, spare: FloatArray) -> FloatArray:
-    """Vectors s and h of waves that travel along unit directions, (n, 3) each: (n, 2, 3).
+    """Vectors s and h of waves that travel along unit directions, (n, 3) each, normals of any length: (n, 2, 3).
 
     ``spare`` (n, 3), tangent to the body, replaces n × d where d is along n.
     """
     s = np.cross(normals, directions)
     long = np.linalg.norm(s, axis=-1, keepdims=True)
-    clear = long > CLEAR
+    clear = long > CLEAR * np.linalg.norm(normals, axis=-1, keepdims=True)
     s = np.where(clear, s / np.where(clear, long, 1.0), spare)
     return np.stack([s, np.cross(s, directions)], axis=-2)
 

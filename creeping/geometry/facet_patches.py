@@ -68,6 +68,12 @@ class Triangles(NamedTuple):
     triangles: IntArray
     tessellated: bool = False
 
+    @property
+    def flat(self) -> bool:
+        """Whether neighbours lie in one plane or meet at an edge: then the triangles are the body."""
+        turned = turns_of(self.vertices, self.triangles, sides_of(self.triangles)[1])[0]
+        return bool(np.all((turned < PLANE) | (turned > SHARP)))
+
 
 def halved(vertices: FloatArray, triangles: IntArray, longest: float) -> Triangles:
     """Triangles with sides no longer than this, L: sides are halved, for both triangles alike.

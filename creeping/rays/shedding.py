@@ -4,7 +4,9 @@
     at y on the body          x(σ, s) = y
 
 In each case two functions on the strip vanish together, n.v and b.v with v = y - x (on the body: y - x along two
-tangents at y). Cells in which both change sign start Newton's method on the strip's splines.
+tangents at y). Cells in which both change sign start Newton's method on the strip's splines. From a point at a low
+height h above the body n.v > 0 only on a spot within √(2h/κ) of the point below it, which may be smaller than a cell:
+there the search starts on the rays through the point below, √(2h/κₙ) before it.
 
 Sources: Derivations, R12.
 """
@@ -16,6 +18,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.distinct import first_of_equals
+from creeping.geometry.quadrature import SYMMETRIC, nearest_points
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
@@ -58,6 +61,12 @@ class ShedRays:
         return ShedRays(self.observer[index], self.strip[index], self.sigma[index], self.rays[index], self.reach[index])
 
 
+_Functions = tuple[FloatArray, FloatArray, Callable[[IntArray, IntArray], BoolArray]]
+_Step = Callable[[RayPoints, tuple[FloatArray, FloatArray], FloatArray], tuple[FloatArray, FloatArray]]
+_Places = tuple[IntArray, IntArray, FloatArray, FloatArray]
+"""Observers (n,), strips (n,), σ and s (n,)."""
+
+
 def free_ways(body: Surface, rays: RayPoints, reach: FloatArray | float = np.inf) -> BoolArray:
     """Whether the tangents of rays (n,) get clear of the body up to a distance, L: (n,).
 
@@ -85,10 +94,26 @@ def shed_near(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> S
         columns = [v - np.sum(v * at.directions, axis=-1, keepdims=True) * at.directions for v in columns]
         return np.stack(columns, axis=-1) / scale, (away - reach[:, None] * at.directions) / scale
 
-    observer, strip, sigma, rays = _search(strips, body, points, functions, step)
+    low = _before_feet(strips, body, points)
+    observer, strip, sigma, rays = _search(strips, body, points, functions, step, low)
     reach = np.sum((points[observer] - rays.points) * rays.directions, axis=-1)
     ahead = reach > 0
     return ShedRays(observer[ahead], strip[ahead], sigma[ahead], rays[ahead], reach[ahead])
+
+
+def _before_feet(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> _Places:
+    """About where rays leave towards points (m, 3) so low above the body that cells may miss it."""
+    foot, _, hessians, height = nearest_points(body, points)
+    # |H|/|grad F| is no less than either curvature
+    bent = np.linalg.norm(hessians[:, SYMMETRIC], axis=(1, 2))
+    widest = max((max(strip.cell) for strip in strips), default=0.0)
+    low = np.flatnonzero((height > 0) & (height < 2 * bent * widest**2))
+    found = shed_on(strips, body, foot[low])
+    row, curvature, s = low[found.observer], found.rays.curvature[1], found.rays.time
+    with np.errstate(divide="ignore", invalid="ignore"):
+        before = s - np.sqrt(2 * height[row] / curvature)
+    good = (curvature > 0) & (before > 0)
+    return row[good], found.strip[good], found.sigma[good], before[good]
 
 
 def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> ShedRays:
@@ -118,17 +143,21 @@ def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> She
     return ShedRays(*found, np.zeros(len(found[0])))
 
 
-_Functions = tuple[FloatArray, FloatArray, Callable[[IntArray, IntArray], BoolArray]]
-_Step = Callable[[RayPoints, tuple[FloatArray, FloatArray], FloatArray], tuple[FloatArray, FloatArray]]
-
-
 def _search(
-    strips: tuple[Strip, ...], body: Surface, targets: FloatArray, functions: Callable[..., _Functions], step: _Step
+    strips: tuple[Strip, ...],
+    body: Surface,
+    targets: FloatArray,
+    functions: Callable[..., _Functions],
+    step: _Step,
+    more: _Places | None = None,
 ) -> tuple[IntArray, IntArray, FloatArray, RayPoints]:
-    """Solve on all strips: observers (n,), strips (n,), positions (n,) and points."""
+    """Solve on all strips, from cells and from places besides: observers (n,), strips (n,), positions (n,), points."""
     observer, which, sigma, s = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], [np.zeros(0)], [np.zeros(0)]
     for k, strip in enumerate(strips):
         seeds = _seeds(strip, body, targets, functions)
+        if more is not None:
+            its = more[1] == k
+            seeds = tuple(np.concatenate([one, more[i][its]]) for one, i in zip(seeds, (0, 2, 3), strict=True))  # type: ignore[assignment]
         row, at_sigma, at_s = _newton(strip, targets, *seeds, step)
         observer.append(row)
         which.append(np.full(len(row), k))

@@ -1,7 +1,9 @@
-"""Files written aside and renamed, so that a reader never meets half of one."""
+"""Files written aside and renamed, so that a reader never meets half of one; what is no file is written through."""
 
 import errno
 import os
+import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -13,18 +15,22 @@ _REMEDIES = {
     errno.ENOENT: "create the folder first",
     errno.ENOTDIR: "a part of the path is a file; choose another folder",
     errno.EISDIR: "the path is a folder; give a file name",
-    errno.EACCES: "choose a folder you may write to",
+    errno.EACCES: "choose another name, or a folder that you may write to",
     errno.EPERM: "choose a folder you may write to",
     errno.EROFS: "choose a folder you may write to",
     errno.ENOSPC: "free some space or choose another disk",
     errno.EDQUOT: "free some space or choose another disk",
     errno.ENAMETOOLONG: "choose a shorter name",
+    errno.ELOOP: "its links lead in a circle; choose another path",
 }
 
 
 @contextmanager
 def written_aside(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path beside ``path``; on success it replaces ``path``, on any error it is removed.
+    """Give a temporary path; on success what is written there stands at ``path``, on any error it is removed.
+
+    A file is replaced at once, where a link leads to if ``path`` is one. A device, a pipe or an open file of this
+    process (``/dev/stdout``) stays what it is: the bytes are written to it.
 
     Raises
     ------
@@ -34,16 +40,22 @@ def written_aside(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     aside: Path | None = None
     try:
+        through = _written_through(target)
+        real = Path(os.path.realpath(target))
         # the suffix stays last: writers of pictures choose the format by it
-        handle, name = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem[:100]}-", dir=target.parent)
+        handle, name = tempfile.mkstemp(
+            suffix=target.suffix, prefix=f".{real.stem[:100]}-", dir=None if through else real.parent
+        )
         os.close(handle)
         aside = Path(name)
         yield aside
-        # mkstemp makes the file private; give it the mode that open() would have given
-        umask = os.umask(0)
-        os.umask(umask)
-        aside.chmod(0o666 & ~umask)
-        os.replace(aside, target)
+        if through:
+            with open(aside, "rb") as made, open(target, "wb") as stream:
+                shutil.copyfileobj(made, stream)
+            return
+        aside.chmod(_mode(real))
+        _on_disk(aside)
+        os.replace(aside, real)
         aside = None
     except OSError as error:
         remedy = _REMEDIES.get(error.errno or 0, "choose another path")
@@ -52,3 +64,39 @@ def written_aside(path: str | os.PathLike[str]) -> Iterator[Path]:
         if aside is not None:
             with suppress(OSError):
                 aside.unlink()
+
+
+def _written_through(target: Path) -> bool:
+    """Whether what stands at the path is neither a file nor a folder, or is a file that a process holds open."""
+    try:
+        mode = os.stat(target).st_mode
+    except FileNotFoundError:
+        return False
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(mode):
+        return True
+    if not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, "the file may not be written")
+    place = str(target)
+    # /dev/stdout and /dev/fd/1 lead to /proc/self/fd/1: replaced, the file would lose what else is written to it
+    while not os.path.realpath(os.path.dirname(place) or ".").startswith("/proc/"):
+        if not os.path.islink(place):
+            return False
+        place = os.path.join(os.path.dirname(place), os.readlink(place))
+    return True
+
+
+def _mode(path: Path) -> int:
+    """Mode of the file that is there, else that which open() would give a new one."""
+    with suppress(FileNotFoundError):
+        return stat.S_IMODE(os.stat(path).st_mode)
+    umask = os.umask(0)
+    os.umask(umask)
+    return 0o666 & ~umask
+
+
+def _on_disk(path: Path) -> None:
+    """Wait until a file is on disk: renamed before it is, it would be empty after a power failure."""
+    with open(path, "rb+") as stream:
+        os.fsync(stream.fileno())

@@ -28,11 +28,13 @@ def body_tiles(body: Any, wavenumber: float, boundary: Boundary, *, finest: bool
         return facet_tiles(body, wavenumber, boundary, finest=finest)
     if why_no_rays(body):
         return _joined(body, [body_tiles(part, wavenumber, boundary, finest=True) for part in body.parts])
+    facets = kept(body, "own triangles", lambda: own_triangles(body)) if is_creased(body) else None
+    if facets is not None and facets.flat:
+        return facet_tiles(facets, wavenumber, boundary, finest=finest)
     try:
         return tiles_of(patches_of(body), wavenumber, boundary)
     except SurfaceError:
         # of more pieces than squares cover
-        facets = kept(body, "own triangles", lambda: own_triangles(body)) if is_creased(body) else None
         if facets is None:
             raise
         return replace(facet_tiles(facets, wavenumber, boundary, finest=finest), alone=True)
