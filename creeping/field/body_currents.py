@@ -20,8 +20,10 @@ from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
 from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, ray_nodes
 from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.waves import lit_waves, ray_waves
+from creeping.field.currents.whole_body import POINTS as POINTS_INSIDE
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.kept import Solved, asked_solution, expected_seconds_of, solution_for
+from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
+from creeping.field.equation.kept import Solved, asked_solution, expected_seconds_of, is_large, solution_for
 from creeping.geometry.arguments import one_of
 from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.quadrature import node_count
@@ -32,8 +34,9 @@ from creeping.shadow.line import ShadowLine
 
 CUT = 1e-3
 """Share of the shadow line without rays from which lit ground is not that of a convex body."""
-POOR = 0.02
-"""What currents leave of the incident wave inside from which the equation of any body is solved."""
+POOR = 0.01
+"""What currents leave of the incident wave inside from which the equation of any body is solved: next to the body they
+err by ten times that."""
 AFFORDABLE = 3e9
 """Nodes times directions, one by one, up to which "auto" takes currents: some ten seconds of one core."""
 POINTS = 2e10
@@ -211,6 +214,20 @@ def expected_nodes(fan: RayFan, wavenumber: float) -> int:
     line = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
     rays = RAYS * STEPS * line * ray_length(fan.line, wavenumber=wavenumber) / wavelength**2
     return int(LIT * node_count(fan.body, 2 * wavenumber) + rays)
+
+
+def solved_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents | None:
+    """Currents of the body's integral equation, where `kept_currents` gives these by itself; None elsewhere.
+
+    So fields far, near and on the body go one way. Nothing is made where the equation would cost too much.
+    """
+    if is_large(fan.body, wavenumber, boundary) or not affordable(fan, POINTS_INSIDE, wavenumber):
+        return None
+    try:
+        found = kept_currents(fan, wavenumber, boundary)
+    except (InvalidInputError, SurfaceError):
+        return None
+    return found if isinstance(found, (TileCurrents, ConductorTileCurrents)) else None
 
 
 def kept_currents(

@@ -21,7 +21,7 @@ import numpy as np
 from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain
-from creeping.field.body_currents import affordable, kept_currents
+from creeping.field.body_currents import affordable, kept_currents, solved_currents
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.total import far_enough, total_at
 from creeping.field.currents.whole_body import SurfaceCurrents
@@ -29,7 +29,7 @@ from creeping.field.equation.currents import TileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.near_layer import layer_field
-from creeping.field.near_wave import shed_waves
+from creeping.field.near_wave import height_above, shed_waves
 from creeping.field.on_body import rays_on, total_on
 from creeping.field.point_result import FieldStatus, NearField, judged
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
@@ -47,8 +47,6 @@ from creeping.shadow.occlusion import occluded
 
 ON_BODY = 1e-7
 """Distance from the body, in its sizes, below which a point counts as on it."""
-OFF = 4.5
-"""Error of solved currents off the body in that of expansions, which leave more inside of what is wrong with them."""
 FINE = 0.01
 """Error of rays up to which currents are not asked."""
 MISSING = 2.0
@@ -122,7 +120,11 @@ def near_field(
     dark[off] = occluded(fan.body, flat[off], fan.line.direction)
     field = zero_field(len(flat), "boundary")
     must = method in ("currents", "equation") or has_edges(fan.body)
-    solved = kept_currents(fan, k, boundary, solve=True if method == "equation" else None) if must else None
+    solved: SurfaceCurrents | None = None
+    if must:
+        solved = kept_currents(fan, k, boundary, solve=True if method == "equation" else None)
+    elif method == "auto" and order == 2:
+        solved = solved_currents(fan, k, boundary)
     by_currents = method != "rays" and order == 2 and (must or affordable(fan, len(off), k))
     # of rays on the lit side nothing is known that currents do not know better
     marched = march_alone(fan.body, kind)
@@ -133,7 +135,7 @@ def near_field(
     if len(at) and kind.kind != "soft":
         its = fan, flat[at], k, kind, order
         field = field.put(at, _rays_alone_on(*its) if method == "rays" else total_on(*its, solved))
-    asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | must))
+    asked = np.flatnonzero(~on & ((field.status != FieldStatus.OK) | (field.error > FINE) | (solved is not None)))
     if method != "rays" and order == 2 and len(asked):
         field = _with_currents(field, fan, flat, asked, dark, k, boundary, must=must or kind.varies, solved=solved)
     left = without[field.method[without] == "none"]
@@ -187,7 +189,8 @@ def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: B
     shed = shed_near(fan_strips(fan), fan.body, points)
     shed = shed[free_ways(fan.body, shed.rays, shed.reach)]
     waves, other = (shed_waves(shed.rays, shed.reach, k, kind, o) for o in (order, 3 - order))
-    error = own_error(shed.rays, (waves, other), k, kind, order, on=False)
+    height = height_above(shed.rays, shed.reach, k)
+    error = own_error(shed.rays, (waves, other), k, kind, order, height=height)
     return rays_alone(ray_sum(fan, shed, len(points), waves, error, k, kind), lit)
 
 
@@ -265,8 +268,5 @@ def _with_currents(
 
 def _solved_at(currents: TileCurrents, points: FloatArray, dark: BoolArray) -> Served:
     """Total field of solved currents at points (n, 3), L, off the body, some of them in the dark."""
-    incident, scattered, error = total_at(currents, points, dark)
-    close, error = np.flatnonzero(currents.next_to(points)), OFF * error
-    if len(close):
-        error[close] = currents.error_next_to(points[close])
-    return measured_field(incident + scattered, error, "equation", "extinction")
+    incident, scattered, _ = total_at(currents, points, dark)
+    return measured_field(incident + scattered, currents.error_around(points), "equation", "extinction")

@@ -50,9 +50,19 @@ def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: 
     phase = wavenumber * (rays.eikonal + reach) - 0.5 * np.pi * zeros
     with np.errstate(divide="ignore", over="ignore"):
         amplitude = -np.sqrt(2 * m1 * m2 / wavenumber / (reach * np.abs(tube)))
-    height = (m2 * reach * rays.curvature[1]) ** 2
+    height = height_above(rays, reach, wavenumber)
     wave = _uniform(rays, reach, height, wavenumber, boundary, order) * np.exp(1j * phase)
     return np.asarray(np.where(np.isinf(amplitude), np.inf, np.where(np.isinf(amplitude), 0.0, amplitude) * wave))
+
+
+def height_above(rays: RayPoints, reach: FloatArray, wavenumber: float) -> FloatArray:
+    """Y of rays (n,) at l = reach (n,), L, along their tangents."""
+    return np.asarray((scales(rays, wavenumber)[1] * reach * rays.curvature[1]) ** 2)
+
+
+def first_order_share(rays: RayPoints, height: FloatArray, wavenumber: float) -> FloatArray:
+    """Share in which waves at heights Y are of leading order, though the second is asked for: (n,)."""
+    return 1 - smoothstep(fock_parameter(rays, wavenumber) + np.sqrt(height), *SERIES)
 
 
 def _uniform(

@@ -20,7 +20,7 @@ import numpy as np
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain
-from creeping.field.body_currents import affordable, kept_currents
+from creeping.field.body_currents import affordable, kept_currents, solved_currents
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part
 from creeping.field.currents.waves import lit_waves
@@ -161,9 +161,7 @@ def rays_on(
         weight = np.where(young, share[found.observer], 1.0)
         # a wave may be infinite
         waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
-    by_modes = ray_sum(
-        fan, found, len(points), waves, own_error(found.rays, (waves, other), k, kind, order, on=True), k, kind
-    )
+    by_modes = ray_sum(fan, found, len(points), waves, own_error(found.rays, (waves, other), k, kind, order), k, kind)
     method = np.full(len(points), "rays")
     if not marches(fan, kind, order, len(points), k):
         return by_modes, method
@@ -192,8 +190,8 @@ def total_on(
     jointed, unit = is_creased(fan.body), k if kind.kind == "soft" else 1.0
     # an admittance that steps is smeared by expansions, of which their currents tell
     alone = not jointed and convex(fan) and not kind.varies
-    if not currents and not alone:
-        currents = _currents_of(fan, k, kind)
+    if not currents:
+        currents = solved_currents(fan, k, _boundary_of(kind)) if alone else _currents_of(fan, k, kind)
     if isinstance(currents, TileCurrents) and order == 2:
         return _solved_on(currents, points)
     checked_plain(fan.body, edgeless="the field at points of the body")
@@ -218,13 +216,16 @@ def _solved_on(currents: TileCurrents, points: FloatArray) -> Served:
 
 def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:
     """Currents of the whole body; None if they cost too much or there is no mesh for them."""
-    impedance = kind.kind == "impedance"
-    boundary = ImpedanceBoundary(kind.coating or kind.admittance) if impedance else SCALAR[kind.kind]
     try:
         # as many points as they are judged at
-        return kept_currents(fan, k, boundary) if affordable(fan, INNER, k) else None
+        return kept_currents(fan, k, _boundary_of(kind)) if affordable(fan, INNER, k) else None
     except (InvalidInputError, SurfaceError):
         return None
+
+
+def _boundary_of(kind: Boundary) -> BoundaryLike:
+    impedance = kind.kind == "impedance"
+    return ImpedanceBoundary(kind.coating or kind.admittance) if impedance else SCALAR[kind.kind]
 
 
 def _lit_at(

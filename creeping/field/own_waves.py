@@ -92,7 +92,7 @@ def _by_modes(
         return values, error, wide
     some = rays[there]
     waves, other = (surface_waves(some, k, kind, o) for o in (order, 3 - order))
-    values[there], error[there] = waves, own_error(some, (waves, other), k, kind, order, on=True)
+    values[there], error[there] = waves, own_error(some, (waves, other), k, kind, order)
     with np.errstate(invalid="ignore"):
         wide[there] = tube_share(some, np.zeros(waves.shape)) * scales(some, k)[1]
     return values, error, wide

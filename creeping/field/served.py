@@ -57,10 +57,16 @@ class Served:
         return Served(*arrays)
 
     def put_better(self, at: IntArray, other: "Served", *, must: bool) -> "Served":
-        """Another one where it must be, or is OK and this one is not or errs more."""
+        """Another one where it must be, or is OK and this one is not, errs more, or may have missed a wave.
+
+        What rays have missed is not in their error: they must agree with currents within what both state.
+        """
         mine = self[at]
-        better = (other.status == FieldStatus.OK) & ((mine.status != FieldStatus.OK) | (other.error < mine.error))
-        better |= must
+        gap = np.abs(other.values - mine.values)
+        apart = gap.reshape(len(at), int(np.prod(gap.shape[1:]))).max(axis=1, initial=0.0)
+        with np.errstate(invalid="ignore"):
+            worse = (other.error < mine.error) | (apart > other.error + mine.error)
+        better = must | (other.status == FieldStatus.OK) & ((mine.status != FieldStatus.OK) | worse)
         return self.put(at[better], other[better])
 
 

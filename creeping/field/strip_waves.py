@@ -88,7 +88,7 @@ def modes_on_strip(strip: Strip, times: FloatArray, k: float, kind: Boundary) ->
     rays = strip.rays
     plain = without_tubes(rays)
     waves = surface_waves(plain, k, kind, 2), surface_waves(plain, k, kind, 1)
-    error = np.where(rays.alive, own_error(plain, waves, k, kind, 2, on=True), np.inf)
+    error = np.where(rays.alive, own_error(plain, waves, k, kind, 2), np.inf)
     y = resampled(strip, waves[0] * np.exp(-1j * k * rays.eikonal), times)
     # the larger of the steps about a place tells
     at = np.clip(np.searchsorted(strip.times, times), 1, len(strip.times) - 1)

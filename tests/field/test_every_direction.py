@@ -118,3 +118,15 @@ def test_a_body_within_a_wavelength_is_unresolved_by_rays(boundary):
     for ka, flagged in ((0.1, True), (0.3, True), (0.7, True), (1.0, True), (12.0, False)):
         far = cr.far_field(fan, [-D], wavenumber=ka, boundary=boundary, method="rays")
         assert far.unresolved.tolist() == [flagged]
+
+
+def test_straight_ahead_of_a_conductor_by_rays_is_as_next_to_it(rng):
+    body, k = sc.Ellipsoid(1.3, 1.0, 0.7), 20.0
+    for d in rng.normal(size=(4, 3)):
+        d /= np.linalg.norm(d)
+        aside = np.cross(d, rng.normal(size=3))
+        r = d + np.radians([0.0, 1e-3])[:, None] * aside / np.linalg.norm(aside)
+        fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, d), n_rays=64)
+        far = cr.far_field(fan, r, wavenumber=k, boundary="pec", method="rays")
+        f = np.einsum("moc,moi->mci", frames(far.directions), far.total)
+        assert np.abs(f[0] - f[1]).max() < 1e-3 * np.abs(f[1]).max()

@@ -1,4 +1,4 @@
-"""What may stand at a writer's path: a file, a link, a pipe, a folder, nothing. All in private folders, never devices."""
+"""What may stand at the path of a writer: a file, a link, a pipe, a folder, nothing; in private folders, no devices."""
 
 import os
 import socket

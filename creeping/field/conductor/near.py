@@ -19,7 +19,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain
-from creeping.field.body_currents import affordable, kept_currents
+from creeping.field.body_currents import affordable, kept_currents, solved_currents
 from creeping.field.conductor.layer import layer_fields, lowest_height
 from creeping.field.conductor.on_body import OnConductor, on_conductor
 from creeping.field.conductor.shed import shed_sums
@@ -30,7 +30,7 @@ from creeping.field.currents.total import far_enough
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.equation.currents import ConductorTileCurrents
 from creeping.field.lit_ground import LEFT, UNKNOWN, convex
-from creeping.field.near import MISSING, OFF, ON_BODY, checked_height, rays_alone
+from creeping.field.near import MISSING, ON_BODY, checked_height, rays_alone
 from creeping.field.point_result import FieldStatus, judged
 from creeping.field.polarisation import incident_mix, spherical_frame
 from creeping.field.served import Served, measured_field, zero_field
@@ -122,9 +122,11 @@ def conductor_field(
         ]
         fields = [one.put(off, its) for one, its in zip(fields, rays, strict=True)]
         fine = np.all([(one.status == FieldStatus.OK) & (one.error <= FINE) for one in fields], axis=0)
-        asked = np.flatnonzero(~on & ~fine)
+        solved = isinstance(currents, ConductorTileCurrents)
+        asked = np.flatnonzero(~on & (~fine | solved))
         if len(asked):
-            fields = _with_currents(fields, fan, flat, asked, dark, left, _for(fan, k, mix, len(asked)))
+            its = currents if solved else _for(fan, k, mix, len(asked))
+            fields = _with_currents(fields, fan, flat, asked, dark, left, its)
     return _result(fields, fan, y, k, electric, single=polarisation is not None)
 
 
@@ -215,7 +217,7 @@ def _places(count: int, mix: ComplexArray) -> int:
 def _left_inside(
     fan: RayFan, k: float, mix: ComplexArray, method: str
 ) -> tuple[FloatArray, ConductorCurrents | None, bool]:
-    """What currents leave inside of each incident wave (p,), and they: 0 on a convex body, NaN where none are known.
+    """What currents leave inside of each incident wave (p,), and they: 0 and none on a convex body; NaN if not known.
 
     And whether nothing but they will do.
     """
@@ -224,8 +226,12 @@ def _left_inside(
         currents = _currents(fan, k, mix, solve=True if method == "equation" else None)
         return np.max(currents.left_of_each, axis=0), currents, alone
     if convex(fan):
-        return np.zeros(mix.shape[1]), None, alone
-    found = _for(fan, k, mix, INNER)
+        solved = solved_currents(fan, k, "pec")
+        if not isinstance(solved, ConductorTileCurrents):
+            return np.zeros(mix.shape[1]), None, alone
+        found: ConductorCurrents | None = solved.polarised(mix)
+    else:
+        found = _for(fan, k, mix, INNER)
     return np.full(mix.shape[1], np.nan) if found is None else np.max(found.left_of_each, axis=0), found, alone
 
 
@@ -318,12 +324,8 @@ def _with_currents(
 
 def _solved_at(currents: ConductorTileCurrents, points: FloatArray, dark: BoolArray) -> list[Served]:
     """E and H (n, 6) of each polarisation by solved currents at points (n, 3), L, off the body."""
-    incident, scattered, error = total_fields(currents, points, dark)
-    error *= OFF
-    close = np.flatnonzero(currents.next_to(points))
-    if len(close):
-        error[close] = currents.error_next_to(points[close])
-    total = incident + scattered
+    incident, scattered, _ = total_fields(currents, points, dark)
+    total, error = incident + scattered, currents.error_around(points)
     return [measured_field(total[..., i], error[:, i], "equation", "extinction") for i in range(error.shape[1])]
 
 

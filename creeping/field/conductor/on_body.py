@@ -183,7 +183,7 @@ def _rays_at(
     sums, methods, parts = [], [], []
     for i in range(electric.shape[1]):
         pair = waves[middle, :, i], other[middle, :, i]
-        own = own_error(found.rays[middle], pair, k, CONDUCTOR, 2, on=True, mixed=strength[middle])
+        own = own_error(found.rays[middle], pair, k, CONDUCTOR, 2, mixed=strength[middle])
         one = ray_sum(fan, found[middle], count, pair[0], own, k, ELECTRIC_HARD, strength[middle])
         sums.append(replace(one, values=total_of(waves[:, :, i], found.observer, 5 * count)))
         methods.append(np.full(count, "rays"))
@@ -307,7 +307,7 @@ def _without_caustics(
     u = np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1))
     large = np.maximum(np.linalg.norm(pair[0], axis=1), u[:, None])
     off = [
-        own_error(rays, (pair[0][:, :, i], pair[1][:, :, i]), k, CONDUCTOR, 2, on=True, mixed=u)
+        own_error(rays, (pair[0][:, :, i], pair[1][:, :, i]), k, CONDUCTOR, 2, mixed=u)
         for i in range(electric.shape[1])
     ]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -17,7 +17,7 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD, ELECTRIC_SOFT
 from creeping.field.currents.conductor import amplitudes
 from creeping.field.far_geometry import fan_strips
-from creeping.field.near_wave import shed_waves
+from creeping.field.near_wave import height_above, shed_waves
 from creeping.field.ray_scales import scales
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.geometry.surface import normal
@@ -36,10 +36,10 @@ def shed_sums(fan: RayFan, points: FloatArray, k: float, electric: ComplexArray)
     coupled = np.linalg.norm(np.sum(pair[0][:, 3:] * shed.rays.directions[:, :, None], axis=1, keepdims=True), axis=1)
     m = scales(shed.rays, k)[1]
     strength = np.max([np.linalg.norm(wave[:, :3], axis=1).max(axis=1, initial=0.0) for wave in pair], axis=0)
-    found = []
+    height, found = height_above(shed.rays, shed.reach, k), []
     for i in range(electric.shape[1]):
         waves, other = (wave[:, :, i] for wave in pair)
-        own = own_error(shed.rays, (waves, other), k, CONDUCTOR, 2, on=False)
+        own = own_error(shed.rays, (waves, other), k, CONDUCTOR, 2, height=height)
         along = np.minimum(ALONG * m / (k * np.maximum(shed.reach, 1e-300)), 1.0)
         own = np.linalg.norm([own, along * np.linalg.norm(waves, axis=1), COUPLED * coupled[:, i]], axis=0)
         found.append(ray_sum(fan, shed, len(points), waves, own, k, ELECTRIC_HARD, strength))

@@ -12,6 +12,7 @@ Sources: [CK13, sec. 3.2 and 6.2]; Derivations, F36.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -51,6 +52,8 @@ LEVELS = {"hard": 1.1, "soft": 0.9, "impedance": 0.9, "conductor": 1.1}
 """Error of the far field over what is found of it, with which it holds in 95 of 100 directions (`studies.edges`)."""
 CLOSEST = 1e-6
 """Distance from an edge, over that of the nodes next to it, at least: on the edge itself currents are infinite."""
+LOW = 2e-3
+"""Height over the size of a tile from which integrals over its parts, halved twelve times at most, are good."""
 ABOVE = 1e-5
 """Height of points just above the nodes, in body sizes: polynomials of tiles may pass under the body."""
 
@@ -208,30 +211,33 @@ class _OnTiles(SurfaceCurrents):
         return np.asarray(away * self.wavenumber <= 2 * np.pi * APART)
 
     def error_around(self, points: FloatArray) -> FloatArray:
-        """Error of the total field at points (m, 3), L, at any distance, as `error_next_to`."""
-        left = ON_BODY * self._left_next_to
-        error, close = np.broadcast_to(left, (len(points), *left.shape)).copy(), np.flatnonzero(self.next_to(points))
-        if len(close):
-            error[close] = self.error_next_to(points[close])
-        return error
+        """Error of the total field at points (m, 3), L, at any distance: (m,), of E and H (m, p).
 
-    def error_next_to(self, points: FloatArray) -> FloatArray:
-        """Error of the total field at points (m, 3), L, next to the body: (m,), of E and H (m, p).
-
-        It is that of what is on the body beneath, which fades as what tiles do not resolve does, by the square of their
-        width over the height, down to what is left inside. What p nodes do not resolve of du/dn gives a field of
-        about width/p times that.
+        What the polynomials of a tile do not resolve of currents changes sign 2p + 1 times or so across its width w:
+        its field fades over w/(2p + 1), slower once it has, and of what du/dn lacks it is that times w/(2p + 1). On the
+        body potentials are halfway between the polynomials and what the equation gives.
         """
         tiles = self.matrix.tiles
-        tile, u, v, height = tiles.located(points)
-        width = tiles.widths[tile]
-        faded = np.minimum(1.0, width / np.maximum(height, 1e-300)) ** 2
-        if self.boundary.kind == "soft":
-            faded = faded * width / tiles.p
-        beneath = self._beneath(_on_tiles(tiles, tiles.aside(tile, u, v, height)))
-        return np.asarray(np.maximum((faded * beneath.T).T, ON_BODY * self._left_next_to))
+        away, nearest = tiles.fine_tree.query(points)
+        tile = nearest // tiles.finer**2
+        reach = np.sqrt(tiles.sizes[tile] * tiles.widths[tile]) / (2 * tiles.p + 1)
+        faded = 0.5 * (reach if self.boundary.kind == "soft" else 1.0) / (1 + (away / reach) ** 2)
+        return np.asarray(np.maximum((faded * self._unresolved_of_tiles[tile].T).T, ON_BODY * self._left_next_to))
 
-    def _beneath(self, places: Places) -> FloatArray:
+    @cached_property
+    def _unresolved_of_tiles(self) -> FloatArray:
+        """What the polynomials of tiles do not resolve of currents: (t,), of a conductor and its charge (t, p)."""
+        tiles = self.matrix.tiles
+        # between the nodes next to its corners, where they oscillate most
+        ends = [
+            [0.5 * at[0], 0.5 + 0.5 * at[0]] if tiles.p == 1 else [at[:2].mean(), at[-2:].mean()] for at in tiles.places
+        ]
+        u, v = (np.tile(one.ravel(), tiles.count) for one in np.meshgrid(*ends))
+        places = _on_tiles(tiles, (np.repeat(np.arange(tiles.count), 4), u, v))
+        found = self._error_at(places)
+        return np.asarray(found.reshape(tiles.count, 4, *found.shape[1:]).max(axis=1))
+
+    def _error_at(self, places: Places) -> FloatArray:
         """Error of what is on the body at places of tiles: u is bounded at edges, whatever the boundary."""
         return self._at(places, edges=False).error
 
@@ -242,6 +248,27 @@ class _OnTiles(SurfaceCurrents):
 
     def _next_to(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         """Scattered field, of a conductor H, at points (m, 3) next to the body, of values at the nodes: (m, ...)."""
+        return self._not_low(points, lambda x: self._integrated(values, x))
+
+    def _not_low(self, points: FloatArray, field: Callable[[FloatArray], ComplexArray]) -> ComplexArray:
+        """A field at points (m, 3) next to the body, of lower ones along a line through two that are not."""
+        tiles = self.matrix.tiles
+        tile, u, v, height = tiles.located(points)
+        least = LOW * tiles.sizes[tile]
+        low = np.flatnonzero(height < least)
+        if not len(low):
+            return field(points)
+        foot, n = tiles.on(tile[low], u[low], v[low])
+        step = least[low, None] * n
+        x = points.copy()
+        x[low] = foot + step
+        found = field(np.concatenate([x, x[low] + step]))
+        out, above = found[: len(x)], found[len(x) :]
+        share = (height[low] / least[low] - 1).reshape(-1, *(1,) * (out.ndim - 1))
+        out[low] += share * (above - out[low])
+        return out
+
+    def _integrated(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         x, z = (np.broadcast_to(row, points.shape) for row in np.eye(3)[[0, 2]])
         if self.boundary.kind == "soft":
             return -0.5 * self._received(Places.at(points, z), values, "single")
@@ -360,10 +387,12 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
         out = np.empty((len(x), 3, self.values.shape[2]), dtype=complex)
         out[~near] = self._electric(self.values, x[~near])
         if np.any(near):
-            out[near] = scattered_electric(self.matrix.soft_one, x[near], self.values, self.charge)
+            out[near] = self._not_low(
+                x[near], lambda y: scattered_electric(self.matrix.soft_one, y, self.values, self.charge)
+            )
         return out
 
-    def _beneath(self, places: Places) -> FloatArray:
+    def _error_at(self, places: Places) -> FloatArray:
         return np.maximum(self._at(places).error, self._charge_at(places)[1])
 
     @property

@@ -17,6 +17,7 @@ from creeping.field.equation.solving import SECONDS, cost, solve
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.creased import is_creased
 from creeping.geometry.kept import kept
+from creeping.geometry.quadrature import node_count
 from creeping.geometry.surface import Surface
 from creeping.storage.memory import budget
 
@@ -111,6 +112,13 @@ def plan_of(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: f
 def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float) -> str:
     """Why the equation of one incidence takes too much time or memory, or cannot be; nothing if it does not."""
     return plan_of(body, wavenumber, boundary, seconds).refused
+
+
+def is_large(body: Surface, wavenumber: float, boundary: BoundaryLike) -> bool:
+    """Whether the equation of one incidence costs more than SECONDS; of large bodies told without making tiles."""
+    # quadrature of the currents has no more than twice the nodes
+    least = node_count(body, wavenumber) // 2
+    return cost(least, _kind(boundary), 1)[0] > SECONDS or bool(too_much(body, wavenumber, boundary, SECONDS))
 
 
 def expected_seconds_of(body: Surface, wavenumber: float, boundary: BoundaryLike) -> float:

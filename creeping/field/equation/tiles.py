@@ -332,17 +332,6 @@ class Tiles:
         away = np.where(side % 2 == 0, along, 1 - along)
         return np.where(side < 0, np.inf, away / gauss(self.p)[0][0])
 
-    def aside(
-        self, tile: IntArray, u: FloatArray, v: FloatArray, away: FloatArray
-    ) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Places of tiles (m,) moved away from their edge to a distance (m,), L, or half of a tile: as given."""
-        side, least = self.edges[tile, 1], np.minimum(away / self.widths[tile], 0.5)
-        u, v = (
-            np.clip(at, np.where(side == one, least, 0.0), 1 - np.where(side == one + 1, least, 0.0))
-            for at, one in ((u, 0), (v, 2))
-        )
-        return tile, u, v
-
     def on(self, tile: IntArray, u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Points of tiles (m,) at u and v, and unit normals there: (m, 3) each."""
         x, along, across = (part[:, 0, 0] for part in on_squares(self.shapes[tile], u[:, None], v[:, None]))

@@ -82,7 +82,7 @@ def test_units_scale(flat):
     small = cr.solve(sc.Cylinder(0.5e-3, 1e-3), D, wavenumber=4e3, boundary="pec").currents()
     x = np.array([[0.1, 0.0, 0.501], [0.6, 0.0, 0.3]])
     np.testing.assert_allclose(small.scattered_electric(1e-3 * x), currents.scattered_electric(x), atol=1e-4)
-    assert ON_BODY * currents.extinction <= currents.error_next_to(x).max()
+    assert ON_BODY * currents.extinction <= currents.error_around(x).max()
 
 
 def test_a_solution_has_the_fields_of_a_fan(flat):
