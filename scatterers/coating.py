@@ -48,6 +48,10 @@ class Coating:
 
         return tuple(differentiate(text).value for text in (self.real, self.imaginary))
 
+    def __reduce__(self) -> tuple[type["Coating"], tuple[str, str]]:
+        # functions are made again from the texts
+        return type(self), (self.real, self.imaginary)
+
     @property
     def fingerprint(self) -> str:
         """Text that changes with the admittance."""

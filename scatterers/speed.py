@@ -50,6 +50,10 @@ class ExpressionSpeed:
 
         return differentiate(self.expression)
 
+    def __reduce__(self) -> tuple[type["ExpressionSpeed"], tuple[str]]:
+        # functions are made again from the text
+        return type(self), (self.expression,)
+
     @property
     def fingerprint(self) -> str:
         """Text that changes with the speed."""

@@ -103,21 +103,28 @@ def _readable(body: str, sources: dict[str, str]) -> str:
 def verify_maps() -> int:
     """Check every stored map and fitted body against its digests; exit code 3 if one is damaged."""
     from creeping.errors import CreepingError
+    from creeping.kernels.private_cache import require_private
     from creeping.storage import folder as storing
     from scatterers.spline import cache as _fit_cache
 
     damaged = 0
     for folder in _stored():
         try:
+            for path in (folder.parent, folder):
+                require_private(path)
             storing.verify_files(folder)
             print(f"ok       {folder.name}")
-        except CreepingError as error:
+        except (PermissionError, CreepingError) as error:
             damaged += 1
             print(f"DAMAGED  {folder.name}: {error}")
     for file in _fits():
         whole = _fit_cache.load(file.parent, file.stem) is not None
         damaged += not whole
-        print(f"ok       {file.stem}" if whole else f"DAMAGED  {file.stem}: it is fitted anew when it is asked for")
+        print(
+            f"ok       {file.stem}"
+            if whole
+            else f"DAMAGED  {file.stem}, or others can write it: it is fitted anew when it is asked for"
+        )
     return 3 if damaged else 0
 
 

@@ -14,11 +14,12 @@ from creeping.errors import CreepingError, StoredMapError
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.arguments import checked_body, folder_path
 from creeping.geometry.surface import Surface, fingerprint
+from creeping.kernels.private_cache import private_folder, require_private
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
 from creeping.phaseflow.grid import PACKED, Grid, Leap
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
-from creeping.storage.folder import SCHEMA, content_digest, open_array, private_folder, read_manifest
+from creeping.storage.folder import SCHEMA, content_digest, open_array, read_manifest
 
 
 def cache_folder() -> Path:
@@ -158,14 +159,16 @@ def cached_phase_map(
             pass
         lock = FileLock(root / f".{place.name}.lock")
         lock.acquire()
-    except (OSError, StoredMapError) as error:
+    except OSError as error:
         progress(f"no cache in {root} ({error}); building without it")
         return build()
     try:
         if place.exists():
             try:
+                # it may be from when others could write the cache
+                require_private(place)
                 return load_phase_map(place, body)
-            except StoredMapError as error:
+            except (OSError, StoredMapError) as error:
                 progress(f"rebuilding: {error}")
                 shutil.rmtree(place, ignore_errors=True)
         result = build()

@@ -113,25 +113,6 @@ def remove_folder(folder: Path) -> str:
     return ""
 
 
-def private_folder(folder: Path) -> Path:
-    """Make a folder that only its owner can write, or check one that is there.
-
-    Raises
-    ------
-    StoredMapError
-        If it is another user's, or others can write it.
-    OSError
-        If it cannot be made.
-    """
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    folder.mkdir(mode=0o700, exist_ok=True)
-    status = folder.stat()
-    if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
-        whose = f"belongs to user {status.st_uid}" if status.st_uid != os.getuid() else "can be written by other users"
-        raise StoredMapError(f"{folder} {whose}; make it yours alone (chmod go-w), or name another by CREEPING_CACHE")
-    return folder
-
-
 def verify_files(folder: Path) -> dict[str, Any]:
     """Check every file of a stored map against the manifest, and return the manifest's content."""
     content = read_manifest(folder)

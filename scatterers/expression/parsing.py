@@ -14,6 +14,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from scatterers.expression.chosen import chosen, numeric_chosen
+from scatterers.kernels.compiled import Compiled, Kind
 
 FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
 MAX_LENGTH = 2000
@@ -183,7 +184,14 @@ def _shared(parts: Any) -> Any:
 
 @lru_cache(maxsize=64)
 def _differentiated(text: str) -> Differentiated:
-    return derivatives(parse(text), text)
+    found = derivatives(parse(text), text)
+    found.block.again = compiled_level, text  # type: ignore[attr-defined]
+    return found
+
+
+def compiled_level(text: str, kind: Kind, parameters: Any) -> Compiled:
+    """The compiled block evaluator of an expression."""
+    return Compiled(differentiate(text).block, kind, parameters)
 
 
 @lru_cache(maxsize=256)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.expression.parsing import Differentiated, differentiate
-from scatterers.kernels.compiled import OPTIONS
+from scatterers.kernels.compiled import OPTIONS, Compiled, Kind
 
 FloatArray = NDArray[np.float64]
 # nodes along an axis plus four, of one cell
@@ -62,4 +62,11 @@ def _sources(expression: str) -> dict[str, Callable[..., None]]:
         space[name] = njit(**OPTIONS)(FunctionType(space[name].py_func.__code__, space, name))
     # a file that does not exist: numba must not cache one expression's code for another
     code = kernels.forward.__code__.replace(co_filename="<expression>")
-    return {"level": differentiate(expression).block, "forward": FunctionType(code, space, "forward")}
+    forward = FunctionType(code, space, "forward")
+    forward.again = compiled_forward, expression  # type: ignore[attr-defined]
+    return {"level": differentiate(expression).block, "forward": forward}
+
+
+def compiled_forward(expression: str, kind: Kind, parameters: FloatArray) -> Compiled:
+    """The compiled sphere map's function on an expression."""
+    return Compiled(_sources(expression)["forward"], kind, parameters)

@@ -1,6 +1,6 @@
 """Pieces of an expression: what is left of it once every max, min and where has chosen."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import Any
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scatterers.expression.chosen import chosen, numeric_chosen
 from scatterers.expression.parsing import Differentiated, derivatives, parse
+from scatterers.kernels.compiled import Compiled, Kind
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -76,7 +77,10 @@ class Switches:
         ValueError
             If there are too many.
         """
-        for row in np.unique(self.choices(points), axis=0).tolist():
+        self._meet(np.unique(self.choices(points), axis=0).tolist())
+
+    def _meet(self, rows: Iterable[Iterable[int]]) -> None:
+        for row in rows:
             made = tuple(row)
             if made in self._known:
                 continue
@@ -99,7 +103,13 @@ class Switches:
 
     def functions(self, number: int) -> Differentiated:
         """Functions of a piece."""
-        return derivatives(self.pieces[number], self._text)
+        found = derivatives(self.pieces[number], self._text)
+        made = next(made for made, k in self._known.items() if k == number)
+        found.block.again = compiled_piece, self._text, made  # type: ignore[attr-defined]
+        return found
+
+    def __reduce__(self) -> tuple[Callable[..., "Switches"], tuple[str, list[tuple[int, ...]]]]:
+        return met_before, (self._text, list(self._known))
 
     def numbers(self, points: FloatArray) -> IntArray:
         """Numbers of the pieces at points (n, 3), L; where the choices are new, of the piece with the least |F|."""
@@ -112,3 +122,15 @@ class Switches:
                 values = [np.broadcast_to(self.functions(k).value(*x)[0], x.shape[1]) for k in range(len(self.pieces))]
             found[new] = np.argmin(np.abs(np.nan_to_num(np.stack(values), nan=np.inf)), axis=0)
         return found
+
+
+def met_before(text: str, choices: Iterable[Iterable[int]]) -> Switches:
+    """The choices in an expression, and the pieces of those that were met, in this order."""
+    found = Switches(text)
+    found._meet(choices)
+    return found
+
+
+def compiled_piece(text: str, made: tuple[int, ...], kind: Kind, parameters: FloatArray) -> Compiled:
+    """The compiled block evaluator of what an expression is by the choices made."""
+    return Compiled(met_before(text, [made]).functions(0).block, kind, parameters)

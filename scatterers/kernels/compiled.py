@@ -50,6 +50,8 @@ class Compiled:
         ``(points (3, n), gradients (3, n), chart (n,), uv (2, n), frame (6, n), parameters)`` for a locator,
         ``(s (3, n), points (3, n), derivatives (9, n), parameters)`` for a forward sphere map,
         ``(points (3, n), s (3, n), parameters)`` for its inverse.
+        Code made from an expression has a member ``again``, a function and its arguments, which with kind and
+        parameters give this object again: it is pickled by its text.
     kind : {"level", "locator", "forward", "inverse"}
     parameters : (k,) float64
     """
@@ -57,6 +59,10 @@ class Compiled:
     source: Callable[..., None]
     kind: Kind
     parameters: NDArray[np.float64]
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        make, *arguments = getattr(self.source, "again", (Compiled, self.source))
+        return make, (*arguments, self.kind, self.parameters)
 
     @property
     def function(self) -> Any:

@@ -1,4 +1,7 @@
-"""Compiled code is loaded from folders of this user alone: numba unpickles and runs what it finds in its cache.
+"""What is kept in caches is loaded from folders of this user alone.
+
+numba unpickles and runs what it finds in its cache, and a fit or a map that somebody else has put there is another
+body.
 
 A folder is trusted if nobody but the user, root and the owner of the package can put files into it or replace it.
 creeping and scatterers, which do not import each other, both have this file; a test holds them equal.
@@ -33,6 +36,35 @@ def _has_others(group: int) -> bool:
         return group != user.pw_gid or bool(set(grp.getgrgid(group).gr_mem) - {user.pw_name})
     except KeyError:
         return True
+
+
+def require_private(path: Path) -> None:
+    """Refuse a file or folder that users other than this one and root can write, or put another in place of.
+
+    Raises
+    ------
+    PermissionError
+    """
+    if hasattr(os, "getuid") and open_to_others(path, trusted := frozenset((0, os.getuid()))):
+        owner = path.stat().st_uid
+        whose = "can be written by other users" if owner in trusted else f"belongs to user {owner}"
+        raise PermissionError(f"{path} {whose}; make it yours alone (chmod go-w), or name another by CREEPING_CACHE")
+
+
+def private_folder(folder: Path) -> Path:
+    """Make a folder that only this user can write, or check one that is there.
+
+    Raises
+    ------
+    PermissionError
+        If others can write it, too.
+    OSError
+        If it cannot be made.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+    require_private(folder)
+    return folder
 
 
 def keep_private(package: Path, digest: str) -> None:

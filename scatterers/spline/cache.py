@@ -18,6 +18,8 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.kernels.private_cache import private_folder, require_private
+
 FloatArray = NDArray[np.float64]
 SCHEMA = 14
 """Counts up with every change of what is stored or of how it is fitted."""
@@ -49,9 +51,12 @@ def key_of(kind: str, content: bytes, **parameters: Any) -> str:
 
 
 def load(folder: Path, key: str) -> tuple[dict[str, FloatArray], dict[str, Any]] | None:
-    """Arrays and text of a fit, None if it is not there, damaged or of another kind."""
+    """Arrays and text of a fit, None if it is not there, damaged, of another kind, or others could have written it."""
+    file = folder / f"{key}.npz"
     try:
-        whole = (folder / f"{key}.npz").read_bytes()
+        for path in (folder, file):
+            require_private(path)
+        whole = file.read_bytes()
         if hashlib.blake2b(whole[DIGEST:], digest_size=DIGEST).digest() != whole[:DIGEST]:
             return None
         with np.load(io.BytesIO(whole[DIGEST:]), allow_pickle=False) as stored:
@@ -87,11 +92,7 @@ def store(folder: Path, key: str, arrays: dict[str, FloatArray], text: dict[str,
     content = packed.getvalue()
     aside = None
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        folder.mkdir(mode=0o700, exist_ok=True)
-        status = folder.stat()
-        if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o022):
-            return f"the fit is not cached: other users can write {folder}"
+        private_folder(folder)
         with tempfile.NamedTemporaryFile(dir=folder, prefix=".writing-", delete=False) as file:
             aside = Path(file.name)
             file.write(hashlib.blake2b(content, digest_size=DIGEST).digest() + content)

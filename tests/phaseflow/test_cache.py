@@ -1,6 +1,7 @@
 """Stored maps: a round trip, and no damage that goes unnoticed."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -108,6 +109,19 @@ def test_cache_hit_rebuild_and_miss(tmp_path):
     np.testing.assert_array_equal(repaired.leaps[0].state, first.leaps[0].state)
     cr.build_phase_map(BODY, **{**options, "degree": 5})
     assert len([p for p in tmp_path.iterdir() if p.is_dir()]) == 2
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
+def test_a_map_that_others_could_write_is_not_taken(tmp_path):
+    said = []
+    options = {**OPTIONS, "cache": tmp_path, "progress": said.append}
+    first = cr.build_phase_map(BODY, **options)
+    (stored,) = [p for p in tmp_path.iterdir() if p.is_dir()]
+    edit(stored, lambda content: content.update(error=[0.5, 0.5, 3]))
+    assert cr.build_phase_map(BODY, **options).error.rms == 0.5, "it would be taken"
+    stored.chmod(0o777)
+    assert cr.build_phase_map(BODY, **options).error == first.error
+    assert any(f"rebuilding: {stored} can be written by other users" in line for line in said)
 
 
 def test_cache_that_cannot_be_written_is_said_and_done_without(tmp_path):

@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import os
 import subprocess
 import sys
 from functools import cache
@@ -220,6 +221,31 @@ def test_a_damaged_fit_is_made_again_signed_or_not(tmp_path, which):
     assert any("fitting" in line for line in messages)
     assert body.fit == ball().fit and body.level([1.1, 0, 0]) == ball().level([1.1, 0, 0])
     assert file.read_bytes()[32:100] == whole[32:100] and len(file.read_bytes()) == len(whole)
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
+def test_a_fit_that_others_could_write_is_not_taken(tmp_path):
+    open_in(tmp_path)
+    (file,) = tmp_path.iterdir()
+    level, whole = ball().level([1.1, 0, 0]), file.read_bytes()
+    with np.load(io.BytesIO(whole[32:])) as held:
+        changed = {name: held[name] + 0.05 for name in held.files if "coefficients" in name}
+    planted = signed(repacked(whole[32:], **changed))
+    file.write_bytes(planted)
+    assert open_in(tmp_path).level([1.1, 0, 0]) - level == pytest.approx(0.05), "it would be taken"
+    file.chmod(0o666)
+    assert open_in(tmp_path).level([1.1, 0, 0]) == level
+    # it was fitted anew and put in the place of what was planted
+    assert file.stat().st_mode & 0o777 == 0o600 and len(file.read_bytes()) == len(whole)
+    file.write_bytes(planted)
+    tmp_path.chmod(0o777)
+    messages = []
+    assert open_in(tmp_path, messages).level([1.1, 0, 0]) == level
+    assert any(f"the fit is not cached: {tmp_path} can be written by other users" in line for line in messages)
+    if os.getuid() == 0:
+        tmp_path.chmod(0o700)
+        os.chown(tmp_path, 1000, -1)
+        assert open_in(tmp_path).level([1.1, 0, 0]) == level
 
 
 def test_an_unwritable_cache_is_said_and_no_more(tmp_path):

@@ -50,9 +50,16 @@ class CompiledModel:
         self.body = body
         atlas: Any = body.atlas
         source = getattr(atlas, "sphere_map", atlas)
-        there, back = source.compiled_forward, source.compiled_inverse
-        self._there = there.function, there.parameters
-        self._back = back.function, back.parameters
+        # a compiled function by itself cannot be pickled
+        self._forward, self._inverse = source.compiled_forward, source.compiled_inverse
+
+    @property
+    def _there(self) -> tuple[Any, FloatArray]:
+        return self._forward.function, self._forward.parameters
+
+    @property
+    def _back(self) -> tuple[Any, FloatArray]:
+        return self._inverse.function, self._inverse.parameters
 
     @cached_property
     def _surface_table(self) -> FloatArray:
