@@ -26,7 +26,7 @@ from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.whole_body import DEPTH, POINTS, SHALLOW, SurfaceCurrents
 from creeping.field.equation.charge import scattered_electric, twice_normal
 from creeping.field.equation.matrix import Matrix, Places
-from creeping.field.equation.tiles import Tiles
+from creeping.field.equation.tiles import Tiles, gauss
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.creased import is_convex, is_creased
 from creeping.geometry.depth import box_points
@@ -151,10 +151,8 @@ class _OnTiles(SurfaceCurrents):
             apart, large = (np.linalg.norm(part, axis=1) for part in (apart, large))
         error = np.hypot(ON_BODY * unit * np.maximum(self._left, LEAST_NEAR), UNRESOLVED * np.abs(apart))
         if edges and self.boundary.kind in ("soft", "conductor"):
-            # polynomials are bounded at edges, where these grow like the root of the distance at most
             assert places.own is not None
-            near = np.minimum(self.matrix.tiles.from_edge(*places.own), 1.0)
-            grown = np.sqrt(1 / np.maximum(near, CLOSEST)) - 1
+            grown = _at_edges(self.matrix.tiles.from_edge(*places.own))
             error = np.hypot(error, (grown * np.abs(large).T).T)
         return np.asarray(error)
 
@@ -312,6 +310,16 @@ class _OnTiles(SurfaceCurrents):
         )
 
 
+def _at_edges(away: FloatArray) -> FloatArray:
+    """What currents or fields (m,) lack next to edges at distances over that of the nodes next to it, as a share.
+
+    Currents grow like r^(-1/2) at most. Polynomials of tiles are bounded: up to the first nodes, at d, they lack
+    d^(1/2) r^(-1/2) - 1. What that is in all, d on each of two faces, is a line on the edge with the field 2d/(2 pi r).
+    """
+    grown = np.sqrt(1 / np.clip(away, CLOSEST, 1.0)) - 1
+    return np.asarray(np.hypot(grown, 1 / (np.pi * np.maximum(away, 1.0))))
+
+
 def _on_tiles(tiles: Tiles, own: tuple[IntArray, FloatArray, FloatArray]) -> Places:
     """Places of tiles (m,) at u and v."""
     x, normals = tiles.on(*own)
@@ -391,6 +399,20 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
                 x[near], lambda y: scattered_electric(self.matrix.soft_one, y, self.values, self.charge)
             )
         return out
+
+    def error_around(self, points: FloatArray) -> FloatArray:
+        """The same, and what currents lack next to edges, where E and H grow."""
+        error, close = super().error_around(points), np.flatnonzero(self.next_to(points))
+        if not (len(close) and self.matrix.tiles.edges[:, 1].max() >= 0):
+            return error
+        tiles = self.matrix.tiles
+        tile, u, v, height = tiles.located(points[close])
+        first = gauss(tiles.p)[0][0] * tiles.widths[tile]
+        grown = _at_edges(np.hypot(tiles.from_edge(tile, u, v), height / first))
+        size = np.maximum(np.linalg.norm(self.values, axis=1), np.abs(self.charge))
+        largest = size.reshape(tiles.count, -1, size.shape[1]).max(axis=1)
+        error[close] = np.hypot(error[close], grown[:, None] * largest[tile])
+        return error
 
     def _error_at(self, places: Places) -> FloatArray:
         return np.maximum(self._at(places).error, self._charge_at(places)[1])
