@@ -120,6 +120,8 @@ def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts
     if getattr(shape, "speed", None) is None:
         _field(shape, wavenumber, answer, texts)
     if why_no_rays(shape):
+        answer["repairs"] = list(getattr(shape, "repairs", ()))
+        texts += answer["repairs"]
         return True
     report = check_surface(shape)
     rows = [asdict(c) | {"ok": c.ok} for c in report.checks]
