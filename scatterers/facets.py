@@ -35,8 +35,8 @@ class Facets:
     Parameters
     ----------
     source : path, or object with ``vertices`` and ``faces``
-        STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh; each of its parts is closed. Or a STEP, IGES or
-        BREP file, whose triangles have their corners on it.
+        STL, OBJ, PLY, OFF, GLB, 3MF, MSH or BDF file, or e.g. a trimesh.Trimesh; each of its parts is closed. Or a
+        STEP, IGES or BREP file, whose triangles have their corners on it.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
     part : str or int, optional

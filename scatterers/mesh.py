@@ -59,7 +59,8 @@ class Mesh(FittedBody):
     Parameters
     ----------
     source : path, or object with ``vertices`` and ``faces``
-        STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh.
+        STL, OBJ, PLY, OFF, GLB, 3MF, MSH (Gmsh) or BDF (NASTRAN) file, packed by gzip or not, or e.g. a
+        trimesh.Trimesh.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
     strict : bool

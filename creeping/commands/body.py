@@ -1,6 +1,7 @@
 """The BODY of a command: a name with parameters, a file, or an expression. Part of the command line."""
 
 import inspect
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -22,7 +23,7 @@ BODIES = {
     "double-ogive": "DoubleOgive",
     "almond": "Almond",
 }
-MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf")
+MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".nas", ".gz")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 Progress = Callable[[str], None]
 
@@ -100,18 +101,20 @@ def parse_body(
     suffix, of_file = Path(text).suffix.lower(), is_file(text)
     name, _, rest = text.partition(":")
     given = options.given()
-    belong = _belonging(suffix, of_file, name in BODIES)
-    if alien := [option for option in given if option not in belong]:
-        what = f"{name} takes none" if not belong else f"{text!r} takes --{', --'.join(belong)}"
-        raise InvalidInputError(f"--{alien[0]} does not belong to this body: {what}")
     if not (of_file or name in BODIES or _like_expression(text)):
         raise InvalidInputError(
             f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
             f"({', '.join(MESHES + CAD)}), or an expression in x, y, z"
         )
+    belong = _belonging(suffix, of_file, name in BODIES)
+    if alien := [option for option in given if option not in belong]:
+        what = f"{name} takes none" if not belong else f"{text!r} takes --{', --'.join(belong)}"
+        if belong and not of_file and alien[0] != "sew":
+            what = f"{text!r} is no file on this machine, but an expression"
+        raise InvalidInputError(f"--{alien[0]} does not belong to this body: {what}")
     try:
         if of_file:
-            kind: Any = scatterers.Mesh if suffix in MESHES else scatterers.Cad
+            kind: Any = scatterers.Cad if suffix in CAD else scatterers.Mesh
             given = {"surface": "auto"} | given
             return _with_charts(kind(text, **given, cache=cache, speed=speed, progress=progress), progress)
         if name in BODIES:
@@ -132,13 +135,14 @@ def parse_body(
 def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:
     """Options that a kind of body has."""
     if of_file:
-        return (*FILE_OPTIONS, "surface", "subdivide" if suffix in MESHES else "sew")
+        return (*FILE_OPTIONS, "surface", "sew" if suffix in CAD else "subdivide")
     return () if named else ("strict",)
 
 
-def is_file(text: str) -> bool:
-    """Whether a BODY names a file, whose lengths are metres."""
-    return Path(text).suffix.lower() in MESHES + CAD
+def is_file(text: str, folder: Path = Path()) -> bool:
+    """Whether a BODY names a file, whose lengths are metres: by its ending, or because there is one in the folder."""
+    named = text.partition(":")[0] in BODIES
+    return Path(text).suffix.lower() in MESHES + CAD or (not named and os.path.isfile(folder / text))
 
 
 def title_of(text: str) -> str:

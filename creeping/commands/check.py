@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping.commands.body import AS_IT_IS, MESHES, Body, FileOptions, SpeedOption, parse_body
+from creeping.commands.body import AS_IT_IS, CAD, MESHES, Body, FileOptions, SpeedOption, is_file, parse_body
 
 WAVELENGTHS = 6.0
 """Size of a body for which it is told how its field is made, where no wavenumber is given."""
@@ -47,12 +47,12 @@ def check(
         from creeping.commands.wave import asked_wavenumber
 
         wavenumber, _ = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
-    suffix = Path(body).suffix.lower()
+    mesh = is_file(body) and Path(body).suffix.lower() not in CAD
     if wavenumber is not None and speed is not None:
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out one of --speed and --wavenumber")
     answer: dict[str, Any] = {}
     texts: list[str] = []
-    if output is not None and suffix not in MESHES:
+    if output is not None and not mesh:
         # the rest of the check is worth having
         texts.append(f"no picture: quality.png is drawn of meshes ({', '.join(MESHES)}); {body!r} is none")
         output = None
@@ -61,10 +61,10 @@ def check(
         shape = parse_body(body, speed, options=file)
     except InvalidInputError as error:
         # an option of CAD files says nothing of a mesh
-        if suffix not in MESHES or file.sew is not None:
+        if not mesh or file.sew is not None:
             raise
         refusal = error
-    if (refusal is not None and suffix in MESHES) or output is not None:
+    if refusal is not None or output is not None:
         # what is known of a mesh that can be read is worth more than the refusal alone
         _mesh(body, file, wavenumber, output, answer, texts)
     if shape is None:
@@ -120,6 +120,8 @@ def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts
     if getattr(shape, "speed", None) is None:
         _field(shape, wavenumber, answer, texts)
     if why_no_rays(shape):
+        answer["repairs"] = list(getattr(shape, "repairs", ()))
+        texts += answer["repairs"]
         return True
     report = check_surface(shape)
     rows = [asdict(c) | {"ok": c.ok} for c in report.checks]

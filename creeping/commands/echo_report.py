@@ -17,6 +17,8 @@ from creeping.field.echo import Echo
 from creeping.field.slant_range import RangeProfile, range_profile
 from creeping.files import read_cut, write_echo, write_mat, write_profile
 from creeping.files.measured import MeasuredCut
+from creeping.geometry.checks import WRONG_SIGNS, wrong_signs
+from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import directions_from_azimuth_elevation
 from creeping.geometry.surface import Surface
 from creeping.shadow.status import FAILED, SINGULAR
@@ -133,7 +135,7 @@ def write_results(
     names = [f"{stem}.{kind}" for kind in formats]
     for kind in formats:
         writers[kind](output / f"{stem}.{kind}", echo)
-    extra: dict[str, Any] = {}
+    extra: dict[str, Any] = {"wrong_signs": wrong_signs(body)[0]} if is_creased(body) else {}
     for channel, found in comparisons.items():
         extra.setdefault("compared", {})[channel] = found.summary()
     profiles = _profiles(echo)
@@ -254,6 +256,11 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     least, largest = summary["validity"]["least_k_rho"], summary["validity"]["largest_transverse"]
     if least is not None and largest is not None:
         rows.append(f"on the rays k rho >= {least:.3g}, kappa_t rho/m^2 <= {largest:.2g}")
+    if summary.get("wrong_signs", 0.0) > WRONG_SIGNS:
+        rows.append(
+            f"beside {100 * summary['wrong_signs']:.2g} % of its area F has the wrong sign outside or inside: see "
+            "`creeping check`; a file can be taken with --surface facets"
+        )
     if summary["failed_incidences"]:
         rows.append(f"{summary['failed_incidences']} incidences are singular or failed: their rows are NaN")
         rows += str(summary["errors"] or "").splitlines()[:3]

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from creeping.commands.body import CAD, MESHES, FileOptions, parse_body
+from creeping.commands.body import FileOptions, is_file, parse_body
 
 PARTIAL, ALL_FAILED = 4, 3
 """Exit codes: of a sweep that --resume would go on with, for what is missing or failed; of one without results."""
@@ -119,8 +119,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
 
     for package in ("xarray", "zarr"):
         require(package)
-    is_file = Path(read.body).suffix.lower() in MESHES + CAD
-    text = str(read.folder / read.body) if is_file else read.body
+    text = str(read.folder / read.body) if is_file(read.body, read.folder) else read.body
     progress("body")
     body = parse_body(
         text, read.speed, options=FileOptions(units=read.units, **read.file), cache=cache, progress=progress

@@ -8,10 +8,13 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import SurfaceError
 from creeping.geometry.arguments import checked_body
-from creeping.geometry.creased import KINDS, is_creased, pieces_of, tiles_of
+from creeping.geometry.creased import KINDS, SAMPLE, is_creased, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import triangulate
 from creeping.geometry.unit import UNKNOWN, unit_of
+
+WRONG_SIGNS = 1e-2
+"""Share of the area of a body of pieces beside which F may have the wrong sign."""
 
 
 @dataclass(frozen=True)
@@ -130,19 +133,19 @@ def _creased_report(body: Any) -> SurfaceReport:
               "close the tiles"),
         Check("share of tiles turned inside out", float(np.mean(np.sum(areas * n, axis=1) < 0)), 0, "turn the tiles"),
     ]  # fmt: skip
-    step, out = 1e-4 * size(body), 0.0
     for number, piece in enumerate(pieces):
         x = piece.samples
         if not len(x):
             continue
-        m = normal(piece, x)
-        out = max(out, float(np.mean((body.level(x + step * m) < 0) | (body.level(x - step * m) > 0))))
         mine = tiles.pieces == number
         off = float(np.max(np.abs(np.sum((middles[mine, None] - tiles.corners[mine]) * n[mine, None], axis=-1))))
         checks.append(Check(f"piece {number}: tiles off their normals' planes, in body sizes", off / size(body), 0.05,
                             "mend tiles()"))  # fmt: skip
         checks += [Check(f"piece {number}: {c.name}", c.worst, c.limit, c.remedy) for c in _derivative_checks(piece, x)]
-    checks.append(Check("share of points where F has the wrong sign outside or inside", out, 0.01, "mend level()"))
+    share, worst, number = wrong_signs(body)
+    of = f" (of that of piece {number}: {worst:.2g})" if worst > WRONG_SIGNS else ""
+    what = f"share of the area where F has the wrong sign outside or inside{of}"
+    checks.append(Check(what, share, WRONG_SIGNS, "mend level()"))
     return SurfaceReport(
         checks=tuple(checks),
         genus=None,
@@ -151,6 +154,28 @@ def _creased_report(body: Any) -> SurfaceReport:
         creases=tuple(body.creases),
         unit=unit_of(body),
     )
+
+
+def wrong_signs(body: Any) -> tuple[float, float, int]:
+    """Share of the area of a body of pieces beside which F has the wrong sign; that of the worst piece, and its number.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> wrong_signs(sc.Cylinder(1.0, 4.0))[0]
+    0.0
+    """
+    tiles, step = tiles_of(body, SAMPLE), 1e-4 * size(body)
+    wrong = np.zeros(len(tiles.pieces), dtype=bool)
+    for number, piece in enumerate(pieces_of(body)):
+        x = piece.samples
+        if len(x):
+            m = normal(piece, x)
+            wrong[tiles.pieces == number] = (body.level(x + step * m) < 0) | (body.level(x - step * m) > 0)
+    whole = np.bincount(tiles.pieces, tiles.areas)
+    bad = np.bincount(tiles.pieces, tiles.areas * wrong)
+    each = bad / np.maximum(whole, 1e-300)
+    return float(bad.sum() / whole.sum()), float(each.max()), int(each.argmax())
 
 
 def _derivative_checks(body: Surface, points: FloatArray) -> list[Check]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scatterers.triangles.choice import Choice, whole_body
 from scatterers.triangles.files import UNITS, TriangleMesh
+from scatterers.triangles.kinds import what_else
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -205,9 +206,12 @@ def kind_of(path: Path) -> str:
     if size == 0 or size > LARGEST:
         raise ValueError(f"{path.name} has {size} bytes; give a CAD file of at most {LARGEST}")
     with path.open("rb") as file:
-        start = file.read(4096).decode("latin-1")
-    if not re.match(BEGINNINGS[kind], start):
-        raise ValueError(f"{path.name} does not begin as {kind} files do; export the body again")
+        start = file.read(4096)
+    if not re.match(BEGINNINGS[kind], start.decode("latin-1")):
+        what = what_else(start)
+        raise ValueError(
+            f"{path.name} does not begin as {kind} files do" + (f": it is {what}" if what else "; export it again")
+        )
     return kind
 
 

@@ -1,6 +1,6 @@
 """Triangle meshes from files and objects, checked and in metres: what happens before a surface is fitted.
 
-Nothing of a file is executed and nothing beside it is opened: only the loaders of six formats are called, on bytes
+Nothing of a file is executed and nothing beside it is opened: only loaders of known formats are called, on bytes
 read here, without a resolver of names; trimesh's own repairs are left out, as they drop what is wrong without a word.
 """
 
@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from scatterers.triangles.choice import Choice, silent, whole_body
 from scatterers.triangles.crossings import crossings
 from scatterers.triangles.cutting import uncrossed
+from scatterers.triangles.decks import read_bdf, read_msh
 from scatterers.triangles.form import check_whole
+from scatterers.triangles.kinds import understood
 from scatterers.triangles.off import with_triangles
 from scatterers.triangles.parts import every_part
 from scatterers.triangles.subdivision import Subdivision
@@ -34,7 +36,6 @@ SPELLED = {
     "meter": "m", "metre": "m", "millimeter": "mm", "millimetre": "mm", "centimeter": "cm", "centimetre": "cm",
     "micron": "um", "micrometer": "um", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft", "kilometer": "km",
 }  # fmt: skip
-SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf")
 MOST_BYTES = 512 * 2**20
 MOST_TRIANGLES = 4_000_000
 SMALLEST, LARGEST = 1e-9, 1e9
@@ -89,7 +90,7 @@ def read_mesh(
     Parameters
     ----------
     source : path, or object with ``vertices`` and ``faces``
-        STL, OBJ, PLY, OFF, GLB or 3MF file, or e.g. a trimesh.Trimesh.
+        STL, OBJ, PLY, OFF, GLB, 3MF, MSH or BDF file, packed by gzip or not, or e.g. a trimesh.Trimesh.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
     choice : Choice, optional
@@ -111,20 +112,40 @@ def read_mesh(
     in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
     choice = choice or Choice()
     named = isinstance(choice.part, str) and choice.part != "largest"
-    raw = _from_object(source) if in_memory else _from_file(source, named)
-    _check_numbers(raw)
-    scale = UNITS[_unit(raw, units, "m" if in_memory else None)]
     repairs: list[str] = []
 
     def note(message: str) -> None:
         repairs.append(message)
         progress(message)
 
+    raw = _from_object(source) if in_memory else _from_file(source, named, note)
+    _check_numbers(raw)
+    scale = UNITS[_unit(raw, units, "m" if in_memory else None)]
     chosen = _named(raw, choice.part)
+    try:
+        vertices, triangles, offset, local = _one_body(raw, chosen, choice, scale, note)
+    except ValueError:
+        # rounding tears a surface and folds it
+        _check_rounding(raw.name, raw.vertices, chosen, torn=True)
+        raise
+    if np.linalg.norm(offset) > FAR * np.linalg.norm(np.ptp(vertices, axis=0)):
+        note(
+            f"{raw.name} lies {np.linalg.norm(offset) * scale:.6g} m from the origin; "
+            f"moved by {_where(-offset * scale)}"
+        )
+        vertices = local
+    return TriangleMesh(vertices * scale, triangles, tuple(repairs))
+
+
+def _one_body(
+    raw: _Raw, chosen: IntArray, choice: Choice, scale: float, note: Callable[[str], None]
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+    """Vertices and triangles of a closed surface, the middle of its box, and the vertices relative to that."""
     vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else silent, note)
     _check_size(raw.name, vertices, scale)
-    named = chosen is not raw.triangles
-    vertices, triangles = whole_body(raw.name, vertices, triangles, choice, scale, note, named=named)
+    vertices, triangles = whole_body(
+        raw.name, vertices, triangles, choice, scale, note, named=chosen is not raw.triangles
+    )
     # digits are lost to the offset in any sum of products of coordinates, so it goes first
     offset = 0.5 * (vertices.min(0) + vertices.max(0))
     local = vertices - offset
@@ -138,13 +159,7 @@ def read_mesh(
         local, triangles = uncrossed(raw.name, local, triangles, choice.cap, scale, note)
         vertices = local + offset
     _check_crossings(raw.name, local, triangles, offset * scale, scale, cut=choice.cap is not None)
-    if np.linalg.norm(offset) > FAR * np.linalg.norm(np.ptp(vertices, axis=0)):
-        note(
-            f"{raw.name} lies {np.linalg.norm(offset) * scale:.6g} m from the origin; "
-            f"moved by {_where(-offset * scale)}"
-        )
-        vertices = local
-    return TriangleMesh(vertices * scale, triangles, tuple(repairs))
+    return vertices, triangles, offset, local
 
 
 def _named(raw: _Raw, part: str | int | None) -> IntArray:
@@ -180,9 +195,10 @@ def _from_object(source: Any) -> _Raw:
     return _Raw(name, vertices, triangles.reshape(-1, 3), getattr(source, "units", None), True)
 
 
-def _from_file(source: Any, named: bool) -> _Raw:
+def _from_file(source: Any, named: bool, note: Callable[[str], None]) -> _Raw:
     path, data = mesh_bytes(source)
-    name, suffix = path.name, path.suffix.lower()
+    name = path.name
+    suffix, data = understood(name, path.suffix.lower(), data, MOST_BYTES, note)
     check_whole(name, suffix, data)
     try:
         vertices, triangles, stated, names = _loaded(data, suffix, named)
@@ -193,7 +209,7 @@ def _from_file(source: Any, named: bool) -> _Raw:
 
 
 def mesh_bytes(source: Any) -> tuple[Path, bytes]:
-    """Path of a mesh file and what it holds, read only if it is a file of a known kind and size.
+    """Path of a mesh file and what it holds, read only if it is a file that is not too large.
 
     Raises
     ------
@@ -206,15 +222,13 @@ def mesh_bytes(source: Any) -> tuple[Path, bytes]:
         raise ValueError(
             f"a {type(source).__name__} is no mesh; give a path or an object with vertices and faces"
         ) from None
-    name, suffix = path.name, path.suffix.lower()
+    name = path.name
     if len(name) > 255 or "\0" in str(path):
         raise ValueError(f"{name[:40]}... is no name of a file; give the path of a mesh file")
     if path.is_dir():
         raise ValueError(f"{path} is a directory; give the path of a mesh file")
     if not path.is_file():
         raise ValueError(f"{path} is no file on this machine; give the path of a mesh file (addresses are not fetched)")
-    if suffix not in SUFFIXES:
-        raise ValueError(f"{name} is of a kind that is not read; give one of {', '.join(SUFFIXES)}")
     try:
         size = path.stat().st_size
         if size > MOST_BYTES:
@@ -254,6 +268,8 @@ def _loaded(
     """Vertices and triangles of everything in the file, the unit it states, and its parts: name, triangles."""
     if suffix == ".3mf":
         return read_3mf(data, MOST_BYTES, MOST_TRIANGLES)
+    if suffix in (".msh", ".bdf"):
+        return *(read_msh if suffix == ".msh" else read_bdf)(data), None, ()
     import trimesh
 
     # else all objects of an OBJ file are one part, by the name of the first
@@ -350,17 +366,19 @@ def _check_size(name: str, vertices: FloatArray, scale: float) -> None:
         )
 
 
-def _check_rounding(name: str, vertices: FloatArray, triangles: IntArray) -> None:
+def _check_rounding(name: str, vertices: FloatArray, triangles: IntArray, *, torn: bool = False) -> None:
+    # of what is torn the largest numbers tell enough
+    column = np.abs(vertices).max(axis=0).argmax() if torn else slice(None)
     with np.errstate(over="ignore"):
-        single = vertices.astype(np.float32)
-    if not np.array_equal(single, vertices):
+        single = vertices[:, column].astype(np.float32)
+    if not np.array_equal(single, vertices[:, column]):
         return
     quantum = float(np.spacing(np.abs(single).max()))
     edge = float(np.mean(np.linalg.norm(vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)], axis=-1)))
     if quantum > COARSEST_ROUNDING * edge:
         raise ValueError(
-            f"the numbers of {name} are rounded to {quantum:.2g}, {quantum / edge:.2g} of its mean edge, as it lies "
-            "far from the origin in single precision; move it to the origin before it is exported"
+            f"the numbers of {name} are rounded to {quantum:.2g}, where its mean edge is {edge:.2g}, as it lies far "
+            "from the origin in single precision, or with few digits; move it to the origin before it is exported"
         )
 
 

@@ -34,7 +34,9 @@ def _stl(name: str, cut: str, data: bytes) -> None:
     count = int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:
         return
-    if b"\0" in data[:84] or not data.lstrip().lower().startswith(b"solid"):
+    if b"\0" not in data and not data.lstrip().lower().startswith(b"solid"):
+        raise ValueError(f"{cut}: it is a text that does not begin with 'solid'")
+    if b"\0" in data:
         raise ValueError(f"{cut}: {count} triangles take {84 + 50 * count} bytes, it has {len(data)}")
     text = data.lower()
     if b"endsolid" not in text or len(re.findall(rb"\bfacet\b", text)) != text.count(b"endfacet"):
@@ -54,6 +56,8 @@ def _ply(name: str, cut: str, data: bytes) -> None:
     elements = re.findall(rb"^\s*element\s+(\w+)\s+(\d+)\s*$((?:\s*(?:property|comment)\b.*$)*)", head, re.MULTILINE)
     if not body:
         raise ValueError(f"{cut}: its header has no end")
+    if strips := next((int(count) for kind, count, _ in elements if kind == b"tristrips"), 0):
+        raise ValueError(f"{name} has its triangles in {strips} tristrips, which are not read; export single triangles")
     for what, names in [
         ("element", [kind for kind, _, _ in elements]),
         *(("property", re.findall(rb"(\w+)[ \t\r]*$", properties, re.MULTILINE)) for _, _, properties in elements),
@@ -142,6 +146,8 @@ def _obj(name: str, cut: str, data: bytes) -> None:
     torn = sum(bool(row) and re.match(rb"[-+.]?\d", row[0]) is not None for row in rows)
     if torn:
         raise ValueError(f"{_of(torn, 'text', name)} a number where a word should be; export it again")
+    if re.search(rb"^\s*f\s(?:.*\s)?0+(?:/|\s|$)", data, re.MULTILINE):
+        raise ValueError(f"{name} has a face with vertex 0, where the first is 1; export it again")
     # x y z, with a weight or a colour
     wrong = [row for row in geometry if row[0] == b"v" and _length(row) - 1 not in (3, 4, 6, 7)]
     few = sum(row[0] == b"f" and _length(row) < 4 for row in geometry)

@@ -169,6 +169,20 @@ def test_bad_options_of_files_are_exit_code_3(balls, options, match, capsys):
 
 
 @pytest.mark.parametrize(
+    "name, match",
+    [
+        ("hull.vtk", "hull.vtk is a VTK file; export the body as a mesh"),
+        ("hull.step", "hull.step does not begin as STEP files do: it is a VTK file"),
+        ("hull", "hull is a VTK file"),
+    ],
+)
+def test_what_is_there_is_a_file_whatever_its_name(name, match, tmp_path, capsys):
+    (tmp_path / name).write_text("# vtk DataFile Version 3.0\n")
+    code, _, err = creeping("check", tmp_path / name, "--units", "m", capsys=capsys)
+    assert code == 3 and match in err and "--units" not in err
+
+
+@pytest.mark.parametrize(
     "body, more, match",
     [
         ("ball", [], "does not state its unit"),
@@ -177,6 +191,7 @@ def test_bad_options_of_files_are_exit_code_3(balls, options, match, capsys):
         ("none.stl", ["--units", "m"], "none.stl is no file on this machine"),
         ("none.xyz", [], "unknown body 'none.xyz'"),
         ("torus", ["--units", "mm"], "--units does not belong to this body: torus takes none"),
+        ("x/none.xyz", ["--units", "mm"], "--units does not belong to this body: 'x/none.xyz' is no file"),
         ("x**2 + y**2 - 1", [], "x**2 + y**2 - 1: "),
         ("__import__('os').system('touch hey') + x", [], ""),
     ],

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 import shared_bodies as sc
 from creased_bodies import TwoBalls, cut_sphere
+from fake_fields import echo_of
 
 import creeping as cr
+from creeping.commands import echo_report
 from creeping.commands.run_report import readable, summary_of
+from creeping.geometry.checks import wrong_signs
 from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
 from creeping.geometry.surface import fingerprint
 from creeping.rays.piece_specular import smooth_parts
+from scatterers import Cylinder
 
 BODIES = {"cut": cut_sphere(), "two": TwoBalls()}
 CUT = BODIES["cut"]
@@ -29,6 +33,27 @@ def test_a_wrong_piece_is_found():
     body.pieces[0].hessian = lambda x: np.zeros((*x.shape, 3))
     report = cr.check_surface(body)
     assert not report.ok and any("piece 0: Hessian" in check.name and not check.ok for check in report.checks)
+
+
+class TurnedAtItsTop(Cylinder):
+    def level(self, points):
+        return np.where(points[..., 2] > 0.999, -1, 1) * super().level(points)
+
+
+def test_wrong_signs_are_a_share_of_the_area_and_rcs_says_so(tmp_path):
+    body = TurnedAtItsTop(0.05, 2.0)
+    end = np.pi * 0.05**2 / (2 * np.pi * 0.05 * 2.05)
+    share, worst, _ = wrong_signs(body)
+    # of tiles as coarse as its radius
+    assert share == pytest.approx(end, rel=0.15) and worst == 1.0
+    (row,) = (check for check in cr.check_surface(body).checks if "wrong sign" in check.name)
+    assert row.worst == share and not row.ok and "(of that of piece" in row.name
+    echo = echo_of(0.5, 0.25)
+    extra = echo_report.write_results(tmp_path, echo, {}, body, "rod", pictures=False)[1]
+    said = dict.fromkeys(("error_db_median", "otherwise_by", "by_currents", "values", "unresolved"))
+    said |= echo.summary() | extra | {"body": "rod", "seconds": 0.0, "files": [], "failed_incidences": 0}
+    said["validity"] = {"least_k_rho": None, "largest_transverse": None}
+    assert "beside 1.1 % of its area F has the wrong sign" in echo_report.readable(said, tmp_path)
 
 
 def test_parts_and_creases():

@@ -1,5 +1,6 @@
 """Meshes from files: what is read, what is repaired with a word, and every kind of bad file, named."""
 
+import gzip
 import json
 import re
 import struct
@@ -168,11 +169,95 @@ def written(name, data):
     return write
 
 
-def exported(kind):
-    return mesh().export(file_type=kind)
+def plain(kind, **options):
+    data = mesh().export(file_type=kind, **options)
+    return data if isinstance(data, bytes) else data.encode()
 
 
-STL, ASCII, PLY, OFF, GLB = (exported(kind) for kind in ("stl", "stl_ascii", "ply", "off", "glb"))
+def fortran(data):
+    return re.sub(rb"-?\d+\.\d+(e[-+]\d+)?", lambda number: b"%.9E" % float(number[0]), data).replace(b"E", b"D")
+
+
+def msh(version):
+    n, m = len(VERTICES), len(FACES)
+    numbers = [f"{k + 1}" for k in range(n)]
+    places = [f"{x!r} {y!r} {z!r}" for x, y, z in VERTICES.tolist()]
+    faces = [f"{a} {b} {c}" for a, b, c in (FACES + 1).tolist()]
+    if version == 2.2:
+        nodes = [n, *(f"{k} {place}" for k, place in zip(numbers, places, strict=True))]
+        elements = [m + 1, "9 15 2 0 1 4", *(f"{k + 10} 2 2 0 1 {face}" for k, face in enumerate(faces))]
+    else:
+        nodes = [f"1 {n} 1 {n}", f"2 1 0 {n}", *numbers, *places]
+        elements = [f"2 {m + 1} 1 {m + 1}", "0 1 15 1", "1 4", f"2 1 2 {m}"]
+        elements += [f"{k + 10} {face}" for k, face in enumerate(faces)]
+    head = ["$MeshFormat", f"{version} 0 8", "$EndMeshFormat"]
+    return "\n".join(
+        map(str, [*head, "$Nodes", *nodes, "$EndNodes", "$Elements", *elements, "$EndElements", ""])
+    ).encode()
+
+
+def bdf(form):
+    """Bulk data in fields of 8 or 16, or divided by commas."""
+    nodes = {
+        "commas": "GRID,{0},,{1:.6f},{2:.6f},{3:.6f}",
+        "small": "GRID    {0:8d}        {1:8.5f}{2:8.5f}{3:8.5f}",
+        "large": "GRID*   {0:16d}                {1:16.9f}{2:16.9f}*N{0}\n*N{0:<6d}{3:16.9f}",
+    }[form]
+    rows = ["$ a ball", "BEGIN BULK", *(nodes.format(k, *place) for k, place in enumerate(VERTICES.tolist(), 1))]
+    rows += [f"CTRIA3  {k:8d}       1{a:8d}{b:8d}{c:8d}" for k, (a, b, c) in enumerate((FACES + 1).tolist(), 1)]
+    return "\n".join([*rows, "ENDDATA"]).encode()
+
+
+STL, ASCII, PLY, OFF, GLB, OBJ = (plain(kind) for kind in ("stl", "stl_ascii", "ply", "off", "glb", "obj"))
+TEXTS = {"stl": ASCII, "obj": OBJ, "off": OFF, "ply": plain("ply", encoding="ascii")}
+ENCODED = {
+    "mark and CRLF": lambda data: b"\xef\xbb\xbf" + data.replace(b"\n", b"\r\n"),
+    "CR": lambda data: data.replace(b"\n", b"\r"),
+    "UTF-16": lambda data: data.decode().encode("utf-16"),
+    "UTF-16 without a mark": lambda data: data.decode().encode("utf-16-be"),
+    "Fortran": fortran,
+    "zeros behind it": lambda data: data + b"\n\0\0",
+}
+ODD_FILES = {
+    "bytes behind it": ("a.stl", STL + bytes(200), "200 bytes of a.stl behind the last of its 320 triangles left out"),
+    "no count": ("a.stl", STL[:80] + bytes(4) + STL[84:], "states 0 triangles, its bytes are those of 320"),
+    "count too low": ("a.stl", STL[:80] + b"\x30\1\0\0" + STL[84:], "states 304 triangles, its bytes are those of 320"),
+    "a PLY": ("a.stl", PLY, "a.stl is of the kind .ply by what it holds"),
+    "an OBJ": ("a.stl", OBJ, "a.stl is of the kind .obj"),
+    "no ending": ("a", STL, "a is of the kind .stl"),
+    "another ending": ("a.txt", OFF, "a.txt is of the kind .off"),
+    "zipped 3MF": ("a.zip", None, "a.zip is of the kind .3mf"),
+    "lines that go on": ("a.obj", OBJ.replace(b"f ", b"f \\\n"), None),
+    "packed": ("a.stl.gz", gzip.compress(ASCII[:9000]) + gzip.compress(ASCII[9000:]), None),
+    **{f"Gmsh {version}": ("a.msh", msh(version), None) for version in (2.2, 4.1)},
+    **{f"NASTRAN {form}": ("a.bdf", bdf(form), None) for form in ("commas", "small", "large")},
+}
+
+
+def check_ball(found):
+    assert (len(found.vertices), len(found.triangles)) == (162, 320)
+    # in half of single precision for the shortest numbers
+    assert volume(found.vertices, found.triangles) == pytest.approx(BALL.volume, rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+@pytest.mark.parametrize("how", ENCODED)
+def test_texts_however_they_are_written(how, kind, tmp_path):
+    found = read(written(f"a.{kind}", ENCODED[how](TEXTS[kind]))(tmp_path), "m")
+    check_ball(found)
+    assert found.repairs == ()
+
+
+@pytest.mark.parametrize("name", ODD_FILES)
+def test_files_are_taken_by_what_they_hold(name, tmp_path):
+    file, data, message = ODD_FILES[name]
+    path = packed(tmp_path / file, "meter") if data is None else written(file, data)(tmp_path)
+    found = read(path, None if data is None else "m")
+    check_ball(found)
+    assert len(found.repairs) == (message is not None)
+    assert message is None or message in found.repairs[0]
+
+
 NAN_STL = STL[:96] + struct.pack("<f", float("nan")) + STL[100:]
 XML = '<!DOCTYPE model [<!ENTITY a "aa">]><model><build/></model>'
 
@@ -224,14 +309,39 @@ BAD_FILES = {
     "entities": (lambda f: packed(f / "a.3mf", text=XML), "document type"),
     "broken xml": (lambda f: packed(f / "a.3mf", text="<model><build>"), "broken XML"),
     "bomb": (bomb, "unpacks to 3000000000 bytes"),
+    "decimal commas": (
+        written("a.stl", re.sub(rb"(\d)\.(\d)", rb"\1,\2", ASCII)),
+        r"1280 lines of a.stl have decimal commas, the first is line 2, 'facet normal",
+    ),
+    "strips": (written("a.ply", TEXTS["ply"].replace(b"element face", b"element tristrips")), "320 tristrips, which"),
+    "web page": (written("a.stl", "<!DOCTYPE html>\n<html>"), "a.stl is a web page; download the mesh itself"),
+    "pointer": (
+        written("a.stl", "version https://git-lfs.github.com/spec/v1\n"),
+        "Git LFS, .*git lfs pull",
+    ),
+    "step": (written("a.stl", "ISO-10303-21;\n"), "a.stl is a STEP file; name it .step"),
+    "zip": (lambda f: without_model(f / "a.zip"), "a.zip is a ZIP archive; unpack it"),
+    "prose": (written("a.stl", "404: Not Found"), "a text that does not begin with 'solid'"),
+    "blanks": (written("a.stl", " \n\n"), "a.stl is empty"),
+    "cut pack": (written("a.stl.gz", gzip.compress(STL)[:-99]), "a.stl.gz cannot be unpacked"),
+    "packed bomb": (written("a.stl.gz", gzip.compress(bytes(2**20))), "unpacks to more than 1 MB"),
+    "vertex 0": (written("a.obj", OBJ + b"f 0 1 2\n"), "a.obj has a face with vertex 0"),
+    "cut msh": (written("a.msh", msh(2.2)[:-99]), "a.msh cannot be read as MSH: it lacks its nodes or elements"),
+    "short msh": (written("a.msh", msh(2.2).replace(b"\n162\n", b"\n99999999999\n")), "states 99999999999 rows"),
+    "binary msh": (written("a.msh", b"$MeshFormat\n2.2 1 8\n"), "no text of Gmsh's versions 2.2 or 4.1"),
+    "coordinates": (written("a.bdf", "GRID,1,3,0.,0.,0.\n"), "node 1 is in the coordinates 3"),
+    "no node": (written("a.bdf", "GRID,1,,0.,0.,0.\nCTRIA3,1,1,1,1,7\n"), "node 7, which it does not hold"),
+    "no number": (written("a.bdf", "GRID,1,,a,0.,0.\n"), "GRID 1 has a field that is no number"),
     "not finite": (written("a.stl", NAN_STL), "1 of 960 vertices of a.stl are not finite .the first is vertex 0"),
     "two bodies": (lambda f: two_bodies(f / "a.glb"), "a.glb holds 2 separate surfaces"),
 }
 
 
 @pytest.mark.parametrize("name", BAD_FILES)
-def test_bad_files_are_named(tmp_path, name):
+def test_bad_files_are_named(tmp_path, name, monkeypatch):
     make, message = BAD_FILES[name]
+    if name == "packed bomb":
+        monkeypatch.setattr("scatterers.triangles.files.MOST_BYTES", 2**20 - 1)
     source = make(tmp_path)
     with pytest.raises(ValueError, match=message):
         read(source, None if str(source).endswith((".glb", ".3mf")) else "m")
@@ -288,7 +398,8 @@ BAD_MESHES = {
     "index": (lambda: Bare(VERTICES, FACES + 1), "refer to vertices that do not exist .vertex 162 of 162"),
     "quads": (lambda: Bare(VERTICES, FACES[:, [0, 1, 2, 2]]), "faces of the mesh have shape .320, 4."),
     "halves": (lambda: Bare(VERTICES, FACES + 0.5), "not whole numbers"),
-    "rounded far away": (lambda: Bare((VERTICES + 1e5).astype(np.float32), FACES), "rounded to 0.0078, .* of its mean"),
+    "rounded far away": (lambda: Bare((VERTICES + 1e5).astype(np.float32), FACES), "rounded to 0.0078, where its"),
+    "torn far away": (lambda: Bare((VERTICES + 5.5e6).astype(np.float32), FACES), "rounded to 0.5, .* to the origin"),
 }
 
 
