@@ -28,6 +28,7 @@ class _Stopped(BaseException):
 
 
 _team = threading.local()
+_PROCESS = os.getpid()
 
 
 def pause() -> None:
@@ -53,8 +54,17 @@ def thread_count() -> int:
     return int(named)
 
 
+def openmp_threads(most: int) -> int:
+    """Threads of a library that works by OpenMP: up to ``most``, but one in a forked process.
+
+    There GNU's OpenMP waits for ever for the threads of the process that was forked.
+    """
+    return min(most, thread_count()) if os.getpid() == _PROCESS else 1
+
+
 @cache
-def _pool(threads: int) -> Any:
+def _pool(threads: int, process: int) -> Any:
+    """Threads of a process: a fork has the pool of its parent, but not its threads."""
     from concurrent.futures import ThreadPoolExecutor
 
     return ThreadPoolExecutor(threads, thread_name_prefix="creeping")
@@ -148,7 +158,7 @@ def in_threads(
         finally:
             _team.stop = None
 
-    futures = [_pool(thread_count()).submit(join) for _ in range(threads)]
+    futures = [_pool(thread_count(), os.getpid()).submit(join) for _ in range(threads)]
     try:
         # where a signal does not end a wait it is seen after it
         while wait(futures, timeout=SLICE).not_done:

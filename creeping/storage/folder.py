@@ -6,7 +6,6 @@ manifest, whose own digest is checked first. Folders are written aside and renam
 
 import hashlib
 import json
-import os
 import shutil
 import tempfile
 from pathlib import Path

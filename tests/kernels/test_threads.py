@@ -1,5 +1,7 @@
 """Work in slices: they cover everything once, end at blocks, change no bit, and stop where they are told to."""
 
+import multiprocessing
+import sys
 import threading
 import time
 
@@ -9,12 +11,15 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.currents import radiation
+from creeping.field.equation.smooth_kernel import SmoothKernel
+from creeping.field.equation.split_sums import SplitSums
 from creeping.geodesics import integrator
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.states import pack
 from creeping.kernels import threads
 from creeping.kernels.threads import in_slices, in_threads
 from creeping.phaseflow.coordinates import rotation
+from patience import HANGS
 
 
 @pytest.mark.parametrize("count", [0, 63, 70_001])
@@ -134,3 +139,32 @@ def test_a_callback_that_has_failed_is_not_called_again():
         with pytest.raises(ArithmeticError, match="no Hessian"):
             integrator.trace_states(body, states, np.array([1.0]))
         assert Failing.calls == times
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere libraries of the system do not allow a fork")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own(rng, monkeypatch):
+    """After the pool and OpenMP of the split sums have been used: both would wait for ever for threads of the parent."""
+    monkeypatch.setenv("CREEPING_THREADS", "2")
+    at, one = rng.random((50, 3)), np.ones((50, 3)) / np.sqrt(3)
+
+    def work():
+        sums = SplitSums(SmoothKernel(6.0, np.ones(3), 0.9), at, one, at, one, np.ones(50))
+        done = np.zeros(70_001, int)
+        in_threads(lambda part: np.add.at(done, part, 1), len(done))
+        return np.all(done == 1), sums.curl(one.astype(complex)[..., None])
+
+    fork = multiprocessing.get_context("fork")
+    near, far = fork.Pipe(duplex=False)
+    whole, own = work()
+    child = fork.Process(target=lambda: far.send(work()))
+    child.start()
+    try:
+        assert near.poll(HANGS), "the forked process hangs"
+        there = near.recv()
+    finally:
+        child.kill()
+        child.join()
+    assert whole and there[0]
+    # the sums are of single precision, and their digits depend on where memory lies
+    np.testing.assert_allclose(there[1], own, atol=10 * np.finfo(np.float32).eps * np.abs(own).max())

@@ -17,7 +17,7 @@ import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.equation.smooth_kernel import SmoothKernel
-from creeping.kernels.threads import in_threads, thread_count
+from creeping.kernels.threads import in_threads, openmp_threads
 from creeping.storage.memory import budget
 
 SPLITS = (3.0, 2.2, 1.6, 1.2, 0.9, 0.75, 0.62, 0.5, 0.4, 0.33, 0.27)
@@ -180,7 +180,7 @@ class SplitSums:
             eps=TRANSFORM,
             isign=sign,
             dtype="complex64",
-            nthreads=min(together, thread_count()),
+            nthreads=openmp_threads(together),
             spread_thread=2,
             n_trans=together,
             upsampfac=1.25,
