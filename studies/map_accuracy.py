@@ -59,7 +59,9 @@ def rows() -> list[tuple[str, cr.PhaseMap, float]]:
 
 def main() -> None:
     """Print the table."""
-    print(f"{'case':28} {'T0':>6} {'nodes':>20} {'degree':>6} {'MB':>5} {'rms':>8} {'paper':>8} {'max':>8} {'build s':>8}")
+    print(
+        f"{'case':28} {'T0':>6} {'nodes':>20} {'degree':>6} {'MB':>5} {'rms':>8} {'paper':>8} {'max':>8} {'build s':>8}"
+    )
     for name, flow, seconds in rows():
         error = measure(flow, samples=SAMPLES, rng=np.random.default_rng(7))
         nodes = " x ".join(map(str, (len(flow.leaps[-1].state), *flow.grid.nodes)))

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from patience import HANGS
 
 import creeping as cr
 import scatterers as sc
@@ -19,7 +20,6 @@ from creeping.geodesics.states import pack
 from creeping.kernels import threads
 from creeping.kernels.threads import in_slices, in_threads
 from creeping.phaseflow.coordinates import rotation
-from patience import HANGS
 
 
 @pytest.mark.parametrize("count", [0, 63, 70_001])
@@ -144,7 +144,7 @@ def test_a_callback_that_has_failed_is_not_called_again():
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere libraries of the system do not allow a fork")
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 def test_a_forked_process_has_threads_of_its_own(rng, monkeypatch):
-    """After the pool and OpenMP of the split sums have been used: both would wait for ever for threads of the parent."""
+    """After the pool and OpenMP of the split sums have been used: both would wait for threads of the parent."""
     monkeypatch.setenv("CREEPING_THREADS", "2")
     at, one = rng.random((50, 3)), np.ones((50, 3)) / np.sqrt(3)
 
