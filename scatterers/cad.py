@@ -12,15 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.clouds import PieceCloud, PointCloud
 from scatterers.base.fitted_body import FittedBody, checked_options
+from scatterers.base.quadrics import PieceCloud, PointCloud
 from scatterers.cad_file.files import CadPoints, CadReading, kind_of, read_cad
 from scatterers.pieces.regions import regions_of
 from scatterers.spline.cache import key_of
-from scatterers.triangles.choice import Choice
-from scatterers.triangles.jet_points import signed_distance
-from scatterers.triangles.jets import osculating_jets
-from scatterers.triangles.quality import MeshQuality, assess
+from scatterers.triangles.jets import osculating_jets, signed_distance
+from scatterers.triangles.quality import Choice, MeshQuality, assess
 from scatterers.triangles.topology import edges_of
 
 FloatArray = NDArray[np.float64]

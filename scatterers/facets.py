@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.cad_file.files import SUFFIXES, CadReading, cad_triangles
-from scatterers.triangles.choice import Choice
 from scatterers.triangles.files import read_mesh
+from scatterers.triangles.quality import Choice
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

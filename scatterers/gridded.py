@@ -13,10 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.body import numbers
-from scatterers.base.level_body import LevelBody
+from scatterers.base.level_body import LevelBody, numbers
 from scatterers.sphere_map.star import star_map
-from scatterers.spline.samples import Samples
+from scatterers.spline.cloud import Samples
 from scatterers.spline.tensor import TensorSpline, coefficients
 
 FloatArray = NDArray[np.float64]

@@ -1,8 +1,8 @@
 """Body F(x, y, z) = 0 from an expression: differentiated by sympy, compiled, and examined before use.
 
-The body is looked for on grids (`scatterers.expression.search`): F < 0 in one connected region inside the box, F > 0 in
-one around it. Then places are looked for where it is not smooth: tips (`scatterers.expression.singularities`), and
-curves along which max, min and where change their choice and the normal or the curvature jumps.
+The body is looked for on grids (`scatterers.expression.singularities`): F < 0 in one connected region inside the box, F
+> 0 in one around it. Then places are looked for where it is not smooth: tips (`scatterers.expression.singularities`),
+and curves along which max, min and where change their choice and the normal or the curvature jumps.
 """
 
 import hashlib
@@ -14,27 +14,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.body import numbers, positive
-from scatterers.base.level_body import LevelBody
+from scatterers.base.level_body import LevelBody, numbers, positive
 from scatterers.exact.body import SHARP, Piece, no_charts
-from scatterers.exact.clipped import clip, creases, normals
-from scatterers.exact.marching import march
-from scatterers.expression.search import FINE, SIZES, examine, found_box, samples_of, tightened
+from scatterers.exact.clipped import clip, creases, march, normals
 from scatterers.expression.singularities import (
+    FINE,
+    SIZES,
     distinct,
+    examine,
+    found_box,
     is_tip,
     kinks,
     polished,
     refuse_edges,
     refuse_kinks,
+    samples_of,
     singular_points,
+    tightened,
 )
 from scatterers.expression.space import ExpressionSpace
 from scatterers.expression.switches import Switches
 from scatterers.kernels.compiled import Compiled
-from scatterers.pieces.crease import Crease
+from scatterers.pieces.patch import Crease
 from scatterers.sphere_map.star import star_map
-from scatterers.spline.samples import Samples
+from scatterers.spline.cloud import Samples
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

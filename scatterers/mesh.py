@@ -17,17 +17,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.clouds import DISTRUSTED, Nearer, PieceCloud, PointCloud
 from scatterers.base.fitted_body import FittedBody, checked_options
+from scatterers.base.quadrics import DISTRUSTED, Nearer, PieceCloud, PointCloud
 from scatterers.pieces.joints import Jointed, jointed
 from scatterers.pieces.regions import regions_of
 from scatterers.spline.cache import key_of
 from scatterers.spline.fitting import spacing_of
-from scatterers.triangles.choice import Choice
 from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
-from scatterers.triangles.jet_points import centroids, signed_distance
-from scatterers.triangles.jets import Jets, angle_weighted_normals, osculating_jets
-from scatterers.triangles.quality import FEWEST_RIMS, MeshQuality, assess, jumps_at, noise_at_most
+from scatterers.triangles.jets import Jets, angle_weighted_normals, centroids, osculating_jets, signed_distance
+from scatterers.triangles.quality import FEWEST_RIMS, Choice, MeshQuality, assess, jumps_at, noise_at_most
 from scatterers.triangles.subdivision import MOST_SUBDIVIDED, Subdivision, edges_where_curved, subdivided
 
 FloatArray = NDArray[np.float64]

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.body import numbers
-from scatterers.exact.profile import Line, Segment, upward
+from scatterers.base.level_body import numbers
+from scatterers.exact.profile import Line, Segment, SplineSegment, smooth_end, upward
 from scatterers.exact.revolved import Revolved
-from scatterers.exact.spline_profile import SplineSegment, smooth_end
 
 FloatArray = NDArray[np.float64]
 RIGHT_ANGLE = 0.05

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.atlas.charts import PeriodicAtlas, PeriodicChart
-from scatterers.base.body import Body, positive
+from scatterers.base.level_body import Body, positive
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.trigonometry import cos_pi, sin_pi, turns
+from scatterers.sphere_map.star import PeriodicAtlas, PeriodicChart
 
 FloatArray = NDArray[np.float64]
 

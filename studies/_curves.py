@@ -12,12 +12,11 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.geometry.creased import drawn_mesh
-from creeping.geometry.frames import polar_frame
+from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.surface import Surface, size
 from creeping.plotting import axes3d
-from creeping.plotting._drawing import Drawing, Mark
+from creeping.plotting._drawing import Drawing, Mark, View
 from creeping.plotting._strokes import ARROW_COLOUR, RAY_COLOUR, LevelColours, Stroke, closed, refined
-from creeping.plotting._view import View
 
 SOURCE_COLOUR = "#c2185b"
 

@@ -14,7 +14,7 @@ from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.geometry.quadrature import body_nodes
 from creeping.rays.fan import RayFan
-from creeping.shadow.occlusion import occluded
+from creeping.shadow.attachment import occluded
 from studies.field_coverage import bodies
 
 HEIGHTS = (0.03, 3.0)

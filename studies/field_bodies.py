@@ -16,7 +16,7 @@ from creeping.field.far_geometry import fan_strips
 from creeping.geometry.surface import normal, project
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_near
-from creeping.shadow.occlusion import occluded
+from creeping.shadow.attachment import occluded
 from studies.reference import clouds, fundamental
 
 INCIDENCES = {

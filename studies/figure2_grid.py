@@ -17,9 +17,9 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.phaseflow.grid import Grid
+from creeping.phaseflow.splines import Grid
+from creeping.plotting._drawing import View
 from creeping.plotting._strokes import Stroke
-from creeping.plotting._view import View
 from creeping.plotting.palette import COLOURS
 from studies._curves import draw_curves, tag
 from studies._measured import end_error, error_card, headline, map_card

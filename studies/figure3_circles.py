@@ -17,8 +17,8 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geodesics.states import pack
+from creeping.plotting._drawing import View
 from creeping.plotting._strokes import LevelColours, Stroke, closed
-from creeping.plotting._view import View
 from studies._curves import add_level_bar, circle_strokes, directions_at, draw_curves, equal_times, ray_stroke, turn
 from studies._measured import end_error, error_card, headline, map_card
 

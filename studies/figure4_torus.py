@@ -14,8 +14,8 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
+from creeping.plotting._drawing import View
 from creeping.plotting._strokes import LevelColours
-from creeping.plotting._view import View
 from studies._curves import add_level_bar, circle_strokes, directions_at, draw_curves, equal_times, ray_stroke, turn
 from studies._measured import end_error, error_card, headline, map_card
 

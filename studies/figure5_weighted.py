@@ -15,8 +15,8 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
+from creeping.plotting._drawing import View
 from creeping.plotting._strokes import RAY_COLOUR, LevelColours, closed
-from creeping.plotting._view import View
 from studies._curves import SOURCE_COLOUR, add_level_bar, circle_strokes, draw_curves, equal_times, ray_stroke, turn
 from studies._measured import end_error, error_card, headline, map_card
 

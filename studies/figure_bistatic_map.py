@@ -11,7 +11,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
-from creeping.field.decibels import cross_section_decibels
+from creeping.field.comparison import cross_section_decibels
 from creeping.geometry.directions import great_circle
 from creeping.plotting.pictures import new_figure
 

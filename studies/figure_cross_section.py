@@ -13,7 +13,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.field.decibels import cross_section_decibels
+from creeping.field.comparison import cross_section_decibels
 from creeping.geometry.directions import directions_from_angles, theta_phi_grid
 from creeping.plotting.pictures import new_figure
 from creeping.shadow.status import NEAR_SINGULAR, SINGULAR

@@ -14,7 +14,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from studies.reference.clouds import ellipsoid
-from studies.reference.ports import coupled, sphere_coupling
+from studies.reference.dipoles import coupled, sphere_coupling
 
 CASES = (
     ((1.0, 0.8, 0.6), 20.0, 0.2, 1),

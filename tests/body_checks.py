@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from creeping.geometry.frames import polar_frame
+from creeping.geometry.evaluators import polar_frame
 
 
 @njit

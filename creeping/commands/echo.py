@@ -11,8 +11,7 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from creeping.commands.body import AS_IT_IS, Body, FileOptions, parse_body
-from creeping.commands.formats import HELP, table_formats
+from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, parse_body, table_formats
 
 _angles = Group("Angles")
 _output = Group("Output")
@@ -140,7 +139,7 @@ def _echo(
     as_json: bool,
 ) -> int:
     from creeping.commands import echo_report
-    from creeping.commands.echo_request import echo_request
+    from creeping.commands.echo_report import echo_request
     from creeping.field.boundary import parse_boundary
     from creeping.sweeping.echoes import echo_of
 

@@ -19,8 +19,7 @@ from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import AS_IT_IS, Body, FileOptions, SpeedOption, parse_body, title_of
-from creeping.commands.formats import HELP, table_formats
+from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, SpeedOption, parse_body, table_formats, title_of
 
 app = App(
     name="creeping",

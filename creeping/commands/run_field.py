@@ -10,19 +10,16 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.formats import write_tables
-from creeping.commands.wave import asked_wavenumber, frequency_words
+from creeping.commands.body import asked_wavenumber, frequency_words, write_tables
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import kept_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
-from creeping.field.decibels import cross_section_decibels
-from creeping.field.equation.kept import ASKED
+from creeping.field.comparison import cross_section_decibels
 from creeping.field.equation.solution import Solution
-from creeping.field.equation.solving import solve
+from creeping.field.equation.solving import ASKED, solve
 from creeping.field.far import far_field
-from creeping.field.far_result import FarField
-from creeping.field.lobes import lobe_step
-from creeping.field.polarisation import turned_to_azimuth
+from creeping.field.far_result import FarField, turned_to_azimuth
+from creeping.field.forward import lobe_step
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions

@@ -10,14 +10,13 @@ import numpy as np
 
 from creeping import plotting
 from creeping._typing import FloatArray
-from creeping.commands.formats import write_tables
+from creeping.commands.body import write_tables
 from creeping.commands.run_field import DPI, ORDER, Job
 from creeping.errors import InvalidInputError
 from creeping.field.body_currents import affordable
 from creeping.field.conductor.near import conductor_field
-from creeping.field.cut_result import FieldCut
+from creeping.field.cut_result import FieldCut, cut_grid, field_cut
 from creeping.field.near import near_field
-from creeping.field.plane_cut import cut_grid, field_cut
 from creeping.rays.fan import RayFan
 
 PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

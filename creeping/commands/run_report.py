@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from creeping._version import __version__
-from creeping.commands.formats import write_tables
+from creeping.commands.body import write_tables
 
 
 def asked_wave(direction: Sequence[float] | None, source: Sequence[float] | None) -> Any:
@@ -123,7 +123,7 @@ def write_results(
 
 def _wave(field: dict[str, Any]) -> str:
     """Wavenumber, and the frequency that was asked for."""
-    from creeping.commands.wave import frequency_words
+    from creeping.commands.body import frequency_words
 
     told = f"k = {field['wavenumber']:g}"
     return told if field["frequency"] is None else f"{frequency_words(field['frequency'])}, {told}"

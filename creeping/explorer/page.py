@@ -2,6 +2,12 @@
 
 One worker follows the hand, from the latest request to the preview; another follows up when no newer request has come.
 The server listens on the loopback address, behind `creeping.explorer.door`.
+
+The latest request and nothing else: a queue of one place, so that work does not pile up behind a hand that drags.
+
+Controls of what the colours show, the field's level or its wave, and the thread that lets the wave run.
+
+The phase is omega t of Re(u e^{-i omega t}), as in the pictures of `creeping.plotting`.
 """
 
 import html
@@ -9,30 +15,28 @@ import sys
 import time
 import traceback
 from collections import deque
+from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
 from io import StringIO
-from threading import RLock, Thread
+from threading import Condition, Event, RLock, Thread
+from typing import Generic, TypeVar
 
 import numpy as np
 import viser
 
 from creeping._typing import Any
 from creeping.errors import CreepingError
-from creeping.explorer.colours import Span, fitted_span
 from creeping.explorer.door import Door
-from creeping.explorer.latest import Latest
-from creeping.explorer.playing import Player
 from creeping.explorer.preview import Preview, preview_of, step_of
 from creeping.explorer.refined import Refined, far_cut, refined_view
-from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles
+from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles, wave_scale
 from creeping.explorer.scene import DrawnBody, Paint, Scene, turned
 from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
-from creeping.explorer.text import legend, preview_text, refined_text, wave_note
-from creeping.explorer.titled import titled
-from creeping.explorer.units import wave_scale
+from creeping.explorer.text import legend, preview_text, refined_text, titled, wave_note
+from creeping.explorer.wave import Span, fitted_span
 from creeping.field.body_currents import expected_nodes
 from creeping.field.lit_ground import convex
-from creeping.geometry.speed import speed_of
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
 
@@ -44,6 +48,14 @@ FOLLOWING = 4.0
 PACE, FOLLOWED = 0.25, 60_000
 """Seconds between two such cuts at least, and nodes of the body's currents up to which they are made, in about half a
 second; beyond, the cut waits until the hand rests."""
+
+T = TypeVar("T")
+
+SHOWS = ("level", "wave")
+STEP = 30
+"""Degrees between two pictures of a running wave."""
+PLAYING_PACE = 0.15
+"""Seconds between them at least; they take as long a rest as their making took."""
 
 
 class LocalServer(viser.ViserServer):  # type: ignore[misc]
@@ -347,3 +359,115 @@ def _range(low: float, high: float, value: float) -> tuple[float, float, float]:
     step = float(10.0 ** np.floor(np.log10((high - low) / 200)))
     low, high = min(low, value), max(high, value)
     return step * np.floor(low / step), step * np.ceil(high / step), step
+
+
+class Latest(Generic[T]):
+    """Hands the latest value put in to one reader; values it had no time for are dropped."""
+
+    def __init__(self) -> None:
+        self._changed = Condition()
+        self._value: T | None = None
+        self._number = 0
+        self._taken = 0
+        self._closed = False
+
+    @property
+    def number(self) -> int:
+        """Values put in so far."""
+        return self._number
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._closed
+
+    def put(self, value: T) -> None:
+        """Replace what is waiting."""
+        with self._changed:
+            self._value, self._number = value, self._number + 1
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Let the reader go."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def take(self) -> tuple[T, int] | None:
+        """Wait for a value not yet taken, and its number; None once closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self._taken < self._number)
+            if self._closed:
+                return None
+            self._taken = self._number
+            assert self._value is not None
+            return self._value, self._number
+
+
+class Player:
+    """The controls, and a thread that advances the phase while ``play`` is on.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+    redraw : callable
+        Called when level or wave was chosen.
+    recolour : callable
+        Called when the phase has changed.
+    """
+
+    def __init__(self, gui: Any, redraw: Callable[[], None], recolour: Callable[[], None]) -> None:
+        self._redraw, self._recolour = redraw, recolour
+        self.show = gui.add_dropdown(
+            "show", SHOWS, initial_value=SHOWS[0], hint="20 log10 |u|, or Re(u e^(-i omega t))"
+        )
+        self.slider = gui.add_slider("phase, omega t (degrees)", 0, 360, STEP // 6, 0, disabled=True)
+        self.play = gui.add_checkbox("play", False, disabled=True, hint="Let the wave run")
+        self._playing, self._closed = Event(), Event()
+        self.show.on_update(lambda _: self._chosen())
+        self.slider.on_update(self._slid)
+        self.play.on_update(lambda _: self._switched())
+        self._worker = Thread(target=self._run, daemon=True)
+        self._worker.start()
+
+    @property
+    def phase(self) -> float | None:
+        """omega t, radians; None while the level is shown."""
+        return None if self.show.value == "level" else float(np.radians(self.slider.value))
+
+    def close(self) -> None:
+        """End the thread."""
+        self._closed.set()
+        self._playing.set()
+        self._worker.join(timeout=5.0)
+
+    def is_alive(self) -> bool:
+        """Whether the thread works."""
+        return self._worker.is_alive()
+
+    def _chosen(self) -> None:
+        level = self.show.value == "level"
+        self.slider.disabled = self.play.disabled = level
+        self._switched()
+        self._redraw()
+
+    def _slid(self, event: Any) -> None:
+        # the thread sets the slider, too
+        if event.client is not None and self.phase is not None:
+            self._recolour()
+
+    def _switched(self) -> None:
+        if self.play.value and self.phase is not None:
+            self._playing.set()
+        else:
+            self._playing.clear()
+
+    def _run(self) -> None:
+        took = 0.0
+        while self._playing.wait() and not self._closed.wait(max(PLAYING_PACE, took)):
+            if not self._playing.is_set():
+                continue
+            began = time.perf_counter()
+            self.slider.value = (self.slider.value + STEP) % 360
+            self._recolour()
+            took = time.perf_counter() - began

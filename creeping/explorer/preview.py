@@ -11,11 +11,11 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.wave import RayWave, ray_wave, segments
-from creeping.field.decibels import decibels
-from creeping.field.on_rays import ray_envelope
+from creeping.field.comparison import decibels
+from creeping.field.on_body import ray_envelope
 from creeping.field.validity_range import Validity, validity
 from creeping.geodesics.equations import natural_horizon
-from creeping.geometry.speed import speed_of
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import Triangulation
 from creeping.rays.fan import RayFan, launch

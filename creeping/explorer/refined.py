@@ -16,7 +16,7 @@ from creeping.field.body_currents import affordable, has_expansions, kept_curren
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.geometry.directions import directions_from_angles
-from creeping.geometry.speed import speed_of
+from creeping.geometry.evaluators import speed_of
 from creeping.plotting.coloured_body import current_levels
 from creeping.plotting.field_pictures import levels_of, surface_values
 from creeping.rays.fan import RayFan, end_error, launch

@@ -10,17 +10,26 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.explorer.colours import ENDED, LEVEL_COLOURS, LINEAR, Bytes, Span, field_colours
 from creeping.explorer.preview import NOTHING, Preview, joined, outline
 from creeping.explorer.refined import Refined
-from creeping.explorer.wave import segments, strengths, wave_colours
-from creeping.field.on_rays import creeps
+from creeping.explorer.wave import (
+    ENDED,
+    LEVEL_COLOURS,
+    LINEAR,
+    Bytes,
+    Span,
+    field_colours,
+    segments,
+    strengths,
+    wave_colours,
+)
+from creeping.field.on_body import creeps
 from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
+from creeping.plotting._drawing import shadow_view
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, line_pieces
-from creeping.plotting._view import shadow_view
-from creeping.plotting.body_fronts import LEAST_SAMPLES, samples_a_wave
+from creeping.plotting.coupling_pictures import LEAST_SAMPLES, samples_a_wave
 
 CELLS = 44
 """Of the drawn body along each side of its box."""

@@ -10,19 +10,18 @@ from itertools import pairwise
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
-from creeping.explorer.colours import LEVEL_COLOURS
 from creeping.explorer.preview import Preview, requested_curves
 from creeping.explorer.refined import Refined
-from creeping.explorer.request import ViewRequest
-from creeping.explorer.units import far_levels, far_name
-from creeping.field.decibels import shown_range
+from creeping.explorer.request import ViewRequest, far_levels, far_name
+from creeping.explorer.wave import LEVEL_COLOURS
+from creeping.field.comparison import shown_range
 from creeping.field.far_result import FarField
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, line_pieces
 from creeping.plotting.far_cuts import component_name
 from creeping.plotting.palette import COLOURS, EXACT
 from creeping.plotting.parameter_plane import is_torus
-from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
+from creeping.rays.isophase import split_at_seam
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 34.0, 8.0, 8.0, 30.0
 """Of a picture and its margins, in units of the drawing."""

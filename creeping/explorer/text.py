@@ -1,16 +1,28 @@
-"""The numbers beside the picture, as short Markdown."""
+"""The numbers beside the picture, as short Markdown.
+
+The title of the page: that of the body instead of the library's.
+"""
+
+import html
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
+from websockets.asyncio import server as websocket_server
+from websockets.http11 import Request, Response
 
+from creeping._typing import Any
 from creeping._version import __version__
-from creeping.explorer.colours import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, ColourTable, Span
 from creeping.explorer.preview import Preview
 from creeping.explorer.refined import Refined
-from creeping.explorer.units import wave_text
+from creeping.explorer.request import wave_text
+from creeping.explorer.wave import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, ColourTable, Span
 from creeping.field.validity_range import WITHIN, Validity, validity_words
-from creeping.geometry.unit import unit_of
+from creeping.geometry.checks import unit_of
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS
 from creeping.rays.fan import RayFan
+
+PLAIN = "<title>Viser</title>"
 
 
 def preview_text(frame: Preview, seconds: float, span: tuple[float, float]) -> str:
@@ -95,7 +107,11 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
 
 
 ARCS = {"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}
+
+
 """Of the handles on the page, in the colours that they have there."""
+
+
 _TEXT = 'font-size="9" font-family="sans-serif" fill="#333"'
 
 
@@ -123,3 +139,35 @@ def _keys(colours: dict[str, str]) -> str:
 def _counts(fan: RayFan) -> str:
     counts = ", ".join(f"{count} {name}" for name, count in fan.status_counts.items())
     return f"{len(fan.points)} rays" + (f" ({counts})" if counts else ": no part of the line launches any")
+
+
+def with_title(page: str, title: str) -> str:
+    """A page of viser with another title."""
+    return page.replace(PLAIN, f"<title>{html.escape(title)}</title>", 1)
+
+
+@contextmanager
+def titled(title: str) -> Iterator[None]:
+    """Name the page of the server that is started inside; behind the door, which looks at requests first."""
+    serve: Callable[..., Any] = websocket_server.serve
+
+    def renamed(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
+        def answer(connection: Any, request: Request) -> Response | None:
+            index = request.path.partition("?")[0] in ("/", "/index.html")
+            if index and "Accept-Encoding" in request.headers:
+                # to be changed it must come uncompressed
+                del request.headers["Accept-Encoding"]
+            found: Response | None = process_request(connection, request)
+            if index and found is not None and found.body and found.headers.get("Content-Type", "").startswith("text/"):
+                found.body = with_title(bytes(found.body).decode(), title).encode()
+                del found.headers["Content-Length"]
+                found.headers["Content-Length"] = str(len(found.body))
+            return found
+
+        return serve(*arguments, process_request=answer, **options)
+
+    websocket_server.serve = renamed  # type: ignore[assignment, misc]
+    try:
+        yield
+    finally:
+        websocket_server.serve = serve  # type: ignore[misc, assignment]

@@ -1,7 +1,7 @@
 """Currents of the whole body of a fan: by expansions, or by the body's integral equation where these do not serve.
 
 Expansions: nodes of the lit side and of creeping rays (`creeping.field.currents.nodes`), each boundary's waves on them.
-The equation: `creeping.field.equation.kept`. What either costs is reckoned here, and currents are kept with the fan.
+The equation: `creeping.field.equation.solving`. What either costs is reckoned here, and currents are kept with the fan.
 
 Sources: Derivations, F16 to F18 and F36.
 """
@@ -17,13 +17,12 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.currents.bounce import faces_itself, may_face_itself
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
-from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, ray_nodes
+from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, lit_waves, ray_nodes, ray_waves
 from creeping.field.currents.radiation import grid_cells, transformed
-from creeping.field.currents.waves import lit_waves, ray_waves
 from creeping.field.currents.whole_body import POINTS as POINTS_INSIDE
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
-from creeping.field.equation.kept import Solved, asked_solution, expected_seconds_of, is_large, solution_for
+from creeping.field.equation.solving import Solved, asked_solution, expected_seconds_of, is_large, solution_for
 from creeping.geometry.arguments import one_of
 from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.quadrature import node_count

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.field.array_result import ArrayResult
+from creeping.field.labelled import ArrayResult
 from creeping.field.point_result import PointData
 
 if TYPE_CHECKING:

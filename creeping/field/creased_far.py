@@ -3,9 +3,9 @@
     f = (1 - w) f_rays + Σ over smooth parts of [u f_optics + (1 - u) f_specular]
 
 with w of the forward lobe as in `creeping.field.far_rays`. A smooth part is what hangs together by joints; u is 1, but
-w where the part has specular points and all stand clear of its creases (`creeping.rays.piece_specular`). f_optics
-(`creeping.field.optics`) holds facets, specular points next to edges, and the forward lobe. The error adds in squares,
-besides what is beyond the second order of each ray and specular point,
+w where the part has specular points and all stand clear of its creases (`creeping.rays.specular`). f_optics
+(`creeping.field.creased_far`) holds facets, specular points next to edges, and the forward lobe. The error adds in
+squares, besides what is beyond the second order of each ray and specular point,
 
     edges      C/(2π) |∫ e^{ik(d - r).x} dl|        lit or part of the outline, and their parts, C of order 1
     line       1/(2π) |∫ min[κ/(k (1 - d.r)²), (kρ)^(1/3)] e^{ik(d - r).x} dl|, of a conductor |d x r|/(1 - d.r) more
@@ -20,33 +20,50 @@ of the penumbra, ahead. That of a conductor starts with a jump, of a current alo
 Between the faces of a concave edge the wave is reflected more than once: that is left out, and so is everything shed by
 an edge and scattered again.
 
-Sources: [LK59], [KLS56]; Derivations, F3 and F13.
+Physical optics of the lit tiles of a body: what its facets and curved pieces reflect, and the shadow they cast.
+
+    f = -(ik/4π) ∫ [(1 + R) n.r + (1 - R) n.d] e^{ik(d - r).x} dS     over lit ground, R of a plane at its cos θᵢ = -n.d
+    f = (ik/2π) [V - (V.r) r],  V = ∫ n e^{ik(d - r).x} dS x (d x E)   of a conductor
+
+On curved ground n.r is replaced by (2w - 1) n.d, w = 1 in the forward lobe and 0 elsewhere: they agree at specular
+points and ahead, and n.d has no jump at the shadow line, where the current of a hard body does not stop.
+
+Each tile is a flat triangle, over which the phase is linear: with phases u and v of two corners relative to the third,
+
+    ∫ e^{iφ} dS = 2A e^{iφ0} (g(u) - g(v))/(i(u - v)),    g(x) = (e^{ix} - 1)/(ix)    (`kernels.triangle_waves`).
+
+The same integral serves a specular point, a flat facet as a whole, the rim of a facet and the forward lobe. Its error
+on curved ground is of the next order, κ/(k cos³θᵢ) of each tile's contribution.
+
+Sources: [LK59], [KLS56]; Derivations, F3 and F13; [KLS56]; Derivations, F13.
 """
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import SOFT, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.creeping_modes import fock_scale, modes_of
-from creeping.field.crossed_rays import strong_coupling
 from creeping.field.far_geometry import FarGeometry, far_geometry, merging
 from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
-from creeping.field.far_result import FarField
+from creeping.field.far_result import FarField, spherical_frame
 from creeping.field.likely_cells import parted
-from creeping.field.optics import lit_tiles, optics_field, side_of_tiles
+from creeping.field.ray_sums import strong_coupling
 from creeping.field.reflected import plane_reflection
 from creeping.field.shed_wave import smoothstep
-from creeping.geometry.creased import pieces_of, tiles_of
+from creeping.geometry.creased import Tiles, is_convex, pieces_of, tiles_of
+from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import size
+from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
-from creeping.rays.piece_specular import joined, smooth_parts, some, specular_on_pieces, stand_clear
-from creeping.rays.specular import SpecularPoints
+from creeping.rays.specular import SpecularPoints, joined, smooth_parts, some, specular_on_pieces, stand_clear
 from creeping.rays.status import AT_CREASES, RayStatus
+from creeping.shadow.attachment import occluded
 from creeping.shadow.edges import convex, unit_normals
-from creeping.shadow.occlusion import occluded
+from creeping.storage.memory import within_budget
 
 WEDGE = 1.0
 """C: what a wedge scatters beside physical optics, times 2π, is of this size but next to its shadow boundaries."""
@@ -62,6 +79,21 @@ STEEP = 1e-9
 """1 - d.r below which the end-point contribution has no bound of its own."""
 OUTWARD = 1e-4
 """Distance from an edge, in body sizes, at which it is asked whether the wave comes to it."""
+
+SAG = 0.1
+"""k h² κ of a tile: its phase then errs by a hundredth of a radian on average, in backscatter."""
+LONGEST, SHORTEST = 0.1, 2e-3
+"""Longest and shortest sides of tiles, in body sizes."""
+SLIVERS = 16.0
+"""Tiles, in units of what squares of their side would be, from which on they are taken for slivers."""
+USUAL = 0.95
+"""Share of the area whose curvature the sides go by: next to a tip it is without bound."""
+OPTICS_OUTWARD = 1e-6
+"""Distance from the body, in its sizes, at which a tile is asked whether the wave comes to it."""
+EACH, SHARES = 3e-8, {"least": 8, "multiple": 4}
+"""Seconds that a tile takes in one direction, and how directions are shared among threads."""
+FLAT = 1e-6
+"""Curvature, in inverse sizes, below which a tile is flat."""
 
 
 def creased_far_field(fan: RayFan, r: FloatArray, k: float, boundary: BoundaryLike, order: int) -> FarField:
@@ -298,3 +330,154 @@ def tip_waves(fan: RayFan, k: float) -> float:
     out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
     seen = ~occluded(body, tips + OUTWARD * size(body) * out, fan.line.direction)
     return float(np.sqrt(np.sum(seen)) / (4 * k))
+
+
+class LitTiles(NamedTuple):
+    """Lit triangles of an incidence.
+
+    Attributes
+    ----------
+    direction : (3,)
+    corners : (t, 3, 3), L
+    normals : (t, 3)
+        Of the body, at their middles.
+    cosine : (t,)
+        cos θᵢ > 0.
+    curvature : (t,), 1/L
+        Larger principal curvature.
+    pieces : (t,)
+        Number of the piece of each.
+    scale : float, L
+        Size of the body.
+    """
+
+    direction: FloatArray
+    corners: FloatArray
+    normals: FloatArray
+    cosine: FloatArray
+    curvature: FloatArray
+    pieces: IntArray
+    scale: float
+
+    def on(self, pieces: tuple[int, ...]) -> "LitTiles":
+        """Those of some pieces."""
+        mine = np.isin(self.pieces, pieces)
+        rows = self.corners[mine], self.normals[mine], self.cosine[mine], self.curvature[mine], self.pieces[mine]
+        return LitTiles(self.direction, *rows, self.scale)
+
+
+def side_of_tiles(body: Any, wavenumber: float) -> float:
+    """Share of the body's size that tiles may have as sides; one of few, so that frequencies share them."""
+    coarse = tiles_of(body, LONGEST)
+    bound = _curvatures(body, coarse, coarse.corners.mean(axis=1))
+    order = np.argsort(bound)
+    covered = np.cumsum(coarse.areas[order])
+    usual = float(bound[order][min(np.searchsorted(covered, USUAL * covered[-1]), len(order) - 1)])
+    side = np.sqrt(SAG / (wavenumber * max(usual, 1e-3 / size(body)))) / size(body)
+    return float(np.clip(2 ** (np.floor(2 * np.log2(side)) / 2), SHORTEST, LONGEST))
+
+
+def _curvatures(body: Any, tiles: Tiles, middles: FloatArray) -> FloatArray:
+    out = np.zeros(len(middles))
+    for number, piece in enumerate(pieces_of(body)):
+        mine = np.flatnonzero(tiles.pieces == number)
+        out[mine] = curvature_norms(piece, middles[mine])
+    return out
+
+
+def lit_tiles(body: Any, direction: FloatArray, share: float) -> LitTiles:
+    """The tiles that the wave comes to, of sides of a share of the body's size (`side_of_tiles`)."""
+    tiles = tiles_of(body, share)
+    within_budget(1000.0 * len(tiles.corners), f"{len(tiles.corners)} tiles of the body", "lower the wavenumber")
+    n = tiles.normals.mean(axis=1)
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    lit = np.flatnonzero(n @ direction < 0)
+    middles = tiles.corners[lit].mean(axis=1)
+    if not is_convex(body):
+        asked, of = _representatives(tiles, lit, middles, share * size(body))
+        above = middles[asked] + (OPTICS_OUTWARD + share**2) * size(body) * n[lit][asked]
+        free = ~occluded(body, above, direction)[of]
+        lit, middles = lit[free], middles[free]
+    some = Tiles(tiles.corners[lit], tiles.normals[lit], tiles.pieces[lit])
+    curvature = _curvatures(body, some, middles)
+    return LitTiles(direction, some.corners, n[lit], -n[lit] @ direction, curvature, some.pieces, size(body))
+
+
+def _representatives(tiles: Tiles, lit: IntArray, middles: FloatArray, side: float) -> tuple[IntArray, IntArray]:
+    """Numbers of the lit tiles that are asked for all, and which of them stands for each.
+
+    Each for itself, unless slivers of a long mesh make many more tiles than their sides would: then one a cube.
+    """
+    each = np.arange(len(lit))
+    if len(tiles.areas) < SLIVERS * float(tiles.areas.sum()) / side**2:
+        return each, each
+    cell = np.column_stack([tiles.pieces[lit], np.floor(middles / side).astype(np.int64)])
+    _, first, of = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+    return first, of.ravel()
+
+
+def phase_sums(corners: FloatArray, vectors: FloatArray, wavenumber: float, weights: FloatArray) -> ComplexArray:
+    """Sums over triangles (t, 3, 3) of weights (t, w) times ∫ e^{ik q.x} dS, for vectors q (m, 3): (m, w).
+
+    Examples
+    --------
+    >>> square = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=float)
+    >>> found = phase_sums(square, np.array([[2.0, 0, 0]]), 3.0, np.ones((2, 1)))[0, 0]
+    >>> bool(abs(found - (np.exp(6j) - 1) / 6j) < 1e-14)
+    True
+    """
+    from creeping.field.kernels.bounce import triangle_waves
+
+    corners = np.ascontiguousarray(corners)
+    a, b, c = np.moveaxis(corners, 1, 0)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)[:, None]
+    # the kernel knows no complex weights
+    columns = np.ascontiguousarray(doubled * np.concatenate([weights.real, weights.imag], axis=1))
+    q, out = wavenumber * vectors, np.empty((len(vectors), 2, columns.shape[1]))
+    seconds = EACH * len(corners)
+    in_threads(lambda part: triangle_waves(corners, q[part], columns, out[part]), len(q), seconds=seconds, **SHARES)
+    sums = out[:, 0] + 1j * out[:, 1]
+    width = weights.shape[1]
+    return np.asarray(sums[:, :width] + 1j * sums[:, width:])
+
+
+class OpticsField(NamedTuple):
+    """What lit tiles give: the field (m,) or (m, 2, 2), L, and the size of its next order (m,), L."""
+
+    values: ComplexArray
+    next_order: FloatArray
+
+
+def optics_field(
+    tiles: LitTiles, observers: FloatArray, wavenumber: float, boundary: tuple[Boundary, ...], in_forward: FloatArray
+) -> OpticsField:
+    """Field of lit tiles in directions r (m, 3): of a scalar boundary, or of a conductor's two.
+
+    ``in_forward`` (m,) is w, 1 in the forward lobe and 0 outside it.
+    """
+    k, n, d = wavenumber, tiles.normals, tiles.direction
+    vectors = d - observers
+    # near grazing the next order stops growing where the transition region begins
+    least = np.cbrt(2 * tiles.curvature / k)
+    later = np.minimum(tiles.curvature / (k * np.maximum(tiles.cosine, np.maximum(least, 1e-12)) ** 3), 1.0)
+    if len(boundary) == 2:
+        sums = phase_sums(tiles.corners, vectors, k, np.concatenate([n, later[:, None] * n], axis=1))
+        received = spherical_frame(d[None])[0]
+        sent = spherical_frame(observers)
+        fields = []
+        for N in (sums[:, :3], sums[:, 3:]):
+            V = np.stack([np.cross(N, np.cross(d, E)) for E in received], axis=-1)
+            fields.append(0.5j * k / np.pi * np.einsum("moc,mci->moi", sent, V))
+        return OpticsField(fields[0], np.max(np.abs(fields[1]), axis=(1, 2)))
+    R = plane_reflection(tiles.cosine, boundary[0])
+    flat, cosine = tiles.curvature < FLAT / tiles.scale, tiles.cosine
+    mirror, shadow = np.where(flat, 1 + R, 0.0)[:, None] * n, -((1 - R) * cosine)[:, None]
+    bent = -(np.where(flat, 0.0, 1 + R) * cosine)[:, None]
+    weights = np.concatenate([mirror, shadow, bent], axis=1)
+    sums = phase_sums(tiles.corners, vectors, k, np.concatenate([weights, later[:, None] * weights], axis=1))
+    turned = 2 * in_forward - 1
+    values, next_ = (
+        -0.25j * k / np.pi * (np.sum(part[:, :3] * observers, axis=1) + part[:, 3] + turned * part[:, 4])
+        for part in (sums[:, :5], sums[:, 5:])
+    )
+    return OpticsField(np.asarray(values), np.abs(next_))

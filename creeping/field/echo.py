@@ -17,7 +17,7 @@ import numpy as np
 from creeping._presenting import Drawn
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.decibels import cross_section_decibels, decibels
+from creeping.field.comparison import cross_section_decibels, decibels
 from creeping.field.frequency import frequency
 from creeping.field.labelled import echo_dataset
 

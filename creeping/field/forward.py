@@ -8,18 +8,20 @@
 By stationary phase I_S is the isolated ray and I_L the reflected field. The fan integral is I_S with g = e^{-iπ/4} P
 over every crossing, tapered in p.r; it replaces isolated rays where they merge.
 
+The step of a cut that fits the lobes of its pattern: lambda/D wide if bistatic, half of that in backscatter.
+
 Sources: Derivations, F10 to F12.
 """
 
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
+from creeping.field.arguments import checked, fock_parameter, scales
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.ray_scales import fock_parameter, scales
-from creeping.field.shed_orders import shed_orders
-from creeping.field.shed_wave import SECOND_ORDER, shared_pole, shed_wave, smoothstep
+from creeping.field.shed_wave import SECOND_ORDER, shared_pole, shed_orders, shed_wave, smoothstep
 from creeping.field.special.fock import pekeris_slope, pekeris_star
+from creeping.geometry.surface import Surface
 from creeping.rays.observer_contour import HorizonRays, MidHorizon
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.line import ShadowLine
@@ -27,6 +29,11 @@ from creeping.storage.memory import within_budget
 
 TAPER = (0.3, 0.7)
 """p.r between which a crossing comes to count."""
+
+PER_LOBE = 4
+"""Angles for each lobe of a pattern."""
+NICE = (1.0, 0.5, 0.25, 0.2, 0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001)
+"""Steps of a cut, degrees, the largest that fits is taken."""
 
 
 def shadow_half(
@@ -158,3 +165,18 @@ def silhouette(line: ShadowLine, observers: FloatArray, wavenumber: float) -> Co
     ahead = gap < 1e-12
     result = -turn * total / (4 * np.pi * np.where(ahead, 1.0, gap))
     return np.asarray(np.where(ahead, 0.5j * wavenumber * abs(area) / np.pi, result))
+
+
+def lobe_step(body: Surface, wavenumber: float, *, monostatic: bool) -> float:
+    """Step of a cut, degrees, with PER_LOBE angles for each lobe: lambda/D of a bistatic pattern, half in backscatter.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> lobe_step(sc.Sphere(), 60.0, monostatic=True)
+    0.25
+    """
+    longest = float(np.max(np.ptp(body.bounds, axis=0)))
+    lobe = 2 * np.pi / (float(checked(wavenumber, 2)) * longest) / (2 if monostatic else 1)
+    wanted = np.degrees(lobe) / PER_LOBE
+    return next((step for step in NICE if step <= wanted), NICE[-1])

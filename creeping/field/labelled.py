@@ -1,6 +1,11 @@
 """Results with names on their axes: fields as an ``xarray.Dataset`` or a ``pandas.DataFrame``.
 
 Units are those of the CF conventions where the body's unit is known, else powers of L, the body's unit of length.
+
+Results that are arrays of complex values with more to say: numpy takes them for their values.
+
+Arithmetic, ufuncs and numpy's functions give plain arrays; so do indexing, the methods that arrays have, and arithmetic
+in place, after which the name stands for the array. Nothing writes into a result.
 """
 
 from typing import TYPE_CHECKING
@@ -9,7 +14,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import azimuth_elevation_of
-from creeping.storage.extras import required
+from creeping.storage.memory import required
 
 if TYPE_CHECKING:
     import xarray
@@ -19,6 +24,11 @@ if TYPE_CHECKING:
     from creeping.field.far_result import FarField
     from creeping.field.point_result import PointData, PointField
     from creeping.field.sources import SourcePattern
+from collections.abc import Callable, Iterator
+
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from creeping._typing import ComplexArray
 
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
@@ -166,3 +176,104 @@ def echo_dataset(echo: "Echo") -> "xarray.Dataset":
     variables |= {part: (dims, values, {"units": "m"}) for part, values in echo.parts.items()}
     found: xarray.Dataset = library.Dataset(variables, coordinates, {"conventions": "time factor exp(-i omega t)"})
     return found
+
+
+def _of_values(name: str) -> Callable[..., Any]:
+    """Method of that name of the values."""
+
+    def method(self: "ArrayResult", *args: Any, **options: Any) -> Any:
+        return getattr(self.values, name)(*args, **options)
+
+    method.__name__, method.__doc__ = name, f"As `numpy.ndarray.{name}` of the values."
+    return method
+
+
+def _not_in_place(self: "ArrayResult", other: Any) -> Any:
+    """Leave it to the operator that makes a new array."""
+    return NotImplemented
+
+
+class ArrayResult(NDArrayOperatorsMixin):
+    """Base of results whose ``values`` they stand for."""
+
+    # no state: results stay frozen dataclasses
+    __slots__ = ()
+    values: ComplexArray
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray[Any, Any]:
+        """Values; the same memory unless a copy or another type is asked for."""
+        if copy is False and dtype is not None and np.dtype(dtype) != self.values.dtype:
+            raise ValueError(f"values of type {self.values.dtype} are no {np.dtype(dtype)} without a copy")
+        return np.array(self.values, dtype=dtype, copy=True) if copy else np.asarray(self.values, dtype=dtype)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        """Apply a ufunc to the values."""
+        if any(isinstance(one, ArrayResult) for one in options.get("out", ())):
+            raise TypeError(f"out= of {ufunc.__name__} would leave the error of a result behind; give its .values")
+        plain = [one.values if isinstance(one, ArrayResult) else one for one in inputs]
+        return getattr(ufunc, method)(*plain, **options)
+
+    def __getitem__(self, index: Any) -> Any:
+        """Part of the values."""
+        return self.values[index]
+
+    def __len__(self) -> int:
+        """Length of the first axis."""
+        return len(self.values)
+
+    def __iter__(self) -> Iterator[Any]:
+        """Values along the first axis."""
+        return iter(self.values)
+
+    def __bool__(self) -> bool:
+        """Truth of a single value, as of an array."""
+        return bool(self.values)
+
+    def __complex__(self) -> complex:
+        """A single value."""
+        return complex(self.values.item())
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the values."""
+        return self.values.shape
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return self.values.ndim
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return self.values.size
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of the values."""
+        return self.values.dtype
+
+    @property
+    def real(self) -> FloatArray:
+        """Real parts."""
+        return self.values.real
+
+    @property
+    def imag(self) -> FloatArray:
+        """Imaginary parts."""
+        return self.values.imag
+
+    @property
+    def T(self) -> ComplexArray:  # noqa: N802
+        """Values, transposed."""
+        return self.values.T
+
+    all, any, argmax, argmin, argsort, astype = map(_of_values, ("all", "any", "argmax", "argmin", "argsort", "astype"))
+    conj, conjugate, copy, cumsum, diagonal = map(_of_values, ("conj", "conjugate", "copy", "cumsum", "diagonal"))
+    dot, flatten, item, max, mean, min = map(_of_values, ("dot", "flatten", "item", "max", "mean", "min"))
+    nonzero, prod, ravel, repeat, reshape = map(_of_values, ("nonzero", "prod", "ravel", "repeat", "reshape"))
+    round, squeeze, std, sum, swapaxes = map(_of_values, ("round", "squeeze", "std", "sum", "swapaxes"))
+    take, tolist, transpose, var = map(_of_values, ("take", "tolist", "transpose", "var"))
+
+    __iadd__ = __isub__ = __imul__ = __itruediv__ = __ipow__ = __imatmul__ = _not_in_place
+    __ifloordiv__ = __imod__ = __iand__ = __ior__ = __ixor__ = __ilshift__ = __irshift__ = _not_in_place

@@ -11,7 +11,7 @@ the mean. Where rays end or the body hides part of its line, 2 epsilon more: not
 elsewhere on the body are known, and what currents leave inside (`creeping.field.currents.whole_body`) tells how large
 the others are; where that cannot be measured the error is a bound.
 
-Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies (`studies.near_coverage`), F on
+Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies (`studies._point_coverage`), F on
 x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
@@ -24,9 +24,8 @@ from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.bounce import may_face_itself
 from creeping.field.currents.nodes import LitNodes
-from creeping.field.point_result import FieldStatus
+from creeping.field.point_result import FieldStatus, Served, Words
 from creeping.field.ray_sums import RaySum
-from creeping.field.served import Served, Words
 from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan

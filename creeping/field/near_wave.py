@@ -16,13 +16,12 @@ Sources: [LK59], [P79], [KP74] for F_t; Derivations, F3 and F8. The power Y/(1 +
 import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray
+from creeping.field.arguments import fock_parameter, mean_scale, scales
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import modes_of
-from creeping.field.ray_scales import fock_parameter, mean_scale, scales
 from creeping.field.shed_wave import amplitude_factor, end_residue, mode_waves, smoothstep
 from creeping.field.special.airy import MODES
-from creeping.field.special.fock import pekeris_star, transition_rate
-from creeping.field.special.height_gain import FAR_HEIGHT, height_gain, near_pekeris
+from creeping.field.special.fock import FAR_HEIGHT, height_gain, near_pekeris, pekeris_star, transition_rate
 from creeping.field.surface import surface_amplitude
 from creeping.rays.quantities import RayPoints
 

@@ -2,9 +2,9 @@
 
     u(x) = Σ dθ (k_c ε/2π)^(1/2) q^(-1/2) y e^{iks + (i/2) k_c (q'/q) n²},   q = J2 - iε J1,   k_c = k - i y_s/y
 
-y is the wave of `creeping.field.port_waves` without its J2, (s, n) the foot of x on the ray of angle θ and its distance
-from there. arg q runs on from -π/2. By stationary phase each geodesic through x has its own wave again, and the term g²
-of its second order: it is left out of y. ε = WIDTH a, a length, is free; what it changes tells the error.
+y is the wave of `creeping.field.ports.waves` without its J2, (s, n) the foot of x on the ray of angle θ and its
+distance from there. arg q runs on from -π/2. By stationary phase each geodesic through x has its own wave again, and
+the term g² of its second order: it is left out of y. ε = WIDTH a, a length, is free; what it changes tells the error.
 
 Sources: [P82], [CPP82]; Derivations, F24 and F25.
 """
@@ -12,7 +12,7 @@ Sources: [P82], [CPP82]; Derivations, F24 and F25.
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
-from creeping.field.port_waves import PathTerms
+from creeping.field.ports.waves import PathTerms
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, normal, size
@@ -57,7 +57,7 @@ class PortBeams:
     def __init__(
         self, body: Surface, port: FloatArray, outward: FloatArray, length: float, wavenumber: float, order: int
     ) -> None:
-        from creeping.field.kernels.beams import SPAN, spans_of
+        from creeping.field.kernels.ray_profile import SPAN, spans_of
         from creeping.rays.kernels import port_fans as lane
 
         self.k, self.a = wavenumber, beam_length(body)
@@ -133,7 +133,7 @@ class PortBeams:
 
     def sums(self, points: FloatArray, beyond: float) -> tuple[ComplexArray, ComplexArray]:
         """Sums at points (n, 3) by feet farther along than ``beyond``, L, for both ε: (n, c), (n, c), 1/L."""
-        from creeping.field.kernels.beams import add_beams
+        from creeping.field.kernels.ray_profile import add_beams
 
         found = []
         for factor in (1.0, OTHER):

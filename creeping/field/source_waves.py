@@ -14,9 +14,9 @@ Sources: [AS64, sec. 9.3]; Derivations, R19.
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
+from creeping.field.arguments import fock_parameter, mean_scale, scales, transverse_ratios
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import decay_terms, modes_of
-from creeping.field.ray_scales import fock_parameter, mean_scale, scales, transverse_ratios
 from creeping.field.special.airy import Modes
 from creeping.rays.quantities import RayPoints
 

@@ -21,14 +21,13 @@ from creeping._presenting import Drawn
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
-from creeping.field.array_result import ArrayResult
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.labelled import pattern_dataset
+from creeping.field.labelled import ArrayResult, pattern_dataset
 from creeping.field.near import MISSING, near_field
 from creeping.field.point_result import FieldStatus, NearField
 from creeping.field.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.unit import unit_of
+from creeping.geometry.checks import unit_of
 from creeping.rays.fan import launch
 from creeping.rays.transport import Flow
 from creeping.shadow.line import shadow_line

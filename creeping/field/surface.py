@@ -24,9 +24,9 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.arguments import fock_parameter, mean_scale, scales, transverse_ratios
 from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.creeping_modes import modes_of
-from creeping.field.ray_scales import fock_parameter, mean_scale, scales, transverse_ratios
 from creeping.field.shed_wave import SECOND_ORDER, end_residue, limited, mode_waves, smoothstep
 from creeping.field.source_waves import nearness
 from creeping.field.special.airy import Modes

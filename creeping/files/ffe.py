@@ -5,6 +5,10 @@ Its time factor is e^{+jωt} and ours e^{-iωt}, so every number is written conj
     E(θ, φ) = f* in V,   RCS = 4π|f|² in m²,   frequency = k c/(2π),   L the metre
 
 Rows run over θ first, then φ, in degrees.
+
+Far fields from FEKO text (.ffe), those of `write_ffe` and of others.
+
+The file's time factor is e^{+jωt} and ours e^{-iωt}: numbers are conjugated, and come back as they were written.
 """
 
 # help() shows names of types instead of what they stand for
@@ -19,18 +23,35 @@ import numpy as np
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
-from creeping.field.polarisation import turned_to_azimuth
-from creeping.files.far_table import angles_of
+from creeping.field.far_result import turned_to_azimuth
+from creeping.files.tables import angles_of
 from creeping.geometry.directions import unit_direction
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
+import re
+from array import array
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TextIO
+
+from creeping.field.frequency import wavenumber
 
 LIGHT = 299792458.0
 """Speed of light, m/s."""
 _QUANTITIES = ("Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)", "RCS(Theta)", "RCS(Phi)", "RCS(Total)")
 _COLUMNS = "#" + "".join(f"{name:>26}" for name in ('"Theta"', '"Phi"', *(f'"{name}"' for name in _QUANTITIES)))
+
+MOST_BYTES = 512_000_000
+MOST_BLOCKS = 10_000
+MOST_ROWS, MOST_KEYS = 5_000_000, 100
+"""Rows of a file, and keys of a block."""
+LONGEST = 4096
+"""Characters of a line."""
+COLUMNS = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+_WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 
 
 def grid_directions(theta: ArrayLike, phi: ArrayLike) -> FloatArray:
@@ -159,3 +180,178 @@ def _components(far: FarField, theta: FloatArray, phi: FloatArray, incident: int
     p = np.tile(phi, len(theta))
     turn = turned_to_azimuth(far.directions, p)
     return np.asarray(np.einsum("nab,nb->na", turn, total[:, :, incident])).reshape(len(theta), len(phi), 2)
+
+
+@dataclass(frozen=True, eq=False)
+class FfeBlock:
+    """One request of a .ffe file: a far field in n directions at one frequency, for one incident wave.
+
+    Attributes
+    ----------
+    name : str
+        Of the configuration.
+    frequency : float, Hz
+    theta, phi : (n,), degrees
+    field : (n, 2) complex
+        Along θ̂ and φ̂ of each row's own angles, time factor e^{-iωt}: f in metres if 1 V/m is incident, else rE in V.
+    keys : dict
+        What else the file says of the block.
+    """
+
+    name: str
+    frequency: float
+    theta: FloatArray
+    phi: FloatArray
+    field: ComplexArray
+    keys: dict[str, str]
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit directions (n, 3)."""
+        t, p = np.radians(self.theta), np.radians(self.phi)
+        return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+
+    @property
+    def wavenumber(self) -> float:
+        """k, 1/m, of light."""
+        return float(wavenumber(self.frequency))
+
+    @property
+    def incidence(self) -> tuple[float, float] | None:
+        """Where the incident wave comes from: theta and phi, degrees; None if the file does not say."""
+        numbers = _NUMBER.findall(self.keys.get("Incident Wave Direction", ""))
+        return (float(numbers[0]), float(numbers[1])) if len(numbers) == 2 else None
+
+
+@dataclass
+class _Open:
+    """A block while it is read."""
+
+    keys: dict[str, str] = field(default_factory=dict)
+    columns: list[int] = field(default_factory=list)
+    count: int = 0
+    rows: array[float] = field(default_factory=lambda: array("d"))
+
+
+def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
+    """Read a FEKO far-field file.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Returns
+    -------
+    tuple of FfeBlock
+        In the order of the file.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is no such file, or damaged; with the number of the line.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, creeping as cr, scatterers as sc
+    >>> from creeping.files import read_ffe, write_ffe
+    >>> from creeping.files.ffe import grid_directions
+    >>> fan = cr.launch(cr.DirectFlow(sc.Sphere(), rtol=1e-6), cr.shadow_line(sc.Sphere(), (0, 0, 1)), n_rays=16)
+    >>> theta, phi = np.radians([30.0, 60.0]), np.radians([0.0, 90.0])
+    >>> far = cr.far_field(fan, grid_directions(theta, phi), wavenumber=30.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_ffe(f"{folder}/far.ffe", far, theta, phi)
+    ...     block, = read_ffe(f"{folder}/far.ffe")
+    >>> block.name, round(block.wavenumber, 9), bool(np.all(block.field[:2, 0] == far.total[[0, 2]]))
+    ('incident_scalar', 30.0, True)
+    """
+    file = Path(path)
+    try:
+        nbytes = file.stat().st_size
+        if nbytes > MOST_BYTES:
+            raise InvalidInputError(f"{file} has {nbytes / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} are the most")
+        with file.open(encoding="utf-8", errors="replace") as stream:
+            found = tuple(_blocks(file, stream))
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
+    if not found:
+        raise InvalidInputError(f"{file} has no far field: no rows below a header of {', '.join(COLUMNS)}")
+    return found
+
+
+def _blocks(file: Path, stream: TextIO) -> Iterator[FfeBlock]:
+    block, number, blocks, rows = _Open(), 0, 0, 0
+    # of a line without an end no more is read than is needed to refuse it
+    for number, raw in enumerate(iter(lambda: stream.readline(LONGEST + 2), ""), 1):
+        if len(raw) > LONGEST + 1:
+            raise InvalidInputError(f"{file}, line {number}: more than {LONGEST} characters")
+        line = raw.strip()
+        if not line or line.startswith(("##", "**")):
+            continue
+        if line.startswith("#"):
+            if block.rows:
+                yield _closed(file, number, block)
+                blocks, block = blocks + 1, _Open()
+                if blocks >= MOST_BLOCKS:
+                    raise InvalidInputError(f"{file}, line {number}: more than {MOST_BLOCKS} blocks")
+            _header(file, number, line, block)
+        else:
+            rows += 1
+            if rows > MOST_ROWS:
+                raise InvalidInputError(f"{file}, line {number}: more than {MOST_ROWS} rows; split the file")
+            block.rows.extend(_row(file, number, line, block))
+    if block.rows:
+        yield _closed(file, number, block)
+
+
+def _header(file: Path, number: int, line: str, block: _Open) -> None:
+    """Take over a key, or the names of the columns."""
+    key, colon, value = line[1:].partition(":")
+    if colon and key.strip() and '"' not in key:
+        name, told = key.strip(), value.strip()
+        if block.keys.setdefault(name, told) != told:
+            raise InvalidInputError(f"{file}, line {number}: {name[:40]!r} is given twice, with other values")
+        if len(block.keys) > MOST_KEYS:
+            raise InvalidInputError(f"{file}, line {number}: more than {MOST_KEYS} keys of one block")
+        return
+    names = re.findall(r'"([^"]*)"', line)
+    missing = [name for name in COLUMNS if name not in names]
+    if missing:
+        raise InvalidInputError(f"{file}, line {number}: no column {missing[0]} among {', '.join(names) or 'none'}")
+    block.columns, block.count = [names.index(name) for name in COLUMNS], len(names)
+
+
+def _row(file: Path, number: int, line: str, block: _Open) -> list[float]:
+    cells = line.split()
+    if not block.columns:
+        raise InvalidInputError(f"{file}, line {number}: a row before the names of the columns")
+    if len(cells) != block.count:
+        raise InvalidInputError(f"{file}, line {number}: {len(cells)} numbers in {block.count} columns")
+    texts = [cells[at] for at in block.columns]
+    strange = [text for text in texts if not _NUMBER.fullmatch(text)]
+    if strange:
+        raise InvalidInputError(f"{file}, line {number}: {strange[0][:40]!r} is no finite number")
+    values = [float(text) for text in texts]
+    if not np.all(np.isfinite(values)):
+        raise InvalidInputError(f"{file}, line {number}: a number is not finite")
+    return values
+
+
+def _closed(file: Path, number: int, block: _Open) -> FfeBlock:
+    """The block that ends before a line."""
+    sizes = []
+    for key in ("No. of Theta Samples", "No. of Phi Samples"):
+        if not _WHOLE.fullmatch(block.keys.get(key, "")):
+            raise InvalidInputError(f"{file}, block before line {number}: no whole number as {key!r}")
+        sizes.append(int(block.keys[key]))
+    rows = np.array(block.rows).reshape(-1, len(COLUMNS))
+    if sizes[0] * sizes[1] != len(rows):
+        raise InvalidInputError(
+            f"{file}, block before line {number}: {len(rows)} rows, not {sizes[0]} theta x {sizes[1]} phi"
+        )
+    text = block.keys.get("Frequency", "")
+    hertz = float(text) if _NUMBER.fullmatch(text) else np.nan
+    if not (np.isfinite(hertz) and hertz > 0):
+        raise InvalidInputError(f"{file}, block before line {number}: no positive number as 'Frequency'")
+    e = np.stack([rows[:, 2] + 1j * rows[:, 3], rows[:, 4] + 1j * rows[:, 5]], axis=-1)
+    name = block.keys.get("Configuration Name", "")
+    return FfeBlock(name, hertz, rows[:, 0], rows[:, 1], np.conj(e), dict(block.keys))

@@ -13,9 +13,9 @@ from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.labelled import power
+from creeping.geometry.checks import UNKNOWN, unit_of
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import PointSource
-from creeping.geometry.speed import speed_of
-from creeping.geometry.unit import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -193,7 +193,7 @@ def _cut(cut: FieldCut) -> Content:
 
 
 def _far(far: FarField) -> Content:
-    from creeping.files.far_table import angles_of
+    from creeping.files.tables import angles_of
 
     angles, length = np.degrees(angles_of(far.directions)), far.unit
     content: dict[str, Any] = {

@@ -24,10 +24,10 @@ from creeping.errors import InvalidInputError
 from creeping.field.frequency import frequency
 from creeping.field.sources import SourcePattern
 from creeping.geometry.arguments import positive_number
+from creeping.geometry.checks import METRE
 from creeping.geometry.directions import angles_of
-from creeping.geometry.unit import METRE
 from creeping.storage.atomic import written_aside
-from creeping.storage.extras import required
+from creeping.storage.memory import required
 
 HRTF, GENERAL = "SimpleFreeFieldHRTF", "GeneralTF"
 AUTO = "auto"

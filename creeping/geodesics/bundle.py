@@ -10,8 +10,7 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.geometry.arguments import real_array
-from creeping.geometry.evaluators import evaluators, is_compiled
-from creeping.geometry.frames import polar_frame
+from creeping.geometry.evaluators import evaluators, is_compiled, polar_frame
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.kernels.threads import in_threads
 
@@ -79,7 +78,7 @@ def bundle_states(body: Surface, points: ArrayLike, directions: ArrayLike) -> tu
 
 def _entered(body: Surface, x: FloatArray, p: FloatArray) -> FloatArray | None:
     """What `_checked` gives, none where it raises."""
-    from creeping.geodesics.kernels.entry import enter
+    from creeping.geodesics.kernels.flow_derivative import enter
 
     out, refused, length = np.empty((len(x), 6)), [0], size(body)
     with evaluators(body) as parts:

@@ -21,8 +21,8 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.geometry.creased import is_creased, pieces_of
 from creeping.geometry.curvature import curvature_norms, principal_curvature_bound, second_form
+from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.kept import kept
-from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import triangulate
 

@@ -50,7 +50,7 @@ def trace_own(body: Any, states: FloatArray, times: FloatArray, *, rtol: float) 
 
 
 def _traced(body: Any, states: FloatArray, times: FloatArray, rtol: float) -> FloatArray:
-    from creeping.geodesics.kernels.own_times import integrate_own
+    from creeping.geodesics.kernels.integrator import integrate_own
 
     states, out = np.ascontiguousarray(states, dtype=float), np.empty(states.shape)
     times = np.ascontiguousarray(times, dtype=float)

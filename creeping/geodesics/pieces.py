@@ -11,10 +11,9 @@ Sources: Derivations, R1 and R3.
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.geodesics.chords import windows
 from creeping.geodesics.piece_trace import Passages, PieceTrace
 from creeping.geodesics.piece_walk import GAP, WINDOW, Walk
-from creeping.geodesics.states import WHOLE
+from creeping.geodesics.states import WHOLE, windows
 from creeping.geometry.creased import is_creased
 
 

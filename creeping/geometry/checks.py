@@ -1,4 +1,7 @@
-"""Numerical verification of a body: derivatives, closedness, orientation, cover and overlap of its charts."""
+"""Numerical verification of a body: derivatives, closedness, orientation, cover and overlap of its charts.
+
+The unit of a body's lengths: bodies made from files know theirs, the metre; of others it is the user's, L.
+"""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -11,10 +14,11 @@ from creeping.geometry.arguments import checked_body
 from creeping.geometry.creased import KINDS, SAMPLE, is_creased, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import triangulate
-from creeping.geometry.unit import UNKNOWN, unit_of
 
 WRONG_SIGNS = 1e-2
 """Share of the area of a body of pieces beside which F may have the wrong sign."""
+
+METRE, UNKNOWN = "m", "L"
 
 
 @dataclass(frozen=True)
@@ -242,3 +246,15 @@ def _relative(given: FloatArray, expected: FloatArray, least: float = 1e-300) ->
     if given.shape != expected.shape:
         return float("nan")
     return float(np.max(np.abs(given - expected)) / max(float(np.max(np.abs(expected))), least))
+
+
+def unit_of(body: Any) -> str:
+    """Unit of a body's lengths: "m" if the body says so, else "L".
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> unit_of(sc.Sphere())
+    'L'
+    """
+    return METRE if getattr(body, "unit", None) == METRE else UNKNOWN

@@ -13,9 +13,9 @@ from scipy.spatial import ConvexHull
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.facet_patches import halved
 from creeping.geometry.kept import kept
 from creeping.geometry.parts import is_faceted, why_no_rays
+from creeping.geometry.patches import halved
 from creeping.geometry.surface import jet, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 

@@ -5,13 +5,31 @@ With g = grad F, H the Hessian of F and p, b unit tangents:
     kappa_n = p.Hp/|g|          normal curvature along p, positive where the body is convex along p
     K = (g.adj(H) g)/|g|^4      Gaussian curvature
 
-Sources: [G05]; Derivations, R1.
+Parabolic points of a body, K = 0, where its normals fold over.
+
+With u the principal direction in which kappa_1 = 0 and g = u.grad kappa_1, a step s along u turns the normal by
+
+    dn = u g s^2/2
+
+so that near the image of the parabolic curve on the sphere of normals each normal is taken twice on one side,
+sign(g) u, and not at all on the other.
+
+Sources: [G05]; Derivations, R1; Derivations, B12.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geometry.surface import Surface
+from creeping.geometry.kept import kept
+from creeping.geometry.surface import Surface, normal, project, size
+from creeping.geometry.triangulation import Triangulation, triangulate
+
+SECANTS = 24
+"""Steps that bring a point of an edge onto K = 0."""
+STEP = 1e-3
+"""Distance over which curvature is differenced, in body sizes."""
 
 
 def normal_curvature(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:
@@ -71,3 +89,73 @@ def curvature_norms(body: Surface, x: FloatArray) -> FloatArray:
     n = gradient / g[:, None]
     P = np.eye(3) - n[:, :, None] * n[:, None, :]
     return np.asarray(np.linalg.norm(P @ body.hessian(x) @ P, axis=(1, 2)) / g)
+
+
+@dataclass(frozen=True, eq=False)
+class ParabolicPoints:
+    """Points of the parabolic curves, about one for each edge of a mesh that crosses them.
+
+    Attributes
+    ----------
+    points, normals : (n, 3), L and 1
+    axes : (n, 3)
+        Unit tangents u of zero normal curvature, on the side where normals are taken twice.
+    bend : (n,), 1/L^2
+        g >= 0.
+    across : (n,), 1/L
+        The other principal curvature.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    axes: FloatArray
+    bend: FloatArray
+    across: FloatArray
+
+
+def parabolic_points(body: Surface, mesh: Triangulation | None = None) -> ParabolicPoints:
+    """Parabolic points of a body, found once and kept with it; none on a convex one.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> found = parabolic_points(sc.Torus(R=1.0, r=0.5))           # the circles on top and below, which lie in planes
+    >>> bool(abs(abs(found.points[:, 2]) - 0.5).max() < 1e-6), bool(abs(found.across - 2.0).max() < 1e-4)
+    (True, True)
+    """
+    return kept(
+        body, "parabolic points", lambda: _found(body, mesh or triangulate(body.level, body.gradient, body.bounds))
+    )
+
+
+def _found(body: Surface, mesh: Triangulation) -> ParabolicPoints:
+    K = gaussian_curvature(body, mesh.vertices)
+    edges = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges = edges[(edges[:, 0] < edges[:, 1]) & ((K[edges[:, 0]] > 0) != (K[edges[:, 1]] > 0))]
+    points = _crossings(body, mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]], K[edges[:, 0]], K[edges[:, 1]])
+    n = normal(body, points)
+    flat = np.eye(3) - n[:, :, None] * n[:, None, :]
+    shape = flat @ body.hessian(points) @ flat / np.linalg.norm(body.gradient(points), axis=1)[:, None, None]
+    # of the three eigenvalues that of n is 0, and one of the others nearly
+    curvatures, vectors = np.linalg.eigh(shape)
+    across = np.take_along_axis(curvatures, np.argmax(np.abs(curvatures), axis=1)[:, None], axis=1)[:, 0]
+    t = np.take_along_axis(vectors, np.argmax(np.abs(curvatures), axis=1)[:, None, None], axis=2)[:, :, 0]
+    u = np.cross(n, t)
+    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-300)
+    step = STEP * size(body)
+    ahead, behind = (gaussian_curvature(body, project(body, points + sign * step * u)) for sign in (1, -1))
+    bend = (ahead - behind) / (2 * step) / across
+    return ParabolicPoints(points, n, u * np.sign(bend)[:, None], np.abs(bend), across)
+
+
+def _crossings(body: Surface, a: FloatArray, b: FloatArray, Ka: FloatArray, Kb: FloatArray) -> FloatArray:
+    """Points of K = 0 between points of both signs (n, 3), L, by false position that halves the stale end."""
+    x = a
+    for _ in range(SECANTS):
+        share = (Ka / (Ka - Kb))[:, None]
+        x = project(body, a + share * (b - a))
+        K = gaussian_curvature(body, x)
+        same = (K > 0) == (Ka > 0)
+        a, Kb = np.where(same[:, None], x, a), np.where(same, 0.5 * Kb, K)
+        b, Ka = np.where(same[:, None], b, x), np.where(same, K, 0.5 * Ka)
+    return x

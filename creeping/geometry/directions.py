@@ -3,12 +3,16 @@
 A direction is where the wave travels. theta is measured from z, phi and the azimuth from x towards y, the elevation
 from the plane of x and y; all in radians.
 
+Solutions found more than once: the first of each.
+
 Sources: [G10], [LL99], [W06]; Derivations, B9.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
-from creeping._typing import ArrayLike, FloatArray
+from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import real_array, shown
 
@@ -307,3 +311,32 @@ def unit_direction(direction: ArrayLike) -> FloatArray:
     if not np.any(d):
         raise InvalidInputError("direction is the zero vector; give where the wave travels, e.g. (1, 1, 1)")
     return np.asarray(_normalised(d[None])[0])
+
+
+def first_of_equals(group: IntArray, alike: Callable[[IntArray, IntArray], BoolArray]) -> IntArray:
+    """Numbers (m,), ascending, of those that are like no earlier one of their group.
+
+    Parameters
+    ----------
+    group : (n,)
+        What each is a solution of.
+    alike : callable
+        Whether two of them are one: numbers (k,), (k,) -> (k,).
+
+    Examples
+    --------
+    >>> x = np.array([0.0, 1.0, 1e-9, 1.0])
+    >>> first_of_equals(np.array([0, 0, 0, 1]), lambda i, j: np.abs(x[i] - x[j]) < 1e-6)
+    array([0, 1, 3])
+    """
+    kept = np.ones(len(group), dtype=bool)
+    if not len(group):
+        return np.flatnonzero(kept)
+    order = np.argsort(group, kind="stable")
+    _, counts = np.unique(group, return_counts=True)
+    for shift in range(1, int(counts.max())):
+        late, early = order[shift:], order[:-shift]
+        same = group[late] == group[early]
+        late, early = late[same], early[same]
+        kept[late[alike(late, early)]] = False
+    return np.flatnonzero(kept)

@@ -6,7 +6,14 @@
 
 A body with numpy methods only goes through the same kernels as a compiled one, a hundred times slower.
 
-Sources: Derivations, R1.
+Orthonormal frames of tangent planes.
+
+The polar frame of a chart with tangents T = [x_u, x_v] (3 x 2) is the orthogonal polar factor
+E = T (T^T T)^(-1/2): orthonormal, tangent, and nearest to T.
+
+Speed c of a body's weighted flow.
+
+Sources: Derivations, R1; [H86]; Derivations, B2.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,10 +24,8 @@ from weakref import ref
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.frames import polar_frame
 from creeping.geometry.kept import kept
-from creeping.geometry.speed import speed_hessian, speed_of
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, size
 
 
 class Evaluators(NamedTuple):
@@ -151,3 +156,51 @@ def _reference(body: Surface) -> Callable[[], Any]:
         return ref(body)
     except TypeError:
         return lambda: body
+
+
+def polar_frame(tangents: FloatArray) -> FloatArray:
+    """Polar frame E = T (T^T T)^(-1/2) of chart tangents, of any unit: (..., 3, 2) -> (..., 3, 2).
+
+    The 2 x 2 root is closed: G^(1/2) = (G + s)/t with s = sqrt(det G), t = sqrt(tr G + 2 s).
+
+    Examples
+    --------
+    >>> polar_frame(np.array([[2.0, 1.0], [0.0, 1.0], [0.0, 0.0]])).round(4)
+    array([[ 0.9487,  0.3162],
+           [-0.3162,  0.9487],
+           [ 0.    ,  0.    ]])
+    """
+    gram = np.swapaxes(tangents, -1, -2) @ tangents
+    p, q, r = gram[..., 0, 0], gram[..., 0, 1], gram[..., 1, 1]
+    s = np.sqrt(p * r - q * q)
+    t = np.sqrt(p + r + 2 * s)
+    # inverse of (G + s)/t; its determinant is s t^2
+    scale = 1.0 / (s * t)
+    root = np.empty_like(gram)
+    root[..., 0, 0] = (r + s) * scale
+    root[..., 1, 1] = (p + s) * scale
+    root[..., 0, 1] = root[..., 1, 0] = -q * scale
+    return np.asarray(tangents @ root)
+
+
+def speed_of(body: Surface) -> Any:
+    """Speed c of the body's weighted flow, or None."""
+    return getattr(body, "speed", None)
+
+
+def speed_values(body: Surface, points: FloatArray) -> FloatArray:
+    """Speed c, 1 without a weight: (..., 3) -> (...)."""
+    speed = speed_of(body)
+    return np.ones(np.shape(points)[:-1]) if speed is None else np.asarray(speed.value(points), dtype=float)
+
+
+def speed_hessian(body: Surface, points: FloatArray) -> FloatArray:
+    """Hessian of c: (..., 3) -> (..., 3, 3), by central differences where the speed offers none."""
+    speed = speed_of(body)
+    if hasattr(speed, "hessian"):
+        return np.asarray(speed.hessian(points), dtype=float)
+    # rounding and truncation balance near eps^(1/3): relative error about 1e-10
+    step = 6e-6 * size(body)
+    columns = [(speed.gradient(points + step * e) - speed.gradient(points - step * e)) / (2 * step) for e in np.eye(3)]
+    hessian = np.stack(columns, axis=-1)
+    return np.asarray(0.5 * (hessian + np.swapaxes(hessian, -1, -2)))

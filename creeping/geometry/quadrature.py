@@ -10,24 +10,28 @@ its error. Which mesh and rule are taken: `creeping.geometry.tile_rules`.
 
 A body of smooth pieces is tiled by triangles, each mapped onto its own piece, with conical products of Gauss's rules.
 
+Points inside a body, by their depth under its surface.
+
+A point is as deep as the nearest of many nodes of the body is far, less what the nodes are apart.
+
 Sources: [G98], [DR84, sec. 2.7]; Derivations, B11.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.geometry.creased import Tiles, is_creased, pieces_of
 from creeping.geometry.curvature import adjugate_form, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
-from creeping.geometry.graded_tiles import graded
 from creeping.geometry.kept import kept
-from creeping.geometry.piece_rules import MOST_NODES, PieceRules
+from creeping.geometry.parts import inside
 from creeping.geometry.surface import Surface, size
-from creeping.geometry.tile_rules import CLOSED, FEWEST, MOST, MOST_CELLS, Rules, finer
+from creeping.geometry.tile_rules import CLOSED, FEWEST, MOST, MOST_CELLS, MOST_NODES, PieceRules, Rules, finer, graded
 from creeping.kernels.threads import in_slices
 
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
@@ -38,6 +42,11 @@ BESIDE = 8
 """Nodes next to a point that tell how far they are apart."""
 STRETCH = (0.1, 10.0)
 """Bounds of (1 + h kappa_1)(1 + h kappa_2); at a tip, where curvatures are infinite, a triangle counts as flat."""
+
+TRIED = 20_000
+"""Points of the box that are tried."""
+FEWER = 4000
+"""The same where each costs a sum over nodes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,3 +279,37 @@ def nearest_points(body: Surface, points: FloatArray) -> tuple[FloatArray, Float
 
         in_slices(run, m)
     return np.ascontiguousarray(x.T), np.ascontiguousarray(n.T), np.ascontiguousarray(hessians.T), height
+
+
+def inner_points(body: Surface, depth: float, count: int) -> FloatArray:
+    """Points inside, at least ``depth``, L, under the surface, evenly spread: (count, 3), L.
+
+    Fewer, or none, where the body is hardly or nowhere that thick; the same ones at every call.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> points = inner_points(sc.Sphere(), 0.3, 50)
+    >>> points.shape, bool(np.linalg.norm(points, axis=1).max() < 0.7)
+    ((50, 3), True)
+    """
+    x, distance = kept(body, "depths", lambda: _depths(body))
+    return np.asarray(x[distance > depth][:count])
+
+
+def box_points(body: Surface, within: Callable[[FloatArray], BoolArray] | None = None) -> FloatArray:
+    """Points inside, evenly spread over the body's box (n, 3), L; the same ones at every call.
+
+    ``within`` tells which are, if it is not the body that does.
+    """
+    from scipy.stats import qmc
+
+    low, high = np.asarray(body.bounds, dtype=float)
+    x = low + (high - low) * qmc.Halton(3, scramble=False).random(TRIED if within is None else FEWER)
+    return np.asarray(x[inside(body, x) if within is None else within(x)])
+
+
+def _depths(body: Surface) -> tuple[FloatArray, FloatArray]:
+    """Points inside (n, 3) and bounds of their depth (n,), L."""
+    x = box_points(body)
+    return x, body_nodes(body, 4 / size(body)).distance(x)

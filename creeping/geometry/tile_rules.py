@@ -7,6 +7,21 @@ For integrands as fast as e^{i a u} on a tile of -1 < u < 1 Gauss's rule of p po
 Few large tiles with many points cost less than many small ones with few, as far as the map onto the body is smooth on
 them, which the integral of n tells: it is 0 over a closed surface.
 
+Which triangles a body of smooth pieces is tiled by and how many points they have: the cheapest that resolve a rate.
+
+As `creeping.geometry.tile_rules` of smooth bodies: many points on few triangles cost least where the rate asks for
+them, few points where triangles must be small for the body's sake. The integral of n, 0 over a closed surface, tells
+how small: it is made less until it is CLOSED, or, where the pieces do not meet any better, until it does not get less.
+
+Triangles of a body of smooth pieces, smaller where the body bends and towards its tips.
+
+An edge between whose ends the normal turns by more than BEND, or that ends in a tip, is split in the middle, which is
+put onto its piece, and the triangles on both sides of it with it, so that no gap opens between them:
+
+    one edge split: 2 triangles,   two: 3,   three: 4
+
+Along a rim triangles may be ASPECT times as long as across it: windows of sums over nodes are round.
+
 Sources: [DR84, sec. 2.7]; Derivations, B11.
 """
 
@@ -17,9 +32,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.geometry.creased import Tiles, pieces_of, tiles_of
 from creeping.geometry.curvature import principal_curvature_bound
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import quadrilaterals
 
 CELLS, MOST_CELLS = 24, 120
@@ -38,6 +54,39 @@ CLOSED = 1e-6
 """Integral of n, as a share of the area, beyond which a mesh is too coarse for the body."""
 KEPT = 4
 """Rules kept with a body."""
+
+POINTS = (3, 4, 5, 6)
+"""Points of Gauss's rule along a side of a triangle."""
+LONGEST = 0.2
+"""Longest sides, in body sizes."""
+SMALLER = 3.7
+"""Triangles of bodies over the square of their longest sides."""
+LADDER, RUNGS = 1.1, 4
+"""Ratio of the sides that are taken: neighbouring rates have one rule; and by how many they are shorter where the
+integral of n is too large."""
+PIECE_RULES_CLOSED, OPEN = 1e-4, 1e-3
+"""Integral of n, as a share of the area, that is small enough, and beyond which pieces do not make a closed body."""
+LESS = 0.5
+"""Ratio by which it must become less with shorter sides to become less at all."""
+NEARLY = 0.9
+"""Share of triangles that were counted that there are at least with other sides."""
+MOST_NODES = 3_000_000
+"""Most nodes."""
+
+BEND = 0.6
+"""Largest angle between the normals at the ends of an edge, radians."""
+ASPECT = 2.0
+"""What an edge may be longer than one across the bend, by the most bent of its triangles."""
+ROUNDS = 4
+"""Times that an edge is split at most: at a tip the normal turns on any length."""
+SAME = 1e-9
+"""Distance of corners that are one, in body sizes."""
+SPLITS = {
+    1: ((0, 3, 2), (3, 1, 2)),
+    3: ((3, 1, 4), (0, 3, 2), (3, 4, 2)),
+    7: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+}
+"""Triangles for corners 0, 1, 2 and middles 3, 4, 5 of the edges 01, 12, 20, where 01, 01 and 12, or all are split."""
 
 
 class Rules:
@@ -179,3 +228,170 @@ def points_for(half: float) -> int:
         if log - math.log(2 * p + 1) < math.log(SMALL):
             return p
     return MOST + 1
+
+
+class PieceRules:
+    """Rules of a body of pieces, those kept, and which of them close.
+
+    ``make`` turns body, sides, L, and points into nodes (`creeping.geometry.quadrature.BodyNodes`).
+    """
+
+    def __init__(self, body: Any, make: Callable[[Any, float, int], Any]) -> None:
+        self._make = make
+        self._rules: dict[tuple[int, int], Any] = {}
+        self._area = float(np.sum(tiles_of(body, LONGEST).areas)) / size(body) ** 2
+        # of each number of points the longest sides that may close, those that do, and what longer ones left
+        self._rung = dict.fromkeys(POINTS, _rung(LONGEST))
+        self._counts: dict[tuple[int, int], int] = {}
+        self._tiles: dict[int, int] = {}
+        self._left = dict.fromkeys(POINTS, np.inf)
+
+    def rule(self, body: Any, rate: float) -> tuple[int, int, int]:
+        """Rung of the sides, points along a side, and the number of nodes, for a rate, 1/L.
+
+        More than MOST_NODES if that takes as many, or nothing closes.
+        """
+        while self._rung:
+            few = list(self._rung)
+            rungs = np.array([min(self._rung[p], _rung(2 * _HALVES[p] / (rate * size(body)))) for p in few])
+            least = self._least_tiles(rungs) * np.square(few)
+            counts = [self._counts.get((int(r), p), int(n)) for r, p, n in zip(rungs, few, least, strict=True)]
+            best = int(np.argmin(counts))
+            rung, points, count = int(rungs[best]), few[best], counts[best]
+            if count > MOST_NODES or (rung, points) in self._counts:
+                return rung, points, count
+            nodes = self.nodes(body, rung, points)
+            self._tiles[rung] = len(nodes.points) // points**2
+            error, same = nodes.error, nodes.error > LESS * self._left[points]
+            if error <= PIECE_RULES_CLOSED or (error <= OPEN and same):
+                # more than their sides tell, where the body bends
+                self._counts[rung, points] = len(nodes.points)
+            elif same:
+                del self._rung[points]
+            else:
+                self._rung[points], self._left[points] = rung - RUNGS, error
+        return 0, 0, MOST_NODES + 1
+
+    def _least_tiles(self, rungs: IntArray) -> FloatArray:
+        """Triangles that there are at least: for the area, and where others were counted, by their number.
+
+        A body of many small pieces has more than its area asks for. Of shorter sides there are as many, of longer ones
+        fewer by the square, or nearly.
+        """
+        least = self._area / _piece_rules_sides(rungs) ** 2 * SMALLER
+        for rung, count in self._tiles.items():
+            least = np.maximum(
+                least, NEARLY * count * np.minimum(1.0, (_piece_rules_sides(rung) / _piece_rules_sides(rungs)) ** 2)
+            )
+        return np.asarray(least)
+
+    def nodes(self, body: Any, rung: int, points: int) -> Any:
+        """Nodes of a rule, kept; the last one used stands last."""
+        key = rung, points
+        side = float(_piece_rules_sides(rung)) * size(body)
+        made = self._rules.pop(key) if key in self._rules else self._make(body, side, points)
+        self._rules[key] = made
+        while len(self._rules) > KEPT:
+            self._rules.pop(next(iter(self._rules)))
+        return made
+
+
+def _rung(share: float) -> int:
+    """That of the longest sides up to a share of the body's size, no longer than LONGEST."""
+    return int(np.floor(np.log(min(share, LONGEST)) / np.log(LADDER)))
+
+
+def _piece_rules_sides(rung: Any) -> FloatArray:
+    """Sides, in body sizes."""
+    return np.asarray(LADDER ** np.asarray(rung, dtype=float))
+
+
+_HALVES = {p: float(max(half for half in np.arange(0.05, 20.0, 0.05) if points_for(half) <= p)) for p in POINTS}
+
+
+"""Half the phase along a side up to which so many points do."""
+
+
+def graded(body: Any, tiles: Tiles) -> Tiles:
+    """Triangles whose edges turn by no more than BEND and end in no tip, or have been split ROUNDS times.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> body = sc.Capsule(1.0, 4.0)
+    >>> coarse = Tiles(*body.tiles(1.5))
+    >>> fine = graded(body, coarse)
+    >>> sharper = 2 * 4 * np.pi - coarse.areas.sum() > 3 * (2 * 4 * np.pi - fine.areas.sum())
+    >>> len(coarse.pieces) < len(fine.pieces), bool(sharper)
+    (True, True)
+    """
+    for _ in range(ROUNDS):
+        edges, first = _edges(body, tiles)
+        following = Tiles(np.roll(tiles.corners, -1, axis=1), np.roll(tiles.normals, -1, axis=1), tiles.pieces)
+        angles = np.arccos(np.clip(np.sum(tiles.normals * following.normals, axis=2), -1.0, 1.0))
+        lengths = np.linalg.norm(following.corners - tiles.corners, axis=2)
+        curvature = np.max(angles / lengths, axis=1, keepdims=True)
+        worst = np.zeros(len(first))
+        np.maximum.at(worst, edges.ravel(), np.maximum(angles, lengths * curvature / ASPECT).ravel())
+        turned = worst > BEND
+        turned[edges[_at_tips(body, tiles)]] = True
+        if not np.any(turned):
+            break
+        tiles = _split(body, tiles, edges, first, turned)
+    return tiles
+
+
+def _edges(body: Any, tiles: Tiles) -> tuple[IntArray, IntArray]:
+    """Numbers of the edges 01, 12, 20 of each triangle (m, 3), and where among these 3m each edge is first."""
+    grid = np.round(tiles.corners.reshape(-1, 3) / (SAME * size(body))).astype(np.int64)
+    corners = np.unique(grid, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    pairs = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    _, first, edges = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    return edges.reshape(-1, 3), first
+
+
+def _at_tips(body: Any, tiles: Tiles) -> BoolArray:
+    """Whether the edges 01, 12, 20 of each triangle end in a tip (m, 3)."""
+    at = np.zeros(tiles.corners.shape[:2], dtype=bool)
+    for crease in body.creases:
+        if crease.kind == "tip":
+            tip = np.ravel(np.asarray(crease.points, dtype=float))[:3]
+            at |= np.linalg.norm(tiles.corners - tip, axis=2) < SAME * size(body)
+    return at | np.roll(at, -1, axis=1)
+
+
+def _split(body: Any, tiles: Tiles, edges: IntArray, first: IntArray, turned: BoolArray) -> Tiles:
+    """Triangles with the ``turned`` of their edges split."""
+    ends = tiles.corners, np.roll(tiles.corners, -1, axis=1)
+    middles = (0.5 * (ends[0] + ends[1])).reshape(-1, 3)[first]
+    owners = tiles.pieces[first // 3]
+    pieces = pieces_of(body)
+    for number in np.unique(owners[turned]):
+        mine = turned & (owners == number)
+        middles[mine] = project(pieces[number], middles[mine])
+    marks = turned[edges]
+    parts = [Tiles(*(values[~np.any(marks, axis=1)] for values in tiles))]
+    for which in range(1, 8):
+        wanted = np.array([which & 1, which & 2, which & 4], dtype=bool)
+        these = np.flatnonzero(np.all(marks == wanted, axis=1))
+        if not len(these):
+            continue
+        # turned so that the edges that are split come first
+        shift = next(s for s in range(3) if sum(int(wanted[(i + s) % 3]) << i for i in range(3)) in SPLITS)
+        order = (np.arange(3) + shift) % 3
+        split = SPLITS[sum(int(wanted[order[i]]) << i for i in range(3))]
+        points = np.concatenate([tiles.corners[these][:, order], middles[edges[these][:, order]]], axis=1)
+        mine = tiles.pieces[these]
+        added = _normals(pieces, points[:, 3:].reshape(-1, 3), np.repeat(mine, 3)).reshape(-1, 3, 3)
+        sides = np.concatenate([tiles.normals[these][:, order], added], axis=1)
+        parts += [Tiles(points[:, corners], sides[:, corners], mine) for corners in map(list, split)]
+    return Tiles(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+
+
+def _normals(pieces: Any, points: FloatArray, owners: IntArray) -> FloatArray:
+    """Normals at points (n, 3) of the pieces with these numbers."""
+    out = np.empty_like(points)
+    for number in np.unique(owners):
+        mine = owners == number
+        out[mine] = normal(pieces[number], points[mine])
+    return out

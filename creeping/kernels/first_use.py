@@ -1,7 +1,7 @@
 """The first use of kernels: it is said that they are compiled, and another process compiles ahead on a second core.
 
 A compiled kernel is kept on disk, so this happens once an installation. numba compiles in one thread at a time, but a
-process finds what another one has put into the cache: `creeping.commands.compile_ahead` runs a small job of its own
+process finds what another one has put into the cache: `creeping.commands.upkeep` runs a small job of its own
 with the kernels that the caller comes to later. It ends with the process that has started it, and what becomes of it
 changes no result: what it has not compiled is compiled where it is needed.
 """
@@ -22,7 +22,7 @@ from numba.core import event as events
 from creeping._typing import Any
 from creeping.kernels.threads import thread_count
 
-AHEAD = "creeping.commands.compile_ahead"
+AHEAD = "creeping.commands.upkeep"
 """Module that compiles ahead; by name, for it stands above."""
 STAMP = "ahead.done"
 """File that says for which sources all has been compiled."""

@@ -24,11 +24,9 @@ from creeping.geometry.checks import check_surface
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.ambient import AmbientModel
 from creeping.phaseflow.coordinates.base import Model, nodes_of
-from creeping.phaseflow.coordinates.rotation import CompiledModel
-from creeping.phaseflow.grid import PACKED, Grid, Leap
-from creeping.phaseflow.packing import packed_lanes, with_flags
+from creeping.phaseflow.coordinates.rotation import CompiledModel, packed_lanes, with_flags
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
-from creeping.phaseflow.splines import prefilter
+from creeping.phaseflow.splines import PACKED, Grid, Leap, prefilter
 
 Progress = Callable[[str], None]
 SAMPLES = 2000

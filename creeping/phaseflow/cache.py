@@ -17,8 +17,8 @@ from creeping.geometry.surface import Surface, fingerprint
 from creeping.kernels.private_cache import private_folder, require_private
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
-from creeping.phaseflow.grid import PACKED, Grid, Leap
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
+from creeping.phaseflow.splines import PACKED, Grid, Leap
 from creeping.storage.folder import SCHEMA, content_digest, open_array, read_manifest
 
 

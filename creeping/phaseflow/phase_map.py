@@ -24,7 +24,7 @@ from creeping.geodesics.states import DETACHMENT, checked_states, unpack
 from creeping.geometry.arguments import folder_path, positive_number, real_number, whole_number
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates.base import Model
-from creeping.phaseflow.grid import Grid, Leap
+from creeping.phaseflow.splines import Grid, Leap
 from creeping.storage.folder import write_folder
 
 SHORT = 0.5

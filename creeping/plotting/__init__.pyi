@@ -1,8 +1,6 @@
 # Public names and where they are: read by type checkers, and by lazy_loader when the package is imported.
 from .coloured_body import currents_picture as currents_picture
 from .coupling_pictures import coupling_picture as coupling_picture
-from .display import GLProbe as GLProbe
-from .display import gl_available as gl_available
 from .echo_pictures import comparison_picture as comparison_picture
 from .echo_pictures import echo_band_picture as echo_band_picture
 from .echo_pictures import echo_cut_picture as echo_cut_picture
@@ -15,3 +13,5 @@ from .parameter_plane import plot_parameters as plot_parameters
 from .pictures import parameter_picture as parameter_picture
 from .pictures import picture as picture
 from .plane_pictures import field_cut_picture as field_cut_picture
+from .scene import GLProbe as GLProbe
+from .scene import gl_available as gl_available

@@ -10,7 +10,7 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.files.far_table import angles_of
+from creeping.files.tables import angles_of
 
 TOLERANCE = 1e-6
 """Distance of unit directions from the plane or the cone."""

@@ -7,8 +7,8 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.checks import UNKNOWN
 from creeping.geometry.surface import size
-from creeping.geometry.unit import UNKNOWN
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.plotting._drawing import Drawing, compose
+from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
-from creeping.plotting._view import View
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine

@@ -10,15 +10,14 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.comparison import decibels, shown_range
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.decibels import decibels, shown_range
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
+from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, normal
-from creeping.geometry.unit import unit_of
-from creeping.plotting._drawing import Drawing, bare, compose
-from creeping.plotting._view import View
-from creeping.plotting.colour_bar import add_bar, beyond
+from creeping.plotting._drawing import Drawing, View, bare, compose
+from creeping.plotting.palette import add_bar, beyond
 from creeping.plotting.pictures import chosen_backend, drawn_page, save_figure
 from creeping.shadow.line import shadow_line
 

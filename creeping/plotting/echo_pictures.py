@@ -8,17 +8,16 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.decibels import shown_range
+from creeping.field.comparison import shown_range
 from creeping.field.frequency import suited
-from creeping.plotting.colour_bar import add_bar, beyond
 from creeping.plotting.far_cuts import Curve, draw_cut, dressed, minus
-from creeping.plotting.palette import GREY, curve_style
+from creeping.plotting.palette import GREY, add_bar, beyond, curve_style
 from creeping.plotting.pictures import add_legend, axes_or_new, new_figure, save_figure
 
 if TYPE_CHECKING:
     from creeping.field.comparison import Comparison
     from creeping.field.echo import Echo
-    from creeping.field.slant_range import RangeProfile
+    from creeping.field.impulse import RangeProfile
 
 SPAN = 60.0
 """Range of levels, dB."""

@@ -13,16 +13,15 @@ from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
-from creeping.field.decibels import decibels, shown_range
+from creeping.field.comparison import decibels, shown_range
 from creeping.field.on_body import surface_field
 from creeping.field.point_result import SurfaceField
 from creeping.field.surface import scalar_boundary
-from creeping.geometry.unit import unit_of
-from creeping.plotting._drawing import compose
+from creeping.geometry.checks import unit_of
+from creeping.plotting._drawing import View, compose
 from creeping.plotting._strokes import chosen_rays
-from creeping.plotting._view import View
-from creeping.plotting.body_fronts import with_fronts
 from creeping.plotting.coloured_body import NOTHING, cells_of, save_painted
+from creeping.plotting.coupling_pictures import with_fronts
 from creeping.plotting.palette import curve_style
 from creeping.plotting.pictures import chosen_backend, new_figure, save_figure
 from creeping.rays.fan import RayFan

@@ -7,9 +7,8 @@ import numpy as np
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.geometry.incident import incident_of_row
-from creeping.plotting._drawing import Drawing, compose
+from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import LEVEL_NAMES
-from creeping.plotting._view import View
 from creeping.plotting.parameter_plane import draw_curves, frame, is_torus, page_size, plot_parameters
 from creeping.plotting.pictures import add_legend, axes_or_new, drawn_page
 from creeping.rays.fan import RayFan

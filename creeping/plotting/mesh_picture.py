@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.plotting._view import View
+from creeping.plotting._drawing import View
 from creeping.plotting.axes3d import brightness
 from creeping.plotting.pictures import new_figure, save_figure
 

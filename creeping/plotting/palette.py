@@ -3,10 +3,14 @@
 Any two colours differ by 12 or more (CIEDE2000), also as seen in deuteranopia and protanopia, and each stands on white
 with a contrast of 3 to 1; `tests/plotting/test_palette.py` holds them to it.
 
+Bars of colours: their look, and the arrows at their ends for what lies beyond.
+
 Sources: [MOF09] for the simulation.
 """
 
-from creeping._typing import Any
+import numpy as np
+
+from creeping._typing import Any, FloatArray
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a0f45", "#3a92fa")
 STYLES: tuple[Any, ...] = (
@@ -35,3 +39,23 @@ def curve_style(number: int, width: float = 1.3) -> dict[str, Any]:
         "linewidth": width,
         "zorder": 2.0 + 0.01 * style,
     }
+
+
+def beyond(values: FloatArray, low: float, high: float) -> str:
+    """Ends of a bar from ``low`` to ``high`` that some values (...) lie beyond: "neither", "min", "max" or "both".
+
+    Examples
+    --------
+    >>> beyond(np.array([-1.0, 0.5, np.nan]), 0.0, 1.0), beyond(np.array([0.5]), 0.0, 1.0)
+    ('min', 'neither')
+    """
+    ends = ("min" if np.any(values < low) else "") + ("max" if np.any(values > high) else "")
+    return {"": "neither", "minmax": "both"}.get(ends, ends)
+
+
+def add_bar(figure: Any, colours: Any, label: str, *, extend: str, fontsize: float, **place: Any) -> None:
+    """Add the bar of a matplotlib image or mapping of colours; ``place`` as of ``Figure.colorbar``."""
+    bar = figure.colorbar(colours, extend=extend, **place)
+    bar.set_label(label, fontsize=fontsize)
+    bar.ax.tick_params(labelsize=8, width=0.5)
+    bar.outline.set_linewidth(0.5)

@@ -14,9 +14,8 @@ from creeping.plotting._strokes import (
     line_pieces,
     ray_strokes,
 )
-from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
-from creeping.rays.isophase import IsoPhaseCurve
+from creeping.rays.isophase import IsoPhaseCurve, split_at_seam
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import STATUSES
 

@@ -1,16 +1,25 @@
-"""Whole figures as PNG files: the body in space, by pyvista or matplotlib, and the parameter plane."""
+"""Whole figures as PNG files: the body in space, by pyvista or matplotlib, and the parameter plane.
+
+Figures outside pyplot that notebooks show: no window, no global state, and their axes answer as pictures.
+
+A notebook asks the last value of a cell for ``_repr_png_``, whichever backend is on.
+"""
 
 import os
 from collections.abc import Sequence
+from io import BytesIO
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.plotting._drawing import Drawing, compose
+from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR
-from creeping.plotting._view import View
-from creeping.plotting.display import gl_available
+from creeping.plotting.scene import gl_available
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -128,8 +137,6 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
 
 def new_figure(inches: tuple[float, float]) -> Any:
     """Return a figure outside pyplot: no window, no global state, whatever the user's backend; notebooks show it."""
-    from creeping.plotting._inline import made
-
     return made(inches)
 
 
@@ -137,7 +144,6 @@ def axes_or_new(ax: Any, inches: tuple[float, float], *, space: bool = False) ->
     """Whether the axes are new, and the axes: those given, or those of a new figure, of the plane or of space."""
     if ax is not None:
         return False, ax
-    from creeping.plotting._inline import InlineAxes, InlineAxes3D
 
     figure = new_figure(inches)
     figure.set_layout_engine("constrained")
@@ -181,7 +187,6 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
 
 def _draw_matplotlib(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
     from creeping.plotting import axes3d
-    from creeping.plotting._inline import InlineAxes3D
 
     axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
 
@@ -206,3 +211,38 @@ def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None
     for mark in drawing.marks:
         ax.fill(*drawing.view.project(mark.outline(drawing.view)).T, color=ARROW_COLOUR, linewidth=0)
         ax.text(*drawing.view.project(mark.label(drawing.view)), mark.name, **mark.text)
+
+
+class InlineFigure(Figure):
+    """A figure that shows itself."""
+
+    def _repr_png_(self) -> bytes:
+        """The figure as a PNG."""
+        with BytesIO() as stream:
+            self.savefig(stream, format="png", dpi=self.dpi)
+            return stream.getvalue()
+
+
+class _Inline:
+    """Axes that show the figure that they are in."""
+
+    figure: Any
+
+    def _repr_png_(self) -> bytes:
+        """The whole figure as a PNG."""
+        return bytes(self.figure._repr_png_())
+
+
+class InlineAxes(_Inline, Axes):
+    """Axes of the plane."""
+
+
+class InlineAxes3D(_Inline, Axes3D):  # type: ignore[misc, unused-ignore]
+    """Axes of space."""
+
+
+def made(inches: tuple[float, float]) -> InlineFigure:
+    """Return a white figure with a canvas of its own."""
+    figure = InlineFigure(figsize=inches, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure

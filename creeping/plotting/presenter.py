@@ -9,16 +9,7 @@ from html import escape
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.files.polylines import polydata
-from creeping.plotting import (
-    _facts,
-    _response_facts,
-    echo_pictures,
-    level_plots,
-    line_plots,
-    plane_pictures,
-    port_plots,
-    response_plots,
-)
+from creeping.plotting import _facts, echo_pictures, far_cuts, line_plots, plane_pictures, response_plots
 
 _FACTS: dict[str, Callable[..., _facts.Facts]] = {
     "ShadowLine": _facts.of_line,
@@ -30,22 +21,22 @@ _FACTS: dict[str, Callable[..., _facts.Facts]] = {
     "FieldCut": _facts.of_cut,
     "PhaseMap": _facts.of_map,
     "DirectFlow": _facts.of_direct,
-    "Coupling": _response_facts.of_coupling,
-    "SourcePattern": _response_facts.of_pattern,
-    "ImpulseResponse": _response_facts.of_impulse,
-    "RangeProfile": _response_facts.of_profile,
-    "Echo": _response_facts.of_echo,
+    "Coupling": _facts.of_coupling,
+    "SourcePattern": _facts.of_pattern,
+    "ImpulseResponse": _facts.of_impulse,
+    "RangeProfile": _facts.of_profile,
+    "Echo": _facts.of_echo,
 }
 _PLOTS: dict[str, Callable[..., Any]] = {
     "ShadowLine": line_plots.plot_line,
     "ShadowCurve": line_plots.plot_shadow_curve,
     "RayFan": line_plots.plot_fan,
     "IsoPhaseCurve": line_plots.plot_curve,
-    "FarField": level_plots.plot_far,
+    "FarField": far_cuts.plot_far,
     "FieldCut": plane_pictures.plot_field_cut,
-    "PhaseMap": level_plots.plot_growth,
-    "Coupling": port_plots.plot_coupling,
-    "SourcePattern": port_plots.plot_pattern,
+    "PhaseMap": far_cuts.plot_growth,
+    "Coupling": response_plots.plot_coupling,
+    "SourcePattern": response_plots.plot_pattern,
     "ImpulseResponse": response_plots.plot_impulse,
     "RangeProfile": response_plots.plot_profile,
     "Echo": echo_pictures.plot_echo,

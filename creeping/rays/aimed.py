@@ -18,7 +18,7 @@ from creeping.geometry.creased import is_creased
 from creeping.geometry.curvature import second_form
 from creeping.geometry.surface import normal, size
 from creeping.rays.quantities import STRAIGHT, RayPoints
-from creeping.rays.single_rays import SingleRays
+from creeping.rays.reach import SingleRays
 from creeping.rays.tracer import RayTracer
 
 CLOSE = 1e-6

@@ -1,14 +1,51 @@
-"""Where rays end before the fan does: detached, at what a body calls not smooth, at its edges and tips."""
+"""Where rays end before the fan does: detached, at what a body calls not smooth, at its edges and tips.
+
+Where the rays of one fan start: the launch points of the line, and further ones between them.
+
+A position is an arclength that grows along its arc, beyond the curve's length where the arc comes round.
+
+How much of a body with edges and tips the creeping rays of an incidence do not serve.
+
+    line        (l_e + l_t)/(l + l_e + l_t)               l of the curves, l_e on edges, l_t next to tips
+    rays        sum' h e^(-ξ Im τ)/sum h                  h the spacing of rays, sum' over those that ended there
+    outline     the same as line, dl |T - (T.d) d| for dl, of l the attached part alone
+
+ξ = (k/2)^(1/3) A with the attenuation integral A up to the end; Im τ is that of the slowest mode of any boundary, so
+the share is one of amplitudes and rather too large.
+
+Where rays come to a place at which the body (`Surface.non_smooth`) is not smooth enough for them.
+
+Sources: Derivations, R4; Derivations, R6 and F3.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.geodesics.states import CREASE, DETACHMENT, END, WHOLE, X
 from creeping.geometry.creased import is_creased, nearest_crease
-from creeping.rays.nonsmooth import non_smooth_from
-from creeping.rays.status import RayStatus
+from creeping.rays.reach import HARD_DECAY, IN_RANGE
+from creeping.rays.status import AT_CREASES, RayStatus
+from creeping.shadow.attachment import Arc, LaunchPoints
+from creeping.shadow.line import ShadowLine
+
+if TYPE_CHECKING:
+    from creeping.rays.fan import RayFan
+    from creeping.shadow.line import ShadowLine
+
+from creeping.geometry.surface import Surface, size
 
 OF_CREASE = {"edge": RayStatus.EDGE, "tip": RayStatus.TIP}
+
+MANY, FEW = 4096, 32
+"""Rays that are enough for a line of several arcs to begin with, or so many for each in the mean: of many holes and
+fillets each has as many points as a body's only curve."""
+
+NON_SMOOTH_SPACING = 0.005
+"""Spacing at which rays are looked at for non-smooth regions, in sizes of the body,"""
+NON_SMOOTH_BLOCK = 64
+"""so many rays at a time."""
 
 
 def ends_of(
@@ -61,3 +98,167 @@ def _refused(body: Any, path: FloatArray, times: FloatArray, met: FloatArray) ->
     for row, number in zip(rows, crease, strict=True):
         out[row] = OF_CREASE.get(body.creases[number].kind, RayStatus.NON_SMOOTH)
     return out
+
+
+class Starts(NamedTuple):
+    """Starts of one incidence in the order of their arcs.
+
+    Attributes
+    ----------
+    arcs : list of Arc
+        Those that hold rays.
+    arc : (n,)
+    position : (n,), L
+    points : (n, 3), L
+    state : (n,)
+        Codes of `creeping.shadow.status.STATUSES`.
+    spacing, arclength : (n,), L
+        Length of the line that each stands for, and the position modulo the length of its curve.
+    """
+
+    arcs: list[Arc]
+    arc: IntArray
+    position: FloatArray
+    points: FloatArray
+    state: IntArray
+    spacing: FloatArray
+    arclength: FloatArray
+
+    @classmethod
+    def of(cls, line: ShadowLine, n_rays: int | None, launch_from: str) -> "Starts":
+        """The launch points of a line: so many, or at the spacing of its points; one at least on each arc."""
+        arcs = line.arcs(launch_from)
+        if n_rays is None:
+            shares = [(a.end - a.start) / line.curves[a.curve].length * len(line.curves[a.curve].points) for a in arcs]
+            n_rays = sum(max(1, round(share)) for share in shares)
+            if len(arcs) > 1:
+                n_rays = min(n_rays, max(MANY, FEW * len(arcs)))
+        launch = line.launch_points(max(n_rays, len(arcs)), launch_from)
+        there = np.flatnonzero(launch.there[0])
+        _, arc = np.unique(launch.arc_index[0, there], return_inverse=True)
+        position, found = launch.arclength[0, there].copy(), []
+        for number in range(int(arc.max(initial=-1)) + 1):
+            mine = np.flatnonzero(arc == number)
+            curve, spacing = int(launch.curve_index[0, there[mine[0]]]), launch.spacing[0, there[mine]]
+            round_ = np.cumsum(np.diff(position[mine], prepend=0.0) < 0)
+            position[mine] += round_ * line.curves[curve].length
+            closed = bool(launch.closed[0, there[mine[0]]] == 1)
+            begin = float(position[mine[0]]) - (0.0 if closed else 0.5 * float(spacing[0]))
+            found.append(Arc(curve, begin, begin + float(np.sum(spacing)), closed))
+        state = launch.state[0, there].astype(np.int64)
+        return cls(
+            found, arc, position, launch.points[0, there], state, launch.spacing[0, there], launch.arclength[0, there]
+        )
+
+    @classmethod
+    def at(cls, line: ShadowLine, arcs: list[Arc], arc: IntArray, position: FloatArray) -> "Starts":
+        """Those at positions of the line (n,), (n,)."""
+        points, state = np.empty((len(arc), 3)), np.empty(len(arc), dtype=np.int64)
+        for number, one in enumerate(arcs):
+            mine = np.flatnonzero(arc == number)
+            points[mine] = line.curves[one.curve].at(position[mine])
+            state[mine] = line.curves[one.curve].state_at(position[mine])
+        lengths = np.array([line.curves[one.curve].length for one in arcs])
+        return cls(arcs, arc, position, points, state, np.full(len(arc), np.nan), position % lengths[arc])
+
+    def joined(self, more: "Starts") -> tuple["Starts", IntArray]:
+        """Both in order, and where each comes from in the one followed by the other."""
+        arc, position = np.concatenate([self.arc, more.arc]), np.concatenate([self.position, more.position])
+        points, state = np.concatenate([self.points, more.points]), np.concatenate([self.state, more.state])
+        order = np.lexsort((position, arc))
+        arc, position, spacing = arc[order], position[order], np.empty(len(order))
+        for number, one in enumerate(self.arcs):
+            mine = arc == number
+            s, long = position[mine], one.end - one.start
+            # half the way to either neighbour
+            ends = [s[-1] - long, *s, s[0] + long] if one.closed else [2 * one.start - s[0], *s, 2 * one.end - s[-1]]
+            spacing[mine] = 0.5 * (np.array(ends[2:]) - np.array(ends[:-2]))
+        arclength = np.concatenate([self.arclength, more.arclength])[order]
+        return Starts(self.arcs, arc, position, points[order], state[order], spacing, arclength), order
+
+    def launch_points(self, line: ShadowLine) -> LaunchPoints:
+        """As launch points of one incidence."""
+        curve = np.array([self.arcs[k].curve for k in self.arc], dtype=np.int64)
+        rows: tuple[Any, ...] = (
+            self.points,
+            self.arclength,
+            curve,
+            self.arc.astype(float),
+            self.spacing,
+            np.array([self.arcs[k].closed for k in self.arc], dtype=float),
+            self.state,
+        )
+        return LaunchPoints(line.wave[None], *(row[None] for row in rows))
+
+
+class Losses(NamedTuple):
+    """Shares, from 0 to 1, that edges and tips take; 0 of a smooth body.
+
+    Attributes
+    ----------
+    line : float
+        Of the length of the shadow line: it goes on along edges, where no creeping ray starts.
+    rays : float
+        Of the rays, that end at an edge or a tip, each by what is left of its wave there.
+    outline : float
+        Of the outline of the lit side seen along d, that has no creeping wave.
+    """
+
+    line: float
+    rays: float
+    outline: float
+
+
+def losses_of(fan: "RayFan", wavenumber: float | None = None) -> Losses:
+    """Losses of a fan at a wavenumber, 1/L; where k rho is 10 at the median of the launch points if not given."""
+    return Losses(fan.line.edge_share, _of_rays(fan, wavenumber), outline_share(fan.line))
+
+
+def _of_rays(fan: "RayFan", wavenumber: float | None) -> float:
+    launched = fan.launched
+    ended = launched & np.isin(fan.status, AT_CREASES)
+    if not np.any(ended):
+        return 0.0
+    k = IN_RANGE * float(np.median(fan.curvature[launched, 0])) if wavenumber is None else wavenumber
+    # a ray that has ended stays where it is, and so does its attenuation
+    left = np.exp(-np.cbrt(max(k, 0.0) / 2) * fan.attenuation[ended, -1] * HARD_DECAY)
+    return float(np.sum(fan.spacing[ended] * left) / np.sum(fan.spacing[launched]))
+
+
+def outline_share(line: "ShadowLine") -> float:
+    """Share of the outline that is on edges and tips."""
+    lost = line.at_tips + sum(_across(part.points, line.direction) for part in line.on_edges)
+    if not lost:
+        return 0.0
+    kept = 0.0
+    for curve in line.curves:
+        for start, end, status in curve.arcs:
+            if status == "attached":
+                kept += _across(curve.at(np.linspace(start, end, 257)), line.direction)
+    return float(lost / (lost + kept))
+
+
+def _across(points: FloatArray, direction: FloatArray) -> float:
+    """Length of a polyline seen along d, L."""
+    chords = np.diff(points, axis=0)
+    return float(np.sum(np.linalg.norm(chords - (chords @ direction)[:, None] * direction, axis=1)))
+
+
+def non_smooth_from(body: Surface, points: FloatArray, times: FloatArray) -> FloatArray:
+    """Travel time (rays,) of the last place before a non-smooth region, inf on rays that do not come there."""
+    non_smooth: Any = getattr(body, "non_smooth", None)
+    if non_smooth is None or not points.size:
+        return np.full(len(points), np.inf)
+    # between the steps on chords: non-smooth places may be small
+    parts = int(np.ceil(np.max(np.diff(times), initial=0.0) / (NON_SMOOTH_SPACING * size(body)))) or 1
+    fine = np.interp(np.arange((len(times) - 1) * parts + 1) / parts, np.arange(len(times)), times)
+    share = (np.arange(parts) / parts)[:, None]
+    found = np.full(len(points), np.inf)
+    for first in range(0, len(points), NON_SMOOTH_BLOCK):
+        path = points[first : first + NON_SMOOTH_BLOCK, :, None]
+        dense = path[:, :-1] + share * (path[:, 1:] - path[:, :-1])
+        dense = np.concatenate([dense.reshape(len(path), -1, 3), path[:, -1]], axis=1)
+        met = non_smooth(dense)
+        before = np.maximum(np.argmax(met, axis=1) - 1, 0)
+        found[first : first + NON_SMOOTH_BLOCK] = np.where(met.any(axis=1), fine[before], np.inf)
+    return found

@@ -28,19 +28,16 @@ from creeping.geodesics.piece_trace import Passages
 from creeping.geodesics.pieces import passages, trace_pieces
 from creeping.geodesics.states import ATTENUATION, P, X, known_steps, pack, whole_lanes
 from creeping.geometry.arguments import flag, one_of, real_number, whole_number
+from creeping.geometry.checks import unit_of
 from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
+from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.kept import kept
-from creeping.geometry.speed import speed_of, speed_values
 from creeping.geometry.surface import Surface, fingerprint, size
-from creeping.geometry.unit import unit_of
-from creeping.rays.ends import ends_of
-from creeping.rays.losses import Losses, losses_of
+from creeping.rays.ends import Losses, Starts, ends_of, losses_of
 from creeping.rays.reach import AUTO, IN_RANGE, ray_length
-from creeping.rays.spreading import spread, zeros_passed
-from creeping.rays.starts import Starts
 from creeping.rays.status import LAUNCHED, LINE_STATUS, RayStatus
-from creeping.rays.transport import Flow, carried, checked_flow
+from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
 from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
 from creeping.shadow.line import ShadowLine, checked_launch_from
 from creeping.shadow.status import NO_RAY

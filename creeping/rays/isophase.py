@@ -4,6 +4,11 @@ Ray sigma meets the level at t(sigma) = level, or level - d.x0(sigma); of a poin
 Between two steps the ray is the quintic polynomial with the positions, velocities x' and accelerations x'' of both
 ends, put back on the body.
 
+Curves in the plane of two angles, cut where an angle jumps.
+
+An angle jumps by 2 pi across its seam at +-pi: both ends are carried on to the seam. An azimuth jumps by about pi where
+a curve passes a pole: no line in the plane belongs there, and the ends stay as they are.
+
 Sources: [YC06b]; Derivations, R14.
 """
 
@@ -20,16 +25,18 @@ from creeping._typing import ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import vector_field
 from creeping.geometry.arguments import flag, one_of, real_array
+from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.creased import is_creased
-from creeping.geometry.speed import speed_of, speed_values
+from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.surface import project
-from creeping.geometry.unit import UNKNOWN, unit_of
-from creeping.rays.angle_seams import split_at_seam
 from creeping.rays.fan import RayFan
 from creeping.rays.status import AT_CREASES
 
 MOST_LEVELS = 100_000
 """Levels of one call."""
+
+POLE_JUMP = np.pi / 2
+"""Step of an angle, seams apart, that only the passage of a pole makes on a well sampled curve."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -221,3 +228,48 @@ class _Hermite:
         points += h**2 * 0.5 * (s**2 - cube * (3 - 3 * s + s**2)) * self.acceleration[rays, k]
         points += h**2 * 0.5 * cube * (1 - 2 * s + s**2) * self.acceleration[rays, k + 1]
         return project(self.fan.body, points)
+
+
+def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:
+    """Cut a curve of angles at seams and poles.
+
+    Parameters
+    ----------
+    parameters : (m, 2)
+        Angles in [-pi, pi].
+    closed : bool
+        Whether the last point is joined to the first.
+
+    Returns
+    -------
+    list of (k, 2)
+        Pieces in order; no step of a piece exceeds pi/2.
+    """
+    path = np.concatenate([parameters, parameters[:1]]) if closed else parameters
+    if np.all(np.abs(np.diff(path, axis=0)) <= POLE_JUMP):
+        return [np.array(path)] if len(path) > 1 else []
+    pieces: list[FloatArray] = []
+    current = [path[0]]
+    for after in path[1:]:
+        jump = after - current[-1]
+        short = jump - 2 * np.pi * np.round(jump / (2 * np.pi))
+        if np.any(np.abs(short) > POLE_JUMP):
+            pieces.append(np.array(current))
+            current = [after]
+            continue
+        # a step may cross the seams of both angles
+        for axis in (0, 1):
+            jump = after - current[-1]
+            if abs(jump[axis]) <= np.pi:
+                continue
+            side = np.sign(current[-1][axis]) or 1.0
+            short = jump - 2 * np.pi * np.round(jump / (2 * np.pi))
+            share = (side * np.pi - current[-1][axis]) / short[axis] if short[axis] != 0 else 0.0
+            crossing = current[-1] + np.clip(share, 0.0, 1.0) * short
+            entry = crossing.copy()
+            crossing[axis], entry[axis] = side * np.pi, -side * np.pi
+            pieces.append(np.array([*current, crossing]))
+            current = [entry]
+        current.append(after)
+    pieces.append(np.array(current))
+    return [piece for piece in pieces if len(piece) > 1]

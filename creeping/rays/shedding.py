@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.distinct import first_of_equals
+from creeping.geometry.directions import first_of_equals
 from creeping.geometry.quadrature import SYMMETRIC, nearest_points
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
-from creeping.shadow.occlusion import occluded
+from creeping.shadow.attachment import occluded
 
 BLOCK = 4_000_000
 """Values of a function on a strip for several observers that are held at once."""

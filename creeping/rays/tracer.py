@@ -20,13 +20,12 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
-from creeping.geometry.evaluators import evaluators
-from creeping.geometry.speed import speed_of
+from creeping.geometry.evaluators import evaluators, speed_of
 from creeping.geometry.surface import Surface, size
-from creeping.rays.nonsmooth import non_smooth_from
+from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
-from creeping.rays.single_rays import SingleRays
-from creeping.shadow.moving import moved_onto_lines
+from creeping.rays.reach import SingleRays
+from creeping.shadow.many import moved_onto_lines
 
 TURN = 0.12
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 1e-9."""

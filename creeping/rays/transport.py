@@ -2,18 +2,28 @@
 
 Rays of an incidence start in blocks of their own, the last one filled up: a tracer that adapts its step to a block
 then gives the same, bit for bit, in whatever company an incidence is computed.
+
+Spreading of rays launched from a shadow line: J, J' and the caustics passed.
+
+    J = c I,  I(t) = I(0) M11(t) + I'(0) M12(t),  I(0) = 1/c,  I'(0) = (J'(0) - (p.grad c))/c,
+
+M the Jacobi matrix that the flow carries along; J(0), J'(0) of `creeping.geodesics.equations.launch_spreading`.
+
+Sources: Derivations, R3 to R5 and R19.
 """
 
 from typing import Protocol
 
 import numpy as np
 
-from creeping._typing import FloatArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.geodesics.equations import launch_spreading
 from creeping.geodesics.integrator import ErrorEstimate
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.arguments import checked_body, shown
 from creeping.geometry.creased import is_creased
+from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.incident import headings
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK
@@ -82,3 +92,61 @@ def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: 
     whole = np.full((n, rays, len(times), components), np.nan)
     whole[some] = states
     return whole
+
+
+def spread(
+    body: Surface,
+    points: FloatArray,
+    tangents: FloatArray | None,
+    directions: FloatArray,
+    openings: FloatArray,
+    states: FloatArray,
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """J, J' (rays, steps) and the rays whose launch point has no speed.
+
+    Parameters
+    ----------
+    body : Surface
+    points, tangents, directions : (rays, 3)
+        Of the line, where the rays start, and those of the launch; without a weight the tangents are not needed.
+    openings : (rays,), 1/L
+        1/R of the wave that launches them, 0 of a plane wave.
+    states : (rays, steps, 10 or more)
+        What the flow carried from there.
+    """
+    speed = speed_of(body)
+    if speed is None:
+        none = np.zeros(len(points), dtype=bool)
+        if not np.any(openings):
+            # J(0) = 1, J'(0) = 0: the first column of the Jacobi matrix
+            return states[..., M11], states[..., M21], none
+        a = openings[:, None]
+        return states[..., M11] + a * states[..., M12], states[..., M21] + a * states[..., M22], none
+    assert tangents is not None
+    first = launch_spreading(body, points, directions, tangents, openings)
+    x, p = states[..., X], states[..., P]
+    c, c0 = speed_values(body, x), speed_values(body, points)
+    rate = np.sum(speed.gradient(x) * p, axis=-1)
+    stalled = c0 < 1e-12 * float(np.max(c, initial=0.0))
+    c0 = np.where(stalled, np.nan, c0)
+    i = first[:, 0] / c0
+    j = (first[:, 1] - np.sum(speed.gradient(points) * directions, axis=-1)) / c0
+    reduced = i[:, None] * states[..., M11] + j[:, None] * states[..., M12]
+    reduced_rate = i[:, None] * states[..., M21] + j[:, None] * states[..., M22]
+    # J' = c I' + (dc/dt) I with dc/dt = c grad c.p
+    return c * reduced, c * reduced_rate + c * rate * reduced, stalled
+
+
+def zeros_passed(spreading: FloatArray) -> IntArray:
+    """Sign changes of J up to each step; a step that lands on a zero counts once it is passed."""
+    sign = np.sign(spreading)
+    if np.all(sign):
+        flips = sign[:, 1:] * sign[:, :-1] < 0
+        return np.concatenate([np.zeros_like(flips[:, :1], dtype=np.int64), np.cumsum(flips, axis=1)], axis=1)
+    count = np.zeros(sign.shape, dtype=np.int64)
+    last = sign[:, 0].copy() if sign.shape[1] else np.zeros(0)
+    for k in range(1, sign.shape[1]):
+        flipped = sign[:, k] * last < 0
+        count[:, k] = count[:, k - 1] + flipped
+        last = np.where(sign[:, k] != 0, sign[:, k], last)
+    return count

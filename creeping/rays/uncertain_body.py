@@ -18,8 +18,8 @@ from creeping.geometry.arguments import one_of, whole_number
 from creeping.geometry.incident import headings, openings
 from creeping.geometry.surface import project
 from creeping.rays.fan import RayFan, launch
-from creeping.rays.spreading import spread
 from creeping.rays.status import RayStatus
+from creeping.rays.transport import spread
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.line import shadow_line
 from creeping.storage.memory import within_budget

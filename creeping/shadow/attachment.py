@@ -2,6 +2,13 @@
 
 A position is (arc, arclength) with the arclength unwrapped, so that it grows along an arc that crosses the start of its
 closed curve; the point is that of the arclength modulo the curve's length.
+
+Whether the body stands before a point: F along the backward ray x - t d, t > 0.
+
+F starts there with F = 0, F' = 0, F'' = d.Hd at a point of the shadow line, so behind a convex point it first rises;
+the ray enters the body where F is negative at a sample, or at a minimum between samples.
+
+Sources: [K84]; Derivations, R10.
 """
 
 from dataclasses import dataclass, fields
@@ -11,8 +18,10 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import REMEDY, headings, openings, optical_paths, spherical
 from creeping.geometry.surface import Surface
+from creeping.kernels.threads import in_slices
 from creeping.shadow.status import NO_RAY
 
 
@@ -155,3 +164,28 @@ def line_tangents(body: Surface, points: FloatArray, direction: FloatArray) -> F
     tangent = np.cross(body.gradient(points), np.einsum("nij,nj->ni", body.hessian(points), direction))
     with np.errstate(invalid="ignore"):
         return np.asarray(tangent / np.linalg.norm(tangent, axis=-1, keepdims=True))
+
+
+def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: FloatArray | float = np.inf) -> BoolArray:
+    """Whether the backward ray x - t d, 0 < t < reach, enters the body: points (n, 3), d (3,) or (n, 3) -> (n,).
+
+    It leaves a point along the normal's side, or touches there from a convex side.
+    """
+    from creeping.shadow.kernels.arcs import blocked_rays
+
+    hidden = np.zeros(len(points), dtype=bool)
+    if not len(points):
+        return hidden
+    # copies: of arrays that cannot be written kernels would be compiled once more
+    directions = np.array(np.broadcast_to(direction, points.shape), dtype=float, order="C")
+    limit = np.array(np.broadcast_to(reach, len(points)), dtype=float)
+    box = np.ascontiguousarray(body.bounds, dtype=float)
+    columns = np.ascontiguousarray(points.T, dtype=float)
+    with evaluators(body) as parts:
+
+        def run(part: slice) -> None:
+            some = np.ascontiguousarray(columns[:, part])
+            blocked_rays(*parts[:2], box, directions[part], some, limit[part], hidden[part])
+
+        in_slices(run, len(points), seconds=1e-5)
+    return hidden

@@ -15,10 +15,9 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
 from creeping.geometry.creased import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
-from creeping.shadow.attachment import Arc, LaunchPoints
+from creeping.shadow.attachment import Arc, LaunchPoints, occluded
 from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.edges import EdgePart, parts_on_edges, unit_normals
-from creeping.shadow.occlusion import occluded
 from creeping.shadow.panels import PanelCurve, fit_panels, newton_step
 from creeping.shadow.piece_curves import PieceCurve, curves_on, edge_on
 from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES

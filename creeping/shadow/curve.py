@@ -14,9 +14,9 @@ import numpy as np
 from creeping._presenting import DrawnOnBody
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
+from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import REMEDY, headings, spherical
 from creeping.geometry.surface import Surface
-from creeping.geometry.unit import unit_of
 from creeping.shadow.nodes import LineNodes, polished
 from creeping.shadow.panels import PanelCurve, fit_panels
 from creeping.shadow.status import CONCAVE, STATUSES

@@ -20,11 +20,11 @@ from creeping._presenting import DrawnOnBody, brief
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import checked_body, whole_number
+from creeping.geometry.checks import unit_of
 from creeping.geometry.creased import is_creased
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction
-from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface, normal, size
-from creeping.geometry.unit import unit_of
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.creased import creased_curves, launched_from
 from creeping.shadow.curve import ShadowCurve, counted, interpolated, spelled

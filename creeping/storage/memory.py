@@ -1,12 +1,16 @@
 """How much memory may be asked for: what is too much is refused before it is allocated, with its size and a remedy.
 
 The budget is $CREEPING_MEMORY (bytes, or with K, M, G or T), or half of the memory that is free.
+
+Libraries of the extras, which an installation may lack.
 """
 
 import os
+from importlib import import_module
 from pathlib import Path
 
-from creeping.errors import InvalidInputError
+from creeping._typing import Any
+from creeping.errors import CreepingError, InvalidInputError
 
 UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 UNKNOWN = 8 * 10**9
@@ -77,3 +81,28 @@ def _free() -> float:
         return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, ValueError, OSError):
         return UNKNOWN
+
+
+def required(package: str, *, use: str, extra: str) -> Any:
+    """Import a package of an extra.
+
+    Parameters
+    ----------
+    package : str
+    use, extra : str
+        What needs it, and the extra that brings it.
+
+    Raises
+    ------
+    CreepingError
+        If it is missing, with the command that installs it.
+
+    Examples
+    --------
+    >>> required("json", use="nothing", extra="sweep").dumps(1)
+    '1'
+    """
+    try:
+        return import_module(package)
+    except ModuleNotFoundError as error:
+        raise CreepingError(f"{use} {error.name}: pip install 'creeping[{extra}]'") from error

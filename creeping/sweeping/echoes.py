@@ -27,8 +27,8 @@ from creeping.phaseflow.tuning.flow_choice import choose_flow
 from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
 from creeping.shadow.line import shadow_line
-from creeping.sweeping.accessor import SweepFields
 from creeping.sweeping.request import AMPLITUDES
+from creeping.sweeping.results import SweepFields
 from creeping.sweeping.run import Progress, sweep_directions
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
-from creeping.sweeping.between.choice import sweeper_of
+from creeping.sweeping.between.worth import sweeper_of
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.solved_fields import NoFlow
 

@@ -15,8 +15,8 @@ from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
 from creeping.geometry.arguments import real_array
 from creeping.geometry.directions import unit_directions
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.parts import why_no_rays
-from creeping.geometry.speed import speed_of
 from creeping.geometry.surface import Surface
 from creeping.rays.reach import AUTO, asked_length, body_length
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES

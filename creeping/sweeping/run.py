@@ -28,8 +28,7 @@ from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
 from creeping.sweeping.storage.layout import UNDONE
-from creeping.sweeping.storage.mending import mended
-from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.storage.store import SweepStore, mended
 from creeping.sweeping.sweeper import Passed, Sweeper
 
 if TYPE_CHECKING:

@@ -26,9 +26,8 @@ from creeping.rays.transport import Flow, carried
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.many import ShadowLines, shadow_lines
 from creeping.shadow.status import SINGULAR
-from creeping.sweeping.creased_fields import creased_lines, fill_creased
-from creeping.sweeping.field_arrays import FieldArrays
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
+from creeping.sweeping.solved_fields import FieldArrays, creased_lines, fill_creased
 
 BATCH, FIELD_BATCH = 16_384, 65_536
 """Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few

@@ -7,22 +7,21 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.clouds import PieceCloud, PointCloud
 from scatterers.base.level_body import LevelBody
+from scatterers.base.quadrics import PieceCloud, PointCloud
 from scatterers.base.two_fits import good_fit, require_one_body
-from scatterers.pieces.crease import Crease
 from scatterers.pieces.fitting import fitted_pieces
+from scatterers.pieces.patch import Crease
 from scatterers.pieces.spline_body import SplinePiece, SplinePieces
 from scatterers.sphere_map.star import star_map
 from scatterers.spline import cache as _fit_cache
-from scatterers.spline.report import FitReport
-from scatterers.spline.samples import Samples
+from scatterers.spline.cloud import FitReport, Samples
 from scatterers.spline.tensor import TensorSpline
 from scatterers.triangles.quality import MeshQuality
 
 if TYPE_CHECKING:
-    from scatterers.atlas.charts import CubeSphereAtlas
     from scatterers.atlas.monge.atlas import MongeAtlas
+    from scatterers.sphere_map.star import CubeSphereAtlas
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]

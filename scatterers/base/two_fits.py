@@ -14,11 +14,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.clouds import Nearer, PointCloud
-from scatterers.spline.compared import curvatures, left_at, normal_curvatures, principal_curvatures, tangents
+from scatterers.base.quadrics import Nearer, PointCloud
+from scatterers.spline.cloud import (
+    FitReport,
+    Samples,
+    curvatures,
+    left_at,
+    normal_curvatures,
+    principal_curvatures,
+    tangents,
+)
 from scatterers.spline.fitting import MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
-from scatterers.spline.report import FitReport
-from scatterers.spline.samples import Samples
 from scatterers.triangles.subdivision import BLIND, Source, turns, unseen
 
 FloatArray = NDArray[np.float64]

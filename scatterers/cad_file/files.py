@@ -1,4 +1,23 @@
-"""Points and exact normals of a CAD file's faces, and where faces do not join smoothly."""
+"""Points and exact normals of a CAD file's faces, and where faces do not join smoothly.
+
+Solids of a CAD file taken apart: bodies that touch share points, edges or whole faces, and each is closed by itself.
+
+A face between two solids bounds both. Its triangles are taken twice, once with the other triangles of each solid, and
+vertices are merged within a solid only; so parts are what they are in the file, and the outer surface of all is that of
+their union. Faces of no solid stay together.
+
+Where faces of a CAD file join smoothly while the curvature jumps, from the normals that the faces have.
+
+Across an edge of the mesh that lies on the joint of two faces, each face bends by
+
+    kappa = (n_far - n_near).t / (x_far - x_near).t,
+
+t across the edge in the face, near the middle of the edge and far the corner opposite to it; each errs by half an edge
+times the change of kappa along t. The median of kappa_left - kappa_right over the joint of two faces tells a jump from
+that: between a fillet and a plane it is all of the larger.
+
+Sources: Derivations, B13.
+"""
 
 import importlib.util
 import re
@@ -13,9 +32,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.triangles.choice import Choice, whole_body
+from scatterers.triangles.decks import what_else
 from scatterers.triangles.files import UNITS, TriangleMesh
-from scatterers.triangles.kinds import what_else
+from scatterers.triangles.quality import Choice, whole_body
+from scatterers.triangles.topology import cleaned, edges_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -37,6 +57,11 @@ times the points at most."""
 # what a STEP file may call its length unit
 PREFIXES = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".MICRO.": "um", ".KILO.": "km"}
 IGES_UNITS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 9: "um", 10: "cm"}
+Note = Callable[[str], None]
+JUMP = 0.3
+"""Of the larger curvature: where a resolved mesh's curvature only varies, two sides of an edge differ by less."""
+FLAT = 1e-3
+"""Curvature times edge below which a face counts as plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +136,6 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
     ModuleNotFoundError
         If gmsh is not installed.
     """
-    from scatterers.cad_file.joints import curvature_jumps
     from scatterers.triangles.topology import oriented
 
     of_file = _chosen(path, reading, curved)
@@ -167,8 +191,6 @@ class _Chosen(NamedTuple):
 
 def _chosen(path: Path, reading: CadReading, curved: int) -> _Chosen:
     """Triangles of a file by gmsh, more where little of it is chosen."""
-    from scatterers.cad_file.solids import cleaned_apart
-
     kind = kind_of(path)
     if importlib.util.find_spec("gmsh") is None:
         raise ModuleNotFoundError(
@@ -385,3 +407,89 @@ def _joined(
         if len(faces) == 2
     ]
     return mean, tuple(lines), sharp
+
+
+def cleaned_apart(
+    name: str, points: FloatArray, triangles: IntArray, of: IntArray, bounds: IntArray, note: Note
+) -> tuple[FloatArray, IntArray]:
+    """Vertices and triangles of all solids, cleaned one by one.
+
+    Parameters
+    ----------
+    points : (n, 3)
+    triangles : (m, 3)
+    of : (m,)
+        Face of each triangle.
+    bounds : (j, 2)
+        Faces and the solids that they bound.
+    """
+    solids = np.unique(bounds[:, 1])
+    groups = [np.isin(of, bounds[bounds[:, 1] == solid, 0]) for solid in solids]
+    groups.append(~np.isin(of, bounds[:, 0]))
+    groups = [mine for mine in groups if mine.any()]
+    if len(groups) < 2:
+        return cleaned(name, points, triangles, note, note)
+    vertices, corners, count = [], [], 0
+    notes: list[str] = []
+    for mine in groups:
+        used, own = np.unique(triangles[mine], return_inverse=True)
+        x, t = cleaned(name, points[used], own.reshape(-1, 3).astype(np.int64), notes.append, notes.append)
+        vertices.append(x)
+        corners.append(t + count)
+        count += len(x)
+    if notes:
+        note(notes[0] + (f"; {len(notes) - 1} more of that kind in other solids" if len(notes) > 1 else ""))
+    return np.concatenate(vertices), np.concatenate(corners)
+
+
+def curvature_jumps(
+    vertices: FloatArray, triangles: IntArray, faces: IntArray, normals: FloatArray, level: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Edges (e,) of the joints of two faces along which the curvature jumps.
+
+    Parameters
+    ----------
+    vertices, triangles : (n, 3), L, and (m, 3)
+    faces : (m,)
+        Face of each triangle.
+    normals : (m, 3, 3)
+        Outward at the corners, each of the triangle's own face.
+    level : (e,) bool
+        Edges, in the order of `scatterers.triangles.topology.edges_of`, at which faces join smoothly.
+    """
+    jumps = np.zeros(len(level), dtype=bool)
+    if not level.any():
+        return jumps
+    at = np.flatnonzero(level)
+    order = np.argsort(edges_of(triangles).number, kind="stable").reshape(-1, 2)[level]
+    bends = np.stack([_bend(vertices, triangles, normals, side) for side in order.T], axis=1)
+    sides = np.sort(faces[order // 3], axis=1)
+    _, joint = np.unique(sides, axis=0, return_inverse=True)
+    # always minus the one of the lower face
+    bends = np.where((faces[order[:, :1] // 3] == sides[:, :1]), bends, bends[:, ::-1])
+    length = np.linalg.norm(vertices[triangles.ravel()[order[:, 0]]] - vertices[_next(triangles, order[:, 0])], axis=1)
+    for number in range(int(joint.max()) + 1):
+        mine = joint.ravel() == number
+        jump = abs(float(np.median(bends[mine, 0] - bends[mine, 1])))
+        larger = float(np.median(np.abs(bends[mine]).max(axis=1)))
+        if larger * float(np.median(length[mine])) > FLAT and jump > JUMP * larger:
+            jumps[at[mine]] = True
+    return jumps
+
+
+def _next(triangles: IntArray, corner: IntArray) -> IntArray:
+    """Vertex that follows a corner (k,) of the flat triangles."""
+    return np.asarray(triangles.ravel()[np.where(corner % 3 == 2, corner - 2, corner + 1)])
+
+
+def _bend(vertices: FloatArray, triangles: IntArray, normals: FloatArray, corner: IntArray) -> FloatArray:
+    """Curvature (k,) of the faces of triangles across the edges that begin at these corners, 1/L."""
+    row, first = corner // 3, corner % 3
+    second, far = (first + 1) % 3, (first + 2) % 3
+    a, b, c = (vertices[triangles[row, k]] for k in (first, second, far))
+    n_near = 0.5 * (normals[row, first] + normals[row, second])
+    across = c - 0.5 * (a + b)
+    along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1, keepdims=True), 1e-300)
+    t = across - np.sum(across * along, axis=1, keepdims=True) * along
+    square = np.maximum(np.sum(t**2, axis=1), 1e-300)
+    return np.asarray(np.sum((normals[row, far] - n_near) * t, axis=1) / square)

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.body import Body
+from scatterers.base.level_body import Body
 from scatterers.kernels.compiled import Compiled
-from scatterers.pieces.crease import Crease
+from scatterers.pieces.patch import Crease
 from scatterers.spline.tensor import SYMMETRIC, evaluated
 
 FloatArray = NDArray[np.float64]

@@ -5,7 +5,20 @@ With (u, v, w) = M x, r = sqrt(u^2 + v^2), each segment is a piece F(x) = G(r, w
 else a joint, or a seam between parts of one line or arc. Where the profile meets the axis at another than a right angle
 there is a tip.
 
-Sources: [C76, sec. 3-3].
+Triangles between rings of points: the tiles of bodies of revolution and of their affine images.
+
+A ring at the radius r has n points at equal parts of its length, (r cos phi, r sin phi/stretch). Between two rings the
+fractions (i + 1/2)/n of both are put in order; where one passes, its ring advances by a point and a triangle is closed.
+
+Few squares that cover a body of revolution: parts of its profile turned about the axis by parts of a turn.
+
+    x(u, v) = (r cos phi, r sin phi, w),   (w, r) along the profile by u,   phi by v,   x_u x x_v out of the body
+
+From the axis u goes outwards, and else upwards; where u goes up, phi goes back.
+
+Charts of a body of pieces that has no edges: six over its radial map from the middle of its box.
+
+Sources: [C76, sec. 3-3]; Derivations, B14.
 """
 
 import math
@@ -17,18 +30,27 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.body import positive
+from scatterers.base.level_body import positive
 from scatterers.exact.body import SHARP, CreasedBody, NoCharts, Piece
 from scatterers.exact.profile import Segment
-from scatterers.exact.rings import ring_angles, ring_sizes, strip
-from scatterers.exact.squares import Squares, revolved_squares
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
-from scatterers.kernels.spline_constants import HEADER
-from scatterers.pieces.crease import Crease
+from scatterers.kernels.tensor import HEADER
+from scatterers.pieces.patch import Crease
 
 if TYPE_CHECKING:
-    from scatterers.atlas.charts import CubeSphereAtlas
+    from scatterers.sphere_map.star import CubeSphereAtlas
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from types import FunctionType
+from typing import Any, NamedTuple
+
+from scatterers.kernels.compiled import OPTIONS
+from scatterers.kernels.revolved import value_and_gradient
+from scatterers.sphere_map.radial import RadialMap, Spine
+from scatterers.sphere_map.star import CubeSphereAtlas
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -45,6 +67,78 @@ SECTORS = 6
 MOST_TILES = 1e7
 DENSE = 513
 """Points of a segment by which its length is measured."""
+FEWEST = 6
+"""Points on a ring, however short."""
+STEEP = 1.1
+"""Turn of the profile along a square, radians, at most."""
+Tiles = Callable[[float], tuple[FloatArray, FloatArray, NDArray[np.int64]]]
+# nodes along an axis plus four, of one cell
+ONE_CELL = 6.0
+SLACK = 0.1
+"""By which the box of the map is wider than the body, in its half widths."""
+
+
+class Squares(NamedTuple):
+    """Squares 0 <= u, v <= 1 that cover a body.
+
+    Attributes
+    ----------
+    vertices : (l, 3), L
+    places : (m, n, n, 3), L
+        Points of the body at u and v.
+    corners : (m, 4)
+        Numbers of the vertices at (0, 0), (1, 0), (1, 1), (0, 1). On the axis the whole side u = 0 is one of them.
+    pieces : (m,)
+    """
+
+    vertices: FloatArray
+    places: FloatArray
+    corners: IntArray
+    pieces: IntArray
+
+
+def revolved_squares(profile: Sequence[Segment], sectors: int, at: FloatArray) -> Squares:
+    """Squares of a profile about the axis w, ``sectors`` in a ring, and their points at u and v ``at`` (n,)."""
+    parts = [
+        (piece, segment, low, high)
+        for piece, segment in enumerate(profile)
+        for cuts in [_cuts(segment)]
+        for low, high in itertools.pairwise(cuts)
+    ]
+    heights, radii = np.array(
+        [parts[0][1].start, *(segment.point(np.array([high]))[0] for _, segment, _, high in parts)]
+    ).T
+    counts = np.where(radii > 0, sectors, 1)
+    starts, number = np.concatenate([[0], np.cumsum(counts)]), np.arange(sectors)
+    phi, after = 2 * np.pi * number / sectors, np.roll(number, -1)
+    rings = [_turned(np.full(n, w), np.full(n, r), phi[:n]) for w, r, n in zip(heights, radii, counts, strict=True)]
+    places, corners, pieces = [], [], []
+    for k, (piece, segment, low, high) in enumerate(parts):
+        below, above = (starts[ring] + number % counts[ring] for ring in (k, k + 1))
+        one, two, v = after, number, 1 - at
+        if radii[k + 1] == 0:
+            low, high, below, above, one, two, v = high, low, above, below, number, after, at
+        w, r = segment.point(low + at * (high - low)).T[:, None, :, None]
+        places.append(_turned(w, r, phi[:, None, None] + 2 * np.pi / sectors * v))
+        corners.append(np.stack([below[one], above[one], above[two], below[two]], axis=1))
+        pieces.append(np.full(sectors, piece, dtype=np.int64))
+    return Squares(*map(np.concatenate, (rings, places, corners, pieces)))
+
+
+def _turned(w: FloatArray, r: FloatArray, phi: FloatArray) -> FloatArray:
+    """Points (..., 3) at heights w and distances r from the axis."""
+    return np.stack(np.broadcast_arrays(r * np.cos(phi), r * np.sin(phi), w), axis=-1)
+
+
+def _cuts(segment: Segment) -> FloatArray:
+    """Values of u from 0 to 1 between which a segment turns by no more than STEEP."""
+    u = np.linspace(0, 1, DENSE)
+    tangent = segment.tangent(u)
+    sine = tangent[:-1, 0] * tangent[1:, 1] - tangent[:-1, 1] * tangent[1:, 0]
+    turned = np.concatenate([[0.0], np.cumsum(np.abs(sine))])
+    count = max(1, math.ceil(turned[-1] / STEEP))
+    inner = np.interp(np.arange(1, count) / count * turned[-1], turned, u)
+    return np.concatenate([[0.0], inner, [1.0]])
 
 
 class Revolved(CreasedBody):
@@ -222,7 +316,6 @@ class Revolved(CreasedBody):
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
         if any(crease.kind in SHARP for crease in self.creases) or self._axes != (0, 1, 2) or self._stretch != 1:
             return NoCharts(super().atlas.reason)
-        from scatterers.exact.charts import charts
 
         return charts(self.bounds, self.tiles, lambda of_map: self._packed(self._profile, of_map))
 
@@ -253,3 +346,106 @@ def _towards(phi: FloatArray, sizes: IntArray) -> FloatArray:
     other = np.where(apex, 0.0, 1.0)
     middle = np.arctan2(np.sum(other * np.sin(phi), axis=-1), np.sum(other * np.cos(phi), axis=-1))
     return np.where(apex, middle[:, None], phi)
+
+
+@cache
+def _ring_length(stretch: float) -> tuple[FloatArray, FloatArray]:
+    """Angles in [0, 2 pi] and the length of the ring of radius 1 up to there."""
+    angles = np.linspace(0, 2 * np.pi, 4097)
+    middle = 0.5 * (angles[1:] + angles[:-1])
+    steps = np.hypot(np.sin(middle), np.cos(middle) / stretch) * angles[1]
+    return angles, np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def ring_angles(n: int, stretch: float) -> FloatArray:
+    """Angles (n,), radians, that divide a ring into parts of equal length."""
+    angles, lengths = _ring_length(stretch)
+    return np.asarray(np.interp(np.arange(n) * (lengths[-1] / n), lengths, angles))
+
+
+def ring_sizes(radii: FloatArray, edge: float, stretch: float) -> IntArray:
+    """Points on rings of these radii (n,), L, for parts of at most ``edge``, L; one where the radius is 0."""
+    length = radii * _ring_length(stretch)[1][-1]
+    return np.where(radii > 0, np.maximum(FEWEST, np.ceil(length / edge)), 1).astype(np.int64)
+
+
+def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:
+    """Corners of the triangles between a ring and the next one along the profile, counter-clockwise from outside.
+
+    Returns
+    -------
+    ring : (m, 3)
+        0 of a corner on the lower ring, 1 of one on the upper.
+    number : (m, 3)
+        Of the point on its ring.
+    """
+    # a single point is the corner of all, and never advances
+    below = (np.arange(lower) + 0.5) / lower if lower > 1 else np.zeros(0)
+    above = (np.arange(upper) + 0.5) / upper if upper > 1 else np.zeros(0)
+    of_upper = np.concatenate([np.zeros(len(below), dtype=np.int64), np.ones(len(above), dtype=np.int64)])
+    of_upper = of_upper[np.argsort(np.concatenate([below, above]), kind="stable")]
+    j = np.cumsum(of_upper) - of_upper
+    i = np.arange(len(of_upper)) - j
+    up = of_upper == 1
+    number = np.where(
+        up[:, None],
+        np.stack([i % lower, (j + 1) % upper, j % upper], axis=-1),
+        np.stack([i % lower, (i + 1) % lower, j % upper], axis=-1),
+    )
+    ring = np.where(up[:, None], [0, 1, 1], [0, 0, 1])
+    return ring.astype(np.int64), number
+
+
+@dataclass(frozen=True, eq=False)
+class RevolvedSpace:
+    """F of a body of revolution in a box; satisfies `scatterers.sphere_map.radial.SpaceLevel`.
+
+    Attributes
+    ----------
+    box : (2, 3), L
+    packed : callable
+        All parameters from those of the map.
+    """
+
+    box: FloatArray
+    packed: Callable[[FloatArray], FloatArray]
+
+    def flat(self, of_map: FloatArray) -> FloatArray:
+        """Parameters of the compiled functions: a grid of one cell, those of a map, those of the body."""
+        cell = [np.full(3, ONE_CELL), self.box[0], 1 / (self.box[1] - self.box[0]), of_map]
+        return self.packed(np.concatenate(cell))
+
+    @property
+    def sources(self) -> dict[str, Callable[..., None]]:
+        """Plain Python of the compiled functions."""
+        return {"level": evaluate, "forward": _forward()}
+
+
+def charts(bounds: FloatArray, tiles: Tiles, packed: Callable[[FloatArray], FloatArray]) -> CubeSphereAtlas | NoCharts:
+    """Six charts of a body that is seen whole from the middle of its box, none of another."""
+    half = 0.5 * (bounds[1] - bounds[0])
+    space = RevolvedSpace(np.stack([bounds[0] - SLACK * half, bounds[1] + SLACK * half]), packed)
+    sphere_map = RadialMap(space, 0.5 * (bounds[0] + bounds[1]), half, Spine.none())
+    points = tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
+    if hidden := int(np.sum(~(sphere_map.facing(points) > 0))):
+        return NoCharts(
+            f"the body is not star-shaped about the middle of its box: {hidden} of {len(points)} points are hidden; "
+            "no charts cover it, take its tiles"
+        )
+    return CubeSphereAtlas(sphere_map, sphere_map.compiled_locator)
+
+
+@cache
+def _forward() -> Callable[..., None]:
+    """The sphere map's function on this level, the same object at every call."""
+    from numba import njit
+
+    from scatterers.kernels import radial as kernels
+
+    space: dict[str, Any] = dict(vars(kernels))
+    space["value_and_gradient"] = njit(**OPTIONS)(value_and_gradient)
+    for name in ("_at", "_radius"):
+        space[name] = njit(**OPTIONS)(FunctionType(space[name].py_func.__code__, space, name))
+    # a file that does not exist: numba must not take the code that it keeps for splines
+    code = kernels.forward.__code__.replace(co_filename="<body of revolution>")
+    return FunctionType(code, space, "forward")

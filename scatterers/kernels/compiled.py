@@ -7,6 +7,11 @@ function fills x and the nine entries of d psi/ds by rows (xx, xy, xz, yx, ...),
 of unit length.
 Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.
 numba is imported at the first use, for a quick start: plain Python that several of them call is marked by `helper`.
+
+Compiled block functions as kernels take them, with their numba type known beforehand.
+
+numba finds the type of a function that is an argument anew at each call, by its signature: half of the time of a call
+for few points.
 """
 
 from collections.abc import Callable
@@ -16,19 +21,34 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+from numba import types
+
+# registers how numba passes such functions; else it does that itself after a first failure
+from numba.experimental import function_type as _function_type  # noqa: F401
+from numba.extending import typeof_impl
 from numpy.typing import NDArray
 
 from scatterers.kernels.cache import discard_stale
 from scatterers.kernels.private_cache import keep_private
 
 Kind = Literal["level", "locator", "forward", "inverse"]
+
+
 keep_private(Path(__file__).parents[1], discard_stale(Path(__file__).parents[1]))
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
 # products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+
+
 CLOSED_FORM = 50.0
+
+
 """Operations of the level of a quadric."""
+
+
 _helpers: list[Callable[..., Any]] = []
 
 
@@ -66,7 +86,7 @@ class Compiled:
 
     @property
     def function(self) -> Any:
-        """The compiled function, a `scatterers.kernels.entry.BlockFunction`."""
+        """The compiled function, a `scatterers.kernels.compiled.BlockFunction`."""
         return _compile(self.source, self.kind)
 
     @property
@@ -80,8 +100,6 @@ def _compile(source: Callable[..., None], kind: str) -> Any:
     from numba import cfunc, types
     from numba.extending import register_jitable
 
-    from scatterers.kernels.entry import BlockFunction
-
     while _helpers:
         register_jitable(**OPTIONS)(_helpers.pop())
     row, rows = types.float64[::1], types.float64[:, ::1]
@@ -94,3 +112,30 @@ def _compile(source: Callable[..., None], kind: str) -> Any:
     # code made from an expression has no file that numba could cache beside
     in_file = not source.__code__.co_filename.startswith("<")
     return BlockFunction(cfunc(signature, cache=in_file, **OPTIONS)(source))
+
+
+class BlockFunction(types.WrapperAddressProtocol):  # type: ignore[misc]
+    """A compiled block function.
+
+    Parameters
+    ----------
+    compiled : numba CFunc
+    """
+
+    def __init__(self, compiled: Any) -> None:
+        # kept: the address is valid as long as this lives
+        self._compiled, self._address = compiled, int(compiled.address)
+        self.numba_type = types.FunctionType(compiled._sig)
+
+    def signature(self) -> Any:
+        """Signature, for numba."""
+        return self._compiled._sig
+
+    def __wrapper_address__(self) -> int:
+        """Address, for numba."""
+        return self._address
+
+
+@typeof_impl.register(BlockFunction)  # type: ignore[untyped-decorator]
+def _numba_type(function: BlockFunction, _: Any) -> Any:
+    return function.numba_type

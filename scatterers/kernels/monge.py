@@ -4,6 +4,12 @@ A chart grows over a graph of points of the body from its centre, in the order o
 q = x - x0, so that it never leaps to another sheet over the same square. It ends before the first point with
 n.N < ``least``, or rho > ``longest``, or rho max|kappa| > ``most`` with the largest curvature of the points passed.
 
+Where values stand in the flat parameters of an atlas of Monge charts, which its compiled locator shares.
+
+Origin of the voxels, 1/side, their numbers along the axes, where the table of voxels begins, the least n.N and the
+largest |2u - 1|; then `CHART` values a chart: x0, E1, E2, N, 1/w, bounds of the height. The table gives for each voxel
+the place of its list of charts, which begins with its length.
+
 Sources: Derivations, B3.
 """
 
@@ -14,7 +20,12 @@ import numpy as np
 from numba import njit
 
 from scatterers.kernels.compiled import OPTIONS
-from scatterers.kernels.monge_layout import BEHIND, CHART, FIRST, LEAN, ORIGIN, OUTSIDE, PER_SIDE, SHAPE, VOXELS
+
+ORIGIN, PER_SIDE, SHAPE, VOXELS, LEAN, OUTSIDE = 0, 3, 4, 7, 8, 9
+FIRST = 10
+CHART = 15
+# added to the score of a chart that is not valid
+BEHIND = 1e3
 
 
 @njit(**OPTIONS)

@@ -7,14 +7,22 @@ module imports numba.
 Parameters: origin of the voxels (3), 1/side, their numbers along the axes (3), where the table of voxels begins, where
 that of the pieces does; the table gives for each voxel the place of its program, which stands behind its length; that
 of the pieces gives the place of the parameters of each spline.
+
+What stands in programs of bodies of pieces, which `scatterers.pieces.selection` shares with the compiled level.
 """
 
 import numpy as np
 from numba import njit
 
 from scatterers.kernels.compiled import OPTIONS
-from scatterers.kernels.pieces_layout import BESIDES, LARGER, MOST_PIECES
 from scatterers.kernels.tensor import second_derivatives, value_and_gradient
+
+LARGER, SMALLER, BESIDES = -1, -2, -3
+"""Of the last two values, in a program; the last names a plane."""
+MOST_PIECES = 8
+"""Values that a program holds at a time."""
+FIRST = 9
+"""Parameters before the tables."""
 
 
 @njit(**OPTIONS)

@@ -1,6 +1,6 @@
 """Compiled twins of `scatterers.sphere_map.radial.RadialMap`; importing this module imports numba.
 
-Parameters are those of the spline, `scatterers.kernels.spline_constants` says where.
+Parameters are those of the spline, `scatterers.kernels.tensor` says where.
 
 Sources: Derivations, B4.
 """
@@ -10,8 +10,7 @@ import math
 from numba import njit
 
 from scatterers.kernels.compiled import OPTIONS
-from scatterers.kernels.frames import cube_tangents, fill_frame
-from scatterers.kernels.spline_constants import (
+from scatterers.kernels.tensor import (
     AXIS,
     BOX,
     CENTRE,
@@ -23,8 +22,9 @@ from scatterers.kernels.spline_constants import (
     REACH,
     SHIFTS,
     SMALL,
+    value_and_gradient,
 )
-from scatterers.kernels.tensor import value_and_gradient
+from scatterers.kernels.trigonometry import cube_tangents, fill_frame
 
 
 @njit(**OPTIONS)

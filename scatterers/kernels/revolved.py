@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import helper
-from scatterers.kernels.spline_constants import HEADER
+from scatterers.kernels.tensor import HEADER
 
 FloatArray = NDArray[np.float64]
 # where values stand in the flat parameters: the axes of space that are u, v and w, the stretch of v, whether the

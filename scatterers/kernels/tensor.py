@@ -5,7 +5,17 @@ derivatives are T_op . w^(q), q = order - o - p at most. Weights are Horner sums
 point costs 36 loads and, for order 2, 144 multiply-adds before the ten dot products. Importing this module imports
 numba.
 
-Sources: [B78]; Derivations, B7.
+Constants that the quintic spline and the radial map over it share with their compiled twins.
+
+Compiled S D S of a grid, S from values at nodes to coefficients of B-splines; see `scatterers.spline.tensor`.
+
+B = L diag(d) L^T along each axis, L with ones on its diagonal and two bands below it: S takes a sweep down and one up,
+x_i - l_i x_(i-1) - m_i x_(i-2), then x_i/d_i - l_(i+1) x_(i+1) - m_(i+2) x_(i+2). The axes commute, so S D S takes
+three passes over the grid, of slabs that stay in the cache: the last two axes; the first one, D, the first one; the
+last two. In between the last two axes are exchanged, so that every sweep takes whole rows at a time.
+Factors are (3, n): l, m and 1/d. Importing this module imports numba.
+
+Sources: [B78]; Derivations, B7; Derivations, B6.
 """
 
 from typing import Any
@@ -16,7 +26,6 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from scatterers.kernels.compiled import OPTIONS
-from scatterers.kernels.spline_constants import BEYOND, HEADER, POWERS
 
 LANES = 8
 _double, _index, _lane = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
@@ -24,6 +33,42 @@ _vector = ir.VectorType(_double, LANES)
 # which derivatives (along x, y, z) `contract` returns, in this order
 FIRST = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 SECOND = [*FIRST, (2, 0, 0), (0, 2, 0), (0, 0, 2), (0, 1, 1), (1, 0, 1), (1, 1, 0)]
+
+# w_j(t) = sum_m POWERS[m, j] t^m
+POWERS = (
+    np.array(
+        [
+            [1, 26, 66, 26, 1, 0],
+            [-5, -50, 0, 50, 5, 0],
+            [10, 20, -60, 20, 10, 0],
+            [-10, 20, 0, -20, 10, 0],
+            [5, -20, 30, -20, 5, 0],
+            [-1, 5, -10, 10, -5, 1],
+        ]
+    )
+    / 120
+)
+# degree of the spine's polynomials
+DEGREE = 6
+# how far the polynomials go, in halves of the range they are fitted to: slanted tips pass between the grid's edges
+REACH = 1.5
+# where values stand in the flat parameters: shape, origin and 1/spacing of the grid from 0 on, then those of a radial
+# map: centre, half axes, axis of the spine with the middle and 1/half of its range (0 for no spine), shifts along x, y
+# and z, box of the sheared grid about the centre; behind them the coefficients
+CENTRE, HALF_AXES, AXIS, MIDDLE, PER_HALF, SHIFTS = 9, 12, 15, 16, 17, 18
+BOX = SHIFTS + 3 * (DEGREE + 1)
+HEADER = BOX + 6
+# lanes that the kernels load beyond the last row
+OVERREAD = 2
+# cells by which the polynomial of the last cell is continued beyond the grid
+BEYOND = 1.0
+# iterations of the search for a radius
+ITERATIONS = 60
+# a Newton step this small, relative to the radius, leaves an error below rounding
+SMALL = 1e-8
+
+TILE = 8
+"""Rows exchanged at a time."""
 
 
 def _shuffle(builder: ir.IRBuilder, a: Any, b: Any, lanes: list[int]) -> Any:
@@ -120,6 +165,8 @@ def _contraction(order: int) -> Any:
 
 
 contract_first = _contraction(1)
+
+
 _contract_second = _contraction(2)
 
 
@@ -218,3 +265,84 @@ evaluate.operations = 1250.0  # type: ignore[attr-defined]
 def call(function, points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
     """Fill one block by a compiled level, which Python itself cannot call."""
     function(points, values, gradients, hessians, parameters)
+
+
+@njit(cache=True, nogil=True, **OPTIONS)
+def twice(values, damping, wanted, first, second, third, work, out):  # type: ignore[no-untyped-def]
+    """Fill out (nx, ny, nz) with S (D S values) where wanted, else zero.
+
+    Values, zero where they are not wanted, and ``wanted`` have its shape; the numbers ``damping`` of D, and the numbers
+    that are worked on, have (nx, nz, ny).
+    """
+    nx, ny, nz = values.shape
+    filled = np.zeros(nx, np.bool_)
+    plane, slab = np.empty((ny, nz)), np.empty((nx, ny))
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                plane[j, k] = values[i, j, k]
+                filled[i] |= values[i, j, k] != 0.0
+        if filled[i]:
+            _solve(second, plane)
+            _exchange(plane, work[i])
+            _solve(third, work[i])
+        else:
+            work[i] = 0.0
+    for k in range(nz):
+        for i in range(nx):
+            slab[i] = work[i, k]
+        _solve(first, slab)
+        for i in range(nx):
+            for j in range(ny):
+                slab[i, j] *= damping[i, k, j]
+        _solve(first, slab)
+        for i in range(nx):
+            work[i, k] = slab[i]
+    for i in range(nx):
+        # nothing is wanted where no value is
+        if not filled[i]:
+            out[i] = 0.0
+            continue
+        _solve(third, work[i])
+        _exchange(work[i], plane)
+        _solve(second, plane)
+        for j in range(ny):
+            for k in range(nz):
+                out[i, j, k] = plane[j, k] if wanted[i, j, k] else 0.0
+
+
+@njit(**OPTIONS)
+def _exchange(x, out):  # type: ignore[no-untyped-def]
+    """Fill out (m, n) with x (n, m) transposed."""
+    n, m = x.shape
+    tiles = n // TILE
+    for tile in range(tiles):
+        j = tile * TILE
+        for k in range(m):
+            for b in range(TILE):
+                out[k, j + b] = x[j + b, k]
+    for j in range(tiles * TILE, n):
+        for k in range(m):
+            out[k, j] = x[j, k]
+
+
+@njit(**OPTIONS)
+def _solve(factors, x):  # type: ignore[no-untyped-def]
+    """S along the first axis of x (n, m), n >= 2, in place."""
+    n, m = x.shape
+    for k in range(m):
+        x[1, k] = x[1, k] - factors[0, 1] * x[0, k]
+    for i in range(2, n):
+        near, far = factors[0, i], factors[1, i]
+        row, before, second = x[i], x[i - 1], x[i - 2]
+        for k in range(m):
+            row[k] = row[k] - near * before[k] - far * second[k]
+    for k in range(m):
+        x[n - 1, k] *= factors[2, n - 1]
+        x[n - 2, k] = x[n - 2, k] * factors[2, n - 2] - factors[0, n - 1] * x[n - 1, k]
+    for step in range(2, n):
+        i = n - 1 - step
+        near, far, scale = factors[0, i + 1], factors[1, i + 2], factors[2, i]
+        row, before, second = x[i], x[i + 1], x[i + 2]
+        for k in range(m):
+            row[k] = row[k] * scale - near * before[k] - far * second[k]

@@ -7,9 +7,23 @@ The angle is 1/2 pi times arctan z = z - z^3/3 + ..., |z| <= tan(pi/8), by a pol
 arctan(a/b) = pi/4 + arctan((a - b)/(a + b)) for larger ones.
 
 The series are those of [AS64, sec. 4.3].
+
+Parts of compiled locators: chart variables and tangents of the cube sphere, and the polar frame.
+
+With t = tan xi, t' = tan eta of the face (see `scatterers.sphere_map.star`) and a common factor left out, which no
+frame sees,
+
+    s_u = (-p, du - t p, -t' p) in (a, b, c) up to signs,  p = t du/(1 + t^2 + t'^2),  du = 1 + t^2,
+
+and s_v likewise. The frame of tangents T is T (T^T T)^(-1/2), by the closed root of a 2 x 2 matrix.
+
+Sources: Derivations, B1 and B2.
 """
 
 import math
+
+import numpy as np
+from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import helper
 
@@ -73,3 +87,50 @@ def turns(across: float, along: float) -> float:
     angle = 0.25 - angle if a > b else angle
     angle = 0.5 - angle if along < 0.0 else angle
     return -angle if across < 0.0 else angle
+
+
+@helper
+def cube_tangents(
+    sx: float, sy: float, sz: float
+) -> tuple[int, float, float, float, float, float, float, float, float]:
+    """Chart number, u, v and the directions s_u and s_v at a point of the sphere, whose length is free."""
+    s = (sx, sy, sz)
+    size = (abs(sx), abs(sy), abs(sz))
+    a = 0 if size[0] >= size[1] and size[0] >= size[2] else (1 if size[1] >= size[2] else 2)
+    b, c = (a + 1) % 3, (a + 2) % 3
+    sign = -1.0 if s[a] < 0 else 1.0
+    tan_u, tan_v = s[b] / s[a], s[c] / size[a]
+    number = 2 * a + (1 if s[a] < 0 else 0)
+    u = math.atan(tan_u) / (math.pi / 2) + 0.5
+    v = math.atan(tan_v) / (math.pi / 2) + 0.5
+    # tangents of the cube, (0, sign du, 0) and (0, 0, dv), less their part along s
+    norm2 = 1.0 + tan_u * tan_u + tan_v * tan_v
+    du, dv = 1.0 + tan_u * tan_u, 1.0 + tan_v * tan_v
+    p = tan_u * du / norm2
+    q = tan_v * dv / norm2
+    ta, tb, tc = -sign * p, sign * (du - tan_u * p), -tan_v * p
+    wa, wb, wc = -sign * q, -sign * tan_u * q, dv - tan_v * q
+    if a == 0:
+        return number, u, v, ta, tb, tc, wa, wb, wc
+    if a == 1:
+        return number, u, v, tc, ta, tb, wc, wa, wb
+    return number, u, v, tb, tc, ta, wb, wc, wa
+
+
+@helper
+def fill_frame(
+    frame: NDArray[np.float64], i: int, tx: float, ty: float, tz: float, wx: float, wy: float, wz: float
+) -> None:
+    """Write the polar frame of two tangents into column i of frame (6, n)."""
+    g11 = tx * tx + ty * ty + tz * tz
+    g12 = tx * wx + ty * wy + tz * wz
+    g22 = wx * wx + wy * wy + wz * wz
+    root = math.sqrt(g11 * g22 - g12 * g12)
+    scale = 1.0 / (root * math.sqrt(g11 + g22 + 2 * root))
+    m11, m12, m22 = (g22 + root) * scale, -g12 * scale, (g11 + root) * scale
+    frame[0, i] = tx * m11 + wx * m12
+    frame[1, i] = ty * m11 + wy * m12
+    frame[2, i] = tz * m11 + wz * m12
+    frame[3, i] = tx * m12 + wx * m22
+    frame[4, i] = ty * m12 + wy * m22
+    frame[5, i] = tz * m12 + wz * m22

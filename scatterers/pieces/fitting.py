@@ -4,6 +4,18 @@ A region of the mesh folds where two of its points are nearer than a few cells o
 their normals oppose each other, as the two sides of a wing whose nose is round: one F in space cannot have both. It is
 parted by the axis nearest to the normals of its triangles. Pieces of one region are fitted to some triangles beyond
 their borders as well, so that both know the seam.
+
+What of a body of fitted pieces is not trusted: pieces, and points about which a piece does not follow the body.
+
+A piece is trusted if its F is nearly a distance at its points and meets them; a point, if the piece that stands for the
+body there meets it, and a fit has about the normal of the triangles or faces that it was made from.
+
+Regions of a mesh that one quadric goes through are one: next to the tip of a cone triangles turn as at an edge.
+
+Of a region on a quadric Q = 0 creases are none where it meets itself, and small regions next to it belong to it if all
+their vertices lie on Q = 0 and their triangles face along grad Q, but at the tip.
+
+Sources: Derivations, B13.
 """
 
 from collections.abc import Callable
@@ -12,16 +24,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.pieces.absorbed import absorbed
-from scatterers.pieces.crease import Crease
-from scatterers.pieces.curved import curved, divided
-from scatterers.pieces.patch import COARSER, SPACING, TIP, Closeness, Patch, polynomial_patch, spline_patch, tip_of
+from scatterers.pieces.patch import (
+    COARSER,
+    SLIGHT,
+    SPACING,
+    TIP,
+    Closeness,
+    Crease,
+    Patch,
+    curved,
+    divided,
+    polynomial_patch,
+    spline_patch,
+    tip_of,
+)
 from scatterers.pieces.regions import Regions
 from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
-from scatterers.pieces.trust import astray, doubtful, rough
-from scatterers.spline.compared import curvatures, tangents
+from scatterers.spline.cloud import FitReport, curvatures, tangents
 from scatterers.spline.fitting import SMOOTHING
-from scatterers.spline.report import FitReport
 from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.quality import BAD
 from scatterers.triangles.topology import components
@@ -45,6 +65,53 @@ AT_TIP = 2.0
 """Sides of the nearest triangle within which the tip of a cone belongs to a piece: some meshes blunt it."""
 SHARE = 500
 """Triangles cut at a time."""
+MISSED = 1e-4
+"""Distance in body sizes between a point and the level there, beyond which the level is not trusted about it."""
+TURNED, FAR_FROM_USUAL = 0.05, 6.0
+"""Angle between a fit's normal and that of triangles or faces, radians, and over the median, that is not trusted."""
+ROUGH = 0.05
+"""Misfit, in spacings of the points, beyond which nothing of a piece is trusted."""
+FAR_OFF = 0.5
+"""Largest distance of its points from F = 0, in their spacings, that a piece may have."""
+SLOPES = (0.5, 1.6)
+"""|grad F| at the points: beyond, nothing of a piece is trusted either."""
+SMALL = 0.02
+"""Triangles of a region that may be absorbed, relative to those of the quadric's."""
+
+
+def astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: IntArray, size: float) -> FloatArray:
+    """Points (k, 3) that the level of the body misses by more than `MISSED` of its size."""
+    number = space.numbers(points)
+    wrong = np.flatnonzero(number != owner)
+    missed = np.zeros(len(wrong))
+    for k in np.unique(number[wrong]):
+        mine = number[wrong] == k
+        value, gradient = patches[k].fine.value_and_gradient(points[wrong[mine]])
+        missed[mine] = np.abs(value) / np.linalg.norm(gradient, axis=1)
+    return np.asarray(points[wrong[missed > MISSED * size]])
+
+
+def doubtful(patch: Patch, x: FloatArray, normals: FloatArray) -> FloatArray:
+    """Vertices (k, 3), L, of those of a piece at which its fit does not have about their normals."""
+    if patch.kind != "spline":
+        return np.zeros((0, 3))
+    gradient = patch.fine.gradient(x)
+    turn = np.linalg.norm(gradient / np.linalg.norm(gradient, axis=1, keepdims=True) - normals, axis=1)
+    # coarse triangles err, too
+    return np.asarray(x[~(turn <= max(TURNED, FAR_FROM_USUAL * float(np.median(turn))))])
+
+
+def rough(patch: Patch, points: FloatArray, size: float) -> bool:
+    """Whether F of a patch is no distance at points of its piece, or misses them, or it is a speck of the body."""
+    if float(np.max(np.ptp(points, axis=0))) < MISSED * size:
+        return True
+    if patch.kind != "spline":
+        return False
+    value, gradient = patch.fine.value_and_gradient(points)
+    slope = np.linalg.norm(gradient, axis=1)
+    if patch.misfit > ROUGH * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1]:
+        return True
+    return bool(np.max(np.abs(value) / slope) > FAR_OFF * patch.spacing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,3 +430,65 @@ def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray, exact: 
     apart = np.linalg.norm(jets.normals - normals, axis=1) > 0.5
     sound = jets.fitted & (np.maximum(jets.tilt, doubt) < BAD) & ~apart
     return jets if np.mean(sound) >= GOOD else None
+
+
+def absorbed(
+    vertices: FloatArray,
+    triangles: IntArray,
+    regions: Regions,
+    quadric: Callable[[IntArray], Patch | None],
+    close: float,
+) -> Regions:
+    """Regions without creases that lie within one quadric.
+
+    Parameters
+    ----------
+    vertices, triangles : (n, 3), L, and (m, 3)
+    regions : Regions
+    quadric : callable
+        Plane or quadric through triangles with given numbers, None if there is none.
+    close : float
+        What a vertex on a quadric may be off it, L.
+    """
+    number, crease = regions.number.copy(), regions.crease.copy()
+    sharp = np.flatnonzero(regions.crease & ~regions.level)
+    sides = regions.turns.sides[sharp]
+    corners = vertices[triangles]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    count = np.bincount(number)
+    for k in np.argsort(-count).tolist():
+        pair = number[sides]
+        beside = np.unique(pair[(pair == k).any(axis=1)])
+        small = [j for j in beside.tolist() if j != k and count[j] <= SMALL * count[k]]
+        itself = bool(np.any(np.all(pair == k, axis=1)))
+        patch = quadric(np.flatnonzero(number == k)) if itself or small else None
+        if patch is None or patch.kind != "quadric":
+            continue
+        while small:
+            mine = np.flatnonzero(np.isin(number, small))
+            own = number[mine]
+            fits = _lies_on(patch, corners[mine], flat[mine], close)
+            good = [j for j in small if np.all(fits[own == j])]
+            number[np.isin(number, good)] = k
+            pair = number[sides]
+            beside = np.unique(pair[(pair == k).any(axis=1)])
+            small = [j for j in beside.tolist() if j != k and count[j] <= SMALL * count[k]] if good else []
+        crease[sharp[np.all(number[sides] == k, axis=1)]] = False
+    if np.array_equal(crease, regions.crease):
+        return regions
+    kept = np.unique(number, return_inverse=True)[1].ravel()
+    return replace(regions, number=np.asarray(kept, dtype=np.int64), crease=crease)
+
+
+def _lies_on(patch: Patch, corners: FloatArray, flat: FloatArray, tolerance: float) -> BoolArray:
+    """Whether triangles (m, 3, 3) with normals (m, 3) lie on a quadric by their corners, and face along its slope."""
+    value, gradient = patch.fine.value_and_gradient(corners.reshape(-1, 3))
+    slope = np.linalg.norm(gradient, axis=1)
+    bend = float(np.linalg.norm(patch.fine.hessian(corners[:1, 0])))
+    # of second order, as next to a tip there is no slope
+    off = 2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * bend * np.abs(value)) + 1e-300)
+    along = np.sum(patch.fine.gradient(corners.mean(axis=1)) * flat, axis=1) > 0
+    # the slope is 1 in the median; a triangle at a tip may reach around it, and the tip is known less well
+    at_tip = slope.reshape(-1, 3).min(axis=1) < SLIGHT
+    near = off <= np.where(slope < TIP, TIP * float(patch.fine.spacing[0]), tolerance)
+    return np.asarray(np.all(near.reshape(-1, 3), axis=1) & (along | at_tip))

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.pieces.crease import Crease
+from scatterers.pieces.patch import Crease
 from scatterers.triangles.topology import components, edges_of
 
 FloatArray = NDArray[np.float64]

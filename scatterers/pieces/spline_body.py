@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import Compiled
-from scatterers.pieces.crease import Crease
-from scatterers.pieces.curved import curved, divided
 from scatterers.pieces.fitting import FittedPieces
+from scatterers.pieces.patch import Crease, curved, divided
 from scatterers.pieces.selection import PieceSpace
 from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
 

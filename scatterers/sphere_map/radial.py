@@ -23,7 +23,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.spline_constants import DEGREE, ITERATIONS, REACH, SMALL
+from scatterers.kernels.tensor import DEGREE, ITERATIONS, REACH, SMALL
 from scatterers.spline.tensor import evaluated
 
 FloatArray = NDArray[np.float64]
@@ -128,7 +128,7 @@ class Spine:
 
 @dataclass(frozen=True, eq=False)
 class RadialMap:
-    """The map over an F known in a box; satisfies `scatterers.atlas.charts.SphereMap`.
+    """The map over an F known in a box; satisfies `scatterers.sphere_map.star.SphereMap`.
 
     Attributes
     ----------
@@ -221,7 +221,7 @@ class RadialMap:
 
     @cached_property
     def header(self) -> FloatArray:
-        """Parameters of the map, as `scatterers.kernels.spline_constants` orders them."""
+        """Parameters of the map, as `scatterers.kernels.tensor` orders them."""
         spine = self.spine
         along = [spine.axis, spine.middle, 0.0 if spine.upright else 1 / spine.half]
         parts = [self.centre, self.half_axes, np.array(along, dtype=float), spine.shifts.T.ravel(), self.box.ravel()]

@@ -1,13 +1,29 @@
 """Whether a body is star-shaped, upright or along a bent spine, and the sphere map that follows.
 
+Atlases of the analytic bodies: six charts for genus 0, one doubly periodic chart for the torus.
+
+Genus 0: the body is x = psi(s), s on the unit sphere. Face f = 2 a + (0 if s_a > 0 else 1) holds the s whose
+largest component is s_a; with (a, b, c) cyclic and sign = +-1,
+
+    s = (sign, sign tan xi, tan eta)/|.| in the order (a, b, c),  xi = (u - 1/2) pi/2,  eta = (v - 1/2) pi/2,
+
+so the unit squares of (u, v) tile the sphere, and every point finds the chart in which it is farthest from the edge.
+
+The equiangular cubed sphere is that of [RIP96]; Derivations, B1.
+
 Sources: Derivations, B4.
 """
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.kernels.compiled import Compiled
 from scatterers.sphere_map.radial import RadialMap, SpaceLevel, Spine
-from scatterers.spline.samples import Samples
+from scatterers.spline.cloud import Samples
 from scatterers.spline.tensor import evaluated
 
 FloatArray = NDArray[np.float64]
@@ -51,3 +67,139 @@ def _hidden(sphere_map: RadialMap, points: FloatArray) -> str:
     if not hidden:
         return ""
     return f"the body is not star-shaped about {where}: {hidden} of {len(points)} directions fail; {remedy}"
+
+
+class SphereMap(Protocol):
+    """A diffeomorphism psi from the unit sphere to the body, with its 3 x 3 derivative."""
+
+    def forward(self, s: FloatArray) -> FloatArray:
+        """Body point, L, of a unit vector: (..., 3) -> (..., 3)."""
+        ...
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Derivative of psi as a map of space, L: (..., 3) -> (..., 3, 3)."""
+        ...
+
+    def inverse(self, points: FloatArray) -> FloatArray:
+        """Sphere point of a body point, L, up to its length: (..., 3) -> (..., 3)."""
+        ...
+
+    @property
+    def compiled_forward(self) -> Compiled:
+        """Compiled psi and its derivative, of kind "forward"."""
+        ...
+
+    @property
+    def compiled_inverse(self) -> Compiled:
+        """Compiled psi^-1, of kind "inverse"."""
+        ...
+
+
+@dataclass(frozen=True)
+class FaceChart:
+    """Face ``2 axis + (sign < 0)`` of the equiangular cube over psi."""
+
+    sphere_map: SphereMap
+    axis: int
+    sign: float
+    periodic: tuple[bool, bool] = (False, False)
+
+    def _order(self) -> tuple[int, int, int]:
+        return self.axis, (self.axis + 1) % 3, (self.axis + 2) % 3
+
+    def _cube(self, uv: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Unnormalised cube point and tan xi, tan eta."""
+        a, b, c = self._order()
+        tangent = np.tan((np.asarray(uv, dtype=float) - 0.5) * (np.pi / 2))
+        cube = np.empty((*tangent.shape[:-1], 3))
+        cube[..., a] = self.sign
+        cube[..., b] = self.sign * tangent[..., 0]
+        cube[..., c] = tangent[..., 1]
+        return cube, tangent[..., 0], tangent[..., 1]
+
+    def point(self, uv: FloatArray) -> FloatArray:
+        """Point of the body: (..., 2) -> (..., 3), L."""
+        cube, _, _ = self._cube(uv)
+        return self.sphere_map.forward(cube / np.linalg.norm(cube, axis=-1, keepdims=True))
+
+    def tangents(self, uv: FloatArray) -> FloatArray:
+        """Columns x_u, x_v: (..., 2) -> (..., 3, 2), L."""
+        _, b, c = self._order()
+        cube, tan_u, tan_v = self._cube(uv)
+        length = np.linalg.norm(cube, axis=-1)
+        s = cube / length[..., None]
+        ds = np.zeros((*s.shape, 2))
+        ds[..., b, 0] = self.sign * (np.pi / 2) * (1 + tan_u**2)
+        ds[..., c, 1] = (np.pi / 2) * (1 + tan_v**2)
+        # derivative of the normalisation: (I - s s^T)/|cube|
+        ds -= s[..., :, None] * np.sum(s[..., :, None] * ds, axis=-2, keepdims=True)
+        ds /= length[..., None, None]
+        return np.asarray(self.sphere_map.derivative(s) @ ds)
+
+
+@dataclass(frozen=True)
+class CubeSphereAtlas:
+    """Six equiangular face charts over psi; ``compiled`` is a locator for kernels, or None."""
+
+    sphere_map: SphereMap
+    compiled: Compiled | None = None
+
+    @property
+    def charts(self) -> Sequence[FaceChart]:
+        """The six charts, ordered +x, -x, +y, -y, +z, -z."""
+        return [FaceChart(self.sphere_map, a, sign) for a in range(3) for sign in (1.0, -1.0)]
+
+    def locate(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+        """Chart number (...) and chart variables (..., 2) of points (..., 3)."""
+        s = self.sphere_map.inverse(np.asarray(points, dtype=float))
+        axis = np.argmax(np.abs(s), axis=-1)[..., None]
+        along = np.take_along_axis(s, axis, -1)[..., 0]
+        ratio_u = np.take_along_axis(s, (axis + 1) % 3, -1)[..., 0] / along
+        # the second tangent carries no sign, so that faces of either sign are right-handed
+        ratio_v = np.take_along_axis(s, (axis + 2) % 3, -1)[..., 0] / np.abs(along)
+        uv = np.stack([np.arctan(ratio_u), np.arctan(ratio_v)], axis=-1) / (np.pi / 2) + 0.5
+        return 2 * axis[..., 0] + (along < 0), uv
+
+
+@dataclass(frozen=True)
+class PeriodicChart:
+    """A chart of period 1 in both variables, given by its point and tangent functions."""
+
+    point_of: Callable[[FloatArray], FloatArray]
+    tangents_of: Callable[[FloatArray], FloatArray]
+    periodic: tuple[bool, bool] = (True, True)
+
+    def point(self, uv: FloatArray) -> FloatArray:
+        """Point of the body: (..., 2) -> (..., 3), L."""
+        return self.point_of(np.asarray(uv, dtype=float))
+
+    def tangents(self, uv: FloatArray) -> FloatArray:
+        """Columns x_u, x_v: (..., 2) -> (..., 3, 2), L."""
+        return self.tangents_of(np.asarray(uv, dtype=float))
+
+
+@dataclass(frozen=True)
+class PeriodicAtlas:
+    """A single doubly periodic chart; ``coordinates`` inverts it.
+
+    For kernels: ``compiled`` is a locator; ``compiled_forward`` takes (u, v, anything) to the point and, in columns 0
+    and 1 of the derivative, the tangents; ``compiled_inverse`` takes points to (u, v, 0). All or none may be None.
+    """
+
+    chart: PeriodicChart
+    coordinates: Callable[[FloatArray], FloatArray]
+    compiled: Compiled | None = None
+    compiled_forward: Compiled | None = None
+    compiled_inverse: Compiled | None = None
+
+    @property
+    def charts(self) -> Sequence[PeriodicChart]:
+        """The chart, in a list."""
+        return [self.chart]
+
+    def locate(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+        """Chart number 0 (...) and chart variables in [0, 1) (..., 2) of points (..., 3)."""
+        uv = self.coordinates(np.asarray(points, dtype=float)) % 1.0
+        # -1e-17 % 1.0 is 1.0
+        uv[uv >= 1.0] = 0.0
+        return np.zeros(uv.shape[:-1], dtype=np.int64), uv

@@ -8,7 +8,11 @@ n nodes carrying n + 4 coefficients. Ends are not-a-knot, so quintics are reprod
 the grid the outermost cell's polynomial goes on for one cell; from there on t is held. A NaN stays one.
 `scatterers.kernels.tensor` is the compiled twin.
 
-Sources: [B78]; Derivations, B7.
+From values at the nodes of a grid to coefficients of quintic B-splines there: S = B^-1 along each axis.
+
+B has the bands (1, 26, 66, 26, 1)/120, and is factored once for each axis.
+
+Sources: [B78]; Derivations, B7; Derivations, B6.
 """
 
 from collections.abc import Callable
@@ -19,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.spline_constants import BEYOND, CENTRE, HEADER, OVERREAD, POWERS
+from scatterers.kernels.tensor import BEYOND, CENTRE, HEADER, OVERREAD, POWERS
 
 FloatArray = NDArray[np.float64]
 # where xx, yy, zz, yz, xz, xy stand in a matrix
@@ -160,3 +164,40 @@ def evaluated(compiled: Compiled, points: FloatArray) -> tuple[FloatArray, Float
     values, gradients, hessians = np.empty(n), np.empty((3, n)), np.empty((6, n))
     call(compiled.function, columns, values, gradients, hessians, compiled.parameters)
     return values.reshape(shape), gradients.T.reshape(*shape, 3), hessians.T.reshape(*shape, 6)
+
+
+class Cardinal:
+    """S D S on grids of one shape, D a number of each node; symmetric, as B is.
+
+    Examples
+    --------
+    >>> one = np.ones((7, 8, 9))
+    >>> Cardinal(one)(one, one > 0, np.empty((7, 8, 9))).shape
+    (7, 8, 9)
+    """
+
+    def __init__(self, damping: FloatArray) -> None:
+        self.factors = [_factors(n) for n in damping.shape]
+        # as the kernel takes it
+        self.damping = np.ascontiguousarray(np.swapaxes(damping, 1, 2))
+        self.work = np.empty_like(self.damping)
+
+    def __call__(self, values: FloatArray, wanted: NDArray[np.bool_], out: FloatArray) -> FloatArray:
+        """Out, filled with S D S of values where wanted, else with zero, as values are to be there."""
+        from scatterers.kernels.tensor import twice
+
+        twice(values, self.damping, wanted, *self.factors, self.work, out)
+        return out
+
+
+def _factors(n: int) -> FloatArray:
+    """Bands of L, one and two below the diagonal, and 1/d of B = L diag(d) L^T for n nodes: (3, n)."""
+    edge, near, middle = np.array([1, 26, 66]) / 120
+    found = np.zeros((3, n))
+    for i in range(n):
+        # what the two rows before take of this one
+        far = edge * found[2, i - 2] if i > 1 else 0.0
+        left = near - (edge * found[0, i - 1] if i > 1 else 0.0) if i else 0.0
+        found[:2, i] = left * found[2, i - 1], far
+        found[2, i] = 1 / (middle - left * found[0, i] - edge * far)
+    return found

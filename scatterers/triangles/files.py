@@ -16,17 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.triangles.choice import Choice, silent, whole_body
-from scatterers.triangles.crossings import crossings
-from scatterers.triangles.cutting import uncrossed
-from scatterers.triangles.decks import read_bdf, read_msh
-from scatterers.triangles.form import check_whole
-from scatterers.triangles.kinds import understood
-from scatterers.triangles.off import with_triangles
+from scatterers.triangles.decks import read_bdf, read_msh, understood
+from scatterers.triangles.form import check_whole, uncrossed
 from scatterers.triangles.parts import every_part
+from scatterers.triangles.quality import Choice, silent, whole_body
 from scatterers.triangles.subdivision import Subdivision
-from scatterers.triangles.threemf import read_3mf
-from scatterers.triangles.topology import cleaned, oriented
+from scatterers.triangles.threemf import read_3mf, with_triangles
+from scatterers.triangles.topology import cleaned, crossings, oriented
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -7,13 +7,11 @@ accepted that is not what was given ("silent"). The cases are tried in processes
 
 from collections.abc import Callable
 
-from studies.fuzz.attack import Attack
-from studies.fuzz.calls import BadCalls
+from studies.fuzz.calls import Attack, BadCalls
 from studies.fuzz.expressions import Expressions, Specs
-from studies.fuzz.fields import FarFiles
 from studies.fuzz.files import CadFiles, Directions, Studies, meshes
 from studies.fuzz.origins import Origins
-from studies.fuzz.stored import Fits, Maps, Stores
+from studies.fuzz.stored import FarFiles, Fits, Maps, Stores
 
 
 def _invariants() -> Attack:

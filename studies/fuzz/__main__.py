@@ -11,8 +11,7 @@ import tempfile
 from pathlib import Path
 
 from studies.fuzz import ATTACKS
-from studies.fuzz.child import tried
-from studies.fuzz.supervision import HEAD, LIMIT, MEMORY, run_attack
+from studies.fuzz.supervision import HEAD, LIMIT, MEMORY, run_attack, tried
 
 CASES = 10**9
 

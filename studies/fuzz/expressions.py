@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from studies.fuzz.attack import ACCEPTED, REFUSED, SILENT, Verdict
+from studies.fuzz.calls import ACCEPTED, REFUSED, SILENT, Verdict
 from studies.fuzz.mutation import mutated
 
 FUNCTIONS = (

@@ -19,7 +19,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from studies.fuzz import seeds
-from studies.fuzz.attack import ACCEPTED, REFUSED, SILENT, Verdict, failure
+from studies.fuzz.calls import ACCEPTED, REFUSED, SILENT, Verdict, failure
 from studies.fuzz.mutation import mutated
 from studies.fuzz.readers import UnclearError, corners_of
 
@@ -206,7 +206,7 @@ class Directions:
     def attempt(self, number: int, rng: Generator, place: Path) -> Verdict:
         """Change the file, read it, and compare it with what another reader finds."""
         from creeping import CreepingError
-        from creeping.sweeping.studyfile.directions import read_directions
+        from creeping.sweeping.studyfile.schema import read_directions
 
         data = mutated(self.seed, rng, text=self.suffix == "csv")
         path = place.with_suffix(f".{self.suffix}")

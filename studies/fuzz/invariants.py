@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 import creeping as cr
 import scatterers as sc
-from studies.fuzz.attack import ACCEPTED, SILENT, Verdict
+from studies.fuzz.calls import ACCEPTED, SILENT, Verdict
 
 FloatArray = NDArray[np.float64]
 RTOL = 1e-11

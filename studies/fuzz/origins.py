@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
-from studies.fuzz.attack import REFUSED, SILENT, Verdict
+from studies.fuzz.calls import REFUSED, SILENT, Verdict
 
 BURST = 10
 """Connections of a case."""

@@ -3,11 +3,17 @@
 Bytes of a file are changed as they may rot, and what is then accepted must be equal to what was stored. Of maps and
 fits, in as many cases, content is changed and signed anew, as by somebody who means harm: then nothing says what
 it ought to be, but kernels must not leave their arrays.
+
+Mutated files of fields: FEKO text.
+
+What is accepted is read a second time, by code of its own, strictly. The same numbers must come of both, else it is
+"silent".
 """
 
 import hashlib
 import io
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -15,11 +21,15 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from studies.fuzz.attack import ACCEPTED, REFUSED, SILENT, Verdict
+from studies.fuzz import seeds
+from studies.fuzz.calls import ACCEPTED, REFUSED, SILENT, Verdict
 from studies.fuzz.mutation import mutated, shuffled_array
+from studies.fuzz.readers import UnclearError
 
 ODD = (None, True, -1, 0, 1, 3, 2**31, 2**63, 10**30, 1e308, 1e-308, float("nan"), float("inf"), "", "nan", "sphere")
 ODD_LISTS: tuple[Any, ...] = ([], [[]], {}, [1], [1, 2, 3], [None], {"a": 1})
+
+COLUMNS = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)")
 
 
 def odd(rng: Generator) -> Any:
@@ -230,3 +240,89 @@ class Stores:
 
 def _equal(one: Any, other: Any) -> bool:
     return bool(one.shape == other.shape and one.dtype == other.dtype and one.tobytes() == other.tobytes())
+
+
+def described(data: bytes) -> list[tuple[float, Any]]:
+    """Frequency and numbers (n, 6) of each block of FEKO text, in the columns' order.
+
+    Raises
+    ------
+    UnclearError
+        If the text has no one meaning.
+    """
+    blocks: list[tuple[float, Any]] = []
+    keys: dict[str, set[str]] = {}
+    rows: list[list[float]] = []
+    names: list[str] = []
+    lines = re.split("\r\n|\r|\n", data.decode(errors="replace"))
+    for line in [*map(str.strip, lines), "#"]:
+        if not line or line[:2] in ("##", "**"):
+            continue
+        if not line.startswith("#"):
+            words = line.split()
+            if len(words) != len(names) or not names:
+                raise UnclearError("another number of columns")
+            rows.append([_number(words[names.index(name)]) for name in COLUMNS])
+            continue
+        if rows:
+            counts = [int(_only(keys, f"No. of {angle} Samples")) for angle in ("Theta", "Phi")]
+            if counts[0] * counts[1] != len(rows):
+                raise UnclearError("another number of rows")
+            blocks.append((_number(_only(keys, "Frequency")), np.array(rows)))
+            keys, rows, names = {}, [], []
+        found = re.match(r'#([^:"]*):(.*)', line)
+        if found:
+            keys.setdefault(found[1].strip(), set()).add(found[2].strip())
+        elif '"' in line:
+            names = line.split('"')[1::2]
+    return blocks
+
+
+def _only(keys: dict[str, set[str]], name: str) -> str:
+    values = keys.get(name, set())
+    if len(values) != 1:
+        raise UnclearError(f"{len(values)} values of {name}")
+    return next(iter(values))
+
+
+def _number(text: str) -> float:
+    if not text.isascii() or "_" in text or not np.isfinite(float(text)):
+        raise UnclearError(f"{text!r} is no number")
+    return float(text)
+
+
+class FarFiles:
+    """FEKO text (.ffe)."""
+
+    def prepare(self, folder: Path) -> None:
+        """Read the file to begin with."""
+        self.seed = seeds.far_field_text()
+        assert self._compared(self.seed, folder / "seed.ffe") == ""
+
+    def attempt(self, number: int, rng: Generator, place: Path) -> Verdict:
+        """Change the file and read it twice."""
+        from creeping import CreepingError
+
+        try:
+            mistake = self._compared(mutated(self.seed, rng, text=True), place.with_suffix(".ffe"))
+        except CreepingError as error:
+            return Verdict(REFUSED, str(error))
+        return Verdict(SILENT, mistake) if mistake else Verdict(ACCEPTED)
+
+    def _compared(self, data: bytes, path: Path) -> str:
+        from creeping.files import read_ffe
+
+        path.write_bytes(data)
+        found = read_ffe(path)
+        try:
+            expected = described(data)
+        except (UnclearError, ValueError) as error:
+            return f"{len(found)} blocks of a file that has no meaning: {error}"
+        if len(found) != len(expected):
+            return f"{len(found)} blocks, not {len(expected)}"
+        for block, (frequency, rows) in zip(found, expected, strict=True):
+            field = np.stack([rows[:, 2] - 1j * rows[:, 3], rows[:, 4] - 1j * rows[:, 5]], axis=-1)
+            same = block.frequency == frequency and np.array_equal(block.field, field)
+            if not (same and np.array_equal(np.stack([block.theta, block.phi], axis=-1), rows[:, :2])):
+                return "other numbers than those of the file"
+        return ""

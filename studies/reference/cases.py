@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from studies.reference import antennas, dipoles, fundamental, monopoles, ports, slots
-from studies.reference._boundary import Boundary, FloatArray
+from studies.reference import dipoles, fundamental, slots
 from studies.reference.clouds import Body, ellipsoid, star
 from studies.reference.generatrix import pieces_profile
 from studies.reference.mirrored_box import scatter_box
 from studies.reference.modal_conductor import scatter_conductor
 from studies.reference.modal_equation import scatter_by_modes
 from studies.reference.revolution import Profile, wave_directions
+from studies.reference.section_shapes import Boundary, FloatArray
 from studies.reference.stored import Arrays
 from studies.reference.two_spheres import Kind, scatter_spheres
 
@@ -72,21 +72,21 @@ def ellipsoid_ports() -> Arrays:
     sources = np.sign(sources) * np.maximum(np.abs(sources), 0.25)
     sources /= np.linalg.norm(sources, axis=1, keepdims=True)
     body = ellipsoid(0.8, 0.9, 1.1)
-    found = ports.coupled(body, 14.0, sources, points, depth=0.25, heights=HEIGHTS, per_wavelength=7.0)
+    found = dipoles.coupled(body, 14.0, sources, points, depth=0.25, heights=HEIGHTS, per_wavelength=7.0)
     return {"ports": found.ports, "points": found.points, "values": found.values, "spread": found.spread}
 
 
 def ellipsoid_monopoles() -> Arrays:
     """E of a monopole on the conductor (0.75, 0.9, 1.15), k = 12, at points all about it."""
     body, sources, points = _about_a_monopole(60)
-    found = monopoles.coupled_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
+    found = slots.coupled_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
     return {"ports": found.ports, "points": found.points, "values": found.values, "spread": found.spread}
 
 
 def ellipsoid_antennas() -> Arrays:
     """H of the same monopole along two tangents of each point."""
     body, sources, points = _about_a_monopole(80)
-    found = antennas.slots_of_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
+    found = slots.slots_of_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
     return {name: getattr(found, name) for name in ("ports", "points", "tangents", "values", "spread")}
 
 

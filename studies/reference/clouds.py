@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from studies.reference._boundary import FloatArray
+from studies.reference.section_shapes import FloatArray
 
 Field = Callable[[FloatArray], FloatArray]
 GRID = 240

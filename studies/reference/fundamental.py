@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import qr, solve_triangular
 
-from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
 from studies.reference.clouds import Cloud, Spread, images
+from studies.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
 BLOCK = 4_000_000
 """Entries of a kernel matrix held at once, 64 MB."""

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from studies.reference._boundary import ComplexArray, FloatArray
 from studies.reference.revolution import Profile
+from studies.reference.section_shapes import ComplexArray, FloatArray
 
 ORDER = 10
 """Nodes of a panel."""

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from studies.reference._boundary import Boundary, ComplexArray, FloatArray, IntArray, condition, positive
 from studies.reference.generatrix import GAUSS, lagrange
+from studies.reference.section_shapes import Boundary, ComplexArray, FloatArray, IntArray, condition, positive
 
 IMAGES = np.array(list(product((1.0, -1.0), repeat=3)))
 """Mirrors g (8, 3)."""

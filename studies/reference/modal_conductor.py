@@ -25,12 +25,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import jv
 
-from studies.reference._boundary import ComplexArray, FloatArray, positive
 from studies.reference.dipoles import frames
 from studies.reference.fundamental import least_squares
 from studies.reference.generatrix import Azimuth, Panels, modal_matrix, waves
 from studies.reference.modal_equation import order_count
 from studies.reference.revolution import Profile, wave_directions
+from studies.reference.section_shapes import ComplexArray, FloatArray, positive
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import jv, jvp
 
-from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
 from studies.reference.fundamental import least_squares
 from studies.reference.generatrix import Azimuth, Panels, modal_matrix, waves
 from studies.reference.revolution import Profile, wave_directions
+from studies.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,9 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 from scipy.special import jv
 
-from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
 from studies.reference.clouds import Cloud
 from studies.reference.fundamental import least_squares
+from studies.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
 BLOCK = 1_500_000
 """Values of a kernel held at once."""

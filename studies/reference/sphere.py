@@ -31,14 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import spherical_jn, spherical_yn
 
-from studies.reference._boundary import (
-    Boundary,
-    ComplexArray,
-    FloatArray,
-    condition,
-    positive,
-    series_length,
-)
+from studies.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive, series_length
 
 
 def _hankel(x: FloatArray, orders: int) -> Iterator[ComplexArray]:

@@ -31,9 +31,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import sph_legendre_p_all, spherical_jn, spherical_yn
 
-from studies.reference._boundary import Boundary, ComplexArray, FloatArray, condition, positive
 from studies.reference.dipoles import frames
 from studies.reference.fundamental import least_squares
+from studies.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
 Kind: TypeAlias = Boundary | Literal["pec"]
 """Soft, hard, the impedance number eta, or a perfect conductor."""

@@ -9,7 +9,7 @@ import shared_bodies as sc
 from command_line import ran, table
 
 from creeping.commands.echo import _cost
-from creeping.commands.echo_request import echo_request
+from creeping.commands.echo_report import echo_request
 from creeping.errors import InvalidInputError
 
 

@@ -10,7 +10,7 @@ from command_line import ran, table
 import creeping as cr
 from creeping.commands import run_field
 from creeping.errors import InvalidInputError
-from creeping.field.lobes import lobe_step
+from creeping.field.forward import lobe_step
 from studies.reference import sphere
 
 X = (1.0, 0.0, 0.0)

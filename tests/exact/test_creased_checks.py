@@ -14,7 +14,7 @@ from creeping.commands.run_report import readable, summary_of
 from creeping.geometry.checks import wrong_signs
 from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
 from creeping.geometry.surface import fingerprint
-from creeping.rays.piece_specular import smooth_parts
+from creeping.rays.specular import smooth_parts
 from scatterers import Cylinder
 
 BODIES = {"cut": cut_sphere(), "two": TwoBalls()}

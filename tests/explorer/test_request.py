@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creeping import InvalidInputError
-from creeping.explorer.latest import Latest
+from creeping.explorer.page import Latest
 from creeping.explorer.request import ViewRequest, angles
 
 GOOD = {"theta": 30.0, "phi": -120.0, "rays": 64, "length": 2.0, "spacing": 0.25, "wavenumber": 30.0}

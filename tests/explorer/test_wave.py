@@ -7,14 +7,13 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.explorer.colours import ENDED, WAVE_COLOURS
 from creeping.explorer.preview import preview_of, step_of
 from creeping.explorer.refined import refined_view
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.text import legend, wave_note
-from creeping.explorer.wave import strengths, wave_colours
+from creeping.explorer.wave import ENDED, WAVE_COLOURS, strengths, wave_colours
 from creeping.geometry.triangulation import triangulate
-from creeping.plotting.body_fronts import at_phase
+from creeping.plotting.coupling_pictures import at_phase
 from studies.reference import sphere
 from tests.patience import until
 

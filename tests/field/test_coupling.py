@@ -14,10 +14,15 @@ from creeping.field.point_result import FieldStatus
 from creeping.files import write_touchstone
 from creeping.geometry.surface import normal, project
 from studies.reference import stored
-from studies.reference.antennas import plane_antennas, sphere_antennas
-from studies.reference.monopoles import plane_monopoles, sphere_monopoles
-from studies.reference.ports import sphere_coupling
-from studies.reference.slots import plane_slots, sphere_slots
+from studies.reference.dipoles import sphere_coupling
+from studies.reference.slots import (
+    plane_antennas,
+    plane_monopoles,
+    plane_slots,
+    sphere_antennas,
+    sphere_monopoles,
+    sphere_slots,
+)
 
 KINDS = ("ports", "slots", "monopoles", "antennas")
 DEGREES = {

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.extrapolated import Level, measured_level
+from creeping.field.far import Level, measured_level
 from creeping.geometry.directions import fibonacci_directions
 
 

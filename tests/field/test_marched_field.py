@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.field import on_body
 from creeping.field.beams import beam_sums
 from creeping.field.boundary import HARD
-from creeping.field.equation import kept
+from creeping.field.equation import solving
 from creeping.field.marching.fan_waves import fan_waves
 from creeping.rays.shedding import shed_on
 from studies.reference import clouds, fundamental, sphere, stored
@@ -47,10 +47,10 @@ def test_focus_behind_a_sphere(ball, k, limit, boundary):
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_cusped_caustic_of_an_ellipsoid(boundary):
     """Points of the whole shadow of a body that nothing here was set on, none left out; modes are infinite between."""
-    kept = stored.read("ellipsoid_caustic")
-    fan = fan_of(sc.Ellipsoid(0.9, 0.7, 1.0), kept["direction"], 3.4)
-    exact = kept[boundary]
-    found = cr.surface_field(fan, kept["points"], wavenumber=16.0, boundary=boundary)
+    solving = stored.read("ellipsoid_caustic")
+    fan = fan_of(sc.Ellipsoid(0.9, 0.7, 1.0), solving["direction"], 3.4)
+    exact = solving[boundary]
+    found = cr.surface_field(fan, solving["points"], wavenumber=16.0, boundary=boundary)
     error, top = np.abs(np.asarray(found) - exact), np.median(np.abs(exact))
     assert np.median(error) < 0.035 * top and np.max(error) < 0.3 * top
     assert np.mean(error <= found.error) > 0.93 and np.mean(found.ok) > 0.97
@@ -71,7 +71,7 @@ def test_where_rays_have_ended(monkeypatch):
     reference = fundamental.scatter(clouds.twisted_ellipsoid(), k, d[None], "hard", depth=0.12, per_wavelength=5.0)
     exact = reference.total(points)[:, 0]
     # as where the integral equation would cost too much
-    monkeypatch.setattr(kept, "SECONDS", 0.0)
+    monkeypatch.setattr(solving, "SECONDS", 0.0)
     found = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
     monkeypatch.setattr(on_body, "marches", lambda *_: False)
     modes = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
@@ -90,7 +90,7 @@ def test_ground_that_the_body_hides():
     x, exact = known["points"], known["values"]
     with pytest.MonkeyPatch.context() as patch:
         # as where the integral equation would cost too much
-        patch.setattr(kept, "SECONDS", 0.0)
+        patch.setattr(solving, "SECONDS", 0.0)
         found = cr.surface_field(fan, x, wavenumber=k, boundary="hard")
         patch.setattr(on_body, "marches", lambda *_: False)
         modes = cr.surface_field(fan, x, wavenumber=k, boundary="hard")

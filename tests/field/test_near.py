@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field.near import FINE
 from creeping.field.point_result import FieldStatus
-from creeping.shadow.occlusion import occluded
+from creeping.shadow.attachment import occluded
 from studies.reference import sphere
 
 D = np.array([0.0, 0.0, 1.0])

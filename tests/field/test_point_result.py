@@ -8,9 +8,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.equation import kept
-from creeping.field.point_result import FieldStatus, judged
-from creeping.field.served import measured_field
+from creeping.field.equation import solving
+from creeping.field.point_result import FieldStatus, judged, measured_field
 
 K = 20.0
 AT = np.array([(0.3, 0.1, 1.6), (0.0, 0.0, 1.5), (0.0, 0.2, -1.05), (0.0, 0.5, -2.0), (1.4, 0.0, 1.0)])
@@ -68,7 +67,7 @@ def test_they_act_as_arrays(fields):
 
 def test_arithmetic_in_place_gives_plain_arrays_and_leaves_the_result(fields):
     for u in fields:
-        values, kept = u.values, u.values.copy()
+        values, solving = u.values, u.values.copy()
         v = u
         v *= 2
         v += 1
@@ -79,7 +78,7 @@ def test_arithmetic_in_place_gives_plain_arrays_and_leaves_the_result(fields):
         np.testing.assert_array_equal(plain, values)
         with pytest.raises(TypeError, match=r"\.values"):
             np.add(u, 1, out=u)
-        np.testing.assert_array_equal(u.values, kept)
+        np.testing.assert_array_equal(u.values, solving)
         np.testing.assert_array_equal(np.add(u, 1, out=plain), values + 1)
 
 
@@ -137,7 +136,7 @@ def test_values_of_the_size_of_their_error_are_not_ok():
 
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_the_axis_of_a_torus_is_unresolved_without_the_equation(boundary, monkeypatch):
-    monkeypatch.setattr(kept, "SECONDS", 0.0)
+    monkeypatch.setattr(solving, "SECONDS", 0.0)
     body = sc.Torus(1.0, 0.5)
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=3.0, n_rays=64)
     u = cr.near_field(fan, [(0.0, 0.0, z) for z in (0.5, 1.5, 3.0)], wavenumber=30.0, boundary=boundary)
@@ -160,12 +159,16 @@ def test_fields_at_points_have_the_validity_of_their_fan(fan, fields):
 def test_what_serves_gives_way_to_what_is_ok_and_errs_less():
     mine = measured_field(np.zeros(4, dtype=complex), np.array([0.1, 0.3, 0.3, 0.1]), "rays", "expansion")
     mine = replace(mine, status=np.array([0, 0, 4, 4]))
-    other = measured_field(np.ones(4, dtype=complex), np.array([0.2, 0.2, 0.5, np.nan]), "currents", "extinction+x")
+    values = np.array([0.25, 1.0, 1.0, 1.0], dtype=complex)
+    other = measured_field(values, np.array([0.2, 0.2, 0.5, np.nan]), "currents", "extinction+x")
     at = np.arange(4)
     found = mine.put_better(at, other, must=False)
     assert found.method.tolist() == ["rays", "currents", "currents", "rays"]
     assert found.error_by.tolist() == ["expansion", "extinction+x", "extinction+x", "expansion"]
     assert found.status.tolist() == [0, 0, 0, 4] and found.values.tolist() == [0, 1, 1, 0]
+    # what the two differ by, more than both state, the one with the smaller error has overlooked
+    apart = mine.put_better(at[:1], replace(other, wave=np.ones(4, dtype=complex))[at[:1]], must=False)
+    assert apart.method[0] == "currents" and apart.error[0] == 0.2
     must = mine.put_better(at[2:], other[2:], must=True)
     assert must.method.tolist() == ["rays", "rays", "currents", "currents"]
     assert must.status[3] == FieldStatus.UNRESOLVED and must.error[3] == 1.0

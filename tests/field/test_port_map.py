@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field import port_map as module
+from creeping.field.ports import port_map as module
 from creeping.geometry.surface import project
 
 EGG = sc.Ellipsoid(1.2, 1.0, 0.8)

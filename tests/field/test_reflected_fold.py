@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.reflected_fold import fold_error
+from creeping.field.far_geometry import fold_error
 from creeping.geometry.quadrature import body_nodes
 from creeping.shadow.nodes import prepared
 
@@ -26,7 +26,7 @@ def test_size_of_the_field_at_the_fold(k):
     # physical optics of one lit bay, integrated: a torus from above, whose top is one parabolic circle, is not generic;
     # the twisted ellipsoid's normal line at a parabolic point is
     body = sc.TwistedEllipsoid()
-    from creeping.geometry.parabolic import parabolic_points
+    from creeping.geometry.curvature import parabolic_points
 
     found = parabolic_points(body)
     best = int(np.argmax(np.where((found.bend > 1) & (found.bend < 2.5), found.across, -1)))

@@ -7,11 +7,10 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
+from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary
 from creeping.field.far_geometry import far_geometry
-from creeping.field.ray_scales import fock_parameter
-from creeping.field.shed_orders import shed_orders
-from creeping.field.shed_wave import SECOND_ORDER, shed_wave
+from creeping.field.shed_wave import SECOND_ORDER, shed_orders, shed_wave
 from creeping.field.special.fock import SERIES
 from creeping.geometry.directions import fibonacci_directions
 

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.on_rays import ray_magnitude
+from creeping.field.on_body import ray_magnitude
 from creeping.geometry.surface import normal
 from studies.reference import clouds
 from studies.reference.near_source import beside_source

@@ -8,8 +8,8 @@ import pytest
 from creeping import InvalidInputError
 from creeping.field.far_result import FarField
 from creeping.files import read_ffe, write_csv, write_ffe
-from creeping.files.far_table import angles_of
 from creeping.files.ffe import grid_directions
+from creeping.files.tables import angles_of
 
 THETA, PHI = np.linspace(0, np.pi, 5), np.linspace(0, 2 * np.pi, 4)
 

@@ -19,7 +19,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.speed import speed_values
+from creeping.geometry.evaluators import speed_values
 
 # unequal, repeated, with 0, and two that differ by rounding
 AWKWARD = np.array([0.0, 0.0, 0.3, 0.3, np.nextafter(0.3, 1), 0.31, 0.9, 0.9 + 1e-9, 2.0])

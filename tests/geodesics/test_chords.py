@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from creeping.geodesics.chords import cubic_at
-from creeping.geodesics.states import P, X
+from creeping.geodesics.states import P, X, cubic_at
 
 
 def test_a_cubic_curve_is_its_own(rng):

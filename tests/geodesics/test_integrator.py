@@ -12,7 +12,7 @@ from creeping.geodesics.equations import vector_field
 from creeping.geodesics.integrator import counted_states, trace_states
 from creeping.geodesics.states import pack
 from creeping.geodesics.tableaus import RUNGE_KUTTA_4
-from creeping.geometry.speed import speed_values
+from creeping.geometry.evaluators import speed_values
 from creeping.geometry.surface import normal
 
 

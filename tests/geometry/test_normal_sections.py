@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.evaluators import evaluators
-from creeping.geometry.kernels.normal_sections import normal_sections
+from creeping.geometry.kernels.nearest import normal_sections
 from creeping.geometry.surface import normal, project
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 import shared_bodies as sc
 
-from creeping.geometry.curvature import gaussian_curvature, normal_curvature
-from creeping.geometry.parabolic import parabolic_points
+from creeping.geometry.curvature import gaussian_curvature, normal_curvature, parabolic_points
 from creeping.geometry.surface import normal
 
 

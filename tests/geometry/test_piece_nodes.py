@@ -7,9 +7,9 @@ import scatterers as sc
 from creeping.errors import SurfaceError
 from creeping.geometry.creased import Tiles, pieces_across
 from creeping.geometry.curvature import gaussian_curvature
-from creeping.geometry.graded_tiles import BEND, graded
 from creeping.geometry.quadrature import body_nodes, node_count
 from creeping.geometry.surface import size
+from creeping.geometry.tile_rules import BEND, graded
 
 ALMOND, PILL = sc.Almond(), sc.Capsule(1.0, 4.0)
 

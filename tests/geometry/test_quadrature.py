@@ -8,8 +8,7 @@ from body_checks import directions, normal_curvature, unit
 from creeping.errors import SurfaceError
 from creeping.geometry import quadrature, tile_rules
 from creeping.geometry.curvature import gaussian_curvature
-from creeping.geometry.depth import inner_points
-from creeping.geometry.quadrature import body_nodes, nearest_points, node_count
+from creeping.geometry.quadrature import body_nodes, inner_points, nearest_points, node_count
 from creeping.geometry.triangulation import quadrilaterals
 from studies.field_coverage import bodies
 

@@ -6,7 +6,7 @@ import shared_bodies as sc
 import trimesh
 
 import creeping as cr
-from creeping.geometry.unit import unit_of
+from creeping.geometry.checks import unit_of
 
 
 def fan_on(body):

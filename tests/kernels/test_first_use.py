@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from numba import njit
 
-from creeping.commands import compile_ahead
+from creeping.commands import upkeep
 from creeping.kernels import first_use
 from tests.patience import HANGS, until
 
@@ -83,7 +83,7 @@ os.kill(os.getpid(), getattr(signal, "SIGKILL", signal.SIGTERM))
 """
     (tmp_path / "slow.py").write_text(f"""
 import os, pathlib, threading, time
-from creeping.commands.compile_ahead import _end_with_parent
+from creeping.commands.upkeep import _end_with_parent
 def main(*given):
     threading.Thread(target=_end_with_parent, daemon=True).start()
     pathlib.Path({str(tmp_path / "part")!r}).write_text(str(os.getpid()))
@@ -106,11 +106,11 @@ def main(*given):
 
 def test_what_is_compiled_ahead_is_noted_once(monkeypatch, tmp_path):
     ran = []
-    monkeypatch.setattr(compile_ahead, "steps", lambda first: [lambda: ran.append(first)])
-    monkeypatch.setattr(compile_ahead, "_end_with_parent", lambda: None)
+    monkeypatch.setattr(upkeep, "steps", lambda first: [lambda: ran.append(first)])
+    monkeypatch.setattr(upkeep, "_end_with_parent", lambda: None)
     try:
         for _ in range(2):
-            compile_ahead.main("creeping.shadow.kernels.trace", str(tmp_path / "new"), "abc")
+            upkeep.main("creeping.shadow.kernels.trace", str(tmp_path / "new"), "abc")
     finally:
         gc.enable()
     assert ran == ["creeping.shadow.kernels.trace"] and first_use.is_done(tmp_path / "new", "abc")
@@ -118,5 +118,5 @@ def test_what_is_compiled_ahead_is_noted_once(monkeypatch, tmp_path):
 
 def test_the_job_runs():
     for first in ("creeping.shadow.kernels.newton", "creeping.geodesics.kernels.integrator"):
-        for step in compile_ahead.steps(first):
+        for step in upkeep.steps(first):
             step()

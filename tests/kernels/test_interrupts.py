@@ -117,8 +117,8 @@ def test_long_calls_are_interrupted(what, threads, tmp_path, monkeypatch):
 
     code, err, seconds = interrupted([sys.executable, "-c", BEGIN + LONG[what]], tmp_path, wait)
     assert code == -signal.SIGINT and err.rstrip().endswith("KeyboardInterrupt")
-    # the end of the interpreter is in it
-    assert seconds < 1.5 * threads
+    # the end of the interpreter is in it, and what else the machine does makes seconds longer
+    assert seconds < 3 * threads
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processor time is read from /proc")

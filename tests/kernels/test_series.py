@@ -3,8 +3,7 @@
 import numpy as np
 from numba import njit
 
-from creeping.kernels.cube_root import LEAST, cube_root
-from creeping.kernels.exponential import exponential, wave
+from creeping.kernels.exponential import LEAST, cube_root, exponential, wave
 
 
 @njit

@@ -12,8 +12,7 @@ from patience import HANGS
 import creeping as cr
 import scatterers as sc
 from creeping.field.currents import radiation
-from creeping.field.equation.smooth_kernel import SmoothKernel
-from creeping.field.equation.split_sums import SplitSums
+from creeping.field.equation.split_sums import SmoothKernel, SplitSums
 from creeping.geodesics import integrator
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.states import pack

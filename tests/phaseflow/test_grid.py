@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.phaseflow.building import Plan
-from creeping.phaseflow.grid import MARGIN, Grid, least_cells
+from creeping.phaseflow.splines import MARGIN, Grid, least_cells
 from creeping.phaseflow.tuning.search import _scaled
 
 SPHERE = sc.Sphere()

@@ -11,7 +11,7 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.phaseflow.building import Plan, build_direct
 from creeping.phaseflow.coordinates.base import has_mirrors, model_of
-from creeping.phaseflow.grid import Grid
+from creeping.phaseflow.splines import Grid
 
 
 def rms(a, b):

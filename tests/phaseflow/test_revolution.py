@@ -11,7 +11,7 @@ from creeping.geometry.revolution import charted_axis, rotations
 from creeping.phaseflow.building import Plan, build_direct
 from creeping.phaseflow.coordinates import rotation as compiled_models
 from creeping.phaseflow.coordinates.base import model_of
-from creeping.phaseflow.grid import Grid
+from creeping.phaseflow.splines import Grid
 
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
 

@@ -7,8 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.geometry.creased import drawn_mesh
 from creeping.plotting import coupling_picture
-from creeping.plotting.body_fronts import front_strokes
-from creeping.plotting.coupling_pictures import coupling_levels
+from creeping.plotting.coupling_pictures import coupling_levels, front_strokes
 
 BALL = sc.Sphere()
 

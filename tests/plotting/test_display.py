@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from creeping.plotting import display
-from creeping.plotting.display import GLProbe, gl_available
+from creeping.plotting import scene
+from creeping.plotting.scene import GLProbe, gl_available
 
 
 @pytest.fixture
@@ -20,12 +20,12 @@ def answers(monkeypatch, fresh_display):
             raise state.raises
         return SimpleNamespace(returncode=state.code, stderr=state.stderr)
 
-    monkeypatch.setattr(display.subprocess, "run", run)
+    monkeypatch.setattr(scene.subprocess, "run", run)
     return state
 
 
 def forget():
-    display._verdict.cache_clear()
+    scene._verdict.cache_clear()
 
 
 def test_asks_once_per_process_and_once_per_machine(answers, fresh_display, monkeypatch):
@@ -65,7 +65,7 @@ def test_damaged_cache_asks_again(answers, fresh_display, content):
 def test_unwritable_cache_is_no_error(answers, monkeypatch, tmp_path):
     blocker = tmp_path / "file"
     blocker.write_text("in the way")
-    monkeypatch.setattr(display, "_cache_file", lambda: blocker / "creeping" / "gl.json")
+    monkeypatch.setattr(scene, "_cache_file", lambda: blocker / "creeping" / "gl.json")
     assert gl_available().ok
 
 

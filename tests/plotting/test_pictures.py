@@ -9,9 +9,9 @@ import shared_bodies as sc
 import creeping as cr
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
+from creeping.plotting._drawing import View, shadow_view
 from creeping.plotting._strokes import chosen_rays, line_pieces, refined, runs, status_pieces, strokes
-from creeping.plotting._view import View, shadow_view
-from creeping.plotting.display import GLProbe
+from creeping.plotting.scene import GLProbe
 
 
 def pixels(path):

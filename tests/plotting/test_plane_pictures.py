@@ -7,7 +7,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.plotting import field_cut_picture, plane_marks
+from creeping.plotting import field_cut_picture, plane_pictures
 
 K = 10.0
 
@@ -64,7 +64,7 @@ def test_what_is_missing_is_grey_and_named(rays):
     cover = ax.images[1].get_array()
     missing = np.isin(rays.status, [s for s in cr.FieldStatus if s.name not in ("OK", "UNRESOLVED")])
     np.testing.assert_array_equal(cover[..., 3] == 1.0, missing)
-    assert any(one.hatches == [plane_marks.HATCH] for one in ax.collections if hasattr(one, "hatches"))
+    assert any(one.hatches == [plane_pictures.HATCH] for one in ax.collections if hasattr(one, "hatches"))
     words = [text.get_text() for legend in ax.figure.legends for text in legend.get_texts()]
     count = int(np.sum(rays.status == cr.FieldStatus.LIT))
     assert count > 100 and any(f"not OK: {count} LIT" in text for text in words)
@@ -73,10 +73,10 @@ def test_what_is_missing_is_grey_and_named(rays):
 def test_a_field_below_its_error_is_dotted(total):
     doubtful = replace(total.field, error=np.full(total.field.error.shape, 0.5))
     ax = replace(total, field=doubtful).plot(legend=False)
-    assert any(one.hatches == [plane_marks.DOTS] for one in ax.collections if hasattr(one, "hatches"))
+    assert any(one.hatches == [plane_pictures.DOTS] for one in ax.collections if hasattr(one, "hatches"))
     assert not ax.figure.legends
     certain = replace(total, field=replace(total.field, error=np.zeros(total.field.error.shape)))
-    assert not any(getattr(one, "hatches", None) == [plane_marks.DOTS] for one in certain.plot().collections)
+    assert not any(getattr(one, "hatches", None) == [plane_pictures.DOTS] for one in certain.plot().collections)
 
 
 @pytest.mark.parametrize(("show", "error"), [("level", False), ("magnitude", False), ("wave", True)])

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from creeping.rays.angle_seams import split_at_seam
+from creeping.rays.isophase import split_at_seam
 
 
 def test_seam_is_crossed_at_pi():

@@ -15,7 +15,7 @@ from body_checks import (
 
 import creeping as cr
 import scatterers as sc
-from creeping.geometry.frames import polar_frame
+from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.surface import Surface
 from scatterers.kernels.trigonometry import cos_pi, sin_pi
 from scatterers.spline.tensor import SYMMETRIC

@@ -16,7 +16,7 @@ import scatterers as sc
 from creeping.geometry.surface import normal, project
 from scatterers.cad_file import files as _cad_files
 from scatterers.cad_file.files import CadReading, read_cad
-from scatterers.triangles.choice import Choice
+from scatterers.triangles.quality import Choice
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 

@@ -18,7 +18,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project
 from scatterers.spline import cache as _fit_cache
-from scatterers.spline.report import FitReport
+from scatterers.spline.cloud import FitReport
 from studies._meshes import capsule, geodesic_sphere, on_body, scattered, torus_grid
 
 NAMES = ("ellipsoid", "torus", "twisted")

@@ -6,7 +6,7 @@ import shared_bodies as sc
 from body_checks import directions, unit
 
 from creeping.geometry.surface import normal, project
-from creeping.shadow.occlusion import occluded
+from creeping.shadow.attachment import occluded
 
 D = unit(np.array([0.3, 0.5, 0.81]))
 

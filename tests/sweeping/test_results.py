@@ -9,7 +9,7 @@ import shared_bodies as sc
 import xarray
 
 import creeping as cr
-from creeping.storage import extras
+from creeping.storage import memory
 from creeping.sweeping import results as dataset
 from creeping.sweeping import run
 from creeping.sweeping.plan import SweepPlan
@@ -79,7 +79,7 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
     def gone(name):
         raise ModuleNotFoundError(name=name)
 
-    monkeypatch.setattr(extras, "import_module", gone)
+    monkeypatch.setattr(memory, "import_module", gone)
     with pytest.raises(cr.CreepingError, match=r"need xarray: pip install 'creeping\[sweep\]'"):
         cr.sweep_directions(fake.FLOW, [(0, 0, 1)], quantity="rays")
 

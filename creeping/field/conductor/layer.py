@@ -1,6 +1,6 @@
 """E and H nearer to a conductor than currents serve: between J and the charge on it and the fields of currents above.
 
-Along the normal at x, t = kh above the body, the four terms of `creeping.field.near_layer` are those of
+Along the normal at x, t = kh above the body, the four terms of `creeping.field.near` are those of
 
     E_n   value q = n.E, slope -(kappa_1 + kappa_2) q/k on the body; values at two heights
     H_t   value J x n, slope -K H_t/k with the shape operator K; values at two heights
@@ -11,21 +11,27 @@ The slopes are div E = 0, (curl H)_t = 0 and div H = 0 on the body, where E_t = 
 is about A |kappa_1 + kappa_2|/k of the incident wave, A = 0.1, and 0.3 of E_t, on a saddle with the root of the sum of
 squares; curl E = ikH gives a slope of E_t by the gradient of the charge, which is not known well enough.
 
-Sources: [CK13, sec. 6.2]; Derivations, F20 and F26.
+E and H at points off a conductor by the currents of its whole body, with their error.
+
+    E_s(y) = ik int [J + grad_y grad_y.J/k^2] G dS,   H_s(y) = int grad_y G x J dS
+
+Errors are those of `creeping.field.currents.whole_body`, with what currents leave of E and of H inside for epsilon, and
+with the second order's E and H for u'; the larger of the two counts for both.
+
+Sources: [CK13, sec. 6.2]; Derivations, F20 and F26; Derivations, F17, F20 and F26.
 """
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.conductor.on_body import OnConductor, on_conductor
-from creeping.field.conductor.total import total_fields
 from creeping.field.currents.conductor import ConductorCurrents
-from creeping.field.near_layer import GRAZING, feet_of, layer_terms, solved
-from creeping.field.point_result import FieldStatus
-from creeping.field.served import Served, measured_field
+from creeping.field.currents.whole_body import level_at
+from creeping.field.near import GRAZING, feet_of, layer_terms, solved
+from creeping.field.point_result import FieldStatus, Served, measured_field
 from creeping.geometry.quadrature import SYMMETRIC, BodyNodes, body_nodes
 from creeping.rays.fan import RayFan
-from creeping.shadow.occlusion import occluded
+from creeping.shadow.attachment import occluded
 
 LOWEST, APART = 0.27, 0.27
 """Least height, in wavelengths, at which currents are asked, and that of further points above it."""
@@ -36,6 +42,9 @@ CLEAR = 0.8
 LEFT_OUT, LEFT_OUT_ACROSS = 0.1, 0.3
 """Error of four terms, in |kappa_1 + kappa_2|/k or on a saddle the root of the sum of squares, and of those of E_t; as
 the cube of the heights they span."""
+
+LIT_LEVEL, DARK_LEVEL, SHAPE = 2.3, 4.6, 2.3
+"""Factors L and S of the error, set on the first four bodies of `studies._point_coverage`."""
 
 
 def lowest_height(currents: ConductorCurrents) -> float:
@@ -119,4 +128,29 @@ def _between(
 
 
 ELECTRIC, MAGNETIC = slice(0, 3), slice(3, 6)
+
+
 """Where E and H stand among six components."""
+
+
+def incident_fields(direction: FloatArray, electric: ComplexArray, points: FloatArray, k: float) -> ComplexArray:
+    """E and H (m, 6, p) of incident waves E0 (3, p) at points (m, 3), L."""
+    both = np.concatenate([electric, np.cross(direction, electric, axisb=0).T])
+    return np.asarray(np.multiply.outer(np.exp(1j * k * (points @ direction)), both))
+
+
+def total_fields(
+    currents: ConductorCurrents, points: FloatArray, dark: BoolArray
+) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    """Incident and scattered E and H (m, 6, p) at points (m, 3), L, some in the dark, and their error (m, p)."""
+    k = currents.wavenumber
+    incident = incident_fields(currents.direction, currents.incident_electric, points, k)
+    scattered = np.concatenate([currents.scattered_electric(points), currents.scattered(points)], axis=1)
+    left = currents.left_of_each
+    shapes = currents.changed_electric(points), currents.changed_magnetic(points)
+    error = np.empty((len(points), incident.shape[2]))
+    for i, mean in enumerate(currents.amplitudes):
+        level = level_at(currents, points, dark, float(mean), LIT_LEVEL, DARK_LEVEL)
+        each = [left[j, i] * np.hypot(level, SHAPE * shape[:, i]) for j, shape in enumerate(shapes)]
+        error[:, i] = np.maximum(*each)
+    return incident, scattered, error

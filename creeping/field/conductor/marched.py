@@ -17,14 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray
-from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
+from creeping.field.arguments import scales, transverse_ratios
+from creeping.field.beams import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import ELECTRIC_HARD, SOFT
 from creeping.field.conductor.vector_waves import VectorWaves
 from creeping.field.currents.conductor import spread_of, turn_of, vectors_of
-from creeping.field.marched_sum import marches
 from creeping.field.marching.fan_rays import FLAT
-from creeping.field.marching.fan_waves import FanWaves, fan_waves, spread_out
-from creeping.field.ray_scales import scales, transverse_ratios
+from creeping.field.marching.fan_waves import FanWaves, fan_waves, marches, spread_out
 from creeping.field.ray_sums import RaySum
 from creeping.field.shed_wave import smoothstep
 from creeping.geometry.quadrature import BodyNodes, nodes_at

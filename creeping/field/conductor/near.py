@@ -1,12 +1,22 @@
 """E and H at points off a perfect conductor or on it, and the current on it, for plane waves of chosen polarisation.
 
     on the body              E = (n.E) n,  H = J x n, by J and its divergence     `creeping.field.conductor.on_body`
-    a quarter wavelength off the radiation of the whole body's currents           `creeping.field.conductor.total`
+    a quarter wavelength off the radiation of the whole body's currents           `creeping.field.conductor.layer`
     nearer                   between the two                                      `creeping.field.conductor.layer`
-    anywhere, solved         tiles of the integral equation                       `creeping.field.equation.charge`
-    in the shadow            creeping rays, where they state the smaller error    `creeping.field.conductor.shed`
+    anywhere, solved         tiles of the integral equation                       `creeping.field.equation.currents`
+    in the shadow            creeping rays, where they state the smaller error    `creeping.field.conductor.near`
 
-Sources: [CK13, sec. 6.2]; Derivations, F18, F20 and F26.
+E and H of the creeping rays whose tangents pass through points off a conductor.
+
+    H = h u b - e (i kappa_t1/(kT)) u p,   E = -h u n        electric hard
+    E = e v b,                             H = e v n         electric soft
+
+p, n and b = n x p are those where the ray leaves, h = H0.b and e = E0.b those where it has landed, u and v the waves of
+`creeping.field.near_wave`, T = J + l J' the width of the ray's tube. A ray carries b onto b and n onto n; what h varies
+by across rays gives H along them, (i/k) dh/db, as in the current on the body. E and H along rays that come from what u
+and v vary by along n, of the order m/(k l) at the distance l, are left out; the error counts them.
+
+Sources: [CK13, sec. 6.2]; Derivations, F18, F20 and F26; [LK59], [PBM80]; Derivations, F8, F14 and F26.
 """
 
 # help() shows names of types instead of what they stand for
@@ -18,35 +28,40 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain
+from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain, scales
 from creeping.field.body_currents import affordable, kept_currents, solved_currents
-from creeping.field.conductor.layer import layer_fields, lowest_height
+from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD, ELECTRIC_SOFT
+from creeping.field.conductor.layer import incident_fields, layer_fields, lowest_height, total_fields
 from creeping.field.conductor.on_body import OnConductor, on_conductor
-from creeping.field.conductor.shed import shed_sums
-from creeping.field.conductor.total import incident_fields, total_fields
 from creeping.field.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
-from creeping.field.currents.conductor import ConductorCurrents
-from creeping.field.currents.total import far_enough
+from creeping.field.currents.conductor import ConductorCurrents, amplitudes
 from creeping.field.currents.whole_body import POINTS as INNER
+from creeping.field.currents.whole_body import far_enough
 from creeping.field.equation.currents import ConductorTileCurrents
+from creeping.field.far_geometry import fan_strips
+from creeping.field.far_result import incident_mix, spherical_frame
 from creeping.field.lit_ground import LEFT, UNKNOWN, convex
 from creeping.field.near import MISSING, ON_BODY, checked_height, rays_alone
-from creeping.field.point_result import FieldStatus, judged
-from creeping.field.polarisation import incident_mix, spherical_frame
-from creeping.field.served import Served, measured_field, zero_field
+from creeping.field.near_wave import height_above, shed_waves
+from creeping.field.point_result import FieldStatus, Served, judged, measured_field, zero_field
+from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
+from creeping.geometry.checks import unit_of
 from creeping.geometry.creased import is_creased
 from creeping.geometry.surface import normal
-from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
-from creeping.shadow.occlusion import occluded
+from creeping.rays.shedding import ShedRays, free_ways, shed_near
+from creeping.shadow.attachment import occluded
 
 VECTOR = 1.5
 """What sums for both fields of a polarisation cost, in terms of a scalar's."""
 FINE = 1e-4
 """Error of rays up to which currents are not asked."""
+
+ALONG, COUPLED = 1.5, 0.5
+"""Error by what E and H have along the ray beside the term in kappa_t1, over m/(k l), and of that term."""
 
 
 def conductor_field(
@@ -379,3 +394,40 @@ def _facts(fan: RayFan, k: float, electric: ComplexArray, single: bool) -> dict[
         "validity": validity(fan, wavenumber=k),
         "length_unit": unit_of(fan.body),
     }
+
+
+def shed_sums(fan: RayFan, points: FloatArray, k: float, electric: ComplexArray) -> list[RaySum]:
+    """Sums over rays of E and H (n, 6) at points off the body (n, 3), L, for each incident E0 (3, p)."""
+    shed = shed_near(fan_strips(fan), fan.body, points)
+    shed = shed[free_ways(fan.body, shed.rays, shed.reach)]
+    pair = [_vectors(fan, shed, k, electric, order) for order in (2, 1)]
+    coupled = np.linalg.norm(np.sum(pair[0][:, 3:] * shed.rays.directions[:, :, None], axis=1, keepdims=True), axis=1)
+    m = scales(shed.rays, k)[1]
+    strength = np.max([np.linalg.norm(wave[:, :3], axis=1).max(axis=1, initial=0.0) for wave in pair], axis=0)
+    height, found = height_above(shed.rays, shed.reach, k), []
+    for i in range(electric.shape[1]):
+        waves, other = (wave[:, :, i] for wave in pair)
+        own = own_error(shed.rays, (waves, other), k, CONDUCTOR, 2, height=height)
+        along = np.minimum(ALONG * m / (k * np.maximum(shed.reach, 1e-300)), 1.0)
+        own = np.linalg.norm([own, along * np.linalg.norm(waves, axis=1), COUPLED * coupled[:, i]], axis=0)
+        found.append(ray_sum(fan, shed, len(points), waves, own, k, ELECTRIC_HARD, strength))
+    return found
+
+
+def _vectors(fan: RayFan, shed: ShedRays, k: float, electric: ComplexArray, order: int) -> ComplexArray:
+    """E and H (m, 6, p) of each ray."""
+    rays = shed.rays
+    p, n = rays.directions, normal(fan.body, rays.points)
+    b = np.cross(n, p)
+    axes = np.broadcast_to(fan.line.direction, rays.first_normal.shape)
+    h, e = amplitudes(rays.first_normal, axes, fan.line.direction, electric)
+    with np.errstate(invalid="ignore"):
+        u, v = (shed_waves(rays, shed.reach, k, kind, order) for kind in (ELECTRIC_HARD, ELECTRIC_SOFT))
+        hu, ev = h * u[:, None], e * v[:, None]
+        E = -n[:, :, None] * hu[:, None] + b[:, :, None] * ev[:, None]
+        H = b[:, :, None] * hu[:, None] + n[:, :, None] * ev[:, None]
+        # 1/T is held where rays merge, as 1/J is on the body
+        tube, m = rays.spreading + shed.reach * rays.spreading_rate, scales(rays, k)[1]
+        aside = -1j / k * rays.transverse[0] * u * tube / (tube**2 + 1 / m**4)
+        H = H + p[:, :, None] * (e * aside[:, None])[:, None]
+    return np.concatenate([E, H], axis=1)

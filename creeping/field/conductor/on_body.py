@@ -5,40 +5,49 @@
 
 J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
 the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
-(`creeping.field.conductor.mode_beams`). Where the integral equation is solved its solution stands for all of it, and
-n.E is that of `creeping.field.equation.charge`. Divergences are by `creeping.field.conductor.divergence`.
+(`creeping.field.conductor.on_body`). Where the integral equation is solved its solution stands for all of it, and
+n.E is that of `creeping.field.equation.currents`. Divergences are by `creeping.field.conductor.on_body`.
 Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
 ground BEYOND |J_thrown| stands besides, for what comes to it later. The charge of expansions has the error of J.
 
-Sources: [CK13, sec. 6.2]; Derivations, F18 and F26.
+The current of creeping waves where their rays merge, by Gaussian beams that carry vectors.
+
+Beams of `creeping.field.conductor.vector_waves`, whose waves are creeping modes of second order.
+
+Surface divergence of a tangential field on a body, by its differences between points to either side.
+
+    div v = Σ_t t.[v(x + h t) - v(x - h t)]/2h,   t two tangents at x, kh = CLOSE
+
+Sources: [CK13, sec. 6.2]; Derivations, F18 and F26; [P82]; Derivations, F24 and F26; Derivations, F26.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.beam_blend import STRONG, beams_beside_rays, blended_sum, variation
+from creeping.field.arguments import fock_parameter
+from creeping.field.beams import STRONG, beams_beside_rays, blended_sum, seconds, variation
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
-from creeping.field.conductor.divergence import Crosses, crosses
 from creeping.field.conductor.marched import current_marches, marched_current
-from creeping.field.conductor.mode_beams import beams_serve, mode_waves_of
-from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
-from creeping.field.currents.nodes import TAKEN_OVER, lit_part
+from creeping.field.conductor.vector_waves import VectorWaves
+from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_scalars, ray_vectors
+from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
-from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus
-from creeping.field.ray_scales import fock_parameter
+from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus, Served, Words, measured_field
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
-from creeping.field.served import Served, Words, measured_field
-from creeping.field.strip_waves import without_tubes
+from creeping.field.strip_waves import StripTable, modes_on_strip, resampled, without_tubes
 from creeping.field.surface import surface_waves
 from creeping.geometry.quadrature import nodes_at
-from creeping.geometry.surface import normal, size
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays, shed_on
+from creeping.rays.status import RayStatus
 
 MERGED = 1e-3
 """Error of the sum over rays, as a share of the incident wave, from which beams are asked."""
@@ -49,6 +58,47 @@ BEYOND = 1.0
 """What the ground receives later than at first, to and fro and by shed rays, as a share of what it does at first."""
 WORST = 0.99
 """Error of a ray, as a share of it, at most: one that has ended is none of those that beams are made of."""
+
+STEPS = 12.0
+"""Steps a wavelength at which waves are kept along rays."""
+FEWEST = 8
+"""Rays of a strip from which waves are interpolated between them."""
+LONGEST = 60.0
+"""Seconds that beams may take."""
+
+CLOSE = 0.02
+"""kh: expansions are smooth to rounding."""
+
+
+class Crosses(NamedTuple):
+    """Points (n,) of a body and those to either side of them, in blocks of n: the points first.
+
+    Attributes
+    ----------
+    points, normals : (5 n, 3), L and 1
+    apart : (2, n, 3), L
+        What the two points along each tangent are apart.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    apart: FloatArray
+
+    def divergence(self, values: ComplexArray) -> ComplexArray:
+        """Divergence, 1/L, of values (5 n, 3, p): (n, p)."""
+        ends = values.reshape(5, -1, *values.shape[1:])[1:]
+        slopes = np.sum(self.apart[..., None] * (ends[0::2] - ends[1::2]), axis=2)
+        return np.asarray(np.sum(slopes / np.sum(self.apart**2, axis=2)[..., None], axis=0))
+
+
+def crosses(body: Surface, direction: FloatArray, points: FloatArray, k: float) -> Crosses:
+    """Crosses at points of a body (n, 3), L."""
+    n = normal(body, points)
+    first = axes_of_incidence(n, direction)
+    sides = [project(body, points + sign * CLOSE / k * t) for t in (first, np.cross(n, first)) for sign in (1.0, -1.0)]
+    apart = np.stack([a - b for a, b in zip(sides[0::2], sides[1::2], strict=True)])
+    around = np.concatenate([points, *sides])
+    return Crosses(around, normal(body, around), apart)
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,3 +362,65 @@ def _without_caustics(
     ]
     with np.errstate(divide="ignore", invalid="ignore"):
         return large, np.nan_to_num(np.minimum(np.stack(off, axis=1) / large, WORST))
+
+
+class ModeWaves(VectorWaves):
+    """Creeping modes of a conductor."""
+
+    def at(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
+        """Y of u at places (n,) of a strip: (n,)."""
+        return self._hard.at(strip, sigma, s)
+
+    def slope(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
+        """Its derivative in s, 1/L: (n,)."""
+        return self._hard.at(strip, sigma, s, ds=1)
+
+    def across(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
+        """Its derivative in sigma, 1/L: (n,)."""
+        return self._hard.at(strip, sigma, s, dsigma=1)
+
+    def lean(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
+        """0 (n,): modes know nothing of what varies across their rays."""
+        return np.zeros(sigma.shape)
+
+    def ratios(self, strip: int, sigma: FloatArray, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """(i/k) v/u and Du/(2 m^2 u) at places (n,) of a strip."""
+        soft, changing = (table.at(strip, sigma, s) for table in self._ratios)
+        return soft, changing
+
+    @cached_property
+    def _hard(self) -> StripTable:
+        found = [modes_on_strip(strip, self.times, self.wavenumber, ELECTRIC_HARD)[0] for strip in self.strips]
+        return StripTable(self.strips, self.times, found)
+
+    @cached_property
+    def _ratios(self) -> tuple[StripTable, StripTable]:
+        """(i/k) v/u and Du/(2 m^2 u) on the strips' rays."""
+        tables: tuple[list[ComplexArray], list[ComplexArray]] = ([], [])
+        for strip in self.strips:
+            hard, soft, changing = ray_scalars(without_tubes(strip.rays), self.wavenumber, 2)
+            for table, wave in zip(tables, (soft, changing), strict=True):
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    ratio = np.where(np.abs(hard) > 0, wave / hard, 0.0)
+                table.append(resampled(strip, ratio, self.times))
+        soft_table, changing_table = (StripTable(self.strips, self.times, table) for table in tables)
+        return soft_table, changing_table
+
+
+def mode_waves_of(fan: RayFan, wavenumber: float, electric: ComplexArray) -> ModeWaves:
+    """Creeping modes of a conductor on a fan."""
+    count = max(64, int(np.ceil(STEPS * fan.length * wavenumber / (2 * np.pi))))
+    times = np.linspace(0.0, fan.length, count + 1)
+    return ModeWaves(fan_strips(fan), times, wavenumber, fan.line.direction, electric)
+
+
+def beams_serve(fan: RayFan, count: int, wavenumber: float) -> bool:
+    """Whether beams can be made of a fan's modes, and cost little enough at ``count`` points."""
+    strips = fan_strips(fan)
+    return (
+        len(strips) > 0
+        and sum(len(strip.positions) for strip in strips) == len(fan.status)
+        and min(len(strip.positions) for strip in strips) >= FEWEST
+        and bool(np.all(fan.status == RayStatus.OK))
+        and seconds(fan, strips, wavenumber, count) < LONGEST
+    )

@@ -1,6 +1,6 @@
 """Currents J = n x H of the whole of a perfect conductor, for both polarisations of the incident wave.
 
-On the lit side as `creeping.field.currents.lit_conductor` says. On a creeping ray, with tangent p, b = n x p, h = H0.b
+On the lit side as `creeping.field.currents.lit` says. On a creeping ray, with tangent p, b = n x p, h = H0.b
 and e = E0.b at its launch point, u and v the waves "electric hard" and "electric soft" there, t = p.Kb the torsion,
 
     J = -(h u + h (T/(2m^2)) Du + t rho j) p + (j + h (t rho/(2m^2)) Du) b,      T = (t rho)^2, rho = 1/kappa_n
@@ -21,10 +21,10 @@ from typing import ClassVar
 import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray
+from creeping.field.arguments import fock_parameter, scales
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT
 from creeping.field.currents.bounce import received_vectors
-from creeping.field.currents.lit import STEEPEST
-from creeping.field.currents.lit_conductor import lit_conductor
+from creeping.field.currents.lit import STEEPEST, lit_conductor
 from creeping.field.currents.nodes import LitNodes, RayNodes
 from creeping.field.currents.radiation import (
     electric_field_of_vector,
@@ -32,8 +32,7 @@ from creeping.field.currents.radiation import (
     magnetic_field_of_vector,
 )
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.polarisation import spherical_frame
-from creeping.field.ray_scales import fock_parameter, scales
+from creeping.field.far_result import spherical_frame
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import ray_factor, surface_waves
 from creeping.rays.quantities import RayPoints

@@ -7,7 +7,7 @@ from creeping.field.arguments import UNRESOLVED
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.far_result import FarField
-from creeping.geometry.unit import unit_of
+from creeping.geometry.checks import unit_of
 
 
 def far_by_currents(

@@ -6,18 +6,29 @@
 A current goes like |J|^(-1/2), so that its caustics on the body cost nothing in ray coordinates. From xi = 0 to 0.6
 behind the line both parts have a share, W(xi; 0, 0.6) that of the rays, W a smooth step.
 
-Sources: [LK59]; Derivations, F16.
+The wave of a scalar boundary at nodes of the lit side and of creeping rays.
+
+On rays it is the sum of creeping modes, or, where the admittance varies and there are none, the marched wave
+
+    u = y |J|^(-1/2) e^{ik(d.x0 + s) - i pi N/2}
+
+of `creeping.field.marching.fan_waves`; then what is of second order has u's phase and the size of its error.
+
+Sources: [LK59]; Derivations, F16; Derivations, F16 and F22.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, slowest_decay
-from creeping.field.marching.fan_waves import march_alone
+from creeping.field.currents.lit import lit_currents
+from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.shed_wave import smoothstep
+from creeping.field.surface import surface_waves
 from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size
@@ -25,8 +36,8 @@ from creeping.rays.fan import RayFan, launch
 from creeping.rays.fan_points import ray_points
 from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
 from creeping.rays.reach import ray_length
+from creeping.shadow.attachment import occluded
 from creeping.shadow.line import ShadowLine
-from creeping.shadow.occlusion import occluded
 from creeping.shadow.status import ATTACHED
 
 PENUMBRA = (0.0, 0.6)
@@ -259,3 +270,41 @@ def _share_of_rays(
         xi = np.where(along > 0, -fock_scale(wavenumber, along) * cosine[near], np.inf)
     share[near] = smoothstep(xi, *PENUMBRA)
     return np.where(np.maximum.accumulate(share >= 1, axis=1), 1.0, share)
+
+
+def lit_waves(
+    part: LitNodes, direction: FloatArray, extent: float, k: float, kind: Boundary
+) -> tuple[ComplexArray, ComplexArray]:
+    """Wave at nodes of the lit side of a body of size ``extent``, L, by second and by first order (n,)."""
+    along = direction + part.cosine[:, None] * part.normals
+    here = kind.at(part.points, along, STEP * extent)
+    geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
+    wave = np.exp(1j * k * (part.points @ direction))
+    second, first = (wave * lit_currents(*geometry, k, here, order) for order in (2, 1))
+    return second, first
+
+
+def ray_waves(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, ComplexArray]:
+    """Wave at nodes of rays, 0 where there is none, and what of it is of second order (n,)."""
+    if march_alone(nodes.fan.body, kind):
+        return _marched(nodes, k, kind)
+    waves, first = (surface_waves(nodes.rays, k, kind, order) for order in (2, 1))
+    # on a caustic of the body the current is infinite and its weight 0
+    ok = np.isfinite(waves) & np.isfinite(first)
+    return np.where(ok, waves, 0.0), np.where(ok, waves - first, 0.0)
+
+
+def _marched(nodes: RayNodes, k: float, kind: Boundary) -> tuple[ComplexArray, ComplexArray]:
+    if not marchable(nodes.fan, kind, 2):
+        some = f"of {len(nodes.fan.status)} rays of this incidence some stand alone, where no wave can be marched"
+        if not kind.varies:
+            raise SurfaceError(f"the body has joints, and {some}; its far field by rays is known, or another incidence")
+        raise InvalidInputError(
+            f"the admittance {kind.coating} varies, and {some}; give a constant admittance, or another incidence"
+        )
+    y, error = fan_waves(nodes.fan, wavenumber=k, boundary=kind).along(nodes.rows, nodes.rays.time)
+    wave = spread_out(y, nodes.rays, k)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = wave * np.minimum(error / np.abs(y), 1.0)
+    known = np.isfinite(error) & np.isfinite(wave) & np.isfinite(off)
+    return np.where(known, wave, 0.0), np.where(known, off, 0.0)

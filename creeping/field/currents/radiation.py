@@ -49,7 +49,7 @@ def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray
     cells = grid_cells(np.ptp(points, axis=0) if len(points) else np.zeros(3), wavenumber)
     if transformed(len(points), len(directions), cells):
         return _by_transform(points, weights, directions, wavenumber)
-    from creeping.field.kernels.radiation import distant
+    from creeping.field.kernels.near_pairs import distant
 
     turns = np.ascontiguousarray(points.T) * (wavenumber / (2 * np.pi))
     real, imaginary = np.ascontiguousarray(weights.real), np.ascontiguousarray(weights.imag)
@@ -114,7 +114,7 @@ def field_of_scalar(
 
     Or of several columns (c, n) of them: (m, c).
     """
-    from creeping.field.kernels.radiation import near
+    from creeping.field.kernels.near_pairs import near
 
     given = slope if u is None else u
     nothing = np.zeros((1, len(points)) if given is None else np.atleast_2d(given).shape, dtype=complex)
@@ -148,7 +148,7 @@ def magnetic_field_of_vector(
     points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
 ) -> ComplexArray:
     """Scattered H (m, 3, ...) at points off the body, in the unit of the incident one, of J dS (n, 3, ...)."""
-    from creeping.field.kernels.radiation import curl
+    from creeping.field.kernels.near_pairs import curl
 
     return _vector_sums(curl, points, currents, at, wavenumber)
 
@@ -157,7 +157,7 @@ def electric_field_of_vector(
     points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
 ) -> ComplexArray:
     """Scattered E (m, 3, ...) at points off the body, in the unit of the incident one, of J dS (n, 3, ...)."""
-    from creeping.field.kernels.radiation import electric
+    from creeping.field.kernels.near_pairs import electric
 
     return _vector_sums(electric, points, currents, at, wavenumber)
 

@@ -19,7 +19,19 @@ relative error of all currents gives.
 It is meant to hold in 95 of 100 directions; both factors were set so on four bodies. A conductor has 2.8 and 2.3 in
 their place, since epsilon is smaller beside the true error there.
 
-Sources: [F46], [LK59], [CK13, sec. 3.2]; Derivations, F16 and F17.
+The total field at points off the body by currents, with its error.
+
+With epsilon what currents leave of the incident wave inside the body, epsilon' what u', of second order, leaves there,
+R the distance from the body's middle and f_rms the rms of the far field,
+
+    error = epsilon [(L s)^2 + (S |u'|/epsilon')^2]^(1/2),   |u'|^2 = |u'_lit|^2 + |u'_rays|^2
+    s = [1 + (R/f_rms)^2]^(-1/2) in the light,   s = [1 + (R/(k f_rms^2))^2]^(-1/2) in the shadow
+
+since the scattered field is f_rms/R, rms over all directions, and f(d)/R = k f_rms^2/R at most, straight ahead, where
+it is no more than the incident wave itself.
+
+Sources: [F46], [LK59], [CK13, sec. 3.2]; Derivations, F16 and F17; [CK13, sec. 3.2]; Derivations, F17 and F20. L and S
+were set on four bodies (`studies._point_coverage`).
 """
 
 # help() shows names of types instead of what they stand for
@@ -38,8 +50,8 @@ from creeping.field.boundary import Boundary
 from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.depth import inner_points
 from creeping.geometry.parts import inside
+from creeping.geometry.quadrature import body_nodes, inner_points
 from creeping.geometry.surface import Surface
 
 DEPTH = 0.25
@@ -54,6 +66,13 @@ BESIDE, STEP, LARGEST = 6, 0.05, 2.0
 """Nodes next to one, the change of admittance to these from which it steps, and |u| of a wave that comes back."""
 POINTS = 100
 """Points inside at which they are judged."""
+
+LIT_LEVEL, DARK_LEVEL, SHAPE = 2.0, 4.0, 2.0
+"""Factors L and S of the error."""
+ABSORBING_LEVEL = 1.3
+"""L in the light of an impedance: most of what is wrong with its currents stands at the line and radiates ahead."""
+OFF = 0.25
+"""Least distance from the body, in wavelengths, at which currents serve."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -325,3 +344,38 @@ class SurfaceCurrents:
         if self.boundary.kind == "hard":
             return strength, None
         return strength, np.asarray(-1j * self.wavenumber * self.boundary.at(self.points).admittance * strength)
+
+
+def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: float = OFF) -> BoolArray:
+    """Whether points (n, 3), L, are so far off the body that sums over nodes are integrals: (n,).
+
+    ``least`` is the distance asked for, in wavelengths.
+
+    Raises
+    ------
+    SurfaceError
+        If the wavenumber, 1/L, is too high for any mesh of the body.
+    """
+    # the nodes of the lit side, on the whole of the body
+    return body_nodes(body, 2 * wavenumber).distance(points) > least * 2 * np.pi / wavenumber
+
+
+def total_at(
+    currents: SurfaceCurrents, points: FloatArray, dark: BoolArray
+) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    """Incident and scattered field and the error of their sum at points (n, 3), L, some of them in the dark: (n,)."""
+    incident = np.exp(1j * currents.wavenumber * (points @ currents.direction))
+    lit = ABSORBING_LEVEL if currents.boundary.kind == "impedance" else LIT_LEVEL
+    level = level_at(currents, points, dark, currents.mean_amplitude, lit, DARK_LEVEL)
+    scattered, shape = currents.scattered_and_changed(points)
+    return incident, scattered, currents.extinction * np.hypot(level, SHAPE * shape)
+
+
+def level_at(
+    currents: SurfaceCurrents, points: FloatArray, dark: BoolArray, mean: float, lit: float, shadow: float
+) -> FloatArray:
+    """L s (n,) at points (n, 3), L, some in the dark, with f_rms = ``mean`` and L in the light and the shadow."""
+    middle = np.mean(np.asarray(currents.body.bounds, dtype=float), axis=0)
+    away = np.linalg.norm(points - middle, axis=1)
+    in_shadow = shadow / np.hypot(1, away / (currents.wavenumber * mean**2))
+    return np.asarray(np.where(dark, in_shadow, lit / np.hypot(1, away / mean)))

@@ -1,21 +1,37 @@
-"""The equation of a matrix solved for many right sides: all that memory allows share each product with it."""
+"""The equation of a matrix solved for many right sides: all that memory allows share each product with it.
+
+GMRES of several right sides at once: each has its own Krylov space, and all share the products with the matrix.
+
+Products with the matrix of the equation where it has too many entries to be kept.
+
+    M v = plain sums over all nodes, split (`creeping.field.equation.split_sums`) + C v
+    C   = integrals over tiles near to points less what plain sums have of their nodes, a sparse matrix
+
+Sources: [SS86]; [E21]; Derivations, F35 and F36.
+"""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary
-from creeping.field.equation.block_gmres import STEPS, TOLERANCE, block_gmres
-from creeping.field.equation.matrix import Matrix
-from creeping.field.equation.split_product import SplitProduct
+from creeping.field.equation.matrix import Matrix, Places
+from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, SplitSums, best_split
 from creeping.storage.memory import budget
 
 TOGETHER = 2e8
 """Bytes of what GMRES keeps of right sides that are solved together."""
 DENSE = 8e9
 """Bytes of a matrix, and of its transpose, that are kept at most."""
+
+TOLERANCE, STEPS = 3e-5, 80
+"""What is left of the equation, as a share of its right side, and steps at most."""
+
+ROWS = 4096
+"""Rows of the sparse matrix that are made at a time."""
 
 
 class Columns(NamedTuple):
@@ -31,7 +47,7 @@ class Columns(NamedTuple):
 
 
 def is_dense(nodes: int, boundary: Boundary) -> bool:
-    """Whether the matrix is kept: else its products are sums (`creeping.field.equation.split_product`)."""
+    """Whether the matrix is kept: else its products are sums (`creeping.field.equation.columns`)."""
     return 16.0 * nodes**2 * (4 if boundary.kind == "conductor" else 1) <= min(DENSE, budget())
 
 
@@ -62,3 +78,169 @@ def solved_columns(
     matrix.__dict__.pop("whole", None)
     back = matrix.root[:, None, None]
     return Columns(values.reshape(nodes, c, -1) / back, change.reshape(nodes, c, -1) / back, left, steps)
+
+
+def block_gmres(
+    product: Callable[[ComplexArray], ComplexArray], right: ComplexArray, tolerance: float, steps: int
+) -> tuple[ComplexArray, FloatArray, int]:
+    """Solutions x (n, m) of A x = right (n, m), what is left of each as a share of its right side (m,), and steps.
+
+    Parameters
+    ----------
+    product : callable
+        A times columns (n, m).
+    right : (n, m)
+    tolerance : float
+        What may be left.
+    steps : int
+        At most.
+
+    Examples
+    --------
+    >>> A = np.array([[2.0, 1.0], [0.0, 1.0]])
+    >>> x, left, steps = block_gmres(lambda v: A @ v, np.eye(2, dtype=complex), 1e-10, 5)
+    >>> bool(np.allclose(A @ x, np.eye(2))), steps
+    (True, 2)
+    """
+    n, m = right.shape
+    size = np.linalg.norm(right, axis=0)
+    scale = np.where(size > 0, size, 1.0)
+    basis = np.empty((steps + 1, n, m), dtype=complex)
+    basis[0] = right / scale
+    H = np.zeros((m, steps + 1, steps), dtype=complex)
+    used, left, y = 0, np.ones(m), np.zeros((m, steps), dtype=complex)
+    for step in range(steps):
+        new = product(basis[step])
+        # twice, for the sake of rounding
+        for _ in range(2):
+            along = np.einsum("snm,nm->ms", np.conj(basis[: step + 1]), new)
+            new = new - np.einsum("snm,ms->nm", basis[: step + 1], along)
+            H[:, : step + 1, step] += along
+        length = np.linalg.norm(new, axis=0)
+        H[:, step + 1, step] = length
+        basis[step + 1] = new / np.where(length > 0, length, 1.0)
+        used = step + 1
+        first = np.zeros((m, used + 1), dtype=complex)
+        first[:, 0] = size
+        # each right side ends where it would by itself
+        for one in np.flatnonzero(left > tolerance):
+            h = H[one, : used + 1, :used]
+            found = np.linalg.lstsq(h, first[one], rcond=None)[0]
+            y[one, :used] = found
+            left[one] = np.linalg.norm(h @ found - first[one]) / scale[one]
+        if np.all(left <= tolerance):
+            break
+    return np.einsum("snm,ms->nm", basis[:used], y[:, :used]), left, used
+
+
+class SplitProduct:
+    """Products of a matrix with columns, as `Matrix.product`."""
+
+    def __init__(self, matrix: Matrix) -> None:
+        self._of, k = matrix, matrix.k
+        nodes, inner = matrix.nodes, matrix.inner
+        x, n = (np.concatenate(part) for part in ((nodes.points, inner.points), (nodes.normals, inner.normals)))
+        low, high = nodes.points.min(axis=0), nodes.points.max(axis=0)
+        plain = matrix.soft or matrix.boundary.kind == "hard"
+        load = CURL if matrix.vector else ONE_LAYER if plain else TWO_LAYERS
+        kernel = best_split(lambda a: SmoothKernel(k, high - low, a), x, nodes.points, load, np.inf)
+        if kernel is None:
+            raise InvalidInputError(
+                f"sums over {len(nodes.points)} nodes take more memory than there is; lower the wavenumber or set "
+                "CREEPING_MEMORY"
+            )
+        self._sums = SplitSums(kernel, x, n, nodes.points, nodes.normals, matrix.root**2 / (4 * np.pi))
+        self._own = _correction(matrix, nodes, matrix.root, "double")
+        self._under = _correction(matrix, inner, matrix.root[matrix.at], "slope" if matrix.soft else "double")
+
+    def __call__(self, values: ComplexArray) -> ComplexArray:
+        """The matrix times columns (n, m)."""
+        matrix = self._of
+        own, under = self._vectors(values) if matrix.vector else self._scalars(values)
+        small = values.astype(np.complex64)
+        own = own + (self._own.T if matrix.soft else self._own) @ small
+        under = under + self._under @ small
+        out, c = values + (own if matrix.soft else -own), matrix.columns
+        rows = (c * matrix.at[:, None] + np.arange(c)).ravel()
+        out[rows] += (-1j if matrix.soft else 1j) * under
+        return np.asarray(out)
+
+    def _scalars(self, values: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Plain sums at the nodes and beneath them, times sqrt(w)."""
+        matrix, sums = self._of, self._sums
+        single = matrix.single("double")
+        found = []
+        for column in (values / matrix.root[:, None]).T:
+            if matrix.soft:
+                found.append(-sums.tilted_at_points(column))
+            else:
+                both = sums.tilted_at_nodes(column)
+                found.append(both + sums.values(single * column) if len(single) else both)
+        both = 2 * np.stack(found, axis=1)
+        n = len(matrix.root)
+        return both[:n] * matrix.root[:, None], both[n:] * matrix.root[matrix.at, None]
+
+    def _vectors(self, values: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """The same along a and b, of a conductor."""
+        matrix, n = self._of, len(self._of.root)
+        u = values.reshape(n, 2, -1) / matrix.root[:, None, None]
+        nodes, inner = matrix.nodes, matrix.inner
+        curl = self._sums.curl(nodes.a[:, :, None] * u[:, :1] + nodes.b[:, :, None] * u[:, 1:])
+        parts = []
+        for places, field, root in ((nodes, curl[:n], matrix.root), (inner, curl[n:], matrix.root[matrix.at])):
+            turned = 2 * root[:, None, None] * np.cross(places.normals[:, :, None], field, axis=1)
+            along = [np.einsum("mx,mxc->mc", t, turned) for t in (places.a, places.b)]
+            parts.append(np.stack(along, axis=1).reshape(2 * len(root), -1))
+        return parts[0], parts[1]
+
+
+def _correction(matrix: Matrix, places: Places, scale: FloatArray, kind: str) -> Any:
+    """The sparse matrix C of places (m,), times a scale (m,), for values u sqrt(w)."""
+    from scipy.sparse import csr_array, vstack
+
+    c, m, n, parts = matrix.columns, len(places.points), len(matrix.root), []
+    for first in range(0, m, ROWS):
+        some = places.part(slice(first, first + ROWS))
+        targets, columns, near = matrix.near(some, kind)
+        near = near - _plain(matrix, some, targets, columns, kind)
+        share = scale[first + targets, None] / (2 * np.pi * matrix.root[columns])
+        count = len(some.points)
+        if c == 2:
+            entries = near * share[:, None, :, None]
+            rows = np.broadcast_to(2 * targets[:, None, None, None] + np.arange(2)[:, None, None], entries.shape)
+            ends = np.broadcast_to(2 * columns[:, None, :, None] + np.arange(2), entries.shape)
+        else:
+            entries, ends = near * share, columns
+            rows = np.broadcast_to(targets[:, None], entries.shape)
+        data = entries.ravel().astype(np.complex64)
+        shape = (c * count, c * n)
+        parts.append(csr_array((data, (rows.ravel().astype(np.int32), ends.ravel().astype(np.int32))), shape))
+    return vstack(parts, format="csr")
+
+
+def _plain(matrix: Matrix, places: Places, targets: IntArray, columns: IntArray, kind: str) -> ComplexArray:
+    """What plain sums have of the same pairs, as of `Matrix.near`."""
+    nodes, k = matrix.nodes, matrix.k
+    away = places.points[targets, None] - nodes.points[columns]
+    R = np.linalg.norm(away, axis=2)
+    same = R * k < 1e-6
+    R[same] = 1.0
+    G = np.exp(1j * k * R) / R
+    slope = np.where(same, 0.0, G * (1j * k - 1 / R) / R)
+    weights = matrix.root[columns] ** 2
+    if kind == "slope":
+        return np.asarray(weights * slope * np.einsum("px,pjx->pj", places.normals[targets], away))
+    if not matrix.vector:
+        found = -slope * np.einsum("pjx,pjx->pj", nodes.normals[columns], away)
+        single = matrix.single(kind)
+        if len(single):
+            found = found + single[columns] * np.where(same, 1j * k, G)
+        return np.asarray(weights * found)
+    lean = np.einsum("px,pjx->pj", places.normals[targets], away)
+    out = np.empty((len(targets), 2, columns.shape[1], 2), dtype=complex)
+    for row, p in enumerate((places.a[targets], places.b[targets])):
+        along = np.einsum("px,pjx->pj", p, away)
+        for column, q in enumerate((nodes.a[columns], nodes.b[columns])):
+            turned = along * np.einsum("px,pjx->pj", places.normals[targets], q)
+            out[:, row, :, column] = weights * slope * (turned - np.einsum("px,pjx->pj", p, q) * lean)
+    return out

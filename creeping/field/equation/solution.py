@@ -21,18 +21,16 @@ from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.charge import charges
 from creeping.field.equation.columns import solved_columns
-from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, lit_ground, twice_incident
+from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, charges, lit_ground, twice_incident
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.tiles import Tiles
-from creeping.field.far_result import FarField
+from creeping.field.far_result import FarField, incident_mix, spherical_frame
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
-from creeping.field.polarisation import incident_mix, spherical_frame
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside as inside_of
 from creeping.geometry.surface import Surface, size
-from creeping.geometry.unit import unit_of
 
 TOUCHING = 1e-6
 """Distance from the body, in its sizes, up to which a point is on it."""

@@ -18,8 +18,7 @@ from scipy.special import roots_jacobi
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
-from creeping.geometry.patches import DEGREE, Patches
-from creeping.geometry.squares import barycentric, interpolation, lobatto, on_squares
+from creeping.geometry.patches import DEGREE, Patches, barycentric, interpolation, lobatto, on_squares
 from creeping.kernels.threads import in_threads
 
 POINTS = 5
@@ -157,7 +156,7 @@ class Tiles:
     @cached_property
     def _tables(self) -> FloatArray:
         """x, x_u, x_v at the places of the shapes (t, n, n, 9)."""
-        from creeping.geometry.squares import differentiation
+        from creeping.geometry.patches import differentiation
 
         slope = differentiation(self._grid)
         u, v = np.einsum("ai,tijx->tajx", slope, self.shapes), np.einsum("bj,tijx->tibx", slope, self.shapes)

@@ -1,7 +1,7 @@
 """Compiled marching of a boundary layer along blocks of rays, in Hermite elements across it.
 
 A block has LANES rays with one grid of heights; each has its own curvatures, steps and boundary data. With the
-matrices of `creeping.field.marching.elements`, m and t the heights of its potentials, and c = kappa_n, e, c0 and a at
+matrices of `creeping.field.marching.profile`, m and t the heights of its potentials, and c = kappa_n, e, c0 and a at
 mid step as of `creeping.field.kernels.ray_load`,
 
     w = y/sqrt(h),   h = 1 + c m(n) + e t(n)

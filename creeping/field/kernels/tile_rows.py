@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from creeping.kernels.block import entry_options, options, strict_options
-from creeping.kernels.turns import cosine_sine
+from creeping.kernels.exponential import cosine_sine
 
 WAITING = 400
 """Parts of a tile that wait, at most."""

@@ -21,8 +21,7 @@ from enum import IntEnum
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from creeping.field.marching.elements import CAP, KEPT_BELOW, GridSpec
-from creeping.field.marching.profile import RayProfiles
+from creeping.field.marching.profile import CAP, KEPT_BELOW, GridSpec, RayProfiles
 
 PROBES = 512
 """Places of a ray at which it is looked at,"""

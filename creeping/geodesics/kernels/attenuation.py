@@ -11,7 +11,7 @@ from numba import njit
 from creeping.geodesics.hermite import NEAREST
 from creeping.geodesics.kernels.flow_derivative import derivative, two_thirds
 from creeping.kernels.block import BLOCK, aligned, entry_options, options
-from creeping.kernels.curvature import second_form
+from creeping.kernels.exponential import second_form
 from creeping.kernels.vectors import pointer
 
 SAMPLES = 23

@@ -1,6 +1,6 @@
 """Maps stored in space, for any atlas: D = x' - x - t p and p' - p at (chart, u, v, angle).
 
-p = E (cos angle, sin angle) with E(u, v) the polar frame of the chart (`creeping.geometry.frames.polar_frame`). A
+p = E (cos angle, sin angle) with E(u, v) the polar frame of the chart (`creeping.geometry.evaluators.polar_frame`). A
 leap ends off T1Q by the error of the map and is put back.
 
 Sources: [YC06b]; Derivations, B2.
@@ -12,11 +12,10 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.evaluators import evaluators, locator
-from creeping.geometry.frames import polar_frame
+from creeping.geometry.evaluators import evaluators, locator, polar_frame
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads, pause
-from creeping.phaseflow.grid import Grid, Leap
+from creeping.phaseflow.splines import Grid, Leap
 
 TOGETHER = 1000
 """Leaps between which the kernel comes up for signals, 0.1 s for a block."""

@@ -10,9 +10,16 @@ A model says where a ray lies on the grid, what displacement is stored there, an
 
 All but the first stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
 
-Sources: Derivations, R15.
+Maps of bodies of revolution: tables without the azimuth.
+
+The flow commutes with turns about the axis (`creeping.geometry.revolution`), so a displacement of rotations or of
+angles depends on where a ray is along the meridian and on its angle from it: two axes of a table instead of three. The
+first axis of the grid, u, has one node.
+
+Sources: Derivations, R15; Derivations, R18.
 """
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -22,9 +29,8 @@ from creeping.geometry.evaluators import is_compiled
 from creeping.geometry.revolution import charted_axis
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.coordinates.ambient import AmbientModel
-from creeping.phaseflow.coordinates.revolution import MeridianModel, RingModel
-from creeping.phaseflow.coordinates.rotation import AngleModel, OctantModel, RotationModel
-from creeping.phaseflow.grid import Grid, Leap
+from creeping.phaseflow.coordinates.rotation import AngleModel, OctantModel, RotationModel, quaternions
+from creeping.phaseflow.splines import Grid, Leap
 
 
 class Model(Protocol):
@@ -117,3 +123,48 @@ def has_mirrors(body: Surface) -> bool:
     flips = 1.0 - 2.0 * np.eye(3)
     gaps = [np.abs(sphere_map.forward(s * flip) - points * flip).max() for flip in flips]
     return bool(max(gaps) <= 1e-13 * size(body))
+
+
+class MeridianModel(RotationModel):
+    """Rotations on a body of revolution that is an image of the sphere: one chart, the meridian from pole to pole.
+
+    u is the azimuth in turns, v = theta/pi with theta the angle from the axis on the sphere; see
+    `phaseflow.kernels.meridian`.
+    """
+
+    name = "meridian"
+    kind = 3
+    charts = 1
+    periodic = (True, False)
+    is_flat = True
+
+    def __init__(self, body: Surface) -> None:
+        super().__init__(body)
+        axis = charted_axis(body)
+        assert axis is not None
+        self.axis = axis
+
+    @cached_property
+    def _surface_table(self) -> FloatArray:
+        return RotationModel(self.body)._surface_table
+
+    def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
+        """See `CompiledModel`; the axis follows the shift."""
+        return grid.cells, np.array([*grid.origin, 0.0, *self.axis])
+
+    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
+        """See `Model`; v beyond [0, 1] goes on over the pole."""
+        first = np.cross(self.axis, np.eye(3)[np.argmin(np.abs(self.axis))])
+        first /= np.linalg.norm(first)
+        azimuth, theta, angle = (np.asarray(t)[..., None] for t in (2 * np.pi * u, np.pi * np.asarray(v), angle))
+        outwards = np.cos(azimuth) * first + np.sin(azimuth) * np.cross(self.axis, first)
+        s = np.cos(theta) * self.axis + np.sin(theta) * outwards
+        south = np.cos(theta) * outwards - np.sin(theta) * self.axis
+        return quaternions(s, np.cos(angle) * south + np.sin(angle) * np.cross(s, south))
+
+
+class RingModel(AngleModel):
+    """(u, v, angle) in turns on the doubly periodic chart of a body of revolution, u its azimuth."""
+
+    name = "ring"
+    is_flat = True

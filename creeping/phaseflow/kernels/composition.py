@@ -4,6 +4,10 @@ Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`rotation`), 
 is a table of their displacement; a ray is converted to the model once, is composed there, and is converted back for an
 output. FOLDED are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes, MERIDIAN
 those of bodies of revolution (`meridian`). The table of a body of revolution has one plane: no axis u.
+
+What all compositions of maps share: stencil sums for a block of rays in explicit vector code.
+
+Sources: [B78]; Derivations, B7.
 """
 
 import math
@@ -13,12 +17,12 @@ from numba import njit
 
 from creeping.geodesics.kernels.attenuation import SAMPLES, extend
 from creeping.kernels.block import BLOCK, aligned, entry_options, options, strict_inlined
+from creeping.kernels.contraction import contraction
 from creeping.kernels.splines import cells_and_fractions, weights
-from creeping.phaseflow.kernels import angles as _angles
-from creeping.phaseflow.kernels import meridian as _meridian
+from creeping.phaseflow.kernels import rotation as _angles
 from creeping.phaseflow.kernels import rotation as _rotations
+from creeping.phaseflow.kernels import surface_table as _meridian
 from creeping.phaseflow.kernels import surface_table as _surface_table
-from creeping.phaseflow.kernels.stencil import interpolate, interpolate_some
 
 ROTATION, ANGLES, FOLDED, MERIDIAN = 0, 1, 2, 3
 WORK = 48
@@ -28,12 +32,17 @@ INTERPOLATED = 6 * BLOCK
 KEPT = 10
 """Rows that a block keeps between two calls: coordinates, Jacobi matrix, attenuation, time of detachment."""
 
-_to_rotation, _to_angles = _rotations.to_coordinates, _angles.to_coordinates
-_from_rotation, _from_angles = _rotations.from_coordinates, _angles.from_coordinates
+_to_rotation, _to_angles = _rotations.to_coordinates, _angles.angles_to_coordinates
+_from_rotation, _from_angles = _rotations.from_coordinates, _angles.angles_from_coordinates
 _to_rotation_by_table = _surface_table.to_coordinates
 _from_rotation_by_table = _surface_table.from_coordinates
-_locate_rotation, _locate_angles, _locate_meridian = _rotations.locate, _angles.locate, _meridian.locate
-_move_rotation, _move_angles, _unfold = _rotations.move, _angles.move, _rotations.unfold
+_locate_rotation, _locate_angles, _locate_meridian = _rotations.locate, _angles.angles_locate, _meridian.locate
+_move_rotation, _move_angles, _unfold = _rotations.move, _angles.angles_move, _rotations.unfold
+
+_sum_3_4, _sum_5_4 = contraction(3, 4), contraction(5, 4)
+_sum_3_8, _sum_5_8 = contraction(3, 8), contraction(5, 8)
+_flat_3_4, _flat_5_4 = contraction(3, 4, flat=True), contraction(5, 4, flat=True)
+_flat_3_8, _flat_5_8 = contraction(3, 8, flat=True), contraction(5, 8, flat=True)
 
 
 @njit(**options)
@@ -247,3 +256,64 @@ def flow(
                 for k in range(6, lanes):
                     out[start + i, output, k] = m[k - 6, i]
     return True
+
+
+@njit(**options)
+def interpolate(table, degree, first, wu, wv, wa, count, out):
+    """Stencil sums of the first ``count`` rays of a block: out (BLOCK, lanes), flat.
+
+    ``first`` holds the number of each stencil's first coefficient; for the weights see `creeping.kernels.splines`. A
+    table with one plane has no axis u.
+    """
+    lanes = table.shape[4]
+    row = table.shape[3]
+    plane = row * table.shape[2]
+    su, sv = lanes * plane, lanes * row
+    if table.shape[1] == 1:
+        if lanes == 4 and degree == 3:
+            for i in range(count):
+                _flat_3_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+        elif lanes == 4:
+            for i in range(count):
+                _flat_5_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+        elif degree == 3:
+            for i in range(count):
+                _flat_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+        else:
+            for i in range(count):
+                _flat_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+    elif lanes == 4 and degree == 3:
+        for i in range(count):
+            _sum_3_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+    elif lanes == 4:
+        for i in range(count):
+            _sum_5_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+    elif degree == 3:
+        for i in range(count):
+            _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+    else:
+        for i in range(count):
+            _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+
+
+@njit(**options)
+def interpolate_some(table, degree, first, wu, wv, wa, mine, some, out):
+    """Eight-lane sums of the rays mine[:some] of a block, one after the other in ``out``; see `interpolate`."""
+    row = table.shape[3]
+    su, sv = 8 * row * table.shape[2], 8 * row
+    if table.shape[1] == 1 and degree == 3:
+        for j in range(some):
+            i = mine[j]
+            _flat_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
+    elif table.shape[1] == 1:
+        for j in range(some):
+            i = mine[j]
+            _flat_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
+    elif degree == 3:
+        for j in range(some):
+            i = mine[j]
+            _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
+    else:
+        for j in range(some):
+            i = mine[j]
+            _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)

@@ -1,15 +1,25 @@
-"""Compiled work on the nodes of a map while it is built; the kinds of coordinates are those of `composition`."""
+"""Compiled work on the nodes of a map while it is built; the kinds of coordinates are those of `composition`.
+
+Compiled composition of many rays in the order of their cells.
+
+Rays anywhere on the body read stencils anywhere in the table, and a table beyond the nearest cache makes each of its 16
+to 36 rows wait. Where there are many rays, they are sorted by (chart, cell of u, cell of v) before each leap, by
+counting: the rows of one ray's stencil are then those of the next. Only indices are sorted; a ray's own data is one
+cache line.
+"""
 
 import math
 
 import numpy as np
 from numba import njit
 
-from creeping.kernels.block import BLOCK, aligned, entry_options
+from creeping.geodesics.kernels.attenuation import SAMPLES
+from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.phaseflow.kernels.composition import (
     ANGLES,
     INTERPOLATED,
     WORK,
+    extend_some,
     from_coordinates,
     leap_block,
     move,
@@ -110,3 +120,118 @@ def displacements(kind, surface_table, there, there_par, back, back_par, nodes, 
                         d[k] = before + step
                     d[3] = 0.0
     return surest
+
+
+@njit(**entry_options)
+def flow_ordered(
+    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts,
+    budget, reached, ray, carried, bucket, ends, out
+):  # fmt: skip
+    """Do what `composition.flow` does, for many rays; after a leap of all of them the budget may be spent.
+
+    Between two calls ``ray`` (n, 8), rows aligned, ``carried`` (n, lanes - 6), ``bucket`` (n,) and ``ends`` (cells of
+    (u, v) + 1,), zeros at first, keep the rays: coordinates, fractions of the cell, number of the stencil's first
+    coefficient plus 1/2 where an odd number of mirrors has folded the ray: one cache line.
+    """
+    n, lanes = states.shape
+    table, more = leap[0], lanes - 6
+    extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
+    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
+    m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
+    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((INTERPOLATED, 4))
+    place, cell, bent = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    a = aligned(2, BLOCK)
+    odd = np.zeros(BLOCK)
+    flat, order = ray.reshape(-1), np.empty(n, np.int64)
+    # a whole number times the next number above 1/na never falls below the quotient, and division is slow
+    inverse = (1.0 + 1e-15) / table.shape[3]
+    spent, again = 0, reached[4] > 0.0
+    for start in range(0, 0 if again else n, BLOCK):
+        count = min(BLOCK, n - start)
+        for i in range(BLOCK):
+            source = start + min(i, count - 1)
+            for k in range(3):
+                x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
+        to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
+        place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
+        for i in range(count):
+            order[start + i] = start + i
+            for k in range(more):
+                carried[start + i, k] = states[start + i, 6 + k]
+        _put(flat, order[start : start + count], r, uva, place, work[7], inverse, bucket, ends)
+    now = reached[3]
+    for output in range(int(reached[1]), counts.shape[0]):
+        done = 0
+        if again:
+            done, again = int(reached[2]), False
+        for number in range(done, counts[output]):
+            if spent >= budget:
+                reached[1], reached[2], reached[3], reached[4] = output, number, now, 1.0
+                return False
+            spent += (n + BLOCK - 1) // BLOCK
+            _sort(bucket, ends, order)
+            ends[:] = 0
+            for start in range(0, n, BLOCK):
+                count = min(BLOCK, n - start)
+                mine = order[start : start + count]
+                for i in range(BLOCK):
+                    at = 8 * mine[min(i, count - 1)]
+                    r[0, i], r[1, i], r[2, i], r[3, i] = flat[at], flat[at + 1], flat[at + 2], flat[at + 3]
+                    uva[0, i], uva[1, i], uva[2, i] = flat[at + 4], flat[at + 5], flat[at + 6]
+                    place[i] = np.int64(flat[at + 7])
+                    odd[i] = 2.0 * (flat[at + 7] - place[i])
+                for i in range(BLOCK):
+                    at = mine[min(i, count - 1)]
+                    for k in range(more):
+                        m[k, i] = carried[at, k]
+                some = leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d, bent)
+                if some > 0:
+                    values = d[2 * BLOCK : 4 * BLOCK].reshape(-1)
+                    extend_some(values, rules, time, now, m, bent, some, a, sampled)
+                place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
+                _put(flat, mine, r, uva, place, work[7], inverse, bucket, ends)
+                for i in range(count):
+                    for k in range(more):
+                        carried[mine[i], k] = m[k, i]
+            now += time
+        for start in range(0, n, BLOCK):
+            count = min(BLOCK, n - start)
+            for i in range(BLOCK):
+                for k in range(4):
+                    r[k, i] = ray[start + min(i, count - 1), k]
+            from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
+            for i in range(count):
+                for k in range(3):
+                    out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
+                for k in range(more):
+                    out[start + i, output, 6 + k] = carried[start + i, k]
+    return True
+
+
+@njit(**options)
+def _put(flat, mine, r, uva, place, odd, inverse, bucket, ends):
+    """Keep a block's rays, and count them into ends[1:] by bucket."""
+    for i in range(mine.shape[0]):
+        at = 8 * mine[i]
+        flat[at], flat[at + 1], flat[at + 2], flat[at + 3] = r[0, i], r[1, i], r[2, i], r[3, i]
+        flat[at + 4], flat[at + 5], flat[at + 6], flat[at + 7] = (
+            uva[0, i],
+            uva[1, i],
+            uva[2, i],
+            place[i] + 0.5 * odd[i],
+        )
+    for i in range(mine.shape[0]):
+        number = np.int32(place[i] * inverse)
+        bucket[mine[i]] = number
+        ends[number + 1] += 1
+
+
+@njit(**options)
+def _sort(bucket, ends, order):
+    """Order of the rays by bucket, from the numbers of rays in ends[1:]."""
+    for number in range(1, ends.shape[0]):
+        ends[number] += ends[number - 1]
+    for i in range(bucket.shape[0]):
+        number = bucket[i]
+        order[ends[number]] = i
+        ends[number] += 1

@@ -6,22 +6,44 @@ With T = [x_u, x_v] and G = T^T T, and the stereographic charts being conformal,
 
     p = T G^(-1/2) (along, across),   (along, across) = G^(-1/2) T^T p,   q = along e_u + across e_v.
 
-Sources: Derivations, R15.
+Compiled look-up of x(u, v) and its tangents on a chart, for bodies whose own map psi is expensive to evaluate.
+
+x, x_u and x_v are sums over one stencil of a quintic spline: for each row i, S = sum_j wv_j c_ij and
+S' = sum_j wv'_j c_ij; then x = sum_i wu_i S, x_u = sum_i wu'_i S, x_v = sum_i wu_i S'.
+
+Where rotations lie on a table without azimuth, of a body of revolution x = psi(s); see `rotation`.
+
+With S a turn about the axis a, psi(S s) = S psi(s) gives S R for R = [s, q, s x q], and the displacement R^-1 R' is one
+for all turns: it is a function of
+
+    R^T a = (s.a, q.a, (s x q).a) = (cos theta, -sin theta cos angle, sin theta sin angle),
+
+theta the angle of s from the axis, angle that of q from the direction in which theta grows. At a pole, angle is any:
+there the function does not depend on it. Beyond a pole theta goes on, so that its splines see a smooth function.
+
+Sources: Derivations, R15; Derivations, B7; Derivations, R18.
 """
 
 import math
+from typing import Any
 
 import numpy as np
-from numba import njit
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
 
 from creeping.kernels.block import BLOCK, options
-from creeping.kernels.curvature import inverse_root
+from creeping.kernels.exponential import inverse_root, turns
 from creeping.kernels.splines import cells_and_fractions, slopes, weights
 from creeping.phaseflow.kernels.rotation import REACH, face, quaternion
 from creeping.phaseflow.kernels.rotation import columns as columns_of
-from creeping.phaseflow.kernels.surface_spline import DEGREE, tangents
 
 MARGIN = 2.0
+
+DEGREE = 5
+LANES = 4
+_double, _index = ir.DoubleType(), ir.IntType(64)
+_vector = ir.VectorType(_double, LANES)
 
 
 @njit(**options)
@@ -105,3 +127,71 @@ def to_coordinates(table, inverse, inverse_par, x, p, work, r):
         else:
             qx, qy, qz = qb, qc, qa
         quaternion(s[0, i], s[1, i], s[2, i], qx, qy, qz, r, i)
+
+
+@intrinsic
+def _contract(typing: Any, table: Any, offset: Any, stride: Any, weights: Any, place: Any, out: Any, at: Any) -> Any:
+    """Write x, x_u, x_v (12 values) to out[at:]; weights (4, 6, BLOCK), flat: wu, wu', wv, wv'."""
+    signature = types.void(table, offset, stride, weights, place, out, at)
+
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
+        rows, weight, target = (context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 3, 5))
+
+        def spread(kind: int, j: int) -> Any:
+            number = (kind * (DEGREE + 1) + j) * BLOCK
+            value = builder.load(builder.gep(weight, [builder.add(args[4], ir.Constant(_index, number))]))
+            empty = ir.Constant(_vector, ir.Undefined)
+            single = builder.insert_element(empty, value, ir.Constant(ir.IntType(32), 0))
+            return builder.shuffle_vector(single, empty, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+
+        def multiply_add(total: Any, factor: Any, value: Any) -> Any:
+            product = builder.fmul(factor, value, flags=("contract",))
+            return product if total is None else builder.fadd(total, product, flags=("contract",))
+
+        along, slope = [spread(2, j) for j in range(DEGREE + 1)], [spread(3, j) for j in range(DEGREE + 1)]
+        sums: list[Any] = [None] * 3
+        for i in range(DEGREE + 1):
+            row = builder.add(args[1], builder.mul(args[2], ir.Constant(_index, i)))
+            inner: list[Any] = [None] * 2
+            for j in range(DEGREE + 1):
+                pointer = builder.gep(rows, [builder.add(row, ir.Constant(_index, LANES * j))])
+                value = builder.load(builder.bitcast(pointer, _vector.as_pointer()))
+                value.align = 8
+                inner = [multiply_add(inner[0], along[j], value), multiply_add(inner[1], slope[j], value)]
+            sums[0] = multiply_add(sums[0], spread(0, i), inner[0])
+            sums[1] = multiply_add(sums[1], spread(1, i), inner[0])
+            sums[2] = multiply_add(sums[2], spread(0, i), inner[1])
+        for k, total in enumerate(sums):
+            address = builder.gep(target, [builder.add(args[6], ir.Constant(_index, LANES * k))])
+            builder.store(total, builder.bitcast(address, _vector.as_pointer())).align = 8
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@njit(**options)
+def tangents(table, place, w, count, out):
+    """x, x_u, x_v of a block's stencils into out (BLOCK, 12), flat; see `_contract` for w."""
+    stride = LANES * table.shape[2]
+    for i in range(count):
+        _contract(table, LANES * place[i], stride, w, i, out, 12 * i)
+
+
+@njit(**options)
+def locate(r, shift, work, chart, u, v, angle):
+    """Chart 0, u = 0, v = theta/pi in [0, 1] and angle in turns of a block; the axis is shift[3:6]."""
+    ax, ay, az = shift[3], shift[4], shift[5]
+    along, one, other, across = work[0], work[1], work[2], work[3]
+    for i in range(BLOCK):
+        w, x, y, z = r[i], r[BLOCK + i], r[2 * BLOCK + i], r[3 * BLOCK + i]
+        along[i] = ax * (1.0 - 2.0 * (y * y + z * z)) + 2.0 * ay * (x * y + w * z) + 2.0 * az * (x * z - w * y)
+        one[i] = -(2.0 * ax * (x * y - w * z) + ay * (1.0 - 2.0 * (x * x + z * z)) + 2.0 * az * (y * z + w * x))
+        other[i] = 2.0 * ax * (x * z + w * y) + 2.0 * ay * (y * z - w * x) + az * (1.0 - 2.0 * (x * x + y * y))
+    for i in range(BLOCK):
+        across[i] = math.sqrt(one[i] * one[i] + other[i] * other[i])
+        chart[i] = 0
+        u[i] = 0.0
+    for i in range(BLOCK):
+        v[i] = 2.0 * turns(across[i], along[i])
+    for i in range(BLOCK):
+        angle[i] = turns(other[i], one[i])

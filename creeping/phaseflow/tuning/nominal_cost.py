@@ -21,7 +21,7 @@ from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import counted_states
 from creeping.geodesics.states import pack
-from creeping.geometry.speed import speed_of
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK
 from creeping.phaseflow.building import Plan

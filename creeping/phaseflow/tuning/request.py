@@ -32,8 +32,8 @@ from creeping.phaseflow.building import (
 from creeping.phaseflow.cache import cached_phase_map
 from creeping.phaseflow.coordinates.ambient import AmbientModel
 from creeping.phaseflow.coordinates.base import Model, model_of
-from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
+from creeping.phaseflow.splines import MARGIN, Grid, least_cells
 from creeping.phaseflow.tuning.search import RAYS, tuned_map
 from creeping.storage.memory import within_budget
 

@@ -27,9 +27,8 @@ from creeping.geodesics.states import pack
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import Plan, Progress, Reference, build_direct, curvature_reach, with_errors
 from creeping.phaseflow.coordinates.base import Model, model_of
-from creeping.phaseflow.grid import MARGIN, Grid, least_cells
 from creeping.phaseflow.phase_map import PhaseMap
-from creeping.phaseflow.splines import thinning_operator
+from creeping.phaseflow.splines import MARGIN, Grid, least_cells, thinning_operator
 from creeping.phaseflow.tuning.nominal_cost import (
     build_seconds,
     doublings_of,

@@ -23,7 +23,7 @@ from numba import njit
 
 from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
-from creeping.kernels.curvature import second_form
+from creeping.kernels.exponential import second_form
 
 BEHIND, AHEAD = 2, 3
 """Nodes that polynomials take before and behind an interval."""

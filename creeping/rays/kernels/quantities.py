@@ -14,9 +14,7 @@ from numba import njit
 
 from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
-from creeping.kernels.cube_root import cube_root
-from creeping.kernels.curvature import second_form
-from creeping.kernels.turns import turns
+from creeping.kernels.exponential import cube_root, second_form, turns
 from creeping.rays.quantities import GAUSS, GUARD, SHARPEST, STRAIGHT
 
 WIDTH = 2 * GUARD

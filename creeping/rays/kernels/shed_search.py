@@ -17,7 +17,7 @@ from numba import njit
 
 from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
-from creeping.kernels.curvature import adjugate_form, second_form
+from creeping.kernels.exponential import adjugate_form, second_form
 
 PARTS = 4
 """Samples of a step."""

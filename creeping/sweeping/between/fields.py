@@ -11,6 +11,13 @@ other node of the stencil, and its corners have no others: none begins or ends. 
 Errors are the largest of the corners, and in squares with them the stated one of interpolation, SAFE times the sum of
 |da| + k |dL| |a| and NOISE times (sum |a|^2)^(1/2).
 
+Nodes of a lattice: their results and their sheets, and the sheets of neighbours that go over into each other.
+
+Which sheet of a node is which of its neighbour: sheets that are nearest to each other, both ways.
+
+A sheet has a chain if it can be followed over all nodes of a stencil; in two dimensions along the first axis and then
+the second, and to the same sheet the other way round.
+
 Sources: Derivations, F23.
 """
 
@@ -20,14 +27,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.field.far_geometry import FarGeometry
+from creeping.field.far_rays import Parts
+from creeping.field.strip_waves import isolated, sheets_of
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
-from creeping.sweeping.between.levels import Between, by_cell
-from creeping.sweeping.between.nodes import Nodes
-from creeping.sweeping.between.stencil import corner_weights, corners, totals, weights
-from creeping.sweeping.field_arrays import FieldArrays
+from creeping.sweeping.between.stencil import (
+    BASE,
+    NODES,
+    Between,
+    around,
+    by_cell,
+    corner_weights,
+    corners,
+    offsets,
+    totals,
+    weights,
+)
+from creeping.sweeping.lattice import FINER, Lattice
 from creeping.sweeping.request import LINE, SHARES, VALID, SweepRequest
+from creeping.sweeping.solved_fields import FieldArrays
 from creeping.sweeping.sweeper import Arrays, Sweeper
 
 MOST_NODES = 20_000
@@ -37,6 +57,215 @@ SAFE, NOISE = 2.0, 1e-5
 set on six bodies."""
 OF_CREEPING = 10.0
 """Error allowed to the creeping part, of its own size, over that allowed to the whole field."""
+
+NEAR = 12.0
+"""Largest distance of neighbouring sheets, in body sizes and steps of the lattice."""
+
+
+def links(
+    begin: IntArray, count: IntArray, label: IntArray, key: FloatArray, pairs: IntArray, step: float
+) -> tuple[IntArray, IntArray]:
+    """What each sheet goes over into at the next node, and the inverse: (sheets,) each, -1 where there is none.
+
+    Parameters
+    ----------
+    begin, count : (nodes,)
+        First sheet of each node, and how many there are.
+    label : (sheets,)
+        Only sheets of one label are alike.
+    key : (sheets, 4)
+    pairs : (pairs, 2)
+        Nodes and their next ones.
+    step : float
+        Angle between neighbouring nodes.
+    """
+    after, before = np.full(len(label), -1), np.full(len(label), -1)
+    first, second = pairs.T
+    # every sheet of the first node with every one of the second
+    sizes = count[first] * count[second]
+    pair = np.repeat(np.arange(len(pairs)), sizes)
+    number = np.arange(len(pair)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    across = np.maximum(count[second][pair], 1)
+    one, two = begin[first][pair] + number // across, begin[second][pair] + number % across
+    alike = label[one] == label[two]
+    one, two = one[alike], two[alike]
+    apart = np.linalg.norm(key[one] - key[two], axis=1)
+    near = apart < NEAR * step
+    one, two, apart = one[near], two[near], apart[near]
+    nearest = _is_least(one, apart) & _is_least(two, apart)
+    after[one[nearest]], before[two[nearest]] = two[nearest], one[nearest]
+    return after, before
+
+
+def _is_least(group: IntArray, value: FloatArray) -> BoolArray:
+    """Whether a value is the least of its group (n,)."""
+    order = np.lexsort((value, group))
+    least = np.zeros(len(group), dtype=bool)
+    first = np.ones(len(group), dtype=bool)
+    first[1:] = group[order][1:] != group[order][:-1]
+    least[order[first]] = True
+    return least
+
+
+def chains(start: IntArray, after: list[IntArray], before: list[IntArray], base: int, count: int) -> IntArray:
+    """Sheets at the nodes of the stencils around those of ``start``: (n, count^dimensions), -1 where one is lost.
+
+    Parameters
+    ----------
+    start : (n,)
+        Sheets of the node at place ``base`` along each axis.
+    after, before : list of (sheets,)
+        Of `links`, for each axis.
+    base, count : int
+        Places along an axis: that of the start, and how many.
+    """
+    found = start[:, None]
+    for one, other in zip(after, before, strict=True):
+        found = _along(found, one, other, base, count)
+    if len(after) == 2:
+        crossed = start[:, None]
+        for one, other in zip(after[::-1], before[::-1], strict=True):
+            crossed = _along(crossed, one, other, base, count)
+        turned = crossed.reshape(len(start), count, count).swapaxes(1, 2).reshape(found.shape)
+        found = np.where(found == turned, found, -1)
+    return found
+
+
+def _along(sheets: IntArray, after: IntArray, before: IntArray, base: int, count: int) -> IntArray:
+    """Each sheet (n, m) followed along one axis: (n, m count)."""
+    out = np.empty((*sheets.shape, count), dtype=np.int64)
+    out[..., base] = sheets
+    for place in range(base + 1, count):
+        out[..., place] = np.where(out[..., place - 1] >= 0, after[out[..., place - 1]], -1)
+    for place in range(base - 1, -1, -1):
+        out[..., place] = np.where(out[..., place + 1] >= 0, before[out[..., place + 1]], -1)
+    return out.reshape(len(sheets), sheets.shape[1] * count)
+
+
+class Cells(NamedTuple):
+    """Cells of one level with the nodes of their stencils.
+
+    Attributes
+    ----------
+    stencil : (cells, 6^dimensions) of int
+        Nodes of each cell.
+    chains : list of (n, 6^dimensions) or None
+        Of each cell its sheets at all nodes; None where a node has no field that is the sum of its sheets, or sheets
+        begin or end.
+    """
+
+    stencil: IntArray
+    chains: list[IntArray | None]
+
+
+class Nodes:
+    """Nodes of a lattice, each computed once, whatever levels it belongs to.
+
+    Parameters
+    ----------
+    sweeper : Sweeper
+        Of fields by rays.
+    lattice : Lattice
+
+    Attributes
+    ----------
+    results : dict
+        Arrays of results.
+    label : (sheets,)
+        Twice the number of the observer, and 1 more for creeping rays.
+    path : (sheets,), L
+    amplitudes : (sheets, problems), L
+        As of `creeping.field.strip_waves.Sheets`.
+    """
+
+    def __init__(self, sweeper: Sweeper, lattice: Lattice) -> None:
+        self._sweeper, self._lattice = sweeper, lattice
+        self._known: dict[tuple[int, ...], int] = {}
+        self.results: Arrays = sweeper.request.empty(0)
+        # whether the field of a node is that of its sheets, the first of these, and how many there are
+        self._whole = np.zeros(0, dtype=bool)
+        self._begin, self._count = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        self.label, self._key = np.zeros(0, dtype=np.int64), np.zeros((0, 4))
+        self.path: FloatArray = np.zeros(0)
+        self.amplitudes: ComplexArray | None = None
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def cells(self, level: int, own: IntArray) -> Cells:
+        """Cells of a level, (n, 1 + dimensions) the face and the number of their own node."""
+        lattice = self._lattice
+        steps = offsets(lattice.dimensions)
+        numbers = lattice.wrapped(around(own).reshape(-1, own.shape[1]), level)
+        numbers, place = np.unique(numbers, axis=0, return_inverse=True)
+        nodes = self._at(level, numbers)
+        stencil = nodes[place.reshape(len(own), -1)]
+        both = [
+            links(self._begin, self._count, self.label, self._key, nodes[pairs], lattice.spacing(level))
+            for pairs in _neighbours(lattice, level, numbers)
+        ]
+        after, before = [one for one, _ in both], [other for _, other in both]
+        base = np.flatnonzero(np.all(steps == 0, axis=1))[0]
+        counts = self._count[stencil[:, corners(lattice.dimensions)]]
+        curves = self.results["curves"][stencil]
+        served = np.all(self._whole[stencil], axis=1) & np.all(counts == counts[:, :1], axis=1)
+        served &= np.all(curves == curves[:, :1], axis=1)
+        found: list[IntArray | None] = [None] * len(own)
+        for cell in np.flatnonzero(served):
+            first = self._begin[stencil[cell, base]]
+            chain = chains(np.arange(first, first + counts[cell, 0]), after, before, BASE, len(NODES))
+            if np.all(chain >= 0):
+                found[cell] = chain
+        return Cells(stencil, found)
+
+    def _at(self, level: int, numbers: IntArray) -> IntArray:
+        """Nodes of a level by their numbers (n, 1 + dimensions): (n,)."""
+        finest = numbers.copy()
+        finest[:, 1:] *= FINER ** (self._lattice.levels - 1 - level)
+        keys = list(map(tuple, finest.tolist()))
+        new = [row for row, key in enumerate(keys) if key not in self._known]
+        if new:
+            first = len(self._known)
+            self._known |= {keys[row]: first + place for place, row in enumerate(new)}
+            self._compute(self._lattice.directions(numbers[new], level))
+        return np.array([self._known[key] for key in keys], dtype=np.int64)
+
+    def _compute(self, directions: FloatArray) -> None:
+        """Add nodes of unit directions."""
+        whole, count = np.zeros(len(directions), dtype=bool), np.zeros(len(directions), dtype=np.int64)
+        pieces: list[tuple[np.ndarray[Any, Any], ...]] = []
+
+        def told(rows: IntArray, geometry: FarGeometry, parts: list[Parts]) -> None:
+            sheets, many = sheets_of(geometry, parts), len(geometry.directions) // len(rows)
+            of, observer = np.divmod(sheets.observer, many)
+            count[rows] = np.bincount(of, minlength=len(rows))
+            whole[rows] = np.all(isolated(geometry, parts).reshape(-1, many), axis=1)
+            whole[rows[of[~np.all(np.isfinite(sheets.amplitudes), axis=1)]]] = False
+            pieces.append((2 * observer + sheets.creeping, sheets.key, sheets.path, sheets.amplitudes))
+
+        results = self._sweeper(directions, told)
+        self.results = {name: np.concatenate([values, results[name]]) for name, values in self.results.items()}
+        self._whole = np.concatenate([self._whole, whole])
+        self._begin = np.concatenate([self._begin, len(self.label) + np.cumsum(count) - count])
+        self._count = np.concatenate([self._count, count])
+        if pieces:
+            label, key, path, amplitudes = zip(*pieces, strict=True)
+            self.label, self._key = np.concatenate([self.label, *label]), np.concatenate([self._key, *key])
+            self.path = np.concatenate([self.path, *path])
+            self.amplitudes = np.concatenate([*([] if self.amplitudes is None else [self.amplitudes]), *amplitudes])
+
+
+def _neighbours(lattice: Lattice, level: int, nodes: IntArray) -> list[IntArray]:
+    """Pairs (n, 2) of nodes and their next ones along each axis."""
+    places = {tuple(node): number for number, node in enumerate(nodes.tolist())}
+    found = []
+    for axis in range(1, nodes.shape[1]):
+        moved = nodes.copy()
+        moved[:, axis] += 1
+        after = [places.get(tuple(node), -1) for node in lattice.wrapped(moved, level).tolist()]
+        pairs = np.stack([np.arange(len(nodes)), np.array(after, dtype=np.int64)], axis=1)
+        found.append(pairs[pairs[:, 1] >= 0])
+    return found
 
 
 class Problem(NamedTuple):
@@ -138,7 +367,7 @@ class FieldsBetween(Between):
         self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: list[FloatArray]
     ) -> tuple[Any, FloatArray, BoolArray]:
         """Fields (n, m, 2, columns) of reflected and of creeping sheets, their differences, and who passes (n,)."""
-        from creeping.sweeping.kernels.sheet_sums import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
+        from creeping.sweeping.kernels.judging import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
 
         k, amplitudes = self._wavenumbers, np.zeros((0, 1)) if nodes.amplitudes is None else nodes.amplitudes
         sheets, label = amplitudes[chain], nodes.label[chain[:, 0]]

@@ -10,6 +10,8 @@ r being the share of its rays that are carried by themselves. The least mean ove
 are left out, and all of them if it is no less than PAYS. It follows from the whole set of incidences and from what is
 asked of them, never from a clock, so that every task of a study, wherever it runs, has the same nodes.
 
+What computes a sweep: each incidence by itself, or some between others.
+
 Sources: Derivations, F23.
 """
 
@@ -18,11 +20,13 @@ from dataclasses import replace
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.geometry.creased import is_creased
 from creeping.rays.transport import Flow
-from creeping.sweeping.between.choice import sweeper_of
+from creeping.sweeping.between.fans import RaysBetween
+from creeping.sweeping.between.fields import FieldsBetween
 from creeping.sweeping.lattice import Lattice
 from creeping.sweeping.request import SweepRequest, with_lattice
-from creeping.sweeping.solved_fields import SolvedSweeper
+from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
 from creeping.sweeping.sweeper import Sweeper
 
 FEWEST, MOST, SHARE = 2, 12, 2000
@@ -82,3 +86,12 @@ def first_level(lattice: Lattice, left: FloatArray, quantity: str) -> int | None
         own = np.take_along_axis(left[:, first:], last[:, None], axis=1)[:, 0]
         costs.append(float(np.mean(nodes[last] + np.where(given, EACH[kind] + AGAIN * own, 1.0))))
     return int(np.argmin(costs)) if min(costs) < PAYS else None
+
+
+def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween | RaysBetween | SolvedSweeper:
+    """What gives the results of unit directions (n, 3); bodies with creases have no rays that all go on."""
+    if isinstance(flow, NoFlow):
+        return SolvedSweeper(flow, request)
+    if request.lattice is None or is_creased(flow.body):
+        return Sweeper(flow, request)
+    return RaysBetween(flow, request) if request.quantity == "rays" else FieldsBetween(flow, request)

@@ -6,6 +6,8 @@ its chunks: what is marked is whole, whenever a writer dies. The group ``study``
 a digest, the digests of what describes arrays and coordinates, and the flow. A store is opened if these agree and the
 chunks of done tasks are there; `SweepStore.verify` reads them. CRCs and digests have no key: they tell of accidents,
 not of forgery.
+
+Mending a store before it is filled further: files written anew from the plan, tasks computed anew.
 """
 
 import shutil
@@ -19,30 +21,41 @@ import numpy as np
 
 from creeping._typing import IntArray
 from creeping.errors import CreepingError, InvalidInputError
+from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface
-from creeping.geometry.unit import unit_of
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
-from creeping.sweeping.accessor import register
 from creeping.sweeping.plan import Arrays, SweepPlan, differing, open_flow, save_flow
-from creeping.sweeping.results import MISSING, SHOWN, count_attributes, require
-from creeping.sweeping.storage.arrays import StoreArrays, checksum, exists
-from creeping.sweeping.storage.damage import ROOT, SEAL, STUDY, STUDY_FILE, damaged_files, read_document, sealed
+from creeping.sweeping.results import MISSING, SHOWN, count_attributes, register, require
 from creeping.sweeping.storage.layout import (
     DONE,
     ERROR_BYTES,
     ERRORS,
+    ROOT,
     SCHEMA,
+    SEAL,
     STATUS,
+    STUDY,
+    STUDY_FILE,
     SUMS,
     UNDONE,
     WITH_FAILURES,
+    StoreArrays,
+    checksum,
+    damaged_files,
+    exists,
+    read_document,
+    sealed,
     write_empty,
 )
 
 if TYPE_CHECKING:
     import xarray
+import json
+
+from creeping.storage.atomic import written_aside
+from creeping.sweeping.storage.layout import write_anew
 
 
 class SweepStore(StoreArrays):
@@ -54,7 +67,7 @@ class SweepStore(StoreArrays):
     key : dict
         What the results depend on; see `SweepPlan.key`.
     files : dict
-        Digests of what is the same from beginning to end; see `creeping.sweeping.storage.damage`.
+        Digests of what is the same from beginning to end; see `creeping.sweeping.storage.layout`.
     unit : str
         Of lengths in what it says of its arrays: "m" where the body knew it, else "L".
     """
@@ -356,3 +369,53 @@ class SweepStore(StoreArrays):
         except CreepingError:
             self.chunk_file(STATUS, task).unlink(missing_ok=True)
             return True
+
+
+def mended(store: SweepStore, plan: SweepPlan) -> list[str]:
+    """Write damaged files of a store anew, and mark done tasks as missing whose chunks or marks are lost.
+
+    Parameters
+    ----------
+    store : SweepStore
+    plan : SweepPlan
+        That of the store; see `SweepStore.require_same`.
+
+    Returns
+    -------
+    list of str
+        What was damaged.
+
+    Raises
+    ------
+    CreepingError
+        If a damaged file does not follow from the plan, or another process fills the store.
+    """
+    try:
+        store.require_whole()
+        return []
+    except CreepingError:
+        pass
+    found = []
+    with store.locked():
+        names = damaged_files(store.folder, store.files)
+        if names:
+            others = [name for name in names if name != STUDY_FILE]
+            write_anew(store.folder, plan, store.unit, others, store.files)
+            if STUDY_FILE in names:
+                _write_study(store)
+            store.close()
+            found = [f"{name} was damaged, and is written anew" for name in names]
+        marks = [task for task in range(store.tasks) if store.forget_mark(task)]
+        found += [f"the mark of task {task} was damaged; it is computed anew" for task in marks]
+        for task, name in store.lost().items():
+            store.undo(task)
+            found.append(f"{name} of task {task} was missing; the task is computed anew")
+    return found
+
+
+def _write_study(store: SweepStore) -> None:
+    """Write the description of the study anew, whose content is whole."""
+    file = store.folder / STUDY_FILE
+    attributes, _ = read_document(file)
+    with written_aside(file) as aside:
+        aside.write_text(json.dumps({"attributes": attributes, "zarr_format": 3, "node_type": "group"}))

@@ -1,14 +1,31 @@
-"""Keys of study files: what a table may hold, and the mistakes of one that holds something else."""
+"""Keys of study files: what a table may hold, and the mistakes of one that holds something else.
+
+Tables of directions in study files: kinds of sets, and files that hold them.
+"""
 
 import difflib
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
+from tokenize import TokenError
 from typing import Literal
 
 import numpy as np
 
-from creeping._typing import Any
+from creeping._typing import Any, FloatArray
+from creeping.errors import CreepingError, InvalidInputError
+from creeping.geometry.directions import (
+    MOST,
+    direction_count,
+    directions_from_angles,
+    directions_from_azimuth_elevation,
+    fibonacci_directions,
+    great_circle,
+    lebedev_directions,
+    theta_phi_grid,
+    unit_directions,
+)
 from creeping.sweeping.plan import short
 
 LEAST_WAVENUMBER, LARGEST_WAVENUMBER = 1e-12, 1e12
@@ -139,3 +156,142 @@ def _list_of(value: Any, test: Any) -> bool:
 
 def _shown(value: Any) -> str:
     return short(f'"{value}"' if isinstance(value, str) else value)
+
+
+LINE_BYTES = 100
+
+
+"""Bytes of a line of three numbers in a file, at most."""
+
+
+_COUNT = {"count": Key("count", 1, required=True, most=MOST)}
+
+
+def _ranges(first: str, second: str) -> dict[str, Key]:
+    found: dict[str, Key] = {}
+    for name in (first, second):
+        found |= {
+            f"{name}_deg_min": Key("number", 0.0, required=True),
+            f"{name}_deg_max": Key("number", 0.0, required=True),
+            f"{name}_count": Key("count", 1, required=True, most=MOST),
+        }
+    return found
+
+
+KINDS: dict[str, dict[str, Key]] = {
+    "fibonacci": _COUNT,
+    "lebedev": {"order": Key("count", 3, required=True)},
+    "grid": {
+        "theta_count": Key("count", 1, required=True, most=MOST),
+        "phi_count": Key("count", 1, required=True, most=MOST),
+    },
+    "theta-phi": _ranges("theta", "phi"),
+    "azimuth-elevation": _ranges("azimuth", "elevation"),
+    "great-circle": {
+        "first": Key("vector", required=True),
+        "through": Key("vector", required=True),
+        **_COUNT,
+        "angle_deg_min": Key("number", 0.0),
+        "angle_deg_max": Key("number", 360.0),
+    },
+    "list": {"directions": Key("vectors", required=True, most=MOST)},
+    "file": {"path": Key("text", "", required=True)},
+}
+
+
+def read_directions(name: str, table: Any, folder: Path, mistakes: list[str]) -> FloatArray | None:
+    """Unit directions of a table; its mistakes are added to the list."""
+    kind = table.get("kind") if isinstance(table, dict) else None
+    if not isinstance(kind, str) or kind not in KINDS:
+        what = "is missing" if kind is None else f"= {kind!r} is unknown"
+        mistakes.append(f"[{name}] kind {what}{nearest(str(kind or ''), KINDS)}")
+        return None
+    before = len(mistakes)
+    values = read_table(name, {k: v for k, v in table.items() if k != "kind"}, KINDS[kind], mistakes)
+    if len(mistakes) > before:
+        return None
+    try:
+        return unit_directions(_made(kind, values, folder), f"[{name}] directions").reshape(-1, 3)
+    except CreepingError as error:
+        mistakes.append(f"[{name}] {error}".replace(f"[{name}] [{name}]", f"[{name}]"))
+        return None
+
+
+def _made(kind: str, values: dict[str, Any], folder: Path) -> FloatArray:
+    if kind == "fibonacci":
+        return fibonacci_directions(values["count"])
+    if kind == "lebedev":
+        return lebedev_directions(values["order"])[0]
+    if kind == "grid":
+        return theta_phi_grid(values["theta_count"], values["phi_count"])[0]
+    if kind == "theta-phi":
+        return directions_from_angles(*_mesh(values, "theta", "phi"))
+    if kind == "azimuth-elevation":
+        return directions_from_azimuth_elevation(*_mesh(values, "azimuth", "elevation"))
+    if kind == "great-circle":
+        start, stop = np.radians(values["angle_deg_min"]), np.radians(values["angle_deg_max"])
+        # a whole circle ends where it began
+        ends = abs(stop - start) < 2 * np.pi - 1e-9
+        return great_circle(values["first"], values["through"], values["count"], start=start, stop=stop, endpoint=ends)
+    if kind == "list":
+        return np.asarray(values["directions"], dtype=float)
+    return _from_file(folder / values["path"])
+
+
+def _mesh(values: dict[str, Any], first: str, second: str) -> tuple[FloatArray, FloatArray]:
+    """Angles of both axes in radians (n, m), the second running fastest."""
+    axes = []
+    direction_count(f"{first}_count {second}_count", values[f"{first}_count"] * values[f"{second}_count"])
+    for name in (first, second):
+        low, high, count = (values[f"{name}_{part}"] for part in ("deg_min", "deg_max", "count"))
+        whole = count > 1 and abs(abs(high - low) - 360) < 1e-9
+        axes.append(np.radians(np.linspace(low, high, count, endpoint=not whole)))
+    grids = np.meshgrid(*axes, indexing="ij")
+    return grids[0], grids[1]
+
+
+def _from_file(path: Path) -> FloatArray:
+    """Directions of a .npy file or of a table with three columns, separated by commas; nothing in it is executed."""
+    kind = path.suffix.lower()
+    if kind not in (".csv", ".npy"):
+        raise InvalidInputError(f"path = {str(path)!r} ends neither in .csv nor in .npy")
+    try:
+        if not path.is_file():
+            raise InvalidInputError(f"cannot read directions from {path}: there is no such file")
+        if path.stat().st_size > MOST * LINE_BYTES:
+            raise InvalidInputError(
+                f"{path} has {path.stat().st_size / 1e9:.1f} GB, more than {MOST} directions; divide it"
+            )
+        # mapped, so that a header that promises more than the file holds is an error before memory is asked for
+        found = np.lib.format.open_memmap(path, mode="r") if kind == ".npy" else _table(path)
+    except (OSError, ValueError, OverflowError, TokenError, SyntaxError, TypeError) as error:
+        if isinstance(error, CreepingError):
+            raise
+        raise InvalidInputError(f"cannot read directions from {path}: {error}") from error
+    if found.ndim != 2 or found.shape[1] != 3 or found.dtype.kind not in "fiu":
+        raise InvalidInputError(f"{path} holds {found.dtype} {found.shape}, not numbers (n, 3)")
+    direction_count(f"{path}: number of directions", len(found))
+    return np.array(found, dtype=float)
+
+
+def _table(path: Path) -> FloatArray:
+    """Numbers of a .csv file (n, columns); a line ``x,y,z`` above them is left out."""
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    rows = [row for row in (line.partition("#")[0].strip() for line in lines) if row]
+    if rows and [word.strip(" \t\"'").lower() for word in rows[0].split(",")] == ["x", "y", "z"]:
+        rows = rows[1:]
+    if not rows:
+        raise InvalidInputError(f"{path} holds no directions; write x,y,z in each line")
+    if not any(map(_is_number, rows[0].split(","))):
+        raise InvalidInputError(
+            f"{path} begins with {short(rows[0])!r}: remove the header line, or give columns x,y,z, separated by commas"
+        )
+    return np.loadtxt(rows, delimiter=",", ndmin=2)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

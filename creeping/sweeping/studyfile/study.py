@@ -24,8 +24,7 @@ from creeping.sweeping.request import (
     sweep_length,
     sweep_request,
 )
-from creeping.sweeping.studyfile.directions import read_directions
-from creeping.sweeping.studyfile.schema import Key, nearest, read_table
+from creeping.sweeping.studyfile.schema import Key, nearest, read_directions, read_table
 
 EXAMPLE = """\
 [study]

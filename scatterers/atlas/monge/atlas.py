@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scatterers.atlas.monge.charts import Field, FloatArray, MongeChart, MongeCharts
 from scatterers.atlas.monge.cover import VALID, Cover, covered_by, probes
 from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.monge_layout import CHART, FIRST, LEAN, ORIGIN, OUTSIDE, PER_SIDE, SHAPE, VOXELS
+from scatterers.kernels.monge import CHART, FIRST, LEAN, ORIGIN, OUTSIDE, PER_SIDE, SHAPE, VOXELS
 
 # times that the cloud is completed where the atlas misses a point between
 ROUNDS = 4
@@ -36,7 +36,7 @@ class MongeAtlas:
     ----------
     graphs : MongeCharts
     parameters : (k,)
-        Charts and table of voxels, as `scatterers.kernels.monge_layout` orders them.
+        Charts and table of voxels, as `scatterers.kernels.monge` orders them.
     """
 
     graphs: MongeCharts

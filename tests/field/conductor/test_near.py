@@ -9,7 +9,7 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field.body_currents import kept_currents
 from creeping.field.conductor import near
-from creeping.shadow.occlusion import occluded
+from creeping.shadow.attachment import occluded
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])
 K = 30.0
@@ -113,7 +113,7 @@ def test_far_shadow_by_rays(mie):
 
 
 def spherical(i):
-    from creeping.field.polarisation import spherical_frame
+    from creeping.field.far_result import spherical_frame
 
     return spherical_frame(OBLIQUE)[i][:, None].astype(complex)
 

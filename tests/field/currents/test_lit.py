@@ -5,7 +5,7 @@ import pytest
 
 from creeping.field.boundary import HARD, SOFT, Boundary
 from creeping.field.currents.lit import lit_currents
-from studies.reference import cylinder, sphere
+from studies.reference import section, sphere
 
 # largest error as a share of the largest current, by k: about one and a half times what is reached
 BOUNDARIES = {
@@ -53,7 +53,7 @@ def test_cylinder(name):
     one = np.ones_like(c)
     for k, limit in limits.items():
         mine = lit_currents(c, one, *np.zeros((4, len(c))), k, kind) * np.exp(-1j * k * c)
-        exact = (cylinder.surface_derivative if name == "soft" else cylinder.surface_field)(k, 1.0, phi, given)
+        exact = (section.surface_derivative if name == "soft" else section.surface_field)(k, 1.0, phi, given)
         assert np.max(np.abs(mine - exact)) < limit * np.max(np.abs(exact))
 
 

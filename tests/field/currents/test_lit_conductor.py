@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from creeping.field.boundary import HARD, SOFT
-from creeping.field.currents.lit import lit_currents
-from creeping.field.currents.lit_conductor import lit_conductor
-from studies.reference import cylinder, sphere
+from creeping.field.currents.lit import lit_conductor, lit_currents
+from studies.reference import section, sphere
 
 NOTHING = np.zeros(80)
 
@@ -57,7 +56,7 @@ def test_scalar_currents_of_a_cylinder_met_obliquely(kind):
     gamma, k = 0.8, 320.0
     phi, geometry = on_the_cylinder(gamma)
     s = np.sin(gamma)
-    of = cylinder.surface_field if kind == HARD else cylinder.surface_derivative
+    of = section.surface_field if kind == HARD else section.surface_derivative
     exact = of(k * s, 1.0, phi, kind.kind) * np.exp(-1j * k * s * np.cos(phi))
     off = np.abs(lit_currents(*geometry, k, kind) - exact) / np.abs(exact).max()
     assert off.max() < 1e-4
@@ -74,7 +73,7 @@ def exact_on_the_cylinder(k, gamma, phi, geometry):
         # H0 = e v + h b, E0 = e b - h v with v in the plane of incidence across d
         magnetic = (e * c * along_axis - h * s * sine) / length
         electric = -(e * s * sine + h * c * along_axis) / length
-        once = [cylinder.pec_currents(k, 1.0, phi, gamma, *pair) for pair in ((1.0, 0.0), (0.0, 1.0))]
+        once = [section.pec_currents(k, 1.0, phi, gamma, *pair) for pair in ((1.0, 0.0), (0.0, 1.0))]
         J = [electric * once[0][i] + magnetic * once[1][i] for i in (0, 1)]
         out[:, 0, column] = (J[0] * s * sine + J[1] * along_axis) / length
         out[:, 1, column] = (J[0] * along_axis - J[1] * s * sine) / length

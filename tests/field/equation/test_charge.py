@@ -9,8 +9,8 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field.body_currents import kept_currents
 from creeping.field.equation.currents import ON_BODY
-from creeping.field.equation.kept import asked_solution
-from creeping.field.polarisation import incident_mix
+from creeping.field.equation.solving import asked_solution
+from creeping.field.far_result import incident_mix
 from studies.reference.sphere import pec_far_field, pec_total_field
 
 D = np.array([0.48, 0.6, -0.64])

@@ -7,8 +7,8 @@ import trimesh
 import creeping as cr
 import scatterers as sc
 from creeping.field.boundary import HARD
-from creeping.field.equation.facet_tiles import RULES, facet_tiles
-from creeping.geometry.facet_patches import facet_patches, halved, sides_of
+from creeping.field.equation.body_tiles import RULES, facet_tiles
+from creeping.geometry.patches import facet_patches, halved, sides_of
 from studies.reference import sphere, stored
 
 CUBE = stored.read("edged_cube")
@@ -51,7 +51,7 @@ def test_a_cube_of_irregular_triangles_is_a_cube(times, kind):
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: f"{'squares' if rule.squares else 'triangles'} {rule.p}")
 def test_every_rule_knows_its_error_at_edges(rule, monkeypatch):
-    monkeypatch.setattr("creeping.field.equation.facet_tiles._chosen", lambda body, wavelength: rule)
+    monkeypatch.setattr("creeping.field.equation.body_tiles._chosen", lambda body, wavelength: rule)
     # another cube than the one that set what they lack, and turned
     turn = trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.5, 0.9]))[:3, :3]
     mesh = cube(1, seed=8)

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.equation import kept, solving
+from creeping.field.equation import solving
 from studies.reference import sphere
 
 D = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, -0.8]])
@@ -70,22 +70,22 @@ def test_far_field_of_a_fan_is_that_of_the_equation_where_edges_diffract(flat):
         assert set(far.method) == {"equation"} and far.validity is not None and not far.unresolved.any()
         assert_allclose(far.total, flat.far_field(R, 3).total, atol=1e-4)
     # kept with the body: it is solved once
-    assert kept.solution_for(CYLINDER, fan.line.direction, 3.0, "hard") is not None
+    assert solving.solution_for(CYLINDER, fan.line.direction, 3.0, "hard") is not None
     by_rays = cr.far_field(fan, R[:3], wavenumber=3.0, boundary="hard", method="rays")
     assert set(by_rays.method) == {"rays+optics"}
 
 
 def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
     asked, found, wavenumbers = [], [], np.array([1.0, 1.2])
-    monkeypatch.setattr(kept, "KEPT", 1)
-    known = kept.solve
+    monkeypatch.setattr(solving, "KEPT", 1)
+    known = solving.solve
 
     def noted(*of, **how):
         asked.append(how["wavenumber"])
         found.append(known(*of, **how))
         return found[-1]
 
-    monkeypatch.setattr(kept, "solve", noted)
+    monkeypatch.setattr(solving, "solve", noted)
     body = sc.Cylinder(0.5, 1.0)
     ds = cr.backscatter(body, wavenumbers=wavenumbers, elevation=[10.0, 50.0], boundary="hard")
     assert asked == wavenumbers.tolist()
@@ -149,6 +149,6 @@ def test_what_cannot_be_solved_is_told(flat, monkeypatch):
     told = []
     cr.solve(CYLINDER, (1, 0, 0), wavenumber=1.0, boundary="soft", progress=told.append)
     assert "nodes, about" in told[0]
-    monkeypatch.setattr(kept, "SECONDS", 1e-9)
-    assert kept.solution_for(CYLINDER, D[0], 2.9, "hard") is None
-    assert solving.cost(10_000, solving.CONDUCTOR, 1) > solving.cost(10_000, kept.scalar_boundaries("soft")[0], 1)
+    monkeypatch.setattr(solving, "SECONDS", 1e-9)
+    assert solving.solution_for(CYLINDER, D[0], 2.9, "hard") is None
+    assert solving.cost(10_000, solving.CONDUCTOR, 1) > solving.cost(10_000, solving.scalar_boundaries("soft")[0], 1)

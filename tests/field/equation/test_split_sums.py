@@ -6,10 +6,9 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.boundary import CONDUCTOR, scalar_boundaries
+from creeping.field.equation.columns import SplitProduct
 from creeping.field.equation.matrix import Matrix
-from creeping.field.equation.smooth_kernel import SmoothKernel
-from creeping.field.equation.split_product import SplitProduct
-from creeping.field.equation.split_sums import CURL, ONE_LAYER, SPLITS, SplitSums, best_split
+from creeping.field.equation.split_sums import CURL, ONE_LAYER, SPLITS, SmoothKernel, SplitSums, best_split
 from creeping.field.equation.tiles import tiles_for
 from creeping.geometry.covering import patches_of
 

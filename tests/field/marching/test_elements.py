@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from oracles.boundary_layer import dense
 
-from creeping.field.marching.elements import DEPTH, GridSpec, layer_grid
+from creeping.field.marching.profile import DEPTH, GridSpec, layer_grid
 
 K = 20.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shared_bodies as sc
 
-from creeping.field.marching.jointed_rays import jointed_rays, piece_nodes
+from creeping.field.marching.fan_rays import jointed_rays, piece_nodes
 from creeping.geodesics.states import M11, P, X, pack
 
 PILL = sc.Capsule(radius=1.0, length=4.0)

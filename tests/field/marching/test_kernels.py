@@ -6,11 +6,10 @@ from oracles.boundary_layer import pole_trace, step
 from scipy.optimize import brentq
 
 from creeping.field.kernels.layer_march import ROW, march_block
-from creeping.field.kernels.plane_wave import ROUNDS, TERMS, pole_traces
+from creeping.field.kernels.ray_load import ROUNDS, TERMS, pole_traces, reflected
 from creeping.field.kernels.ray_profile import cubics, plane_curve
-from creeping.field.kernels.reflected_wave import reflected
-from creeping.field.marching.elements import GridSpec, layer_grid
-from creeping.field.marching.pade import ORDER, rational_step
+from creeping.field.marching.layer import ORDER, rational_step
+from creeping.field.marching.profile import GridSpec, layer_grid
 from creeping.kernels.vectors import LANES
 
 K = 20.0

@@ -8,7 +8,7 @@ from creeping.field.boundary import ELECTRIC_SOFT, HARD, SOFT, Boundary
 from creeping.field.marching.layer import march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.marching.profile import RayProfiles
-from studies.reference import cylinder
+from studies.reference import section
 
 S = np.concatenate([np.linspace(-1.55, 0, 40), np.linspace(0, 3.6, 91)[1:]])
 
@@ -41,7 +41,7 @@ def test_circle(boundary, eta, limits):
     """Per cent of the sum of waves in the light, the penumbra and the shadow, medians."""
     marched = march_rays(circle(), wavenumber=20.0, boundary=boundary)
     s = np.linspace(-0.8, 1.5, 231)
-    exact = cylinder.surface_derivative if eta == "soft" else cylinder.surface_field
+    exact = section.surface_derivative if eta == "soft" else section.surface_field
     found, size = both_senses(marched, s)
     error = 100 * np.abs(found - exact(20.0, 1.0, np.pi / 2 - s, eta)) / size
     regions = (s < -0.46, (s > -0.46) & (s < 0.46), s > 0.6)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creeping.field.marching.pade import ORDER, rational_step, tabulated_step
+from creeping.field.marching.layer import ORDER, rational_step, tabulated_step
 
 
 def step_of(delta, X):

@@ -7,8 +7,7 @@ from tolerances import DIFFERENCE, FOCK_SEAM, FOCK_TABLE, PRINTED
 
 from creeping.field.special import fock
 from creeping.field.special.airy import soft_modes
-from creeping.field.special.fock import boundary_modes
-from creeping.field.special.height_gain import height_gain, near_pekeris
+from creeping.field.special.fock import boundary_modes, height_gain, near_pekeris
 
 QUARTER = np.exp(0.25j * np.pi)
 BOUNDARIES = [None, 0.0, 1j, 2 + 1j, 5j]

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
-from creeping.geometry.frames import polar_frame
+from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.surface import project
 from scatterers.atlas.monge.atlas import MongeAtlas
 from scatterers.spline.cloud import body_cloud, onto, sign_changes

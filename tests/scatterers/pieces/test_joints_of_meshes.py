@@ -13,8 +13,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal, size
-from scatterers.pieces.joints import jointed
-from scatterers.pieces.mesh_cuts import Cuts, cut
+from scatterers.pieces.joints import Cuts, cut, jointed
 from scatterers.triangles.jets import osculating_jets
 from scatterers.triangles.quality import assess, jumps_at, noise_at_most
 from scatterers.triangles.topology import edges_of

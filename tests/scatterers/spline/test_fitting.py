@@ -9,12 +9,10 @@ from body_checks import directions, rms, unit
 import scatterers as sc
 from creeping.geometry.directions import fibonacci_directions
 from scatterers.kernels.normal_equations import accumulate, subtract_roughness
-from scatterers.kernels.spline_constants import OVERREAD
+from scatterers.kernels.tensor import OVERREAD
 from scatterers.spline import fitting as _fitting
-from scatterers.spline.cardinal import Cardinal
-from scatterers.spline.fitting import _Equations, fit
-from scatterers.spline.roughness import fourth_bands, ranges
-from scatterers.spline.tensor import TensorSpline, coefficients, evaluated
+from scatterers.spline.fitting import _Equations, fit, fourth_bands, ranges
+from scatterers.spline.tensor import Cardinal, TensorSpline, coefficients, evaluated
 
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 TRIAXIAL = sc.Ellipsoid(1.0, 0.8, 0.6)

@@ -11,9 +11,9 @@ import pytest
 import trimesh
 from body_checks import volume
 
-from scatterers.triangles.choice import Choice
-from scatterers.triangles.crossings import crossings
 from scatterers.triangles.files import TriangleMesh, read_mesh
+from scatterers.triangles.quality import Choice
+from scatterers.triangles.topology import crossings
 from studies.fuzz import seeds
 
 BALL = trimesh.creation.icosphere(2)

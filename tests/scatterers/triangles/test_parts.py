@@ -7,7 +7,7 @@ from body_checks import normal_curvature, rms, unit, volume
 
 import scatterers as sc
 from creeping.geometry.surface import project
-from scatterers.triangles.choice import Choice
+from scatterers.triangles.quality import Choice
 
 
 def ball(radius=1.0, at=0.0, times=2):

@@ -6,7 +6,7 @@ import trimesh
 from body_checks import volume
 
 import scatterers as sc
-from scatterers.triangles.sheets import taken_apart
+from scatterers.triangles.parts import taken_apart
 from scatterers.triangles.topology import edges_of
 
 

@@ -3,11 +3,21 @@
 import numpy as np
 import pytest
 
-from studies.reference.antennas import monopoles_of_slots, plane_antennas, slots_of_monopoles, sphere_antennas
 from studies.reference.clouds import ellipsoid
-from studies.reference.monopoles import coupled_monopoles, plane_monopoles, sphere_monopoles
-from studies.reference.ports import coupled, sphere_coupling
-from studies.reference.slots import TERMS, coupled_slots, plane_slots, sphere_slots
+from studies.reference.dipoles import coupled, sphere_coupling
+from studies.reference.slots import (
+    TERMS,
+    coupled_monopoles,
+    coupled_slots,
+    monopoles_of_slots,
+    plane_antennas,
+    plane_monopoles,
+    plane_slots,
+    slots_of_monopoles,
+    sphere_antennas,
+    sphere_monopoles,
+    sphere_slots,
+)
 
 SERIES = {
     "slots": (sphere_slots, plane_slots),

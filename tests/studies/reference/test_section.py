@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.reference import cylinder
+from studies.reference import section
 from studies.reference.section import SectionSolver, directions, surface_data
 from studies.reference.section_shapes import CapsuleSection, bump, ellipse, kite, peanut
 
@@ -19,10 +19,10 @@ SECTIONS = {
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.5 + 0.2j])
 def test_circle(boundary):
     found = surface_data(ellipse(1, 1), 12.0, 0.3, boundary)
-    series = cylinder.surface_derivative if boundary == "soft" else cylinder.surface_field
+    series = section.surface_derivative if boundary == "soft" else section.surface_field
     np.testing.assert_allclose(found.values, series(12.0, 1.0, found.nodes.s - 0.3, boundary), atol=1e-10)
     phi = np.linspace(0, 3, 7)
-    far = cylinder.far_field(12.0, 1.0, phi, boundary)
+    far = section.far_field(12.0, 1.0, phi, boundary)
     np.testing.assert_allclose(found.far(directions(phi + 0.3)), far, atol=1e-11)
 
 

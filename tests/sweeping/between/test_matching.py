@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from creeping.sweeping.between.matching import chains, links
+from creeping.sweeping.between.fields import chains, links
 
 
 def made(keys, labels=None):

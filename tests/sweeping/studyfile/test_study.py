@@ -10,8 +10,8 @@ import creeping as cr
 from creeping import InvalidInputError
 from creeping.geometry.directions import angles_of, azimuth_elevation_of
 from creeping.rays.reach import ray_length
-from creeping.sweeping.studyfile import directions as study_directions
-from creeping.sweeping.studyfile.directions import KINDS
+from creeping.sweeping.studyfile import schema as study_directions
+from creeping.sweeping.studyfile.schema import KINDS
 from creeping.sweeping.studyfile.study import EXAMPLE, parse_study, read_study
 
 HEAD = '[study]\nbody = "sphere"\nquantity = "rays"\n'

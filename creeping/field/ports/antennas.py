@@ -1,0 +1,301 @@
+"""The field at each of many slots and monopoles of a perfect conductor of each other: all geodesics between them.
+
+    slot to slot, monopole to monopole     as `creeping.field.ports.antennas` and `creeping.field.ports.antennas`
+    slot i to monopole j                   E_ij = sum over geodesics of `creeping.field.mixed_sources`, or beams
+    monopole j to slot i                   H_ji = -E_ij
+
+The electric field at each of many monopoles on a perfect conductor of each other: all geodesics between them.
+
+    E_ij = sum over geodesics of the waves of `creeping.field.ports.antenna_waves`, or beams where these merge
+
+Their error is that of a point source's waves.
+
+The magnetic field at each of many slots in a perfect conductor of each other: all geodesics between them.
+
+    H_ij = sum over geodesics of the waves of `creeping.field.ports.antenna_waves`, or beams where these merge
+
+Sources: [PW81]; Derivations, F34; Derivations, F33; Derivations, F28.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked, checked_plain
+from creeping.field.mixed_sources import mixed_sources
+from creeping.field.port_beams import PortBeams
+from creeping.field.ports.antenna_waves import MonopoleTerms, monopole_waves, slot_sources
+from creeping.field.ports.coupling_result import Coupling, coupled, matrix_of, port_geodesics
+from creeping.field.ports.sources import PortSources, scalar_sources
+from creeping.field.ports.sums import PortSums, port_sums
+from creeping.field.ports.waves import path_terms
+from creeping.geodesics.bundle import as_points
+from creeping.geometry.arguments import checked_body, real_array
+from creeping.geometry.surface import Surface
+from creeping.rays.port_rays import PortRays
+from creeping.rays.reach import AUTO
+
+FLAT = 1e-3
+"""Least tangential part of an axis, as a share of it."""
+
+
+def antenna_coupling(
+    body: Surface,
+    slots: ArrayLike,
+    axes: ArrayLike,
+    monopoles: ArrayLike,
+    *,
+    wavenumber: float,
+    order: int = 2,
+    length: float | Literal["auto"] = AUTO,
+) -> Coupling:
+    """Fields between slots in and monopoles on a perfect conductor: at each of them of a unit moment at each other.
+
+    Ports are the slots and then the monopoles. Row i is the source, a magnetic moment V dl along a slot as of
+    `slot_coupling` or an electric one I h along n as of `monopole_coupling`; column j what it gives: H along a slot or
+    E along n at a monopole. With electric moments and H times the impedance of free space all values are of one kind,
+    1/L^2: those of slots alone and of monopoles alone are those of the functions named, and what a monopole gives a
+    slot is H of a unit I h, what a slot gives a monopole E of a unit V dl. On a plane the latter is
+    -2 ik (1 + i/kr) e^{ikr}/(4 pi r) for a slot along n x (direction of the path), across it, and 0 for one along it.
+
+    The matrix is not symmetric: by reciprocity H at slot i of monopole j is minus E at monopole j of slot i, as hybrid
+    parameters have it. Currents of slots and voltages of monopoles that receive come from voltages of slots and
+    currents of monopoles by ``values.T @ moments``, the diagonal, which is not known, left out.
+
+    Parameters
+    ----------
+    body : Surface
+        Smooth and plain.
+    slots : (n, 3), L
+        On the body, one or more.
+    axes : (n, 3) or (3,)
+        Directions of the slots, of any length; their tangential parts count.
+    monopoles : (m, 3), L
+        On the body, one or more; no two ports in one place.
+    wavenumber : float, 1/L
+    order : 2 or 1
+    length : float or "auto", L
+        As of `coupling`.
+
+    Returns
+    -------
+    Coupling
+        A matrix (n + m, n + m), 1/L^2, with errors, statuses and geodesics as of `coupling`; its ``kinds`` say "slot"
+        and "monopole".
+
+    Raises
+    ------
+    InvalidInputError
+        On no slots or no monopoles, ports off the body, or two in one place, axes that are not tangential at all, a bad
+        wavenumber, order or length, and for a weighted body or one with edges.
+    SurfaceError
+        If geodesics cannot be traced on the body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> angle = np.radians([0, 40, 80])
+    >>> ports = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    >>> found = cr.antenna_coupling(sc.Sphere(), ports[:1], (0, 1, 0), ports[1:], wavenumber=30.0)
+    >>> np.abs(found[0, 1:]).round(3).tolist(), bool(np.all(found[0, 1:] == -found[1:, 0]))
+    ([3.921, 0.719], True)
+    >>> found.kinds.tolist()
+    ['slot', 'monopole', 'monopole']
+    """
+    checked_body(body)
+    checked_plain(body, smooth="the coupling of antennas")
+    k = checked(wavenumber, order)
+    parts = [as_points(given) for given in (slots, monopoles)]
+    shapes = [part.shape for part in parts]
+    if any(part.ndim != 2 or not len(part) for part in parts):
+        raise InvalidInputError(
+            f"slots have shape {shapes[0]} and monopoles {shapes[1]}; give one or more of each as (n, 3), or use "
+            "slot_coupling or monopole_coupling for one kind"
+        )
+    count = len(parts[0])
+    rays = port_geodesics(body, np.concatenate(parts), k, length)
+    along = np.concatenate([tangential(axes, rays.normals[:count]), rays.normals[count:]])
+    kinds = np.repeat(["slot", "monopole"], [count, len(parts[1])])
+    return matrix_of(rays, _sums(rays, along, count, k, order), k, "pec", order, kinds, along)
+
+
+def _sums(rays: PortRays, axes: FloatArray, count: int, k: float, order: int) -> PortSums:
+    """What geodesics bring, or beams, of both kinds, the first so many ports slots; each block by itself."""
+    n = len(rays.ports)
+    slots, monopoles, mixed = rays.among(0, count), rays.among(count, n), rays.across(count)
+    here, there = slice(0, count), slice(count, n)
+    one = port_sums(slots, slot_sources(slots, axes[here], k, order), k)
+    other = port_sums(monopoles, monopole_sources(monopoles, k, order), k)
+    both = port_sums(mixed, mixed_sources(mixed, axes, k, order), k)
+    for name in ("values", "error", "status", "method"):
+        whole = getattr(both, name)
+        whole[here, here], whole[there, there] = getattr(one, name), getattr(other, name)
+    waves = np.zeros(len(rays), dtype=complex)
+    waves[rays.second < count], waves[rays.first >= count] = one.waves, other.waves
+    waves[(rays.first < count) & (rays.second >= count)] = both.waves
+    return PortSums(both.values, both.error, both.status, both.method, waves)
+
+
+def monopole_coupling(
+    body: Surface,
+    ports: ArrayLike,
+    *,
+    wavenumber: float,
+    order: int = 2,
+    length: float | Literal["auto"] = AUTO,
+) -> Coupling:
+    """Fields between monopoles on a perfect conductor: E along n at each of a unit electric moment at each other.
+
+    A short monopole with the current I all along its height h is the moment I h along the normal. Values are E there
+    along the normal, with the conductor in place, times the admittance of free space, for a unit of the moment: on a
+    plane twice ik (1 + grad grad/k^2) e^{ikr}/(4 pi r), near field and all. The mutual impedance of two short monopoles
+    is minus that times their heights and the impedance of free space.
+
+    Parameters
+    ----------
+    body : Surface
+        Smooth and plain.
+    ports : (n, 3), L
+        On the body, two or more, no two in one place.
+    wavenumber : float, 1/L
+    order : 2 or 1
+    length : float or "auto", L
+        As of `coupling`.
+
+    Returns
+    -------
+    Coupling
+        A symmetric matrix (n, n), 1/L^2, with errors, statuses and geodesics as of `coupling`.
+
+    Raises
+    ------
+    InvalidInputError
+        On ports off the body, or two in one place, a bad wavenumber, order or length, and for a weighted body or one
+        with edges.
+    SurfaceError
+        If geodesics cannot be traced on the body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> angle = np.radians([0, 40, 80])
+    >>> ports = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    >>> E = cr.monopole_coupling(sc.Sphere(), ports, wavenumber=30.0)
+    >>> np.abs(E[0, 1:]).round(3).tolist(), bool(np.all(E[0, 1:] == E[1:, 0]))
+    ([4.083, 0.752], True)
+    """
+    checked_body(body)
+    checked_plain(body, smooth="the coupling of monopoles")
+    k = checked(wavenumber, order)
+    rays = port_geodesics(body, ports, k, length)
+    return coupled(rays, monopole_sources(rays, k, order), k, "pec", order, "monopole")
+
+
+def monopole_sources(rays: PortRays, k: float, order: int) -> PortSources:
+    """Waves of monopoles, 1/L^2."""
+    waves = partial(monopole_waves, rays, k)
+    return scalar_sources(rays, path_terms(rays, k), k, order, waves, MonopoleBeams, k)
+
+
+class MonopoleBeams(PortBeams):
+    """Beams of a monopole at a port; their field is E_n, 1/L^2."""
+
+    def _wave(self, path: tuple[Any, ...], order: int) -> ComplexArray:
+        terms = MonopoleTerms(*path)
+        return np.asarray(terms.hard.factor * terms.upright(order))
+
+
+def slot_coupling(
+    body: Surface,
+    ports: ArrayLike,
+    axes: ArrayLike,
+    *,
+    wavenumber: float,
+    order: int = 2,
+    length: float | Literal["auto"] = AUTO,
+) -> Coupling:
+    """Fields between slots in a perfect conductor: H along each of a unit magnetic dipole along each other.
+
+    A slot of voltage V (its field integrated across it) and length dl is the moment V dl along it. Values are the
+    tangential H there, along the receiving slot and with the conductor in place, times the impedance of free space, for
+    a unit of the moment: on a plane twice ik (1 + grad grad/k^2) e^{ikr}/(4 pi r), near field and all. The mutual
+    admittance of two short slots is that times their lengths over the impedance of free space, but for its sign, which
+    is a matter of the directions of their currents.
+
+    Parameters
+    ----------
+    body : Surface
+        Smooth and plain.
+    ports : (n, 3), L
+        On the body, two or more, no two in one place.
+    axes : (n, 3) or (3,)
+        Directions of the slots, of any length; their tangential parts count.
+    wavenumber : float, 1/L
+    order : 2 or 1
+    length : float or "auto", L
+        As of `coupling`.
+
+    Returns
+    -------
+    Coupling
+        A symmetric matrix (n, n), 1/L^2, with errors, statuses and geodesics as of `coupling`. Where slots are crossed
+        so that next to nothing is received, the error tells so and the status is OK as it is for other axes.
+
+    Raises
+    ------
+    InvalidInputError
+        On ports off the body, or two in one place, axes that are not tangential at all, a bad wavenumber, order or
+        length, and for a weighted body or one with edges.
+    SurfaceError
+        If geodesics cannot be traced on the body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> angle = np.radians([0, 40, 80])
+    >>> ports = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    >>> abreast = cr.slot_coupling(sc.Sphere(), ports, (0, 1, 0), wavenumber=30.0)
+    >>> in_line = cr.slot_coupling(sc.Sphere(), ports, np.cross((0, 1, 0), ports), wavenumber=30.0)
+    >>> np.abs(abreast[0, 1:]).round(3).tolist(), np.abs(in_line[0, 1:]).round(3).tolist()
+    ([3.76, 0.689], [0.256, 0.022])
+    """
+    checked_body(body)
+    checked_plain(body, smooth="the coupling of slots")
+    k = checked(wavenumber, order)
+    rays = port_geodesics(body, ports, k, length)
+    along = tangential(axes, rays.normals)
+    return coupled(rays, slot_sources(rays, along, k, order), k, "pec", order, "slot", along)
+
+
+def tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
+    """Unit tangents (n, 3) along given axes."""
+    given = real_array(axes, "axes")
+    if given.shape not in ((3,), normals.shape):
+        raise InvalidInputError(
+            f"axes have shape {given.shape} for {len(normals)} slots; give ({len(normals)}, 3) or one axis (3,) for all"
+        )
+    given = np.broadcast_to(given, normals.shape)
+    long = np.linalg.norm(given, axis=1)
+    flat = given - np.sum(given * normals, axis=1, keepdims=True) * normals
+    rest = np.linalg.norm(flat, axis=1)
+    bad = ~(np.isfinite(long) & (rest > FLAT * long))
+    if np.any(bad):
+        worst = int(np.flatnonzero(bad)[0])
+        raise InvalidInputError(
+            f"{np.sum(bad)} of {len(normals)} axes are not finite or have no tangential part (first: {worst}, "
+            f"{given[worst].tolist()} where the normal is {normals[worst].round(3).tolist()}); give directions along "
+            "the surface"
+        )
+    return np.asarray(flat / rest[:, None])

@@ -1,0 +1,424 @@
+"""What the coupling of ports is: a matrix of complex values with their error, and the geodesics that gave them.
+
+The field at each of many ports on a hard body of a unit point source at each other: all geodesics between them.
+
+    u_ij = sum over geodesics of the waves of `creeping.field.ports.waves`, or beams where these merge
+
+Sources: Derivations, F25, F28 and F34; [PW81], [P82]; Derivations, F25.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._presenting import Drawn, brief
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
+from creeping.field.labelled import ArrayResult, power
+from creeping.field.point_result import FieldStatus
+from creeping.geometry.surface import Surface
+from creeping.storage.memory import required
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from creeping.rays.port_rays import PortRays
+from typing import Literal
+
+from creeping._typing import ArrayLike
+from creeping.field.arguments import checked, checked_plain
+from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.point_result import Words
+from creeping.field.ports.sources import PortSources, point_sources
+from creeping.field.ports.sums import PortSums, port_sums
+from creeping.field.special.airy import hard_modes
+from creeping.geodesics.bundle import as_points, on_body
+from creeping.geodesics.equations import points_of_charts
+from creeping.geometry.arguments import checked_body, positive_number
+from creeping.geometry.checks import unit_of
+from creeping.geometry.curvature import curvature_norms
+from creeping.geometry.surface import size
+from creeping.rays.port_rays import PortRays, rays_between
+from creeping.rays.reach import AUTO
+
+MEANINGS = {
+    "point": "u of a unit source e^{ikr}/(4 pi r)",
+    "slot": "H of a unit magnetic dipole, times the impedance of free space",
+    "monopole": "E of a unit electric dipole, times the admittance of free space",
+    "monopoleslot": "H along slots, times the impedance of free space, and E along n at monopoles, of unit dipoles",
+}
+"""What values are, by the kinds of ports."""
+
+DECAY, GIRTHS = 13.0, (0.65, 1.2)
+"""Exponent by which the wave falls along geodesics of length "auto", and bounds of that in girths of the body."""
+CLOSEST = 1e-6
+"""Least distance of ports, in body sizes."""
+NEAR = 2.0
+"""How far from a caustic a port is close to it, in terms of (a/k^2)^(1/3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class CouplingPaths:
+    """Geodesics (m,) from one port to another, the shortest first.
+
+    Attributes
+    ----------
+    arclength : (m,), L
+    departure, arrival : (m, 3)
+        Unit tangents at both ends, along the path.
+    spreading : (m,), L
+        Reduced length J2: by how much geodesics part for an angle at the source; negative beyond an odd number of
+        caustics.
+    fock_parameter : (m,)
+        xi = (k/2)^(1/3) int kappa_n^(2/3) ds.
+    caustics : (m,)
+        Zeros of J2 passed.
+    wave : (m,) complex, 1/L, or 1/L^2 on a conductor
+        What each contributes; infinite on its caustic.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> paths = cr.coupling(sc.Sphere(), [(0, 0, 1), (1, 0, 0)], wavenumber=30.0).paths(0, 1)
+    >>> len(paths), (paths.departure[0].round(6) + 0.0).tolist(), paths.spreading.round(3).tolist()
+    (2, [1.0, 0.0, 0.0], [1.0, -1.0])
+    """
+
+    arclength: FloatArray
+    departure: FloatArray
+    arrival: FloatArray
+    spreading: FloatArray
+    fock_parameter: FloatArray
+    caustics: IntArray
+    wave: ComplexArray
+
+    def __len__(self) -> int:
+        """Number of geodesics."""
+        return len(self.arclength)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Coupling(ArrayResult, Drawn):
+    """Fields between ports on a body, at port j of a unit source at port i; acts as their matrix.
+
+    Of `coupling` u of e^{ikr}/(4 pi r); of `slot_coupling` H along slot j of a dipole along slot i; of
+    `monopole_coupling` E along the normal; of `antenna_coupling` what port j of both kinds receives so.
+
+    Attributes
+    ----------
+    body : Surface
+    ports, normals : (n, 3), L and 1
+    values : (n, n) complex, 1/L, or 1/L^2 on a conductor
+        Infinite on the diagonal, where source and receiver are one. Symmetric, but for slots and monopoles, where one
+        way has the opposite of the other.
+    error : (n, n)
+        Of the values, meant to hold for 95 of 100 whose status is OK; at others a bound.
+    status : (n, n) of int
+        Codes of `FieldStatus`.
+    method : (n, n) of str
+        "rays", or "beams" where these merge; "none" on the diagonal.
+    wavenumber : float, 1/L
+    boundary : str
+    order : int
+    length : float, L
+        Up to which geodesics were followed.
+    length_unit : str
+        "m" where the body knows it, else "L".
+    kinds : (n,) of str
+        "point", "slot" or "monopole".
+    axes : (n, 3) or None
+        Unit tangents along the slots, and normals of monopoles beside them; None of `coupling` and `monopole_coupling`.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> found = cr.coupling(sc.Sphere(), [(0, 0, 1), (1, 0, 0), (0, 0.6, -0.8)], wavenumber=30.0)
+    >>> found.shape, bool(found[0, 1] == found[1, 0]), found.status_counts
+    ((3, 3), True, {'OK': 6, 'CAUSTIC': 3})
+    >>> paths = found.paths(0, 1)                               # a quarter of a great circle, and the way round
+    >>> paths.arclength.round(3).tolist(), paths.caustics.tolist()
+    ([1.571, 4.712], [0, 1])
+    """
+
+    body: Surface
+    ports: FloatArray
+    normals: FloatArray
+    values: ComplexArray
+    error: FloatArray
+    status: IntArray
+    method: np.ndarray[Any, np.dtype[np.str_]]
+    wavenumber: float
+    boundary: str
+    order: int
+    length: float
+    length_unit: str
+    kinds: np.ndarray[Any, np.dtype[np.str_]]
+    axes: FloatArray | None
+    _rays: PortRays
+    _waves: ComplexArray
+
+    @property
+    def ok(self) -> BoolArray:
+        """Where the status is OK (n, n)."""
+        return np.asarray(self.status == FieldStatus.OK)
+
+    @property
+    def status_counts(self) -> dict[str, int]:
+        """Number of entries of each status that occurs, by name."""
+        return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
+
+    def paths(self, source: int, receiver: int) -> CouplingPaths:
+        """Geodesics from one port to another, and what each contributes.
+
+        Parameters
+        ----------
+        source, receiver : int
+            Numbers of the ports.
+
+        Returns
+        -------
+        CouplingPaths
+            Of lengths in L and unit directions; empty for a port and itself.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no such port.
+        """
+        count = len(self.ports)
+        for number in (source, receiver):
+            if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < count:
+                raise InvalidInputError(f"port {number!r} is not one of the ports 0 to {count - 1}")
+        rays, one, other = self._rays, min(source, receiver), max(source, receiver)
+        begin, end = np.searchsorted(rays.first * count + rays.second, [one * count + other, one * count + other + 1])
+        mine = slice(int(begin), int(end))
+        departure, arrival = rays.directions[mine, 0], rays.directions[mine, 1]
+        if source > receiver:
+            departure, arrival = -arrival, -departure
+        # what a monopole gives a slot is the opposite of what that gives it
+        sign = -1 if source > receiver and self.kinds[one] != self.kinds[other] else 1
+        return CouplingPaths(
+            arclength=rays.arclength[mine],
+            departure=departure,
+            arrival=arrival,
+            spreading=rays.spreading[mine],
+            fock_parameter=np.cbrt(self.wavenumber / 2) * rays.integrals[mine, 0],
+            caustics=rays.caustics[mine],
+            wave=sign * self._waves[mine],
+        )
+
+    @property
+    def _kind(self) -> tuple[str, str]:
+        """Unit of the values, and what they are."""
+        kinds = sorted(set(self.kinds.tolist()))
+        return power(self.length_unit, -1 if kinds == ["point"] else -2), MEANINGS["".join(kinds)]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Values, error, status and method with names, by source and receiver: an ``xarray.Dataset``."""
+        library = required("xarray", use="labelled results need", extra="sweep")
+        dims = ("source", "receiver")
+        inverse = {"units": power(self.length_unit, -1)}
+        units, meaning = self._kind
+        coordinates: dict[str, Any] = {name: ((name,), np.arange(len(self.ports))) for name in dims}
+        coordinates["axis"] = (("axis",), ["x", "y", "z"])
+        coordinates["wavenumber"] = ((), self.wavenumber, {**inverse, "long_name": "k"})
+        variables: dict[str, Any] = {
+            "total": (dims, self.values, {"units": units, "long_name": meaning}),
+            "error": (dims, self.error, {"units": units}),
+            "status": (dims, self.status, {"long_name": "code of FieldStatus"}),
+            "method": (dims, self.method, {"long_name": "what served"}),
+            "port": (("source", "axis"), self.ports, {"units": self.length_unit}),
+        }
+        if self.axes is not None:
+            variables["slot"] = (("source", "axis"), self.axes, {"long_name": "unit tangent along the slot"})
+        if len(set(self.kinds.tolist())) > 1:
+            variables["moment"] = (*variables.pop("slot")[:2], {"long_name": "unit vector along the moment"})
+            coordinates |= {f"{name}_kind": ((name,), self.kinds) for name in dims}
+        words = {"boundary": self.boundary, "order": self.order, "conventions": "time factor exp(-i omega t)"}
+        found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+        return found
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """The same as a ``pandas.DataFrame``, one row an entry."""
+        return (
+            self.to_xarray()
+            .drop_vars(["port", "slot", "moment"], errors="ignore")
+            .drop_dims("axis", errors="ignore")
+            .to_dataframe()
+        )
+
+    def __repr__(self) -> str:
+        names, counts = np.unique(self.method[~np.eye(len(self.ports), dtype=bool)], return_counts=True)
+        served = ", ".join(f"{n} by {name}" for name, n in zip(names, counts, strict=True))
+        states = ", ".join(f"{n} {name}" for name, n in self.status_counts.items())
+        good = self.ok & np.isfinite(self.values)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = self.error[good] / np.abs(self.values[good])
+        error = f", error {np.median(share):.2g} of it in the median" if share.size else ""
+        return (
+            f"Coupling({len(self.ports)} ports, k = {self.wavenumber:g}, {self.boundary}, order {self.order}, "
+            f"on {brief(self.body)})\n"
+            f"  {served or 'none'}; {states or 'no status'}\n"
+            f"  {len(self._rays)} geodesics up to {self.length:.4g} {self.length_unit}; where OK up to "
+            f"{np.max(np.abs(self.values[good]), initial=0.0):.4g} {self._kind[0]}{error}"
+        )
+
+
+def coupling(
+    body: Surface,
+    ports: ArrayLike,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "hard",
+    order: int = 2,
+    length: float | Literal["auto"] = AUTO,
+) -> Coupling:
+    """Fields between ports on a hard body: u at each of them of a unit point source e^{ikr}/(4 pi r) at each other.
+
+    Parameters
+    ----------
+    body : Surface
+        Smooth and plain.
+    ports : (n, 3), L
+        On the body, two or more.
+    wavenumber : float, 1/L
+    boundary : "hard"
+        On a soft body the field is 0; that of an impedance is not known here.
+    order : 2 or 1
+    length : float or "auto", L
+        Up to which geodesics are followed; "auto" is where the wave has died away, and at least long enough for both
+        ways round to meet.
+
+    Returns
+    -------
+    Coupling
+        A matrix (n, n), 1/L, that acts as an array, with errors, statuses, and the geodesics of each pair. Trouble of a
+        pair is a status: CAUSTIC where geodesics merge and beams do not serve, DETACHED where one that mattered has
+        come to where kappa_n <= 0, NO_RAY and TRUNCATED where none comes.
+
+    Raises
+    ------
+    InvalidInputError
+        On ports off the body, or two in one place, a bad wavenumber, boundary, order or length, and for a weighted body
+        or one with edges.
+    SurfaceError
+        If geodesics cannot be traced on the body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> angle = np.radians([0, 40, 80])
+    >>> ports = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    >>> u = cr.coupling(sc.Sphere(), ports, wavenumber=30.0)
+    >>> np.abs(u[0, 1:]).round(4).tolist(), bool(np.all(u[0, 1:] == u[1:, 0]))
+    ([0.1065, 0.0173], True)
+    """
+    k = checked_wave(body, wavenumber, boundary, order)
+    rays = port_geodesics(body, ports, k, length)
+    return coupled(rays, point_sources(rays, k, order), k, boundary_name(boundary), order)
+
+
+def checked_wave(body: Surface, wavenumber: float, boundary: BoundaryLike, order: int) -> float:
+    """The wavenumber, if coupling is known on the body at it, with the boundary and to the order."""
+    checked_body(body)
+    checked_plain(body, smooth="the coupling of ports")
+    k = checked(wavenumber, order)
+    if scalar_boundaries(boundary)[0].kind != "hard" or boundary == "pec":
+        raise InvalidInputError(
+            f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard', or use "
+            "slot_coupling, monopole_coupling or antenna_coupling for slots in and monopoles on a conductor"
+        )
+    return k
+
+
+def port_geodesics(body: Surface, ports: ArrayLike, k: float, length: float | Literal["auto"]) -> PortRays:
+    """All between checked ports (n, 3), L, up to a length, L."""
+    y = _checked_ports(body, ports)
+    return rays_between(body, y, fan_length(body, k, length), pad=merging_pad(body, k))
+
+
+def merging_pad(body: Surface, k: float) -> float:
+    """How far from a caustic a port counts as close to it, L."""
+    return float(NEAR * np.cbrt(size(body) / k**2))
+
+
+def _checked_ports(body: Surface, ports: ArrayLike) -> FloatArray:
+    """Ports (n, 3) on the body, apart from each other."""
+    given = as_points(ports)
+    if given.ndim != 2 or len(given) < 2:
+        raise InvalidInputError(f"ports have shape {given.shape}; give two or more as (n, 3)")
+    y = on_body(body, given)
+    from scipy.spatial import cKDTree
+
+    close = cKDTree(y).query_pairs(CLOSEST * size(body), output_type="ndarray")
+    if len(close):
+        raise InvalidInputError(
+            f"{len(close)} pairs of ports are in one place (first: {close[0, 0]} and {close[0, 1]}); give each once"
+        )
+    return y
+
+
+def fan_length(body: Surface, k: float, length: float | Literal["auto"]) -> float:
+    """Length of geodesics, L: "auto" is by the decay of the first mode at the root mean square curvature."""
+    if not (isinstance(length, str) and length == AUTO):
+        return positive_number(length, "length")
+    box = np.asarray(body.bounds, dtype=float)
+    girth = np.pi * float(np.max(box[1] - box[0]))
+    typical = float(np.median(curvature_norms(body, points_of_charts(body)))) / np.sqrt(2)
+    decay = float(hard_modes().tau[0].imag) * np.cbrt(k / 2) * np.cbrt(typical) ** 2
+    return float(np.clip(DECAY / decay, GIRTHS[0] * girth, GIRTHS[1] * girth))
+
+
+def coupled(
+    rays: PortRays,
+    sources: PortSources,
+    k: float,
+    boundary: str,
+    order: int,
+    kind: str = "point",
+    axes: FloatArray | None = None,
+) -> Coupling:
+    """The matrix of ports of one kind, symmetric."""
+    return matrix_of(rays, port_sums(rays, sources, k), k, boundary, order, np.full(len(rays.ports), kind), axes)
+
+
+def matrix_of(
+    rays: PortRays, found: PortSums, k: float, boundary: str, order: int, kinds: Words, axes: FloatArray | None
+) -> Coupling:
+    """The matrix, with what has no meaning on its diagonal; ports of two kinds have the opposite the other way."""
+    n = len(rays.ports)
+    values = found.values
+    back = np.where(kinds[:, None] == kinds, values.T, -values.T)
+
+    def square(upper: Any, lower: Any, diagonal: Any) -> Any:
+        out = np.where(np.triu(np.ones((n, n), dtype=bool)), upper, lower)
+        np.fill_diagonal(out, diagonal)
+        return out
+
+    return Coupling(
+        body=rays.body,
+        ports=rays.ports,
+        normals=rays.normals,
+        values=square(values, back, np.inf),
+        error=square(found.error, found.error.T, np.inf),
+        status=square(found.status, found.status.T, int(FieldStatus.CAUSTIC)),
+        method=square(found.method, found.method.T, "none"),
+        wavenumber=k,
+        boundary=boundary,
+        order=order,
+        length=rays.length,
+        length_unit=unit_of(rays.body),
+        kinds=kinds,
+        axes=axes,
+        _rays=rays,
+        _waves=found.waves,
+    )

@@ -1,0 +1,149 @@
+"""The field of one unit point source on a hard body at many points of the body: a row of the coupling of ports.
+
+    u(x) = sum over geodesics from the source of the waves of `creeping.field.ports.waves`, or beams where these merge
+
+Only the source sends a fan, so that the cost grows with the number of points and not with its square.
+
+Sources: [PW81], [P82]; Derivations, F25.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import BoundaryLike, boundary_name
+from creeping.field.labelled import point_dataset, power
+from creeping.field.point_result import FieldStatus, PointField
+from creeping.field.ports.coupling_result import CLOSEST, checked_wave, fan_length, merging_pad
+from creeping.field.ports.sources import point_sources
+from creeping.field.ports.sums import port_sums
+from creeping.geodesics.bundle import as_points, on_body
+from creeping.geometry.checks import unit_of
+from creeping.geometry.surface import Surface, size
+from creeping.rays.port_rays import rays_between
+from creeping.rays.reach import AUTO
+
+if TYPE_CHECKING:
+    import xarray
+
+BLOCK = 512
+"""Points of one fan: tables of pairs have the square of it."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PortField(PointField):
+    """Field on a hard body of a unit source e^{ikr}/(4 pi r) on it; it acts as the array of its values.
+
+    Attributes
+    ----------
+    points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
+        As of every field at points; values and error 1/L, infinite at the source; ``method`` is "rays", or "beams"
+        where these merge, "none" at the source.
+    source : (3,), L
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> u = cr.port_field(sc.Sphere(), (0, 0, 1), [(1, 0, 0), (0, 0.6, -0.8)], wavenumber=30.0)
+    >>> u.shape, u.unit, u.status_counts
+    ((2,), '1/L', {'OK': 2})
+    """
+
+    source: FloatArray
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return power(self.length_unit, -1)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Values, error and status with names, one row a point: an ``xarray.Dataset``."""
+        return point_dataset(self, ()).assign_attrs(source=self.source.tolist())
+
+
+def port_field(
+    body: Surface,
+    source: ArrayLike,
+    points: ArrayLike,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "hard",
+    order: int = 2,
+    length: float | Literal["auto"] = AUTO,
+) -> PortField:
+    """Field on a hard body of a unit point source e^{ikr}/(4 pi r) on it: `coupling` of one port with many.
+
+    Parameters
+    ----------
+    body : Surface
+        Smooth and plain.
+    source : (3,), L
+        On the body.
+    points : (..., 3), L
+        On the body.
+    wavenumber : float, 1/L
+    boundary : "hard"
+    order : 2 or 1
+    length : float or "auto", L
+        As of `coupling`.
+
+    Returns
+    -------
+    PortField
+        `creeping.plotting.coupling_picture` draws it over the whole body.
+
+    Raises
+    ------
+    InvalidInputError
+        On points off the body, a bad wavenumber, boundary, order or length, and for a weighted body or one with edges.
+    SurfaceError
+        If geodesics cannot be traced on the body.
+
+    Examples
+    --------
+    The same as the entry of `coupling`.
+
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> egg, ports = sc.Ellipsoid(1.2, 1.0, 0.8), [(1.2, 0, 0), (0, 1, 0)]
+    >>> u = cr.port_field(egg, ports[0], ports[1:], wavenumber=30.0)
+    >>> bool(abs(u[0] - cr.coupling(egg, ports, wavenumber=30.0)[0, 1]) < 1e-12)
+    True
+    """
+    k = checked_wave(body, wavenumber, boundary, order)
+    start, given = as_points(source), as_points(points)
+    if start.shape != (3,):
+        raise InvalidInputError(f"source has shape {start.shape}; give one point (3,)")
+    x0, x = on_body(body, start[None])[0], on_body(body, given).reshape(-1, 3)
+    far, pad = fan_length(body, k, length), merging_pad(body, k)
+    count = len(x)
+    values, error = np.full(count, np.inf, dtype=complex), np.full(count, np.inf)
+    status, method = np.full(count, int(FieldStatus.CAUSTIC)), np.full(count, "none", dtype="<U5")
+    away = np.flatnonzero(np.linalg.norm(x - x0, axis=1) > CLOSEST * size(body))
+    for first in range(0, len(away), BLOCK):
+        rows = away[first : first + BLOCK]
+        rays = rays_between(body, np.concatenate([x0[None], x[rows]]), far, pad=pad, sources=1)
+        found = port_sums(rays, point_sources(rays, k, order), k)
+        values[rows], error[rows] = found.values[0, 1:], found.error[0, 1:]
+        status[rows], method[rows] = found.status[0, 1:], found.method[0, 1:]
+    shape = given.shape[:-1]
+    return PortField(
+        points=given.copy(),
+        values=values.reshape(shape),
+        error=error.reshape(shape),
+        error_by=np.full(shape, "expansion"),
+        status=status.reshape(shape),
+        method=np.reshape(method, shape),
+        source=x0,
+        wavenumber=k,
+        boundary=boundary_name(boundary),
+        order=order,
+        length_unit=unit_of(body),
+    )
