@@ -19,7 +19,8 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal
 from creeping.phaseflow.tuning.flow_choice import tuned_direct
-from creeping.phaseflow.tuning.request import MapSpec
+from creeping.phaseflow.tuning.map_spec import MapSpec
+from creeping.phaseflow.tuning.request import build_from
 from studies._peers import heyoka_at_error, scipy_flow, seconds_of
 
 Row = dict[str, Any]
@@ -156,7 +157,7 @@ def built(name: str, rays: float = 1e6, n_steps: int = 1, tolerance: float = TOL
         body=shape, tolerance=tolerance, length=LENGTH, n_steps=n_steps, n_rays=int(rays), carry_jacobi=n_steps > 1
     )
     started = time.process_time()
-    flow = spec.build(lambda _: None)
+    flow = build_from(spec, lambda _: None)
     return Build(rays, flow, time.process_time() - started)
 
 

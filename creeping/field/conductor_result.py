@@ -96,7 +96,7 @@ class ConductorField(PointData):
 
     def to_xarray(self) -> xarray.Dataset:
         """E, H, their parts, error and status with names: an ``xarray.Dataset`` by point, component, polarisation."""
-        from creeping.field.labelled import vector_dataset
+        from creeping.field.point_result import vector_dataset
 
         parts = {f"{letter}_{name}": getattr(getattr(self, name), letter) for name in PARTS for letter in "EH"}
         return vector_dataset(self, {"E": self.E, "H": self.H, **parts})
@@ -162,7 +162,7 @@ class ConductorCurrent(ArrayResult, PointData):
 
     def to_xarray(self) -> xarray.Dataset:
         """J, its parts, charge, error and status with names: an ``xarray.Dataset`` by point and component."""
-        from creeping.field.labelled import vector_dataset
+        from creeping.field.point_result import vector_dataset
 
         parts = {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
         return vector_dataset(self, parts | {"charge_error": self.charge_error})

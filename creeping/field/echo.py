@@ -19,7 +19,8 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.comparison import cross_section_decibels, decibels
 from creeping.field.frequency import frequency
-from creeping.field.labelled import echo_dataset
+from creeping.field.labelled import power
+from creeping.storage.memory import required
 
 if TYPE_CHECKING:
     import pandas
@@ -167,3 +168,29 @@ class Echo(Drawn):
 
 def _finite(value: Any) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def echo_dataset(echo: Echo) -> xarray.Dataset:
+    """An echo with its parts, levels, error and flags: see `Echo.to_xarray`."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    dims = ("channel", "angle", "frequency")
+    coordinates: dict[str, Any] = {
+        "channel": (("channel",), list(echo.channels)),
+        "angle": (("angle",), echo.angles, {"units": "degree", "long_name": echo.angle_name or "angle"}),
+        "azimuth": (("angle",), echo.azimuth, {"units": "degree"}),
+        "elevation": (("angle",), echo.elevation, {"units": "degree"}),
+        "frequency": (("frequency",), echo.hertz, {"units": "Hz"}),
+        "wavenumber": (("frequency",), echo.wavenumbers, {"units": power("m", -1), "long_name": "k"}),
+    }
+    name, unit = echo.level_name
+    amplitude = {"units": "m", "long_name": "far-field amplitude f"}
+    variables: dict[str, Any] = {
+        "total": (dims, echo.total, amplitude),
+        "level": (dims, echo.levels(), {"units": unit, "long_name": name}),
+        "error": (dims, echo.error, {"units": "m", "long_name": "error of |f|"}),
+        "unresolved": (dims, echo.unresolved, {"long_name": "an expansion fails, or the error is large"}),
+        "by_currents": (dims, echo.by_currents, {"long_name": f"else by {echo.otherwise}"}),
+    }
+    variables |= {part: (dims, values, {"units": "m"}) for part, values in echo.parts.items()}
+    found: xarray.Dataset = library.Dataset(variables, coordinates, {"conventions": "time factor exp(-i omega t)"})
+    return found

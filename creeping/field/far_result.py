@@ -23,6 +23,7 @@ import numpy as np
 from creeping._presenting import Drawn
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.comparison import cross_section_decibels, decibels
+from creeping.field.labelled import COMPONENTS, directed, power
 from creeping.field.validity_range import Validity, validity_numbers
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 from creeping._typing import ArrayLike
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import shown
+from creeping.storage.memory import required
 
 BY_DIRECTION = ("directions", "total", "method", "unresolved", "error")
 """Arrays of a far field whose first axis is the direction, its parts apart."""
@@ -172,8 +174,6 @@ class FarField(Drawn):
         Dimensions are ``direction``, of a conductor ``scattered`` and ``incident`` too, "theta" and "phi"; coordinates
         ``vector``, ``azimuth`` and ``elevation`` (degrees) of the directions.
         """
-        from creeping.field.labelled import far_dataset
-
         return far_dataset(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -314,3 +314,28 @@ def dyads(incoming: FloatArray, outgoing: FloatArray, direction: FloatArray, obs
     received = incoming @ np.swapaxes(spherical_frame(direction), -1, -2)
     sent = np.einsum("nkc,noc->nko", outgoing, spherical_frame(observers))
     return np.asarray(sent[..., :, None] * received[..., None, :])
+
+
+def far_dataset(far: FarField) -> xarray.Dataset:
+    """A far field, its parts, error and cross section, by direction: see `FarField.to_xarray`."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    unit = far.unit
+    dims = ("direction", "scattered", "incident")[: far.total.ndim]
+    coordinates = directed(far.directions, far.wavenumber, unit)
+    if far.total.ndim == 3:
+        coordinates |= {name: ((name,), list(COMPONENTS)) for name in dims[1:]}
+    variables: dict[str, Any] = {"total": (dims, far.total, {"units": unit, "long_name": "far-field amplitude f"})}
+    for name, values in far.parts.items():
+        variables[name] = (dims, values, {"units": unit, "long_name": f"{name} part of f"})
+    variables["error"] = (dims, far.error, {"units": unit, "long_name": f"error of |f|, by {far.error_source}"})
+    area = {"units": power(unit, 2), "long_name": "cross section 4 pi |f|^2"}
+    variables["cross_section"] = (dims, far.cross_section, area)
+    variables["unresolved"] = (
+        ("direction",),
+        far.unresolved,
+        {"long_name": "an expansion fails, or the error is large"},
+    )
+    variables["method"] = (("direction",), far.method, {"long_name": "what served"})
+    words = {"boundary": far.boundary, "order": far.order, "conventions": "time factor exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+    return found

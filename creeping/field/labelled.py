@@ -1,34 +1,18 @@
-"""Results with names on their axes: fields as an ``xarray.Dataset`` or a ``pandas.DataFrame``.
+"""What results have in common: names and units of their axes, and values that numpy takes them for.
 
 Units are those of the CF conventions where the body's unit is known, else powers of L, the body's unit of length.
 
-Results that are arrays of complex values with more to say: numpy takes them for their values.
-
-Arithmetic, ufuncs and numpy's functions give plain arrays; so do indexing, the methods that arrays have, and arithmetic
-in place, after which the name stands for the array. Nothing writes into a result.
+`ArrayResult`: arithmetic, ufuncs and numpy's functions give plain arrays; so do indexing, the methods that arrays have,
+and arithmetic in place, after which the name stands for the array. Nothing writes into a result.
 """
 
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from creeping._typing import Any, FloatArray
-from creeping.geometry.directions import azimuth_elevation_of
-from creeping.storage.memory import required
-
-if TYPE_CHECKING:
-    import xarray
-
-    from creeping._typing import ComplexArray
-    from creeping.field.echo import Echo
-    from creeping.field.far_result import FarField
-    from creeping.field.point_result import PointData, PointField
-    from creeping.field.sources import SourcePattern
 from collections.abc import Callable, Iterator
 
+import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from creeping._typing import ComplexArray
+from creeping._typing import Any, ComplexArray, FloatArray
+from creeping.geometry.directions import azimuth_elevation_of
 
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
@@ -51,7 +35,7 @@ def power(unit: str, exponent: int) -> str:
     return f"1/{unit}" if exponent == -1 else f"1/{unit}^{-exponent}"
 
 
-def _directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str, Any]:
+def directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str, Any]:
     """Coordinates of results by direction (m, 3)."""
     azimuth, elevation = azimuth_elevation_of(directions)
     return {
@@ -61,121 +45,6 @@ def _directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str,
         "axis": (("axis",), ["x", "y", "z"]),
         "wavenumber": ((), wavenumber, {"units": power(unit, -1), "long_name": "k"}),
     }
-
-
-def far_dataset(far: "FarField") -> "xarray.Dataset":
-    """A far field, its parts, error and cross section, by direction: see `FarField.to_xarray`."""
-    library = required("xarray", use="labelled results need", extra="sweep")
-    unit = far.unit
-    dims = ("direction", "scattered", "incident")[: far.total.ndim]
-    coordinates = _directed(far.directions, far.wavenumber, unit)
-    if far.total.ndim == 3:
-        coordinates |= {name: ((name,), list(COMPONENTS)) for name in dims[1:]}
-    variables: dict[str, Any] = {"total": (dims, far.total, {"units": unit, "long_name": "far-field amplitude f"})}
-    for name, values in far.parts.items():
-        variables[name] = (dims, values, {"units": unit, "long_name": f"{name} part of f"})
-    variables["error"] = (dims, far.error, {"units": unit, "long_name": f"error of |f|, by {far.error_source}"})
-    area = {"units": power(unit, 2), "long_name": "cross section 4 pi |f|^2"}
-    variables["cross_section"] = (dims, far.cross_section, area)
-    variables["unresolved"] = (
-        ("direction",),
-        far.unresolved,
-        {"long_name": "an expansion fails, or the error is large"},
-    )
-    variables["method"] = (("direction",), far.method, {"long_name": "what served"})
-    words = {"boundary": far.boundary, "order": far.order, "conventions": "time factor exp(-i omega t)"}
-    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
-    return found
-
-
-def point_dataset(field: "PointField", parts: tuple[str, ...]) -> "xarray.Dataset":
-    """A field at points with its parts, error and status, one row a point: see `PointField.to_xarray`."""
-    variables: dict[str, Any] = {"total": (("point",), field.values.reshape(-1), {"units": field.unit})}
-    for name in parts:
-        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {"units": field.unit})
-    return _of_points(field, variables, ("point",), {})
-
-
-def vector_dataset(field: "PointData", vectors: "dict[str, ComplexArray | FloatArray]") -> "xarray.Dataset":
-    """Vectors (..., 3) or (..., 3, 2) and scalars at points with error and status: see `ConductorField.to_xarray`."""
-    both = field.status.ndim == field.points.ndim
-    rows = ("point", "polarisation") if both else ("point",)
-    variables: dict[str, Any] = {}
-    for name, values in vectors.items():
-        vector = values.ndim > field.status.ndim
-        dims = ("point", *(("component",) if vector else ()), *rows[1:])
-        shape = (-1, *values.shape[field.points.ndim - 1 :])
-        variables[name] = (dims, values.reshape(shape), {"units": field.unit})
-    named: dict[str, Any] = {"component": (("component",), ["x", "y", "z"])}
-    if both:
-        named["polarisation"] = (("polarisation",), list(COMPONENTS))
-    return _of_points(field, variables, rows, named)
-
-
-def _of_points(
-    field: "PointData", variables: dict[str, Any], rows: tuple[str, ...], named: dict[str, Any]
-) -> "xarray.Dataset":
-    """Variables with error, status and coordinates of points."""
-    library = required("xarray", use="labelled results need", extra="sweep")
-    flat = field.points.reshape(-1, 3)
-    coordinates: dict[str, Any] = {
-        name: (("point",), flat[:, i], {"units": field.length_unit}) for i, name in enumerate(("x", "y", "z"))
-    }
-    coordinates["wavenumber"] = ((), field.wavenumber, {"units": power(field.length_unit, -1), "long_name": "k"})
-    shape = (-1,) if len(rows) == 1 else (-1, len(COMPONENTS))
-    variables = dict(variables)
-    variables["error"] = (rows, field.error.reshape(shape), {"units": field.unit})
-    for name in ("error_by", "status", "method"):
-        variables[name] = (rows, np.reshape(getattr(field, name), shape), {})
-    words = {"boundary": field.boundary, "order": field.order, "conventions": "time factor exp(-i omega t)"}
-    found: xarray.Dataset = library.Dataset(variables, coordinates | named, words)
-    return found
-
-
-def pattern_dataset(pattern: "SourcePattern") -> "xarray.Dataset":
-    """Far fields of sources with their error and status, by direction and source: see `SourcePattern.to_xarray`."""
-    library = required("xarray", use="labelled results need", extra="sweep")
-    unit, dims = pattern.length_unit, ("direction", "source")
-    coordinates = _directed(pattern.directions, pattern.wavenumber, unit)
-    coordinates |= {
-        f"source_{name}": (("source",), pattern.sources[:, i], {"units": unit}) for i, name in enumerate("xyz")
-    }
-    told = {"units": "1", "long_name": "far field over that of the source with no body"}
-    variables: dict[str, Any] = {
-        "pattern": (dims, pattern.values, told),
-        "error": (dims, pattern.error, {"units": "1"}),
-    }
-    for name in ("error_by", "status", "method"):
-        variables[name] = (dims, getattr(pattern, name), {})
-    words = {"boundary": pattern.boundary, "conventions": "time factor exp(-i omega t)"}
-    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
-    return found
-
-
-def echo_dataset(echo: "Echo") -> "xarray.Dataset":
-    """An echo with its parts, levels, error and flags: see `Echo.to_xarray`."""
-    library = required("xarray", use="labelled results need", extra="sweep")
-    dims = ("channel", "angle", "frequency")
-    coordinates: dict[str, Any] = {
-        "channel": (("channel",), list(echo.channels)),
-        "angle": (("angle",), echo.angles, {"units": "degree", "long_name": echo.angle_name or "angle"}),
-        "azimuth": (("angle",), echo.azimuth, {"units": "degree"}),
-        "elevation": (("angle",), echo.elevation, {"units": "degree"}),
-        "frequency": (("frequency",), echo.hertz, {"units": "Hz"}),
-        "wavenumber": (("frequency",), echo.wavenumbers, {"units": power("m", -1), "long_name": "k"}),
-    }
-    name, unit = echo.level_name
-    amplitude = {"units": "m", "long_name": "far-field amplitude f"}
-    variables: dict[str, Any] = {
-        "total": (dims, echo.total, amplitude),
-        "level": (dims, echo.levels(), {"units": unit, "long_name": name}),
-        "error": (dims, echo.error, {"units": "m", "long_name": "error of |f|"}),
-        "unresolved": (dims, echo.unresolved, {"long_name": "an expansion fails, or the error is large"}),
-        "by_currents": (dims, echo.by_currents, {"long_name": f"else by {echo.otherwise}"}),
-    }
-    variables |= {part: (dims, values, {"units": "m"}) for part, values in echo.parts.items()}
-    found: xarray.Dataset = library.Dataset(variables, coordinates, {"conventions": "time factor exp(-i omega t)"})
-    return found
 
 
 def _of_values(name: str) -> Callable[..., Any]:

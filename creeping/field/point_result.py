@@ -18,8 +18,9 @@ import numpy as np
 
 from creeping._presenting import Shown
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.labelled import ArrayResult
+from creeping.field.labelled import COMPONENTS, ArrayResult, power
 from creeping.field.validity_range import Validity
+from creeping.storage.memory import required
 
 if TYPE_CHECKING:
     import pandas
@@ -196,8 +197,6 @@ class PointField(ArrayResult, PointData):
 
     def to_xarray(self) -> xarray.Dataset:
         """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
-        from creeping.field.labelled import point_dataset
-
         own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
         return point_dataset(self, tuple(sorted(own)))
 
@@ -345,3 +344,47 @@ def measured_field(values: ComplexArray, error: FloatArray, method: str, error_b
         status=status,
         method=np.full(len(values), method),
     )
+
+
+def point_dataset(field: PointField, parts: tuple[str, ...]) -> xarray.Dataset:
+    """A field at points with its parts, error and status, one row a point: see `PointField.to_xarray`."""
+    variables: dict[str, Any] = {"total": (("point",), field.values.reshape(-1), {"units": field.unit})}
+    for name in parts:
+        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {"units": field.unit})
+    return _of_points(field, variables, ("point",), {})
+
+
+def vector_dataset(field: PointData, vectors: dict[str, ComplexArray | FloatArray]) -> xarray.Dataset:
+    """Vectors (..., 3) or (..., 3, 2) and scalars at points with error and status: see `ConductorField.to_xarray`."""
+    both = field.status.ndim == field.points.ndim
+    rows = ("point", "polarisation") if both else ("point",)
+    variables: dict[str, Any] = {}
+    for name, values in vectors.items():
+        vector = values.ndim > field.status.ndim
+        dims = ("point", *(("component",) if vector else ()), *rows[1:])
+        shape = (-1, *values.shape[field.points.ndim - 1 :])
+        variables[name] = (dims, values.reshape(shape), {"units": field.unit})
+    named: dict[str, Any] = {"component": (("component",), ["x", "y", "z"])}
+    if both:
+        named["polarisation"] = (("polarisation",), list(COMPONENTS))
+    return _of_points(field, variables, rows, named)
+
+
+def _of_points(
+    field: PointData, variables: dict[str, Any], rows: tuple[str, ...], named: dict[str, Any]
+) -> xarray.Dataset:
+    """Variables with error, status and coordinates of points."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    flat = field.points.reshape(-1, 3)
+    coordinates: dict[str, Any] = {
+        name: (("point",), flat[:, i], {"units": field.length_unit}) for i, name in enumerate(("x", "y", "z"))
+    }
+    coordinates["wavenumber"] = ((), field.wavenumber, {"units": power(field.length_unit, -1), "long_name": "k"})
+    shape = (-1,) if len(rows) == 1 else (-1, len(COMPONENTS))
+    variables = dict(variables)
+    variables["error"] = (rows, field.error.reshape(shape), {"units": field.unit})
+    for name in ("error_by", "status", "method"):
+        variables[name] = (rows, np.reshape(getattr(field, name), shape), {})
+    words = {"boundary": field.boundary, "order": field.order, "conventions": "time factor exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset(variables, coordinates | named, words)
+    return found

@@ -22,7 +22,7 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.labelled import ArrayResult, pattern_dataset
+from creeping.field.labelled import ArrayResult, directed
 from creeping.field.near import MISSING, near_field
 from creeping.field.point_result import FieldStatus, NearField
 from creeping.field.surface import scalar_boundary
@@ -31,6 +31,7 @@ from creeping.geometry.checks import unit_of
 from creeping.rays.fan import launch
 from creeping.rays.transport import Flow
 from creeping.shadow.line import shadow_line
+from creeping.storage.memory import required
 
 if TYPE_CHECKING:
     import pandas
@@ -207,3 +208,23 @@ def _received(
         return None
     fan = launch(flow, line, wavenumber=k, n_rays=n_rays, measured=False)
     return near_field(fan, points, wavenumber=k, boundary=boundary)
+
+
+def pattern_dataset(pattern: SourcePattern) -> xarray.Dataset:
+    """Far fields of sources with their error and status, by direction and source: see `SourcePattern.to_xarray`."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    unit, dims = pattern.length_unit, ("direction", "source")
+    coordinates = directed(pattern.directions, pattern.wavenumber, unit)
+    coordinates |= {
+        f"source_{name}": (("source",), pattern.sources[:, i], {"units": unit}) for i, name in enumerate("xyz")
+    }
+    told = {"units": "1", "long_name": "far field over that of the source with no body"}
+    variables: dict[str, Any] = {
+        "pattern": (dims, pattern.values, told),
+        "error": (dims, pattern.error, {"units": "1"}),
+    }
+    for name in ("error_by", "status", "method"):
+        variables[name] = (dims, getattr(pattern, name), {})
+    words = {"boundary": pattern.boundary, "conventions": "time factor exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+    return found

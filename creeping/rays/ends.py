@@ -18,23 +18,17 @@ Where rays come to a place at which the body (`Surface.non_smooth`) is not smoot
 Sources: Derivations, R4; Derivations, R6 and F3.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.geodesics.states import CREASE, DETACHMENT, END, WHOLE, X
 from creeping.geometry.creased import is_creased, nearest_crease
-from creeping.rays.reach import HARD_DECAY, IN_RANGE
-from creeping.rays.status import AT_CREASES, RayStatus
+from creeping.geometry.surface import Surface, size
+from creeping.rays.status import RayStatus
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.line import ShadowLine
-
-if TYPE_CHECKING:
-    from creeping.rays.fan import RayFan
-    from creeping.shadow.line import ShadowLine
-
-from creeping.geometry.surface import Surface, size
 
 OF_CREASE = {"edge": RayStatus.EDGE, "tip": RayStatus.TIP}
 
@@ -209,23 +203,7 @@ class Losses(NamedTuple):
     outline: float
 
 
-def losses_of(fan: "RayFan", wavenumber: float | None = None) -> Losses:
-    """Losses of a fan at a wavenumber, 1/L; where k rho is 10 at the median of the launch points if not given."""
-    return Losses(fan.line.edge_share, _of_rays(fan, wavenumber), outline_share(fan.line))
-
-
-def _of_rays(fan: "RayFan", wavenumber: float | None) -> float:
-    launched = fan.launched
-    ended = launched & np.isin(fan.status, AT_CREASES)
-    if not np.any(ended):
-        return 0.0
-    k = IN_RANGE * float(np.median(fan.curvature[launched, 0])) if wavenumber is None else wavenumber
-    # a ray that has ended stays where it is, and so does its attenuation
-    left = np.exp(-np.cbrt(max(k, 0.0) / 2) * fan.attenuation[ended, -1] * HARD_DECAY)
-    return float(np.sum(fan.spacing[ended] * left) / np.sum(fan.spacing[launched]))
-
-
-def outline_share(line: "ShadowLine") -> float:
+def outline_share(line: ShadowLine) -> float:
     """Share of the outline that is on edges and tips."""
     lost = line.at_tips + sum(_across(part.points, line.direction) for part in line.on_edges)
     if not lost:

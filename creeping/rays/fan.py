@@ -34,9 +34,9 @@ from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import Surface, fingerprint, size
-from creeping.rays.ends import Losses, Starts, ends_of, losses_of
-from creeping.rays.reach import AUTO, IN_RANGE, ray_length
-from creeping.rays.status import LAUNCHED, LINE_STATUS, RayStatus
+from creeping.rays.ends import Losses, Starts, ends_of, outline_share
+from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
+from creeping.rays.status import AT_CREASES, LAUNCHED, LINE_STATUS, RayStatus
 from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
 from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
 from creeping.shadow.line import ShadowLine, checked_launch_from
@@ -172,7 +172,7 @@ class RayFan(DrawnOnBody):
 
     def losses(self, wavenumber: float | None = None) -> Losses:
         """Shares that edges and tips take of the line, the rays and the outline; of ``wavenumber``, as for `launch`."""
-        return losses_of(self, wavenumber)
+        return Losses(self.line.edge_share, _of_rays(self, wavenumber), outline_share(self.line))
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
@@ -395,3 +395,14 @@ def end_error(fan: RayFan) -> ErrorEstimate:
     exact = trace(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
     error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
     return ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))
+
+
+def _of_rays(fan: RayFan, wavenumber: float | None) -> float:
+    launched = fan.launched
+    ended = launched & np.isin(fan.status, AT_CREASES)
+    if not np.any(ended):
+        return 0.0
+    k = IN_RANGE * float(np.median(fan.curvature[launched, 0])) if wavenumber is None else wavenumber
+    # a ray that has ended stays where it is, and so does its attenuation
+    left = np.exp(-np.cbrt(max(k, 0.0) / 2) * fan.attenuation[ended, -1] * HARD_DECAY)
+    return float(np.sum(fan.spacing[ended] * left) / np.sum(fan.spacing[launched]))

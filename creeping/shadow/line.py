@@ -292,3 +292,9 @@ def _curve(
         arcs=tuple((start, end, STATUSES[code]) for (start, end), code in zip(ends.tolist(), codes, strict=True)),
         nodes=own,
     )
+
+
+def shares_of(line: ShadowLine) -> dict[str, float]:
+    """Shares of a line's length by state, as its kernel adds them."""
+    found = finished(line.body, line.wave, line.nodes, 0)
+    return dict(zip(line.fractions, (float(share) for share in found.shares), strict=True))

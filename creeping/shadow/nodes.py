@@ -7,7 +7,7 @@ Sources: Derivations, R6 and R8.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from creeping.geometry.surface import Surface, normal, project, size
 from creeping.kernels.threads import in_slices
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
-
-if TYPE_CHECKING:
-    from creeping.shadow.line import ShadowLine
 
 NEAR = 1e-3
 """Longest step, in body sizes, that brings an interpolated point onto the line."""
@@ -222,9 +219,3 @@ def shared(
         )  # fmt: skip
     shares = summary[SHARES : SHARES + 3]
     return Finished(arcs[:total], which[0, :total], which[1, :total], shares, launched, places, certain and bool(known))
-
-
-def shares_of(line: "ShadowLine") -> dict[str, float]:
-    """Shares of a line's length by state, as its kernel adds them."""
-    found = finished(line.body, line.wave, line.nodes, 0)
-    return dict(zip(line.fractions, (float(share) for share in found.shares), strict=True))

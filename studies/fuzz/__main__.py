@@ -11,7 +11,8 @@ import tempfile
 from pathlib import Path
 
 from studies.fuzz import ATTACKS
-from studies.fuzz.supervision import HEAD, LIMIT, MEMORY, run_attack, tried
+from studies.fuzz.child import tried
+from studies.fuzz.supervision import HEAD, LIMIT, MEMORY, run_attack
 
 CASES = 10**9
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.fuzz import ATTACKS
-from studies.fuzz.attack import WRONG, Attack, Verdict, failure, generator
+from studies.fuzz.calls import WRONG, Attack, Verdict, failure, generator
 
 
 def main(name: str, seed: int, numbers: range, folder: Path, memory: int) -> None:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-from studies.fuzz.attack import CRASH, FINDINGS, SLOW
+from studies.fuzz.calls import CRASH, FINDINGS, SLOW
 
 LIMIT = 20.0
 """Seconds of a case."""

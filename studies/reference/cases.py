@@ -9,8 +9,7 @@ from studies.reference.mirrored_box import scatter_box
 from studies.reference.modal_conductor import scatter_conductor
 from studies.reference.modal_equation import scatter_by_modes
 from studies.reference.revolution import Profile, wave_directions
-from studies.reference.section_shapes import Boundary, FloatArray
-from studies.reference.stored import Arrays
+from studies.reference.section_shapes import Arrays, Boundary, FloatArray
 from studies.reference.two_spheres import Kind, scatter_spheres
 
 HEIGHTS = (0.05, 0.08, 0.11, 0.14)

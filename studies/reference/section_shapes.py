@@ -31,6 +31,8 @@ GRADING = 6
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 ComplexArray: TypeAlias = NDArray[np.complex128]
+Arrays: TypeAlias = dict[str, NDArray[np.floating | np.complexfloating]]
+"""What a case returns, by names."""
 Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 Radius = Callable[[FloatArray], FloatArray]
 Boundary: TypeAlias = Literal["soft", "hard"] | complex

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Arrays = dict[str, NDArray[np.floating | np.complexfloating]]
+from studies.reference.section_shapes import Arrays
+
 FOLDER = Path(__file__).with_name("values")
 
 

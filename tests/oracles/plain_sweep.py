@@ -8,8 +8,7 @@ from creeping.field.far import far_field
 from creeping.field.validity_range import launch_validity, validities
 from creeping.rays.fan import launch
 from creeping.rays.reach import early_length
-from creeping.shadow.line import shadow_line
-from creeping.shadow.nodes import shares_of
+from creeping.shadow.line import shadow_line, shares_of
 from creeping.shadow.status import NO_RAY, OK, SINGULAR
 
 PARTS_OF_FIELD = ("total", "creeping", "reflected", "forward", "unresolved", "error")

@@ -28,9 +28,9 @@ from creeping.phaseflow.cache import cached_phase_map, is_cached
 from creeping.phaseflow.coordinates.base import model_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
 from creeping.phaseflow.phase_map import PhaseMap
+from creeping.phaseflow.tuning.map_spec import RAYS, MapSpec
 from creeping.phaseflow.tuning.nominal_cost import direct_seconds, map_seconds, tracing_cost
-from creeping.phaseflow.tuning.request import MapSpec
-from creeping.phaseflow.tuning.search import RAYS, Candidate, candidates, tuned_map
+from creeping.phaseflow.tuning.search import Candidate, candidates, tuned_map
 
 SAMPLES = 512
 """Rays on which direct integration is measured, fewer where F is expensive."""

@@ -14,7 +14,6 @@ Sources: Derivations, R16.
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from creeping.phaseflow.building import Plan, Progress, Reference, build_direct,
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.splines import MARGIN, Grid, least_cells, thinning_operator
+from creeping.phaseflow.tuning.map_spec import MapSpec
 from creeping.phaseflow.tuning.nominal_cost import (
     build_seconds,
     doublings_of,
@@ -37,11 +37,6 @@ from creeping.phaseflow.tuning.nominal_cost import (
     tracing_cost,
 )
 
-if TYPE_CHECKING:
-    from creeping.phaseflow.tuning.request import MapSpec
-
-RAYS = 1_000_000
-"""Rays for which a map is tuned unless their number is known: what a build may cost follows from it."""
 MAX_NODES = 4_000_000
 """Nodes of the largest grid that is built."""
 MAX_BYTES = 150e6
@@ -87,7 +82,7 @@ class Candidate:
         return self.build + rays * length * self.leap
 
 
-def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None = None) -> PhaseMap:
+def tuned_map(spec: MapSpec, progress: Progress, found: list[Candidate] | None = None) -> PhaseMap:
     """Build the fastest map that meets the tolerance of the spec, of the candidates if these are known already.
 
     Raises
@@ -149,7 +144,7 @@ def tuned_map(spec: "MapSpec", progress: Progress, found: list[Candidate] | None
     )
 
 
-def _measured(built: PhaseMap, spec: "MapSpec", cost: float, known: dict[Any, Reference]) -> tuple[PhaseMap, float]:
+def _measured(built: PhaseMap, spec: MapSpec, cost: float, known: dict[Any, Reference]) -> tuple[PhaseMap, float]:
     """The map with its errors, and nominal seconds of measuring them.
 
     Where F is expensive it is done on fewer rays, and against a reference only so much better.
@@ -164,12 +159,12 @@ def _measured(built: PhaseMap, spec: "MapSpec", cost: float, known: dict[Any, Re
     return result, measuring_seconds(cost, length, result.error.samples, rtol)
 
 
-def _budget(spec: "MapSpec", cost: float) -> float:
+def _budget(spec: MapSpec, cost: float) -> float:
     """Nominal seconds that one probe or measurement may take."""
     return float(np.clip(SHARE * spec.magnitude * cost * (spec.length or natural_horizon(spec.body)), *BUDGET))
 
 
-def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
+def candidates(spec: MapSpec, model: Model, cost: float) -> list[Candidate]:
     """Horizons with their grids, the fastest first.
 
     Raises
@@ -223,7 +218,7 @@ def candidates(spec: "MapSpec", model: Model, cost: float) -> list[Candidate]:
     return sorted(found, key=lambda one: one.seconds(spec.magnitude, length))
 
 
-def _horizons(spec: "MapSpec", natural: float, cost: float) -> list[float]:
+def _horizons(spec: MapSpec, natural: float, cost: float) -> list[float]:
     """Horizons to try, ascending: they divide the distance of outputs; from 0.4 times the natural one to 16 times."""
     if spec.horizon:
         return [spec.horizon]
