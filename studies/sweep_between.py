@@ -1,9 +1,9 @@
-"""What does interpolation between incidences save, and how far off is it? Cuts and patches, rays and fields.
+"""What does interpolation of fields between incidences save, and how far off is it? Cuts and patches.
 
 Each row is one sweep with ``accuracy``, and one of some of its incidences without: processor times on one thread, least
 of two, by the public call, results in memory. Errors of fields are differences of the two over the median of the field,
-of its creeping part over that of the part; rays have other launch points, so their error is the stated one. Maps are
-tuned for 3e-5 and built beforehand. Run ``python -m studies.sweep_between [--quick]`` (five minutes).
+of its creeping part over that of the part. Maps are tuned for 3e-5 and built beforehand. Run ``python -m
+studies.sweep_between [--quick]`` (five minutes).
 """
 
 import argparse
@@ -17,11 +17,13 @@ from studies._peers import seconds_of
 
 LENGTH, RAYS = 4.0, 256
 WAVENUMBERS = tuple(np.linspace(15.0, 60.0, 8))
-ASKED: dict[str, dict[str, Any]] = {
-    "rays": {"quantity": "rays", "length": LENGTH, "n_rays": RAYS},
-    "fields": {"wavenumbers": WAVENUMBERS, "boundary": ["soft", "hard"], "length": LENGTH, "n_rays": RAYS},
+ASKED: dict[str, Any] = {
+    "wavenumbers": WAVENUMBERS,
+    "boundary": ["soft", "hard"],
+    "length": LENGTH,
+    "n_rays": RAYS,
 }
-ACCURACY = {"rays": 3e-5, "fields": 1e-3}
+ACCURACY = 1e-3
 TILTED, SINGULAR = (0.3, 0.5, 0.81), (1.0, 0.0, 0.05)
 """Axes of cuts: of a general one, and of one that passes through singular directions of the twisted ellipsoid."""
 
@@ -41,20 +43,16 @@ def patch(count: int, height: float) -> FloatArray:
     return np.asarray(found[found @ np.array([0.6, 0.48, 0.64]) > height])
 
 
-def row(name: str, quantity: str, directions: FloatArray, few: int) -> Row:
+def row(name: str, directions: FloatArray, few: int) -> Row:
     """Ratio, rates and errors of one sweep."""
     flow = cr.build_phase_map(body(name), tolerance=3e-5, length=LENGTH)
-    asked, accuracy = ASKED[quantity], ACCURACY[quantity]
     some = np.sort(np.random.default_rng(0).choice(len(directions), min(few, len(directions)), replace=False))
-    known = cr.sweep_directions(flow, directions[some], **asked)
-    alone = seconds_of(lambda: cr.sweep_directions(flow, directions[some], **asked), 2) / len(some)
-    found: Any = cr.sweep_directions(flow, directions, accuracy=accuracy, **asked)
-    between = seconds_of(lambda: cr.sweep_directions(flow, directions, accuracy=accuracy, **asked), 2) / len(directions)
+    known = cr.sweep_directions(flow, directions[some], **ASKED)
+    alone = seconds_of(lambda: cr.sweep_directions(flow, directions[some], **ASKED), 2) / len(some)
+    found: Any = cr.sweep_directions(flow, directions, accuracy=ACCURACY, **ASKED)
+    between = seconds_of(lambda: cr.sweep_directions(flow, directions, accuracy=ACCURACY, **ASKED), 2) / len(directions)
     out = {"computed per s": 1 / alone, "between per s": 1 / between, "ratio": alone / between}
     out["interpolated"] = float(found.interpolated.mean())
-    if quantity == "rays":
-        stated = found.interpolation_error.values
-        return out | {"stated 50 %": float(np.median(stated)), "stated 99 %": float(np.quantile(stated, 0.99))}
     found = found.isel(incidence=some)
     inside = found.interpolated.values
     for part, pair in (
@@ -81,17 +79,15 @@ def main() -> None:
         "singular": cut(3600 // quick, SINGULAR),
     }
     with threads(1):
-        for quantity in ASKED:
-            rows = []
-            for name in ("triaxial", "twisted"):
-                for case, directions in cases.items():
-                    if name == "twisted" or case != "singular":
-                        rows.append({"body": name, "cut": case, **row(name, quantity, directions, few)})
-            show(f"{quantity} of cuts", rows)
+        rows = []
+        for name in ("triaxial", "twisted"):
+            for case, directions in cases.items():
+                if name == "twisted" or case != "singular":
+                    rows.append({"body": name, "cut": case, **row(name, directions, few)})
+        show("cuts", rows)
         caps = [("1e5", patch(100_000 // quick, 0.8)), ("1e6", patch(1_000_000 // quick, 0.97))]
-        for quantity, name in (("fields", "twisted"), ("rays", "twisted"), ("rays", "triaxial")):
-            rows = [{"body": name, "sphere": case, **row(name, quantity, some, few)} for case, some in caps]
-            show(f"{quantity} on a cap of the sphere", rows)
+        rows = [{"body": "twisted", "sphere": case, **row("twisted", some, few)} for case, some in caps]
+        show("a cap of the sphere", rows)
 
 
 if __name__ == "__main__":

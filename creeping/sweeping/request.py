@@ -113,7 +113,7 @@ class SweepRequest:
         Of the fields: isolated rays, currents of the whole body where rays do not resolve an incidence, or for all, or
         the body's integral equation for all.
     accuracy : float, optional
-        Error allowed to interpolation between incidences; without it each is computed.
+        Of fields: error allowed to interpolation between incidences; without it each is computed.
     lattice : Lattice, optional
         Nodes of the interpolation; without it there are too few incidences for one.
     """
@@ -155,6 +155,8 @@ class SweepRequest:
             elif self.method in ("currents", "equation"):
                 yield f'accuracy goes with rays; method "{self.method}" computes every incidence'
         if self.quantity == "rays":
+            if self.accuracy is not None:
+                yield "accuracy is of interpolated fields; rays of every incidence are traced: leave it out"
             for name in ("wavenumbers", "boundaries", "observation"):
                 if getattr(self, name):
                     yield f"{name} belong to a field; quantity 'rays' has none"
@@ -216,9 +218,6 @@ class SweepRequest:
     def _between(self) -> dict[str, Variable]:
         """What is said of interpolation."""
         found = {"interpolated": Variable((), "bool", "1", "whether its results are interpolated", False)}
-        if self.quantity == "rays":
-            text = "change of x, J/(1 + |J|) or attenuation, the largest, with fewer nodes; 0 of what is computed"
-            return found | {"interpolation_error": Variable(("ray",), "float64", "1", text, False)}
         for name, of in self._own.items():
             if name.startswith("error"):
                 text = "change of the amplitude with fewer nodes; 0 of what is computed"

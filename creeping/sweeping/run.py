@@ -94,10 +94,9 @@ def sweep_directions(
         "currents" every one that a mesh of the body resolves: ``by_currents`` says which. "equation" solves the body's
         integral equation for every one, in seconds to minutes each (`creeping.surface_currents` with ``solve=True``).
     accuracy : float, optional
-        Interpolate between incidences, where they are dense and that is known to err by less than this share of the
-        field's size, ten times it of the creeping part's own; 1e-3 is a good one. Each incidence that cannot be had so
-        is computed: ``interpolated`` says which were, ``interpolation_error`` how well. Launch points of interpolated
-        rays follow the line from one incidence to the next and are not evenly spaced on each.
+        Interpolate fields between incidences, where they are dense and that is known to err by less than this share of
+        the field's size, ten times it of the creeping part's own; 1e-3 is a good one. Each incidence that cannot be had
+        so is computed: ``interpolated`` says which were, ``interpolation_error`` how well.
     store : path, optional
         Folder for the results (zarr), written task by task; the dataset is read from it when it is used. Without it
         results are in memory.

@@ -31,12 +31,12 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.far_geometry import FarGeometry
 from creeping.field.far_rays import Parts
 from creeping.field.strip_waves import isolated, sheets_of
+from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
 from creeping.sweeping.between.stencil import (
     BASE,
     NODES,
-    Between,
     around,
     by_cell,
     corner_weights,
@@ -289,11 +289,23 @@ class Problem(NamedTuple):
     arrays: Arrays
 
 
-class FieldsBetween(Between):
-    """Fields of incidences; see `Between`."""
+class FieldsBetween:
+    """Fields of incidences, interpolated where that is good enough; called as a `Sweeper` is.
+
+    Incidences go from level to level, and what none gives is computed.
+
+    Parameters
+    ----------
+    flow : PhaseMap or DirectFlow
+    request : SweepRequest
+        With an accuracy and a lattice.
+    """
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
-        super().__init__(flow, request)
+        assert request.lattice is not None and request.accuracy is not None
+        self.flow, self.request = flow, request
+        self._lattice, self._accuracy = request.lattice, request.accuracy
+        self._direct = Sweeper(flow, request)
         self._plain = Sweeper(flow, replace(request, method="rays"))
         self._nodes = Nodes(self._plain, self._lattice)
         # columns of amplitudes: the components of one boundary and wavenumber after the other
@@ -302,9 +314,28 @@ class FieldsBetween(Between):
         self._many = max(1, len(request.observation))
         self._wavenumbers = np.repeat(np.tile(request.wavenumbers, len(request.problems)), widths)
 
-    def _begin(self) -> None:
+    @property
+    def body(self) -> Surface:
+        """Body of the flow."""
+        return self.flow.body
+
+    def __call__(self, incidences: FloatArray) -> Arrays:
+        """Arrays of results of unit directions (n, 3)."""
+        incidences = np.asarray(incidences, dtype=float)
+        out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
         if len(self._nodes) > MOST_NODES:
             self._nodes = Nodes(self._plain, self._lattice)
+        for level in range(self._lattice.first, self._lattice.levels):
+            if len(left):
+                left = left[self._level(level, incidences, left, out) == 1]
+        if len(left):
+            for name, values in self._direct(incidences[left]).items():
+                out[name][left] = values
+        return out
+
+    def left(self, level: int, incidences: FloatArray) -> FloatArray:
+        """Share of each of the incidences (n, 3) that a level leaves to be computed, 1 of what it does not give."""
+        return self._level(level, incidences, np.arange(len(incidences)), self.request.empty(len(incidences)))
 
     def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> FloatArray:
         nodes = self._nodes
@@ -367,7 +398,7 @@ class FieldsBetween(Between):
         self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: list[FloatArray]
     ) -> tuple[Any, FloatArray, BoolArray]:
         """Fields (n, m, 2, columns) of reflected and of creeping sheets, their differences, and who passes (n,)."""
-        from creeping.sweeping.kernels.judging import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
+        from creeping.sweeping.kernels.sheet_sums import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
 
         k, amplitudes = self._wavenumbers, np.zeros((0, 1)) if nodes.amplitudes is None else nodes.amplitudes
         sheets, label = amplitudes[chain], nodes.label[chain[:, 0]]

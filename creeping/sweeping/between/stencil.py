@@ -6,27 +6,17 @@ In two dimensions weights are products. The error of the six is taken for the la
 first and the last five give, and COARSE times that to the inner four and that between the first and the last four.
 The five know a smooth function's error to the order before; a kink between the nodes they may miss, the four do not.
 
-What interpolated rays and fields share: incidences go from level to level, and what none gives is computed.
-
 Sources: [AS64, sec. 25.2].
 """
-
-from abc import ABC, abstractmethod
 
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from creeping.geometry.surface import Surface
-from creeping.rays.transport import Flow
 from creeping.sweeping.lattice import Lattice
-from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.sweeper import Arrays, Sweeper
 
 NODES = np.arange(-2, 4)
 COARSE = 1.0
 """With it the error of a kink is under-estimated by 5 at most nine times in ten, that of a wave never."""
-LARGEST = np.array([0.0119, 0.1002, 1.0, 1.0, 0.1002, 0.0119])
-"""Largest weights of the nodes."""
 BASE = 2
 """Place of the cell's own node, x = 0, among them."""
 
@@ -78,17 +68,6 @@ def along_axis(place: FloatArray) -> tuple[FloatArray, FloatArray]:
     return own, np.stack(differences, axis=1)
 
 
-def lines(dimensions: int) -> tuple[IntArray, FloatArray]:
-    """Places in the stencil of the nodes along each of its lines (m, 6), and the largest weights of the lines (m,).
-
-    Those of the cell's own sides come with weight 1.
-    """
-    every = np.arange(len(NODES) ** dimensions).reshape((len(NODES),) * dimensions)
-    if dimensions == 1:
-        return every[None], np.ones(1)
-    return np.concatenate([every, every.T]), np.tile(LARGEST, 2)
-
-
 def totals(values: FloatArray) -> FloatArray:
     """Sums (n,) of rows (m, n), one after the other."""
     out: FloatArray = values[0]
@@ -116,53 +95,6 @@ def _lagrange(place: FloatArray, some: slice) -> FloatArray:
     for j, own in zip(range(len(NODES))[some], nodes, strict=True):
         out[:, j] = np.prod([(place - other) / (own - other) for other in nodes if other != own], axis=0)
     return out
-
-
-class Between(ABC):
-    """Results of incidences, interpolated where that is good enough; called as a `Sweeper` is.
-
-    Parameters
-    ----------
-    flow : PhaseMap or DirectFlow
-    request : SweepRequest
-        With an accuracy and a lattice.
-    """
-
-    def __init__(self, flow: Flow, request: SweepRequest) -> None:
-        assert request.lattice is not None and request.accuracy is not None
-        self.flow, self.request = flow, request
-        self._lattice, self._accuracy = request.lattice, request.accuracy
-        self._direct = Sweeper(flow, request)
-
-    @property
-    def body(self) -> Surface:
-        """Body of the flow."""
-        return self.flow.body
-
-    def __call__(self, incidences: FloatArray) -> Arrays:
-        """Arrays of results of unit directions (n, 3)."""
-        incidences = np.asarray(incidences, dtype=float)
-        out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
-        self._begin()
-        for level in range(self._lattice.first, self._lattice.levels):
-            if len(left):
-                left = left[self._level(level, incidences, left, out) == 1]
-        if len(left):
-            for name, values in self._direct(incidences[left]).items():
-                out[name][left] = values
-        return out
-
-    def left(self, level: int, incidences: FloatArray) -> FloatArray:
-        """Share of each of the incidences (n, 3) that a level leaves to be computed, 1 of what it does not give."""
-        return self._level(level, incidences, np.arange(len(incidences)), self.request.empty(len(incidences)))
-
-    @abstractmethod
-    def _begin(self) -> None:
-        """Make room for nodes, where there are too many of earlier calls."""
-
-    @abstractmethod
-    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> FloatArray:
-        """Fill the results of those rows that the level gives; returns the shares that are computed, 1 of others."""
 
 
 def by_cell(

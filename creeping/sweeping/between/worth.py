@@ -4,9 +4,9 @@ Some of the cells that hold the incidences of a study are tried, at its finest l
 ones. In terms of what computing an incidence costs, with c incidences in a cell of a level, one that goes from level l
 on costs
 
-    sum over levels from l to the first that serves of MARGIN NODE/c, and then EACH + AGAIN r, or 1 if none serves
+    sum over levels from l to the first that serves of MARGIN NODE/c, and then EACH, or 1 if none serves
 
-r being the share of its rays that are carried by themselves. The least mean over those tried decides: levels before l
+The least mean over those tried decides: levels before l
 are left out, and all of them if it is no less than PAYS. It follows from the whole set of incidences and from what is
 asked of them, never from a clock, so that every task of a study, wherever it runs, has the same nodes.
 
@@ -22,7 +22,6 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.geometry.creased import is_creased
 from creeping.rays.transport import Flow
-from creeping.sweeping.between.fans import RaysBetween
 from creeping.sweeping.between.fields import FieldsBetween
 from creeping.sweeping.lattice import Lattice
 from creeping.sweeping.request import SweepRequest, with_lattice
@@ -33,10 +32,8 @@ FEWEST, MOST, SHARE = 2, 12, 2000
 """Cells that are tried: at least, at most, and incidences for each."""
 MARGIN = 1.2
 """Nodes of a cell: those at the ends of a task serve the next one, too."""
-NODE, EACH = {"rays": 1.3, "fields": 1.6}, {"rays": 0.1, "fields": 0.15}
+NODE, EACH = 1.6, 0.15
 """What a node with the judging of its cell and an interpolated incidence cost."""
-AGAIN = 1.0
-"""What a ray that is carried by itself costs, over its share in a computed incidence."""
 PAYS = 0.95
 
 
@@ -55,7 +52,7 @@ def with_paying_lattice(flow: Flow, request: SweepRequest, incidences: FloatArra
         left[:, level] = sweeper.left(level, some)
         if np.all(left[:, level] == 1):
             break
-    first = first_level(lattice, left, request.quantity)
+    first = first_level(lattice, left)
     return replace(request, lattice=None if first is None else replace(lattice, first=first))
 
 
@@ -67,31 +64,29 @@ def representatives(lattice: Lattice, directions: FloatArray) -> FloatArray:
     return directions[order[(2 * np.arange(count) + 1) * len(directions) // (2 * count)]]
 
 
-def first_level(lattice: Lattice, left: FloatArray, quantity: str) -> int | None:
+def first_level(lattice: Lattice, left: FloatArray) -> int | None:
     """Level from which on incidences cost least, by what levels leave of some of them (n, levels); none if none pays.
 
     Examples
     --------
     >>> lattice = Lattice((), 0.0, 3, 160.0)                         # 160, 40 and 10 in a cell
-    >>> first_level(lattice, np.array([[1.0, 0.1, 0.0]]), "rays"), first_level(lattice, np.ones((1, 3)), "rays")
+    >>> first_level(lattice, np.array([[1.0, 0.0, 0.0]])), first_level(lattice, np.ones((1, 3)))
     (1, None)
     """
-    kind = "rays" if quantity == "rays" else "fields"
     costs = []
     for first in range(lattice.levels):
         served = left[:, first:] < 1
         given = served.any(axis=1)
         last = np.where(given, np.argmax(served, axis=1), served.shape[1] - 1)
-        nodes = np.cumsum([MARGIN * NODE[kind] / lattice.crowded(level) for level in range(first, lattice.levels)])
-        own = np.take_along_axis(left[:, first:], last[:, None], axis=1)[:, 0]
-        costs.append(float(np.mean(nodes[last] + np.where(given, EACH[kind] + AGAIN * own, 1.0))))
+        nodes = np.cumsum([MARGIN * NODE / lattice.crowded(level) for level in range(first, lattice.levels)])
+        costs.append(float(np.mean(nodes[last] + np.where(given, EACH, 1.0))))
     return int(np.argmin(costs)) if min(costs) < PAYS else None
 
 
-def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween | RaysBetween | SolvedSweeper:
+def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween | SolvedSweeper:
     """What gives the results of unit directions (n, 3); bodies with creases have no rays that all go on."""
     if isinstance(flow, NoFlow):
         return SolvedSweeper(flow, request)
     if request.lattice is None or is_creased(flow.body):
         return Sweeper(flow, request)
-    return RaysBetween(flow, request) if request.quantity == "rays" else FieldsBetween(flow, request)
+    return FieldsBetween(flow, request)
