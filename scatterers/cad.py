@@ -21,13 +21,15 @@ from scatterers.triangles.jets import osculating_jets, signed_distance
 from scatterers.triangles.quality import Choice, MeshQuality, assess
 from scatterers.triangles.topology import edges_of
 
-FloatArray = NDArray[np.float64]
 POINTS = 10_000
 """Points of the body that are asked for."""
 CURVED = 30
 """Triangles to a full turn of a curved face of a body with edges."""
 SPACING = 2.0
 """Spacing of the grid in units of the mean distance of neighbouring points."""
+
+
+FloatArray = NDArray[np.float64]
 
 
 class Cad(FittedBody):

@@ -16,9 +16,6 @@ from scatterers.cad_file.files import SUFFIXES, CadReading, cad_triangles
 from scatterers.triangles.files import read_mesh
 from scatterers.triangles.quality import Choice
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 SOMEWHERE = np.array([0.3602, 0.5413, 0.7597])
 """Direction of the rays that tell inside from outside: along no axis or plane of symmetry."""
 POINTS = 10_000
@@ -27,6 +24,11 @@ CELLS = 512
 """Cells along a side of the plane across rays, at most."""
 MOST = 10_000_000
 """Pairs of a triangle and a cell, at most."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 class Facets:

@@ -18,10 +18,12 @@ from scatterers.sphere_map.star import star_map
 from scatterers.spline.cloud import Samples
 from scatterers.spline.tensor import TensorSpline, coefficients
 
-FloatArray = NDArray[np.float64]
 MOST = 1000
 """Nodes along an axis of a body that is sampled."""
 FEWEST = 8
+
+
+FloatArray = NDArray[np.float64]
 
 
 class Level(Protocol):

@@ -39,11 +39,13 @@ from scatterers.pieces.patch import Crease
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.cloud import Samples
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 MOST_TIPS = 8
 PER_EDGE = 1.5
 """Cells of the grid to an edge of tiles: sides are 1.15 edges at most."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 class Implicit(LevelBody):

@@ -28,7 +28,6 @@ from scatterers.triangles.jets import Jets, angle_weighted_normals, centroids, o
 from scatterers.triangles.quality import FEWEST_RIMS, Choice, MeshQuality, assess, jumps_at, noise_at_most
 from scatterers.triangles.subdivision import MOST_SUBDIVIDED, Subdivision, edges_where_curved, subdivided
 
-FloatArray = NDArray[np.float64]
 CLEAN, NOISY = 1.3, 4.0
 """Spacings of the grid in units of the mean edge: for vertices and the points between them, and for noisy vertices,"""
 TURN = 0.5
@@ -49,6 +48,9 @@ FEW_BAD = 0.05
 """Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
 UNCERTAIN, UNCERTAIN_SUBDIVIDED = 0.25, 0.5
 """by how far its curvatures depend on the grid, relative to their rms; of a subdivided mesh more is counted."""
+
+
+FloatArray = NDArray[np.float64]
 
 
 class Mesh(FittedBody):

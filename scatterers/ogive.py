@@ -37,11 +37,12 @@ from scatterers.base.level_body import finite, positive
 from scatterers.exact.profile import Arc, Segment
 from scatterers.exact.revolved import Revolved
 
-Pair = tuple[float, float]
-
 WIDE, BACK = 29 / 150, 5 / 12
 FLAT = 3.0
 """Width over thickness."""
+
+
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)

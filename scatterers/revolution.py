@@ -18,11 +18,13 @@ from scatterers.base.level_body import numbers
 from scatterers.exact.profile import Line, Segment, SplineSegment, smooth_end, upward
 from scatterers.exact.revolved import Revolved
 
-FloatArray = NDArray[np.float64]
 RIGHT_ANGLE = 0.05
 """Radians from a right angle to the axis within which a splined end on it is a smooth pole."""
 ROUNDING = 1e-14
 """Numbers of a table this small, relative to the largest, are 0."""
+
+
+FloatArray = NDArray[np.float64]
 
 
 class Revolution(Revolved):

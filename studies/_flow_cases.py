@@ -23,8 +23,6 @@ from creeping.phaseflow.tuning.map_spec import MapSpec
 from creeping.phaseflow.tuning.request import build_from
 from studies._peers import heyoka_at_error, scipy_flow, seconds_of
 
-Row = dict[str, Any]
-"""One line of a table: headings with their values."""
 BODIES = ("ellipsoid", "torus", "twisted", "gridded")
 EXPENSIVE = ("gridded",)
 """Bodies whose F takes a microsecond: fewer rays are integrated directly."""
@@ -37,6 +35,10 @@ PENCIL, OPENING = 32, 0.02
 DIRECTION = np.ones(3) / np.sqrt(3)
 """Of the incident wave whose fan is measured."""
 SCIPY_RAYS = 16
+
+
+Row = dict[str, Any]
+"""One line of a table: headings with their values."""
 
 
 @cache

@@ -37,6 +37,11 @@ BODIES = {
 }
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".nas", ".gz")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
+FILE_OPTIONS = ("units", "strict", "part", "cap", "union")
+FORMATS = ("csv", "mat")
+HELP = "Tables: csv or mat (MATLAB), or both joined by a comma."
+
+
 Progress = Callable[[str], None]
 
 Body = Annotated[
@@ -46,11 +51,7 @@ Body = Annotated[
         "or an expression F(x, y, z), negative inside, e.g. 'x**2 + y**4 + z**2 - 1'."
     ),
 ]
-FILE_OPTIONS = ("units", "strict", "part", "cap", "union")
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
-
-FORMATS = ("csv", "mat")
-HELP = "Tables: csv or mat (MATLAB), or both joined by a comma."
 
 
 @Parameter(name="*")

@@ -13,6 +13,10 @@ from cyclopts import Group, Parameter
 
 from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, parse_body, table_formats
 
+TOLD = 90.0
+"""Seconds from which it is said beforehand what a request may cost."""
+
+
 _angles = Group("Angles")
 _output = Group("Output")
 Frequency = Annotated[
@@ -34,8 +38,6 @@ Incidence = Annotated[
     str | None,
     Parameter(group=_angles, help="AZIMUTH,ELEVATION of the radar, degrees; of a cut the angle that stays. 0,0."),
 ]
-TOLD = 90.0
-"""Seconds from which it is said beforehand what a request may cost."""
 Method = Annotated[
     str,
     Parameter(

@@ -7,6 +7,9 @@ from typing import Any
 from creeping._version import __version__
 from creeping.commands.body import write_tables
 
+DPI = 200
+"""Of pictures."""
+
 
 def asked_wave(direction: Sequence[float] | None, source: Sequence[float] | None) -> Any:
     """The incident wave of ``--direction`` or ``--source``.
@@ -89,10 +92,6 @@ def _of_the_body(fan: Any) -> dict[str, Any]:
         "repairs": list(fan.body.repairs),
         "error_of_body": None if error is None else asdict(error),
     }
-
-
-DPI = 200
-"""Of pictures."""
 
 
 def write_results(

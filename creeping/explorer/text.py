@@ -23,6 +23,9 @@ from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS
 from creeping.rays.fan import RayFan
 
 PLAIN = "<title>Viser</title>"
+ARCS = {"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}
+"""Of the handles on the page, in the colours that they have there."""
+_TEXT = 'font-size="9" font-family="sans-serif" fill="#333"'
 
 
 def preview_text(frame: Preview, seconds: float, span: tuple[float, float]) -> str:
@@ -104,15 +107,6 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     placed = "".join(f'<g transform="translate(0 {24 * number})">{row}</g>' for number, row in enumerate(rows))
     box = f'viewBox="0 0 360 {24 * len(rows)}" width="100%"'
     return f'<svg id="bar" xmlns="http://www.w3.org/2000/svg" {box}>{placed}</svg>'
-
-
-ARCS = {"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}
-
-
-"""Of the handles on the page, in the colours that they have there."""
-
-
-_TEXT = 'font-size="9" font-family="sans-serif" fill="#333"'
 
 
 def _bar(name: str, colours: ColourTable, words: tuple[str, str, str]) -> str:

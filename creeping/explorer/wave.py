@@ -21,17 +21,23 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping.plotting.coupling_pictures import LEAST_SAMPLES, at_phase
 from creeping.rays.fan import RayFan
 
+Bytes = NDArray[np.uint8]
 SAMPLES, MOST_SEGMENTS = 6.0, 60_000
 """Points of a ray a wavelength, and segments of all rays up to which there are as many."""
-
-Bytes = NDArray[np.uint8]
 MOST, LEAST, STEP = 60.0, 10.0, 5.0
 """Largest and smallest range of the field's colours, and what its ends are multiples of, dB."""
 KEPT = 7.5
 """By how much data may leave their range or fall short of it, dB, before it changes: it does not flicker."""
-Span = tuple[float, float]
 ENDED = (150, 156, 162)
 """Colour where a ray has ended or no ray passes."""
+_SHARE = np.arange(256) / 255
+LINEAR: Bytes = np.round(255 * np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SHARE + 0.055) / 1.055) ** 2.4)).astype(
+    np.uint8
+)
+"""Bytes of colours as the page takes them at vertices, where it has light and no sRGB."""
+
+
+Span = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,17 +139,6 @@ class ColourTable:
         """One colour as text."""
         r, g, b = self(np.array(share))
         return f"#{r:02x}{g:02x}{b:02x}"
-
-
-_SHARE = np.arange(256) / 255
-
-
-LINEAR: Bytes = np.round(255 * np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SHARE + 0.055) / 1.055) ** 2.4)).astype(
-    np.uint8
-)
-
-
-"""Bytes of colours as the page takes them at vertices, where it has light and no sRGB."""
 
 
 FIELD_COLOURS = ColourTable("magma")

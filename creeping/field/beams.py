@@ -108,8 +108,6 @@ class StripWaves(Protocol):
 
 
 Components = Callable[[int, FloatArray, FloatArray, BodyNodes, FloatArray], tuple[ComplexArray, ComplexArray]]
-
-
 """V and V' (n, c) of a vector's beams at places sigma, s (n,) of a strip, points of the body and tangents (n, 3)."""
 
 

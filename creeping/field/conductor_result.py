@@ -19,6 +19,9 @@ from creeping.field.point_result import PointData
 if TYPE_CHECKING:
     import xarray
 
+PARTS = ("incident", "scattered", "creeping")
+"""Parts of a field near a conductor."""
+
 
 class Fields(NamedTuple):
     """E and H at points (..., 3), in units of the incident E, H times the impedance of free space.
@@ -100,10 +103,6 @@ class ConductorField(PointData):
 
         parts = {f"{letter}_{name}": getattr(getattr(self, name), letter) for name in PARTS for letter in "EH"}
         return vector_dataset(self, {"E": self.E, "H": self.H, **parts})
-
-
-PARTS = ("incident", "scattered", "creeping")
-"""Parts of a field near a conductor."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+_AWAY = "let currents serve: method='currents', a quarter of a wavelength off the body"
+WORTH, LEAST_WORTH = 0.5, 0.1
+"""Error from which a value is unresolved: both this share of it, and this one of the incident wave."""
+
 
 Words = np.ndarray[Any, np.dtype[np.str_]]
 
@@ -60,9 +64,6 @@ class FieldStatus(IntEnum):
         return _REMEDIES[self]
 
 
-_AWAY = "let currents serve: method='currents', a quarter of a wavelength off the body"
-
-
 _REMEDIES = {
     FieldStatus.OK: "none needed",
     FieldStatus.LIT: _AWAY,
@@ -72,12 +73,6 @@ _REMEDIES = {
     FieldStatus.TRUNCATED: "launch longer rays: length= of launch",
     FieldStatus.UNRESOLVED: "none at this wavenumber but another method=: the value is hardly known beyond its error",
 }
-
-
-WORTH, LEAST_WORTH = 0.5, 0.1
-
-
-"""Error from which a value is unresolved: both this share of it, and this one of the incident wave."""
 
 
 def judged(

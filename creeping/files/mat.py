@@ -27,6 +27,12 @@ if TYPE_CHECKING:
     from creeping.field.far_result import FarField
 
 ABOUT = "time factor exp(-i w t); far field f exp(i k r)/r; 4 pi |f|^2 is the cross section"
+_FAN = (
+    *("points", "directions", "travel_time", "eikonal", "spreading", "spreading_rate", "curvature", "attenuation"),
+    *("caustic_index", "status", "detachment", "curve_index", "arclength"),
+)
+
+
 Content = tuple[dict[str, Any], dict[str, str]]
 """Values and units by name."""
 
@@ -144,12 +150,6 @@ def _fan(fan: RayFan) -> Content:
     units |= dict.fromkeys(("spreading_rate", "curvature"), power(length, -1)) | {"attenuation": f"{length}^(1/3)"}
     units |= dict.fromkeys(("direction", "directions", "spreading"), "1")
     return content, _of(content, units | {"source": length})
-
-
-_FAN = (
-    *("points", "directions", "travel_time", "eikonal", "spreading", "spreading_rate", "curvature", "attenuation"),
-    *("caustic_index", "status", "detachment", "curve_index", "arclength"),
-)
 
 
 def _curves(curves: Sequence[IsoPhaseCurve]) -> Content:

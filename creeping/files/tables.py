@@ -55,6 +55,35 @@ COLUMNS = {
     "im_m": "imaginary part of f",
     "error_m": "of |f|",
 }
+_POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}
+_LINE_NOTES = {
+    "curve": "number of the closed curve",
+    "s": "arclength along it, L",
+    **_POSITION,
+    "status": "attached, occluded or concave",
+}
+_FAN_NOTES = {
+    "ray": "number of the ray",
+    "step": "number of the point on it",
+    "t": "travel time; L where the speed is 1",
+    **_POSITION,
+    "px": "unit tangent",
+    "py": "unit tangent",
+    "pz": "unit tangent",
+    "eikonal": "as t",
+    "J": "spreading, 1 on the shadow line",
+    "dJ": "its rate along the ray",
+    "kappa_n": "normal curvature along the ray, 1/L, positive where convex",
+    "caustic_index": "zeros of J passed",
+    "status": "status code of the ray",
+}
+_CURVE_NOTES = {
+    "curve": "number of the curve",
+    "of": "travel_time or eikonal",
+    "level": "its constant value; L where the speed is 1",
+    "closed": "1 if the last point joins the first",
+    **_POSITION,
+}
 
 
 def write_vtp(
@@ -158,43 +187,6 @@ def write_csv(
             )
         elif cut is not None:
             _write_table(stream, _cut_table.notes(cut), _cut_table.rows(cut))
-
-
-_POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}
-
-
-_LINE_NOTES = {
-    "curve": "number of the closed curve",
-    "s": "arclength along it, L",
-    **_POSITION,
-    "status": "attached, occluded or concave",
-}
-
-
-_FAN_NOTES = {
-    "ray": "number of the ray",
-    "step": "number of the point on it",
-    "t": "travel time; L where the speed is 1",
-    **_POSITION,
-    "px": "unit tangent",
-    "py": "unit tangent",
-    "pz": "unit tangent",
-    "eikonal": "as t",
-    "J": "spreading, 1 on the shadow line",
-    "dJ": "its rate along the ray",
-    "kappa_n": "normal curvature along the ray, 1/L, positive where convex",
-    "caustic_index": "zeros of J passed",
-    "status": "status code of the ray",
-}
-
-
-_CURVE_NOTES = {
-    "curve": "number of the curve",
-    "of": "travel_time or eikonal",
-    "level": "its constant value; L where the speed is 1",
-    "closed": "1 if the last point joins the first",
-    **_POSITION,
-}
 
 
 def _in_unit(notes: dict[str, str], unit: str) -> dict[str, str]:

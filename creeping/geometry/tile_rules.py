@@ -307,8 +307,6 @@ def _piece_rules_sides(rung: Any) -> FloatArray:
 
 
 _HALVES = {p: float(max(half for half in np.arange(0.05, 20.0, 0.05) if points_for(half) <= p)) for p in POINTS}
-
-
 """Half the phase along a side up to which so many points do."""
 
 

@@ -19,13 +19,14 @@ def kernel_sources(package: Path) -> list[Path]:
     return sorted(kernels | {place for place in places if place.is_file()})
 
 
-def discard_stale(package: Path) -> str:
+def discard_stale(package: Path, *, every: bool = False) -> str:
     """Delete the compiled kernels cached for a package's folder unless they belong to its sources as they are.
 
-    A cache that cannot be written (numba keeps it elsewhere then) is left alone. Returns the digest of the sources.
+    Those of its kernels; or ``every`` one, where what is compiled stands beside what is not. A cache that cannot be
+    written (numba keeps it elsewhere then) is left alone. Returns the digest of the sources.
     """
     digest = hashlib.blake2b(digest_size=16)
-    for source in kernel_sources(package):
+    for source in sorted(package.rglob("*.py")) if every else kernel_sources(package):
         digest.update(source.relative_to(package).as_posix().encode() + b"\0" + source.read_bytes())
     stamp = package / "__pycache__" / "kernels.digest"
     try:

@@ -34,6 +34,9 @@ UNROLL = 4
 """Vectors summed at a time, to hide the latency of a multiply-add; arrays are multiples of LANES * UNROLL numbers."""
 
 _INTEGER = ir.IntType(64)
+POINTER = types.CPointer(types.float64)
+"""The type of the address of an array in compiled code; what is handed on so is not counted as in use."""
+
 
 Rows = Callable[[], Sequence[Sequence[float]]]
 """Gives weights by rows, when the code is generated: what is loaded from a cache does not need them."""
@@ -93,12 +96,6 @@ infer_global(operator.neg)(_Unary)
 @lower_builtin(operator.neg, Vector)
 def _negative(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.fneg(args[0])
-
-
-POINTER = types.CPointer(types.float64)
-
-
-"""The type of the address of an array in compiled code; what is handed on so is not counted as in use."""
 
 
 @intrinsic
@@ -202,14 +199,10 @@ def _each(name: str) -> Any:
 
 
 root = _each("sqrt")
-
-
 """Square roots of a vector."""
 
 
 magnitude = _each("fabs")
-
-
 """Absolute values of a vector."""
 
 

@@ -28,16 +28,17 @@ from creeping.phaseflow.coordinates.rotation import CompiledModel, packed_lanes,
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
 from creeping.phaseflow.splines import PACKED, Grid, Leap, prefilter
 
-Progress = Callable[[str], None]
 SAMPLES = 2000
 """Random points of T1Q at which a finished map is measured: one ray in a hundred may carry most of the error."""
 CHUNK = 65_536
 """Nodes traced at a time."""
 UNMEASURED = ErrorEstimate(float("nan"), float("nan"), 0)
-
-
 RESOLVED = 1e-7
 """Error of the attenuation over a natural horizon by polynomials through Chebyshev times."""
+_CHECKED: set[str] = set()
+
+
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -274,9 +275,6 @@ class Reference:
             self._drawn.append((states, exact))
         states, exact = self._drawn[draw]
         return np.asarray(np.linalg.norm(flow.transport(states, self._times) - exact, axis=2))
-
-
-_CHECKED: set[str] = set()
 
 
 def require_checked(body: Surface) -> None:

@@ -34,9 +34,11 @@ from typing import TYPE_CHECKING
 
 from creeping._typing import BoolArray
 
-Facts = Iterable[tuple[str, str]]
 MOST = 6
 """Rows of a kind shown at most: curves of a line, arcs of a curve."""
+
+
+Facts = Iterable[tuple[str, str]]
 
 
 def of_line(line: "ShadowLine") -> Facts:

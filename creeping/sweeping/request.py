@@ -29,6 +29,13 @@ LARGEST_LENGTH = 1e300
 LONG_LEAP = 0.15
 """Share of an automatic length up to which it is made one of whole leaps."""
 MOST_RAYS, MOST_STEPS, MOST_WAVENUMBERS = 65_536, 4096, 100_000
+SHARES = ("attached", "occluded", "concave")
+AMPLITUDES = {
+    "total": "far-field amplitude f",
+    "creeping": "far-field amplitude of the creeping rays, where rays serve",
+    "reflected": "far-field amplitude of the reflected rays, where rays serve",
+    "forward": "far-field amplitude of the forward lobe, where rays serve",
+}
 
 
 class Variable(NamedTuple):
@@ -57,7 +64,6 @@ LINE = {
     "concave": Variable((), "float64", "1", "share of the length in concave regions"),
     "singular_distance": Variable((), "float64", "1", "least |n.d| at a critical point of n.d, n = +-d apart"),
 }
-SHARES = ("attached", "occluded", "concave")
 RAYS = {
     "ray_status": Variable(("ray",), "int8", "1", "codes of RayStatus; -1 where there is no ray"),
     "curve_index": Variable(("ray",), "int16", "1", "curve of the shadow line, the longest first"),
@@ -79,12 +85,6 @@ CURVED = {
 VALID = {
     "least_k_rho": Variable(("wavenumber",), "float64", "1", "least k rho on the rays, as creeping.validity"),
     "largest_transverse": Variable(("wavenumber",), "float64", "1", "largest kappa_t rho/m^2, as creeping.validity"),
-}
-AMPLITUDES = {
-    "total": "far-field amplitude f",
-    "creeping": "far-field amplitude of the creeping rays, where rays serve",
-    "reflected": "far-field amplitude of the reflected rays, where rays serve",
-    "forward": "far-field amplitude of the forward lobe, where rays serve",
 }
 
 

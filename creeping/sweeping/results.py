@@ -38,10 +38,11 @@ CONVENTIONS = (
     "time factor exp(-i omega t); direction is where the wave travels; radians; lengths in the unit L of the body, "
     "wavenumbers in 1/L; far field f exp(i k r)/r, f in L"
 )
-Coordinate = tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, Any]]
-
 POLARISATIONS = {"VV": ("theta", "theta"), "VH": ("theta", "phi"), "HV": ("phi", "theta"), "HH": ("phi", "phi")}
 """Scattered by incident component: V is along theta, vertical where z is up and the wave level, H along phi."""
+
+
+Coordinate = tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, Any]]
 
 
 def require(package: str) -> Any:

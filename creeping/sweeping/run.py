@@ -36,10 +36,12 @@ if TYPE_CHECKING:
 
 IN_MEMORY = 8_000_000_000
 """Bytes of results beyond which a store is asked for."""
-Progress = Callable[[float, int, float], None]
-"""Called with incidences done, incidences to do, and seconds."""
 EVERY = 1.0
 """Seconds between reports within a task."""
+
+
+Progress = Callable[[float, int, float], None]
+"""Called with incidences done, incidences to do, and seconds."""
 
 
 def sweep_directions(

@@ -23,14 +23,21 @@ if TYPE_CHECKING:
     from scatterers.atlas.monge.atlas import MongeAtlas
     from scatterers.sphere_map.star import CubeSphereAtlas
 
-FloatArray = NDArray[np.float64]
-Progress = Callable[[str], None]
-Kept = tuple[Path, str, dict[str, FloatArray], dict[str, Any]]
 CHARTS, NO_CHARTS, FITS = "charts-", "no_charts", ("fine", "coarse")
 FEWEST = 0.1
 """Share of the points that has to be farther off, for a fit to mean anything."""
 SLACK = 0.02
 """Of the box about a body of pieces, in its largest side."""
+SURFACES = ("smooth", "facets", "auto")
+OF_FACETS = ("part", "cap", "union", "progress")
+"""Options that a body on its facets has as well,"""
+OF_ALL = ("cache",)
+"""and those that mean nothing there."""
+
+
+FloatArray = NDArray[np.float64]
+Progress = Callable[[str], None]
+Kept = tuple[Path, str, dict[str, FloatArray], dict[str, Any]]
 
 
 class SplineBody(LevelBody):
@@ -109,13 +116,6 @@ class SplineBody(LevelBody):
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self._digest}, speed={self.speed!r})"
-
-
-SURFACES = ("smooth", "facets", "auto")
-OF_FACETS = ("part", "cap", "union", "progress")
-"""Options that a body on its facets has as well,"""
-OF_ALL = ("cache",)
-"""and those that mean nothing there."""
 
 
 class FittedBody(SplineBody):

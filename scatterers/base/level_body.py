@@ -34,13 +34,14 @@ from numpy.typing import ArrayLike
 
 from scatterers.speed import as_speed
 
-FloatArray = NDArray[np.float64]
 CLOUDS = (25_000, 100_000)
 """Points of the body by which charts are chosen, the more if the fewer do not do."""
 MARGIN = 0.4
 """How far charts reach beyond their squares: fewer charts than with more, for maps of at least 15 nodes a side."""
-
 MOST_NUMBERS = 10**9
+
+
+FloatArray = NDArray[np.float64]
 
 
 def finite(**values: float) -> None:

@@ -23,10 +23,12 @@ from scatterers.sphere_map.star import CubeSphereAtlas, FaceChart
 from scatterers.triangles.quality import MeshQuality
 from scatterers.triangles.subdivision import Source
 
-__all__ = ["BentEllipsoid", "finite", "positive"]
-FloatArray = NDArray[np.float64]
 DISTRUSTED = 2.0
 """Edges about a non-smooth point within which nothing is trusted."""
+
+
+__all__ = ["BentEllipsoid", "finite", "positive"]
+FloatArray = NDArray[np.float64]
 
 
 class BentEllipsoid(Body):

@@ -27,8 +27,6 @@ from scatterers.spline.cloud import (
 from scatterers.spline.fitting import MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
 from scatterers.triangles.subdivision import BLIND, Source, turns, unseen
 
-FloatArray = NDArray[np.float64]
-Progress = Callable[[str], None]
 COARSENING, FINER = 1.35, 0.75
 """Spacing of the second fit, in units of the first, and to points nearer to the source."""
 SMOOTHINGS = (1e-6, 1e-5, 1e-4, 1e-3)
@@ -43,6 +41,10 @@ SLOPES = (0.5, 1.6)
 """|grad F| on the body: F is near a signed distance, or the fit has failed."""
 MOST_BLIND = 0.05
 """Share of the vertices of a mesh that is subdivided about which it may show nothing."""
+
+
+FloatArray = NDArray[np.float64]
+Progress = Callable[[str], None]
 
 
 class NoBodyError(ValueError):

@@ -37,8 +37,6 @@ from scatterers.triangles.files import UNITS, TriangleMesh
 from scatterers.triangles.quality import Choice, whole_body
 from scatterers.triangles.topology import cleaned, edges_of
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
 BEGINNINGS = {"STEP": r"\s*ISO-10303-21", "IGES": r".{72}[SFG]", "BREP": r"\s*(DBRep_DrawableShape|CASCADE Topology)"}
 LARGEST = 512_000_000
@@ -57,11 +55,15 @@ times the points at most."""
 # what a STEP file may call its length unit
 PREFIXES = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".MICRO.": "um", ".KILO.": "km"}
 IGES_UNITS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 9: "um", 10: "cm"}
-Note = Callable[[str], None]
 JUMP = 0.3
 """Of the larger curvature: where a resolved mesh's curvature only varies, two sides of an edge differ by less."""
 FLAT = 1e-3
 """Curvature times edge below which a face counts as plane."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Note = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,10 +16,12 @@ from scatterers.kernels.compiled import Compiled
 from scatterers.pieces.patch import Crease
 from scatterers.spline.tensor import SYMMETRIC, evaluated
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 SHARP = ("edge", "tip")
 """Kinds of creases that no smooth chart covers."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 class Levelled:

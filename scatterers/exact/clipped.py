@@ -25,8 +25,6 @@ from numpy.typing import NDArray
 
 from scatterers.pieces.patch import Crease
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 NEWTON = 20
 HALVINGS = 45
 SHALLOW = 1e-3
@@ -47,6 +45,10 @@ STEPS = np.array(
         for p in permutations(range(3))
     ]
 )
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 class Level(Protocol):

@@ -28,13 +28,15 @@ from numpy.typing import NDArray
 from scatterers.base.level_body import finite
 from scatterers.kernels.revolved import CONIC, SPLINE
 
-FloatArray = NDArray[np.float64]
-Pair = tuple[float, float]
 OFF = 1e-9
 """How far from its conic an end may be, in its semi-axes."""
 DEGREE = 5
 MOST_TURN = np.pi / 2
 """Turn of the tangent between two points beyond which a profile is too coarse."""
+
+
+FloatArray = NDArray[np.float64]
+Pair = tuple[float, float]
 
 
 class Segment(Protocol):

@@ -52,8 +52,6 @@ from scatterers.kernels.revolved import value_and_gradient
 from scatterers.sphere_map.radial import RadialMap, Spine
 from scatterers.sphere_map.star import CubeSphereAtlas
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 SMALLEST = 1e-6
 """Turn of the tangent, radians, below which a corner is a joint, and an end on the axis no tip."""
 SAME = 1e-12
@@ -71,11 +69,15 @@ FEWEST = 6
 """Points on a ring, however short."""
 STEEP = 1.1
 """Turn of the profile along a square, radians, at most."""
-Tiles = Callable[[float], tuple[FloatArray, FloatArray, NDArray[np.int64]]]
 # nodes along an axis plus four, of one cell
 ONE_CELL = 6.0
 SLACK = 0.1
 """By which the box of the map is wider than the body, in its half widths."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Tiles = Callable[[float], tuple[FloatArray, FloatArray, NDArray[np.int64]]]
 
 
 class Squares(NamedTuple):

@@ -14,7 +14,6 @@ from scatterers.kernels.compiled import Compiled
 from scatterers.spline.cloud import Samples, step_onto
 from scatterers.spline.tensor import SYMMETRIC, evaluated
 
-FloatArray = NDArray[np.float64]
 SINGULAR = 1e-6
 """|grad F| on the body, relative to its median there, below which a point is singular."""
 SUSPECTS = 200
@@ -37,6 +36,9 @@ COARSE, FINE = 33, 65
 """Nodes along a side of those cubes, and along the longest side of the box that is examined."""
 SLACK = 0.12
 """By which the box is wider than the body, in its own half widths."""
+
+
+FloatArray = NDArray[np.float64]
 
 
 def singular_points(compiled: Compiled, points: FloatArray, size: float) -> FloatArray:

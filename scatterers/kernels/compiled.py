@@ -28,25 +28,21 @@ from numba.experimental import function_type as _function_type  # noqa: F401
 from numba.extending import typeof_impl
 from numpy.typing import NDArray
 
-from scatterers.kernels.cache import discard_stale
-from scatterers.kernels.private_cache import keep_private
+from creeping.kernels.cache import discard_stale
+from creeping.kernels.private_cache import keep_private
+
+F = TypeVar("F", bound=Callable[..., Any])
+# products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+CLOSED_FORM = 50.0
+"""Operations of the level of a quadric."""
+
 
 Kind = Literal["level", "locator", "forward", "inverse"]
 
 
-keep_private(Path(__file__).parents[1], discard_stale(Path(__file__).parents[1]))
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-# products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
-
-
-CLOSED_FORM = 50.0
-
-
-"""Operations of the level of a quadric."""
+# the level of a body is compiled from the file of the body
+keep_private(Path(__file__).parents[1], discard_stale(Path(__file__).parents[1], every=True))
 
 
 _helpers: list[Callable[..., Any]] = []

@@ -13,9 +13,15 @@ from pathlib import Path
 
 from numba import njit
 
-from scatterers.kernels.cache import discard_stale
+from creeping.kernels.cache import discard_stale
 
-discard_stale(Path(__file__).parents[1])
+NOISE = 1e-13
+"""Volumes below this, in cubes of the pair's size, are rounding and count as touching."""
+FOLDED = 1e-6
+"""Angle between two triangles at their common edge, rad, below which they lie on each other."""
+
+
+discard_stale(Path(__file__).parents[1], every=True)
 
 
 @njit(cache=True, error_model="numpy")
@@ -66,20 +72,6 @@ def crossed(points, vertices, triangles, starts, members, low, step, counts, lea
                 counts[i] += 1
                 if counts[i] >= most:
                     break
-
-
-discard_stale(Path(__file__).parents[1])
-
-NOISE = 1e-13
-
-
-"""Volumes below this, in cubes of the pair's size, are rounding and count as touching."""
-
-
-FOLDED = 1e-6
-
-
-"""Angle between two triangles at their common edge, rad, below which they lie on each other."""
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,9 +12,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from scatterers.kernels.cache import discard_stale
-
-discard_stale(Path(__file__).parents[1])
+from creeping.kernels.cache import discard_stale
 
 TERMS = 27
 """Monomials of degree 1 to 6."""
@@ -25,6 +23,9 @@ RIDGE = 2e-4
 """Least singular value, relative to terms of size 1, at which a combination of terms still counts."""
 WEAK = 0.02
 """Part of a column that is new against its predecessors, below which more neighbours are asked."""
+
+
+discard_stale(Path(__file__).parents[1], every=True)
 
 
 @njit(**OPTIONS)

@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from scatterers.kernels.compiled import helper
 from scatterers.kernels.tensor import HEADER
 
-FloatArray = NDArray[np.float64]
 # where values stand in the flat parameters: the axes of space that are u, v and w, the stretch of v, whether the
 # profile is of a whole body (1) or of a piece, which goes on beyond its ends (0), the number of segments; their rows
 PLACE, STRETCH, WHOLE, COUNT, ROWS = HEADER, HEADER + 3, HEADER + 4, HEADER + 5, HEADER + 6
@@ -41,6 +40,9 @@ CONIC, SPLINE = 0.0, 1.0
 SPLINE_WIDTH = 14
 TINY = 1e-300
 NEWTON = 12
+
+
+FloatArray = NDArray[np.float64]
 
 
 @helper

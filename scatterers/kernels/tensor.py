@@ -28,12 +28,9 @@ from numba.extending import intrinsic
 from scatterers.kernels.compiled import OPTIONS
 
 LANES = 8
-_double, _index, _lane = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
-_vector = ir.VectorType(_double, LANES)
 # which derivatives (along x, y, z) `contract` returns, in this order
 FIRST = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 SECOND = [*FIRST, (2, 0, 0), (0, 2, 0), (0, 0, 2), (0, 1, 1), (1, 0, 1), (1, 1, 0)]
-
 # w_j(t) = sum_m POWERS[m, j] t^m
 POWERS = (
     np.array(
@@ -66,9 +63,12 @@ BEYOND = 1.0
 ITERATIONS = 60
 # a Newton step this small, relative to the radius, leaves an error below rounding
 SMALL = 1e-8
-
 TILE = 8
 """Rows exchanged at a time."""
+
+
+_double, _index, _lane = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+_vector = ir.VectorType(_double, LANES)
 
 
 def _shuffle(builder: ir.IRBuilder, a: Any, b: Any, lanes: list[int]) -> Any:

@@ -46,9 +46,6 @@ from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, oscu
 from scatterers.triangles.quality import BAD
 from scatterers.triangles.topology import components
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 FOLD = 3.0
 """Spacings of the grid within which opposite normals make a fold."""
 RINGS = 4
@@ -77,6 +74,11 @@ SLOPES = (0.5, 1.6)
 """|grad F| at the points: beyond, nothing of a piece is trusted either."""
 SMALL = 0.02
 """Triangles of a region that may be absorbed, relative to those of the quadric's."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 def astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: IntArray, size: float) -> FloatArray:

@@ -33,9 +33,6 @@ from scatterers.pieces.patch import Closeness, Patch, polynomial_patch
 from scatterers.triangles.jets import angle_weighted_normals
 from scatterers.triangles.topology import components, edges_of
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 SMOOTH = 0.02
 """Angle between the normals of two quadrics, radians, up to which they may join there without an edge."""
 SECANTS, FOUND = 6, 1e-6
@@ -60,6 +57,11 @@ TIPS, NEARLY = 100, 100.0
 """Vertices that may be tips, and their distance in that within which others are held: Q changes with its square."""
 STEEP = 1e-3
 """Slope of a quadric, relative to the median, below which it has no normal: the tip of a cone."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 class Sheet:

@@ -33,8 +33,6 @@ from scatterers.spline.fitting import ACCURACY, fit, spacing_of
 from scatterers.spline.tensor import TensorSpline, weights
 from scatterers.triangles.jets import Jets, centroids, signed_distance
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 EXACT = 1e-6
 """Distance of points from a plane or quadric, in body sizes, within which they lie on it: single precision and some."""
 OUTLIER, EVENLY = 5.0, 1.4
@@ -59,6 +57,10 @@ CLOSELY, ROUGHLY = ACCURACY, 3e-4
 """Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
 MOST = 4_000_000
 """Triangles of a mesh that is made."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,9 +16,6 @@ from numpy.typing import NDArray
 from scatterers.pieces.patch import Crease
 from scatterers.triangles.topology import components, edges_of
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 FLAT, TURN, SHARP, ALWAYS = 0.5, 12.0, 40.0, 60.0
 """Degrees; beyond the last an edge is sharp whatever the others are."""
 OFTEN = 6.0
@@ -28,6 +25,11 @@ FEWEST = 6
 """Edges of a chain, unless all are turned by more than `ALWAYS`, as those of a tetrahedron."""
 SLIVER = 1e-3
 """Area, relative to the median, below which the normal of a triangle is not asked."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,9 +28,6 @@ from scatterers.kernels.tensor import CENTRE, HEADER
 from scatterers.pieces.patch import Crease
 from scatterers.spline.tensor import TensorSpline, evaluated
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Program = tuple[float, ...]
 VOXELS = 500_000
 """Voxels about a body."""
 SAME = 0.03
@@ -41,11 +38,15 @@ MARGIN = 3
 """Voxels about the body."""
 ALIKE = 0.5
 """Cosine between the normals of pieces that a chain of joints makes one surface: across a sharp nose they oppose."""
-
 STRAIGHT, KINK = 1e-3, 0.8
 """Turn of a joint over three of its segments, radians, from which on it has a plane, and beyond which it is a kink;"""
 STEEP = 0.5
 """cosine between that plane and the one at right angles to the body, below which it nearly touches the body."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Program = tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,14 +14,16 @@ from scatterers.pieces.patch import Crease, curved, divided
 from scatterers.pieces.selection import PieceSpace
 from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 KINDS = ("edge", "joint", "tip", "seam")
 TRUSTED = 1.0
 """Distance from an edge from which on a fitted piece is trusted, in distances of its points."""
 STEPS, MOVED = 3, 0.1
 """Newton steps that bring tiles onto their piece, and the longest, in their sides."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

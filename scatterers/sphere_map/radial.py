@@ -26,9 +26,11 @@ from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.tensor import DEGREE, ITERATIONS, REACH, SMALL
 from scatterers.spline.tensor import evaluated
 
-FloatArray = NDArray[np.float64]
 # centroids this near to a parallel of the axis, in half widths, make no spine
 UPRIGHT = 0.01
+
+
+FloatArray = NDArray[np.float64]
 
 
 class SpaceLevel(Protocol):

@@ -26,9 +26,11 @@ from scatterers.sphere_map.radial import RadialMap, SpaceLevel, Spine
 from scatterers.spline.cloud import Samples
 from scatterers.spline.tensor import evaluated
 
-FloatArray = NDArray[np.float64]
 CHECKED = 20000
 """Points of the body at which the centre is checked."""
+
+
+FloatArray = NDArray[np.float64]
 
 
 def star_map(space: SpaceLevel, samples: Samples, centre: FloatArray | None) -> tuple[RadialMap | None, str]:

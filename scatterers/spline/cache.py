@@ -18,9 +18,8 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.kernels.private_cache import private_folder, require_private
+from creeping.kernels.private_cache import private_folder, require_private
 
-FloatArray = NDArray[np.float64]
 SCHEMA = 14
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
@@ -32,6 +31,9 @@ ARRAYS = {
 """Arrays of a fit and their numbers of axes."""
 LEAST = 6
 """Coefficients along an axis of a spline of degree 5."""
+
+
+FloatArray = NDArray[np.float64]
 
 
 def cache_folder() -> Path:

@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 
 from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
 
-FloatArray = NDArray[np.float64]
-Field = Callable[[FloatArray], FloatArray]
 # cells of the first grid, along the side of a cube of the box's volume
 COARSE = 24
 # nodes of the largest grid
@@ -31,6 +29,10 @@ MOST = 30_000_000
 NEWTON = 30
 # a Newton step this small, in units of the longest, squares to rounding
 SMALL = 1e-7
+
+
+FloatArray = NDArray[np.float64]
+Field = Callable[[FloatArray], FloatArray]
 
 
 def body_cloud(level: Field, gradient: Field, box: FloatArray, count: int) -> FloatArray:

@@ -35,7 +35,6 @@ from scatterers.kernels.tensor import OVERREAD
 from scatterers.spline.cloud import left_at, tangents
 from scatterers.spline.tensor import SYMMETRIC, Cardinal, TensorSpline, evaluated
 
-FloatArray = NDArray[np.float64]
 OFFSET_WEIGHT = 0.01
 """Of the samples at one cell's distance from the body."""
 THIN = 0.2
@@ -65,6 +64,9 @@ LOST = 2.5
 """How much worse than the best the curvatures of the F that is taken may be: points and normals gain by every step."""
 WATCHED = 2000
 """Points at which it is looked at."""
+
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

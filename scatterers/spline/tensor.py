@@ -25,9 +25,11 @@ from numpy.typing import NDArray
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.tensor import BEYOND, CENTRE, HEADER, OVERREAD, POWERS
 
-FloatArray = NDArray[np.float64]
 # where xx, yy, zz, yz, xz, xy stand in a matrix
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+
+
+FloatArray = NDArray[np.float64]
 
 
 @cache

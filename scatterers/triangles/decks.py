@@ -17,15 +17,12 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-Read = tuple[NDArray[np.float64], NDArray[np.int64]]
 CORNERS = {2: 3, 3: 4}
 """Nodes of the triangles and quadrangles of MSH files, by their kinds."""
 CURVED = (9, 10, 16, 20, 21, 23, 25)
 """Kinds of those with nodes along their edges."""
 CARDS = {"CTRIA3": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUADR": 4}
 CURVED_CARDS = ("CTRIA6", "CQUAD8", "CQUAD")
-
-Note = Callable[[str], None]
 SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf")
 KNOWN = (*SUFFIXES, ".nas", ".gz")
 """Endings of names of files that are read; .nas is .bdf, .gz is packed."""
@@ -69,6 +66,11 @@ COMMA = re.compile(
     rb"^[ \t]*(?:(?:vn?|vertex|facet[ \t]+normal)[ \t]+)?(?:[-+.\deE]+[ \t]+)*[-+]?\d+,\d[^\r\n]*", re.MULTILINE
 )
 EXPONENT = re.compile(rb"(?<!\S)([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d+)(?!\S)")
+
+
+Read = tuple[NDArray[np.float64], NDArray[np.int64]]
+
+Note = Callable[[str], None]
 
 
 def read_msh(data: bytes) -> Read:

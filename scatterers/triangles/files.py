@@ -24,8 +24,6 @@ from scatterers.triangles.subdivision import Subdivision
 from scatterers.triangles.threemf import read_3mf, with_triangles
 from scatterers.triangles.topology import cleaned, crossings, oriented
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048, "km": 1e3}
 """Metres per unit."""
 SPELLED = {
@@ -40,6 +38,10 @@ FAR = 100.0
 """Sizes from the origin beyond which a body is brought back: there differences of coordinates lose digits."""
 COARSEST_ROUNDING = 1e-3
 """Rounding of the coordinates, in mean edges, from which on curvatures are those of the rounding."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

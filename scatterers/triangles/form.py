@@ -29,13 +29,14 @@ PLY_BYTES = {
     for name in names
 }
 """Sizes of the numbers of a binary PLY."""
+ROUNDS = 6
+MOST_CUT = 0.1
+"""Share of the area that may be cut out."""
+
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
-ROUNDS = 6
-MOST_CUT = 0.1
-"""Share of the area that may be cut out."""
 
 
 def check_whole(name: str, suffix: str, data: bytes) -> None:

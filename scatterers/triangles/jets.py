@@ -22,8 +22,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 NEIGHBOURS = 56
 """Twice the terms of degree 6: enough to show in the residual what the jet misses."""
 AT_MOST = 112
@@ -39,6 +37,10 @@ JET_POINTS_SHARE = 20_000
 """Triangles treated at a time."""
 # powers of u and v in the order of `Jets.coefficients`
 POWERS = [(d - b, b) for d in range(1, 7) for b in range(d + 1)]
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

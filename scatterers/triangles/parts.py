@@ -22,13 +22,15 @@ from numpy.typing import NDArray
 
 from scatterers.triangles.topology import Edges, components, edges_of, oriented
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Note = Callable[[str], None]
 LISTED = 8
 """Parts that an error lists."""
 MOST_SHARED = 100_000
 """Edges of more than two triangles beyond which a mesh is soup, and left as it is."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Note = Callable[[str], None]
 
 
 def parts_of(vertices: FloatArray, triangles: IntArray) -> IntArray:

@@ -33,9 +33,6 @@ from scatterers.triangles.jets import Jets, angle_weighted_normals
 from scatterers.triangles.parts import capped, chosen_part, taken_apart, united
 from scatterers.triangles.topology import cleaned, oriented
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
 BAD = 0.03
 ASTRAY = 0.5
 """|n_6 - n| of a jet that does not follow its triangles; on slivers of smooth bodies it is below 0.2."""
@@ -54,6 +51,11 @@ ROUNDING = 1e-12
 """Edges below which a residual is rounding of the vertices."""
 FEWEST_RIMS, JUMPS_ALONG = 6, 0.5
 """Vertices that make a rim; jumps, in roots of the number of vertices, that make a curve over the body."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
 
 
 class Mesh(Protocol):

@@ -18,14 +18,15 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Read = tuple[FloatArray, IntArray, str, tuple[tuple[str, int], ...]]
 PART = "3d/3dmodel.model"
 DEEPEST = 16
 MOST_PARTS = 1000
-
 MOST_CORNERS = 4
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Read = tuple[FloatArray, IntArray, str, tuple[tuple[str, int], ...]]
 
 
 def read_3mf(data: bytes, limit: int, most_triangles: int) -> Read:

@@ -20,15 +20,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Note = Callable[[str], None]
 CLOSE = (1e-6, 1e-5, 1e-4)
 """Distance of vertices on open edges that are merged, in diagonals of the body: single precision, and a few digits."""
 FLAT = 1e-9
 """Volume over that of the cube of the diagonal, below which a mesh encloses nothing."""
 KEPT = 1000
 """Pairs that are returned at most."""
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Note = Callable[[str], None]
 
 
 class Edges(NamedTuple):

@@ -28,13 +28,15 @@ from numpy.random import Generator
 
 from studies.fuzz.mutation import bad_values
 
-Call = tuple[Callable[..., Any], dict[str, Any]]
 COMPLEX_PARAMETERS = ("admittance", "level")
-
 REFUSED, ACCEPTED = "refused", "accepted"
 CRASH, WRONG, SLOW, SILENT = "crash", "wrong class", "too long", "silent"
 FINDINGS = (CRASH, WRONG, SLOW, SILENT)
 """Verdicts that must not come."""
+_MADE: dict[Path, dict[str, Any]] = {}
+
+
+Call = tuple[Callable[..., Any], dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -230,9 +232,6 @@ def others(folder: Path) -> dict[str, Callable[[], Any]]:
         "a tiny body": lambda: sc.Sphere(1e-200),
         "an error": lambda: cr.InvalidInputError("x"),
     }
-
-
-_MADE: dict[Path, dict[str, Any]] = {}
 
 
 def _fixtures_of(folder: Path) -> dict[str, Any]:

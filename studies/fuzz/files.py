@@ -23,10 +23,12 @@ from studies.fuzz.calls import ACCEPTED, REFUSED, SILENT, Verdict, failure
 from studies.fuzz.mutation import mutated
 from studies.fuzz.readers import UnclearError, corners_of
 
-FloatArray = NDArray[np.float64]
 FITTED = 0.01
 """Share of accepted meshes to which a body is fitted, too, unless larger than this."""
 LARGEST = 3.0
+
+
+FloatArray = NDArray[np.float64]
 
 
 def in_order(corners: FloatArray) -> FloatArray:

@@ -26,7 +26,6 @@ import creeping as cr
 import scatterers as sc
 from studies.fuzz.calls import ACCEPTED, SILENT, Verdict
 
-FloatArray = NDArray[np.float64]
 RTOL = 1e-11
 FLOW = 3e-8
 """What composition and the other properties of a flow may miss by, in body sizes, at RTOL and times up to 3."""
@@ -36,6 +35,15 @@ TIME = st.floats(0.0, 1.5).map(lambda value: round(value, 4))
 HEIGHT = st.floats(-0.999, 0.999).map(lambda value: round(value, 4))
 EXAMPLES = 3
 """Examples of a property that make one case."""
+UNIT = st.floats(0.05, 0.95).map(lambda value: round(value, 4))
+BOUNDARY = st.sampled_from(["soft", "hard"])
+K = 20.0
+LEAST = 1e-6
+"""Difference of fields that is rounding of their nodes, for bodies of size 1."""
+SHIFT = st.builds(lambda *values: np.array(values), *[st.floats(-2.0, 2.0).map(lambda v: round(v, 3))] * 3)
+
+
+FloatArray = NDArray[np.float64]
 
 ellipsoids = st.builds(sc.Ellipsoid, AXES, AXES, AXES)
 twisted = st.builds(sc.TwistedEllipsoid, AXES, AXES, AXES, st.floats(-0.2, 0.2).map(lambda d: round(d, 3)))
@@ -61,7 +69,6 @@ def start_of(body: Any, u: float, v: float, turn: float) -> tuple[FloatArray, Fl
     return x, frame @ np.array([math.cos(turn), math.sin(turn)])
 
 
-UNIT = st.floats(0.05, 0.95).map(lambda value: round(value, 4))
 starts = {"body": bodies, "u": UNIT, "v": UNIT, "turn": ANGLE}
 
 
@@ -139,11 +146,7 @@ def agree(one: tuple[complex, float], other: tuple[complex, float], least: float
     assert abs(first - second) <= its + mine + least, f"{first:.6g} +- {its:.2g}, {second:.6g} +- {mine:.2g}"
 
 
-BOUNDARY = st.sampled_from(["soft", "hard"])
 fields = {"body": ellipsoids, "d": directions, "r": directions, "boundary": BOUNDARY}
-K = 20.0
-LEAST = 1e-6
-"""Difference of fields that is rounding of their nodes, for bodies of size 1."""
 
 
 def fields_are_reciprocal(body: Any, d: FloatArray, r: FloatArray, boundary: str) -> None:
@@ -186,7 +189,6 @@ def fields_move(
     agree((value * phase, error), (complex(total[0]), float(its[0])), 1e-4 * abs(value))
 
 
-SHIFT = st.builds(lambda *values: np.array(values), *[st.floats(-2.0, 2.0).map(lambda v: round(v, 3))] * 3)
 PROPERTIES: dict[str, tuple[Callable[..., None], dict[str, Any]]] = {
     "rays stay unit tangents": (rays_stay_unit_tangents, {**starts, "t": TIME}),
     "flows compose": (flows_compose, {**starts, "s": TIME, "t": TIME}),

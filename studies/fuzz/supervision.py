@@ -26,6 +26,9 @@ MEMORY = 4_000_000_000
 """Bytes that the cases may take beyond what the process has when it is ready."""
 PREPARING = 600.0
 """Seconds until the first case: kernels are compiled at first use."""
+HEAD = f"{'attack':14}" + "".join(
+    f"{name:>9} " for name in ("cases", "refused", "accepted", "crash", "class", "too long", "silent")
+)
 
 
 @dataclass
@@ -60,9 +63,6 @@ class Tally:
         return f"{self.attack:14}{cells}{self.seconds:8.0f}{self.slowest:9.2f}"
 
 
-HEAD = f"{'attack':14}" + "".join(
-    f"{name:>9} " for name in ("cases", "refused", "accepted", "crash", "class", "too long", "silent")
-)
 HEAD += f"{'s':>8}{'slowest':>9}"
 
 

@@ -18,9 +18,11 @@ import numpy as np
 
 from studies.reference.section_shapes import FloatArray
 
-Field = Callable[[FloatArray], FloatArray]
 GRID = 240
 """Cells along z and phi of the area table; linear interpolation in it moves a point by less than a tenth of h."""
+
+
+Field = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,13 @@ from studies.reference.section_shapes import ComplexArray, FloatArray, positive
 
 TERMS = 20_000
 """Partial waves: good to 1e-9 at ka = 100, where a tenth of them leaves 1e-7."""
+_LEVI_CIVITA = np.array(
+    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
+)
+RINGS, FIT_RINGS = 0.5 * 1.35 ** np.arange(10), 0.25 * 1.2 ** np.arange(20)
+"""Radii around a port, in the least height, of fundamental solutions and of points of the condition."""
+AROUND, CENTRE = 12, (0.7, 1.0, 1.5, 2.2)
+"""Fundamental solutions on a ring, and depths of those below the port itself, in the least height."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +94,6 @@ class ConductorSolution:
             parts.append([(part.reshape(3 * len(some), -1) @ q).reshape(shape) for part in (E, H)])
         scattered = (np.concatenate(part) for part in zip(*parts, strict=True))
         return tuple(wave * one + its for one, its in zip((e0, h0), scattered, strict=True))
-
-
-_LEVI_CIVITA = np.array(
-    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
-)
 
 
 def frames(directions: ArrayLike) -> FloatArray:
@@ -272,18 +274,6 @@ def coupled(
     total = (_kernel(x, everywhere, k) @ strengths + _kernel(x, z, k)).reshape(len(x), len(h), -1) / (4 * np.pi)
     values, fewer = (np.tensordot(_to_zero(h[:n]), total[:, :n], axes=(0, 1)) for n in (len(h), len(h) - 1))
     return Coupled(ports, x, values, np.abs(values - fewer), worst)
-
-
-RINGS, FIT_RINGS = 0.5 * 1.35 ** np.arange(10), 0.25 * 1.2 ** np.arange(20)
-
-
-"""Radii around a port, in the least height, of fundamental solutions and of points of the condition."""
-
-
-AROUND, CENTRE = 12, (0.7, 1.0, 1.5, 2.2)
-
-
-"""Fundamental solutions on a ring, and depths of those below the port itself, in the least height."""
 
 
 def _around(body: Body, X: FloatArray, radii: FloatArray, count: int) -> Cloud:

@@ -35,10 +35,12 @@ from studies.reference.dipoles import frames
 from studies.reference.fundamental import least_squares
 from studies.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
-Kind: TypeAlias = Boundary | Literal["pec"]
-"""Soft, hard, the impedance number eta, or a perfect conductor."""
 CHECKS = 250
 """Points on each sphere at which the residual is taken."""
+
+
+Kind: TypeAlias = Boundary | Literal["pec"]
+"""Soft, hard, the impedance number eta, or a perfect conductor."""
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,14 @@ from pathlib import Path
 import numba
 import pytest
 
-from creeping.kernels import cache as of_creeping
 from creeping.kernels import private_cache
-from scatterers.kernels import cache as of_scatterers
-from scatterers.kernels import private_cache as of_scatterers_private
+from creeping.kernels.cache import discard_stale
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("module", [of_creeping, of_scatterers])
-def test_kernels_are_dropped_when_a_source_changes(module, tmp_path: Path):
+@pytest.mark.parametrize("every", [False, True])
+def test_kernels_are_dropped_when_a_source_changes(every, tmp_path: Path):
     package = tmp_path / "package"
     source, constants, other = (package / f"room/{name}.py" for name in ("kernels/inner", "constants", "other"))
     source.parent.mkdir(parents=True)
@@ -28,27 +26,22 @@ def test_kernels_are_dropped_when_a_source_changes(module, tmp_path: Path):
     cached.parent.mkdir()
     cached.write_bytes(b"old")
     (tmp_path / "__pycache__").write_text("no folder")
-    module.discard_stale(tmp_path)
+    discard_stale(tmp_path, every=every)
     assert (tmp_path / "__pycache__").read_text() == "no folder"
-    module.discard_stale(package)
+    discard_stale(package, every=every)
     assert not cached.exists(), "kernels of unknown sources"
     for changed in (source, constants):
         cached.write_bytes(b"new")
-        module.discard_stale(package)
+        discard_stale(package, every=every)
         assert cached.exists(), "kernels of these very sources"
         changed.write_text(changed.read_text() + "# changed\n")
-        module.discard_stale(package)
+        discard_stale(package, every=every)
         assert not cached.exists(), "kernels of sources that changed"
-    if module is of_creeping:
+    if not every:
         cached.write_bytes(b"new")
         other.write_text("B = 2\n")
-        module.discard_stale(package)
+        discard_stale(package, every=every)
         assert cached.exists(), "no kernel takes anything from there"
-
-
-def test_both_packages_keep_to_private_folders_alike():
-    one, other = (Path(module.__file__).read_text() for module in (private_cache, of_scatterers_private))
-    assert one == other
 
 
 @pytest.fixture

@@ -45,6 +45,8 @@ the cube of the heights they span."""
 
 LIT_LEVEL, DARK_LEVEL, SHAPE = 2.3, 4.6, 2.3
 """Factors L and S of the error, set on the first four bodies of `studies._point_coverage`."""
+ELECTRIC, MAGNETIC = slice(0, 3), slice(3, 6)
+"""Where E and H stand among six components."""
 
 
 def lowest_height(currents: ConductorCurrents) -> float:
@@ -125,12 +127,6 @@ def _between(
     of_H = np.linalg.norm([*shared, w[:, 0] * off, w[:, 1] * off, LEFT_OUT * left_out], axis=0)
     of_E = np.linalg.norm([*shared, *across, of_charge, LEFT_OUT * left_out, LEFT_OUT_ACROSS * left_out], axis=0)
     return field, np.maximum(of_E, of_H)
-
-
-ELECTRIC, MAGNETIC = slice(0, 3), slice(3, 6)
-
-
-"""Where E and H stand among six components."""
 
 
 def incident_fields(direction: FloatArray, electric: ComplexArray, points: FloatArray, k: float) -> ComplexArray:

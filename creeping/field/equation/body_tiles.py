@@ -26,6 +26,12 @@ from creeping.geometry.kept import kept
 from creeping.geometry.parts import inside, is_faceted, why_no_rays
 from creeping.geometry.patches import SHARP, Patches, chordal, facet_patches, halved, own_triangles, sides_of, turns_of
 
+CHEAP = 4000
+"""Nodes up to which those of five a side serve: of a body that is small against the wavelength it is its own shape that
+currents follow."""
+MOST_SQUARES = 20_000
+"""Triangles up to which squares are thought of: more are small."""
+
 
 def body_tiles(body: Any, wavenumber: float, boundary: Boundary, *, finest: bool = False) -> Tiles:
     """Tiles of a body for a wavenumber, 1/L, and a boundary; of facets the ``finest``, which go with other bodies'.
@@ -107,8 +113,6 @@ class Rule(NamedTuple):
 
 
 FINEST = Rule(True, POINTS, SIDE, (0.0, 0.0), 1.0)
-
-
 """Of bodies for which nodes cost nothing, and beside bodies of other kinds."""
 
 
@@ -119,19 +123,6 @@ RULES = (
     Rule(True, 3, 0.55, (0.01, 0.004), 1.0),
     FINEST,
 )
-
-
-CHEAP = 4000
-
-
-"""Nodes up to which those of five a side serve: of a body that is small against the wavelength it is its own shape that
-currents follow."""
-
-
-MOST_SQUARES = 20_000
-
-
-"""Triangles up to which squares are thought of: more are small."""
 
 
 class Faceted(Protocol):

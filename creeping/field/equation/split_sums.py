@@ -165,8 +165,6 @@ class Load(NamedTuple):
 
 
 ONE_LAYER, TWO_LAYERS, CURL = Load(4, 4e-9, 4e-8, 40, 12), Load(6, 8e-9, 8e-8, 40, 24), Load(12, 2e-8, 0.0, 75, 0)
-
-
 """Of a soft or hard body, of an impedance, and of a conductor's two waves, whose pairs are summed anew each time."""
 
 

@@ -51,6 +51,8 @@ FLAT, AT_EDGE = 1e-6, 1e-6
 """Difference of normals on a tile in a plane; distance of places on an edge, over that of the nodes next to it."""
 ANGLES, RADII = 12, 6
 """Places along a side and radii of each of the four triangles about a node of its own."""
+NEXT = ((0, 2, 0), (0, 3, 1), (1, 2, 0), (1, 3, 1), (2, 0, 0), (2, 1, 1), (3, 0, 0), (3, 1, 1))
+"""Of sides, the sides that meet them, and at which of their ends."""
 
 
 @cache
@@ -379,10 +381,6 @@ def _nodes(shapes: FloatArray, points: int, conical: bool) -> tuple[FloatArray, 
     scale = np.linalg.norm(area, axis=-1)
     normals = (area / scale[..., None]).reshape(-1, 3)
     return np.ascontiguousarray(x.reshape(-1, 3)), normals, (scale * np.outer(by_u, by_v)).ravel()
-
-
-NEXT = ((0, 2, 0), (0, 3, 1), (1, 2, 0), (1, 3, 1), (2, 0, 0), (2, 1, 1), (3, 0, 0), (3, 1, 1))
-"""Of sides, the sides that meet them, and at which of their ends."""
 
 
 def _parts(patches: Patches, longest: float, most: float) -> tuple[FloatArray, FloatArray]:

@@ -38,7 +38,6 @@ from creeping.kernels.exponential import wave
 
 _x, _w = np.polynomial.legendre.leggauss(4)
 NODES, WEIGHTS = tuple(float(x) for x in (_x + 1) / 2), tuple(float(w) for w in _w / 2)
-
 I1, I2, I3, I4, U1, U2, RATE1, RATE2, R1, R2, BEND1, BEND2, LANES = range(13)
 """Numbers of a ray: integrals, (2 κ)^(1/3) at both ends, 0 where κ <= 0, ρ', and r and ρρ'', 0 where κ <= 0."""
 TAU, RESIDUE, PLAIN, ACROSS, VARYING, ENDS, SLOPE, SLOPE_ACROSS, BENT, CONSTANTS = range(10)
@@ -46,7 +45,6 @@ TAU, RESIDUE, PLAIN, ACROSS, VARYING, ENDS, SLOPE, SLOPE_ACROSS, BENT, CONSTANTS
 MOST_OF_DECAY, MOST_CHANGE = 0.5, 2.0
 """Bounds of the second order: of |δ| in parts of ξ|τ|, and of what A adds to 1."""
 _FACTOR = 2 * math.sqrt(math.pi)
-
 STEEPEST = 0.6
 """Height of a point above the tangent plane at a foot, over its distance: beyond, it is on another side of a body."""
 SPAN = 16

@@ -58,6 +58,7 @@ SERIES, COUPLING_FUNCTION_TERMS = 1.5, 40
 """ξ up to which the series in powers of ξ^(3/2) serves, and its terms: good to 1e-13 there."""
 COUPLING_FUNCTION_MODES, DEEP, FEW = 16, 4.0, 5
 """Modes summed beyond, to 1e-10, and from DEEP on."""
+_BRANCHES: dict[tuple[complex, int], tuple[list[complex], list[ComplexArray]]] = {}
 
 
 def w1(t: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
@@ -239,9 +240,6 @@ def _at(q: ComplexArray, phase: complex, n: int) -> Modes:
     start, at = roots[nearest], nodes[nearest][:, None]
     tau = _newton(start + (q[:, None] - at) / (start - at * at), q[:, None])
     return _constants(tau, soft=False)
-
-
-_BRANCHES: dict[tuple[complex, int], tuple[list[complex], list[ComplexArray]]] = {}
 
 
 def _branch(phase: complex, n: int, steps: int) -> tuple[ComplexArray, ComplexArray]:

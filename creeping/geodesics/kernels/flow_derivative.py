@@ -24,10 +24,11 @@ from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.exponential import adjugate_form, second_form
 from creeping.kernels.vectors import LANES, load, loads, pointer, root, spread, store
 
-_three, _four, _six = (loads(rows, BLOCK) for rows in (3, 4, 6))
-
 STEPS = 8
 """Most Newton steps onto the body, as of `geometry.surface.project`."""
+
+
+_three, _four, _six = (loads(rows, BLOCK) for rows in (3, 4, 6))
 
 
 @njit(**options)

@@ -29,13 +29,13 @@ from creeping.geodesics.tableaus import DORMAND_PRINCE_8, FIFTH, SOLUTION, STAGE
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.vectors import LANES, larger, load, magnitude, pointer, root, spread, stage_sum, stage_sums, store
 
-sum_stages = stage_sums(STAGE_WEIGHTS)
-_solution, _third, _fifth = (stage_sum(STAGE_WEIGHTS, row) for row in (SOLUTION, THIRD, FIFTH))
-
 LANDING, STRETCHED = 0.6, 1.1
 """Shares of the step that adapts: outputs end no shorter steps, and longer ones only to end there."""
-
 _STAGES = DORMAND_PRINCE_8.stages
+
+
+sum_stages = stage_sums(STAGE_WEIGHTS)
+_solution, _third, _fifth = (stage_sum(STAGE_WEIGHTS, row) for row in (SOLUTION, THIRD, FIFTH))
 
 
 @njit(**options)

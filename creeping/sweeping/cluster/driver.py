@@ -294,8 +294,6 @@ class Recipe:
 
 
 _RECIPES: dict[str, Recipe] = {}
-
-
 """Of the sweeps that this process, a worker, takes part in."""
 
 

@@ -42,6 +42,8 @@ WORDS = {
     "{ first = ..., last = ..., count = ... } with a count up to 100000",
     "vector": "three finite numbers, [x, y, z]",
 }
+LINE_BYTES = 100
+"""Bytes of a line of three numbers in a file, at most."""
 
 
 @dataclass(frozen=True)
@@ -156,12 +158,6 @@ def _list_of(value: Any, test: Any) -> bool:
 
 def _shown(value: Any) -> str:
     return short(f'"{value}"' if isinstance(value, str) else value)
-
-
-LINE_BYTES = 100
-
-
-"""Bytes of a line of three numbers in a file, at most."""
 
 
 _COUNT = {"count": Key("count", 1, required=True, most=MOST)}

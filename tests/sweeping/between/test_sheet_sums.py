@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creeping.sweeping.kernels.judging import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
+from creeping.sweeping.kernels.sheet_sums import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
 
 
 @pytest.mark.parametrize("nodes", [6, 36])

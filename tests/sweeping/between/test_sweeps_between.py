@@ -73,8 +73,10 @@ def test_results_do_not_depend_on_tasks_or_order(asked):
 
 def test_a_cut_through_a_singular_direction_says_what_it_is():
     body = sc.Torus(1.0, 0.4)
-    directions = arc(-6, 6, 0.1, height=0.0)[:, [2, 0, 1]]
-    computed, between = both(directions, 1e-3, cr.DirectFlow(body, rtol=1e-7), boundary="hard", **FIELD)
+    directions = arc(-3, 3, 0.1, height=0.0)[:, [2, 0, 1]]
+    computed, between = both(
+        directions, 1e-3, cr.DirectFlow(body, rtol=1e-7), boundary="hard", wavenumbers=18.0, n_rays=32
+    )
     singular = computed.incidence_status.values == 2
     assert np.array_equal(between.incidence_status.values == 2, singular)
     assert not np.any(between.interpolated.values & singular)
@@ -109,8 +111,8 @@ def test_an_accuracy_is_a_number_between_0_and_1_of_fields_by_rays(accuracy):
 def test_a_patch_of_the_sphere_comes_back_in_its_own_order(tmp_path):
     """In memory and in a folder, whose tasks are patches."""
     directions = cr.fibonacci_directions(40_000)
-    directions = directions[directions @ np.array([0.6, 0.48, 0.64]) > 0.99]
-    asked = {"wavenumbers": 18.0, "boundary": "hard", "n_rays": 48, "length": 1.0, "accuracy": 1e-2}
+    directions = directions[directions @ np.array([0.6, 0.48, 0.64]) > 0.995]
+    asked = {"wavenumbers": 18.0, "boundary": "hard", "n_rays": 32, "length": 1.0, "accuracy": 1e-2}
     flow = cr.DirectFlow(sc.Ellipsoid(1.0, 0.8, 0.6), rtol=1e-8)
     here = cr.sweep_directions(flow, directions, **asked)
     kept = cr.sweep_directions(flow, directions, store=tmp_path / "store", **asked)
