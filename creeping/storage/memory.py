@@ -41,8 +41,10 @@ def budget() -> float:
     return size
 
 
-def within_budget(size: float, what: str, remedy: str) -> None:
+def within_budget(size: float, what: str, remedy: str, *, asked: float | None = None) -> None:
     """Refuse what would take more bytes than the budget.
+
+    ``asked`` is a number with which the size grows; how much of it fits is said.
 
     Raises
     ------
@@ -59,8 +61,9 @@ def within_budget(size: float, what: str, remedy: str) -> None:
         return
     most = budget()
     if not size <= most:
+        fits = f" (up to {asked * most / size:.2g})" if asked else ""
         raise InvalidInputError(
-            f"{what} would take {size / 1e9:.1f} GB of memory, more than {most / 1e9:.1f} GB; {remedy}, "
+            f"{what} would take {size / 1e9:.1f} GB of memory, more than {most / 1e9:.1f} GB; {remedy}{fits}, "
             "or set CREEPING_MEMORY"
         )
 

@@ -64,9 +64,9 @@ def parse(text: str) -> Any:
     ------
     ValueError
         If the text is none, empty, too long, not an expression, or contains anything that is not on the whitelist.
+    ModuleNotFoundError
+        Without sympy.
     """
-    import sympy
-
     if not isinstance(text, str):
         raise ValueError(f"expression {shown(text)} is not text; write one in x, y, z such as '1 + x'")
     if not text.strip():
@@ -77,6 +77,11 @@ def parse(text: str) -> Any:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ValueError(f"expression {shown(text)} is not valid: {error}") from None
+    try:
+        import sympy
+    except ModuleNotFoundError as error:
+        words = f"an expression needs {error.name}: pip install 'creeping[expr]'"
+        raise ModuleNotFoundError(words, name=error.name) from error
     names = {name: sympy.Symbol(name, real=True) for name in "xyz"} | {"pi": sympy.pi}
 
     def refuse(what: str) -> ValueError:

@@ -26,6 +26,10 @@ ASKED = {
     "rays": (lambda line: cr.launch(FLOW, line, length=1.0, n_rays=10**10), "GB of memory"),
     "steps": (lambda line: cr.launch(FLOW, line, length=1.0, n_steps=10**10), "GB of memory"),
     "length": (lambda line: cr.launch(FLOW, line, length=1e12), "more than 100000 sizes of the body"),
+    "length of couplings": (
+        lambda line: cr.coupling(BODY, [(0, 0, 0.6), (1.0, 0, 0)], wavenumber=20.0, length=1e12),
+        r"GB of memory.*give a shorter length \(up to [0-9.e+]+\)",
+    ),
     "points": (lambda line: cr.shadow_line(BODY, (1, 0, 0), n_points=10**10), "GB of memory"),
     "grid": (
         lambda line: cr.build_phase_map(BODY, horizon=0.5, grid=(10**6, 10**6), cache=False),
