@@ -10,6 +10,7 @@ import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TextIO
 
@@ -18,6 +19,7 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.frequency import wavenumber
+from creeping.storage.reading import opened
 
 MOST_BYTES = 512_000_000
 MOST_BLOCKS = 10_000
@@ -114,10 +116,7 @@ def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
     """
     file = Path(path)
     try:
-        nbytes = file.stat().st_size
-        if nbytes > MOST_BYTES:
-            raise InvalidInputError(f"{file} has {nbytes / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} are the most")
-        with file.open(encoding="utf-8", errors="replace") as stream:
+        with TextIOWrapper(opened(file, MOST_BYTES), encoding="utf-8", errors="replace") as stream:
             found = tuple(_blocks(file, stream))
     except OSError as error:
         raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error

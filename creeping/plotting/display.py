@@ -16,6 +16,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from creeping.storage.reading import bytes_of
+
 REMEDY = "on Debian or Ubuntu install libegl1 libgl1-mesa-dri libx11-6"
 TIMEOUT = 60.0
 LIBRARIES = ("/usr/lib", "/usr/lib64", f"/usr/lib/{platform.machine()}-linux-gnu", "/usr/share/glvnd")
@@ -133,7 +135,7 @@ def _cache_file() -> Path:
 def _read() -> dict[str, object]:
     """All stored verdicts; a damaged file counts as an empty one."""
     try:
-        content = json.loads(_cache_file().read_text(encoding="utf-8"))
+        content = json.loads(bytes_of(_cache_file(), 10**6))
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}
