@@ -29,8 +29,14 @@ from creeping.field.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.geometry.arguments import one_of
 from creeping.geometry.creased import is_creased
+from creeping.geometry.surface import size
 from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
+from creeping.storage.memory import blocks, within_budget
+
+KEPT_BYTES, RAY_BYTES, FAN_BYTES = 1000.0, 12_000.0, 100.0
+"""Of a direction: its field, of a conductor, twice while parts are joined; what rays take; and for each k size, the fan
+integral."""
 
 
 def far_field(
@@ -118,8 +124,9 @@ def far_field(
     if creased:
         far = creased_far_field(fan, r, k, boundary, order)
         return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
-    geometry = far_geometry(fan, r)
-    far = field_of(geometry, k, boundary, order)
+    within_budget(KEPT_BYTES * len(r), f"the field in {len(r)} directions", "ask for fewer", asked=len(r))
+    parts = blocks(len(r), RAY_BYTES + FAN_BYTES * k * size(fan.body))
+    far = FarField.joined([field_of(far_geometry(fan, r[some]), k, boundary, order) for some in parts])
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far

@@ -85,7 +85,9 @@ def _correction(matrix: Matrix, places: Places, scale: FloatArray, kind: str) ->
     """The sparse matrix C of places (m,), times a scale (m,), for values u sqrt(w)."""
     from scipy.sparse import csr_array, vstack
 
-    c, m, n, parts = matrix.columns, len(places.points), len(matrix.root), []
+    c, m, n = matrix.columns, len(places.points), len(matrix.root)
+    # a thin body has no points beneath it
+    parts = [csr_array((0, c * n), dtype=np.complex64)]
     for first in range(0, m, ROWS):
         some = places.part(slice(first, first + ROWS))
         targets, columns, near = matrix.near(some, kind)
