@@ -70,8 +70,6 @@ def small_fan():
 
 SMALL = {
     "traced": lambda: cr.trace(BODY, np.tile((1.0, 0, 0), (9999, 1)), np.tile((0, 1.0, 0), (9999, 1)), np.arange(999)),
-        BODY, np.tile((1.0, 0, 0), (10**4, 1)), np.tile((0, 1.0, 0), (10**4, 1)), np.arange(999)
-    ),
     "a band": lambda: cr.impulse_response(np.ones(10**5), np.linspace(1.0, 2.0, 10**5)),
     "directions": lambda: cr.far_field(small_fan(), np.ones((10**5, 3)), wavenumber=9.0, method="rays"),
     "swept": lambda: cr.sweep_directions(

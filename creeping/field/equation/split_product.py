@@ -77,7 +77,7 @@ class SplitProduct:
         for places, field, root in ((nodes, curl[:n], matrix.root), (inner, curl[n:], matrix.root[matrix.at])):
             turned = 2 * root[:, None, None] * np.cross(places.normals[:, :, None], field, axis=1)
             along = [np.einsum("mx,mxc->mc", t, turned) for t in (places.a, places.b)]
-            parts.append(np.stack(along, axis=1).reshape(2 * len(root), -1))
+            parts.append(np.stack(along, axis=1).reshape(2 * len(root), u.shape[-1]))
         return parts[0], parts[1]
 
 
