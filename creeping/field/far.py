@@ -34,9 +34,9 @@ from creeping.geometry.unit import unit_of
 from creeping.rays.fan import RayFan
 from creeping.storage.memory import blocks, within_budget
 
-KEPT_BYTES, RAY_BYTES, FAN_BYTES = 1000.0, 12_000.0, 100.0
-"""Of a direction: its field, of a conductor, twice while parts are joined; what rays take; and for each k size, the fan
-integral."""
+KEPT_BYTES, RAY_BYTES, FAN_BYTES = 1000.0, 24_000.0, 200.0
+"""Of a direction: its field, of a conductor, twice while parts are joined; what rays take, twice as the geometry of the
+directions before is kept; and for each k size, the fan integral."""
 
 
 def far_field(
