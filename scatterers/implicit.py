@@ -34,7 +34,6 @@ from scatterers.expression.singularities import (
 )
 from scatterers.expression.space import ExpressionSpace
 from scatterers.expression.switches import Switches
-from scatterers.kernels.compiled import Compiled
 from scatterers.pieces.patch import Crease
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.cloud import Samples
@@ -175,8 +174,7 @@ class Implicit(LevelBody):
         count = len(self._switches.pieces)
         if count < 2:
             return [Piece(self.compiled, self._bounds)]
-        compiled = [Compiled(self._switches.functions(k).block, "level", np.zeros(1)) for k in range(count)]
-        return [Piece(one, self._bounds) for one in compiled]
+        return [Piece(self._switches.compiled(k), self._bounds) for k in range(count)]
 
     def _numbers(self, points: FloatArray) -> IntArray:
         flat = np.asarray(points, dtype=float).reshape(-1, 3)

@@ -20,6 +20,8 @@ from scatterers.exact.revolved import Revolved
 
 RIGHT_ANGLE = 0.05
 """Radians from a right angle to the axis within which a splined end on it is a smooth pole."""
+MOST_POINTS = 200_000
+"""Of a table: half a gigabyte of splines, in ten seconds."""
 ROUNDING = 1e-14
 """Numbers of a table this small, relative to the largest, are 0."""
 
@@ -101,6 +103,8 @@ def _segments(profile: Any, corners: Iterable[int]) -> list[Segment]:
         ) from None
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2:
         raise ValueError(f"profile of shape {table.shape}; give points (n, 2), (z, radius), two at least")
+    if len(table) > MOST_POINTS:
+        raise ValueError(f"{len(table)} points of the profile are more than {MOST_POINTS}; splines need fewer")
     if bad := int(np.sum(~np.all(np.isfinite(table), axis=1))):
         raise ValueError(f"{bad} of {len(table)} points of the profile are not finite")
     # cos(pi/2) is not quite 0

@@ -140,12 +140,8 @@ def parse_body(
         return _with_charts(scatterers.Implicit(text, **given, speed=speed), progress)
     except InvalidInputError:
         raise
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, ModuleNotFoundError) as error:
         raise InvalidInputError(f"{text if len(text) < 60 else text[:57] + '...'}: {error}") from error
-    except ModuleNotFoundError as error:
-        if error.name in ("gmsh", "manifold3d"):
-            raise InvalidInputError(f"this file: {error}") from error
-        raise InvalidInputError(f"an expression needs {error.name}: pip install 'creeping[expr]'") from error
 
 
 def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:

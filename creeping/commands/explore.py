@@ -124,6 +124,7 @@ def _round(value: float) -> float:
 def _serve(flow: Any, request: Any, port: int, name: str, browser: bool, progress: Any) -> int:
     import webbrowser
 
+    from creeping.explorer.door import leading_to
     from creeping.explorer.page import Explorer
 
     progress("preparing the page")
@@ -132,9 +133,10 @@ def _serve(flow: Any, request: Any, port: int, name: str, browser: bool, progres
         if page.server.get_port() != port:
             progress(f"port {port} is in use")
         progress(f"{page.address} (Ctrl+C ends it)")
-        if browser:
-            webbrowser.open(page.address)
-        page.server.sleep_forever()
+        with leading_to(page.address) as private:
+            if browser:
+                webbrowser.open(private)
+            page.server.sleep_forever()
     except KeyboardInterrupt:
         progress("the page is closed")
     finally:

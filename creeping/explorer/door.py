@@ -7,15 +7,19 @@ A request is let in if
     it brings the token: in the address when the page is opened, in a cookie from there on
 
 so that neither the page of another site nor another user of this machine can drive the program. An upgrade that is
-refused never becomes a connection.
+refused never becomes a connection. A browser is started with a file of this user's own that leads to the page, for
+every user of a machine can read command lines.
 """
 
 import hmac
+import html
 import http
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Lock
 from urllib.parse import parse_qs, urlsplit
 
@@ -128,6 +132,17 @@ class Door:
 def upgrades(request: Request) -> bool:
     """Whether a request is to become a websocket."""
     return any("websocket" in value.lower() for value in request.headers.get_all("Upgrade"))
+
+
+@contextmanager
+def leading_to(address: str) -> Iterator[str]:
+    """Address of a file that only this user can read, and that takes a browser on to another address."""
+    with TemporaryDirectory(prefix="creeping-") as folder:
+        file = Path(folder) / "page.html"
+        file.touch(0o600)
+        onward = f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">'
+        file.write_text(f"<!DOCTYPE html><title>creeping</title>{onward}", encoding="ascii")
+        yield file.as_uri()
 
 
 def _name(port: int) -> str:

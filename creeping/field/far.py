@@ -47,6 +47,11 @@ from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.kept import kept
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
+from creeping.storage.memory import blocks, within_budget
+
+KEPT_BYTES, RAY_BYTES, FAN_BYTES = 1000.0, 24_000.0, 200.0
+"""Of a direction: its field, of a conductor, twice while parts are joined; what rays take, twice as the geometry of the
+directions before is kept; and for each k size, the fan integral."""
 
 NODES = 50_000
 """Nodes of the currents that rays are compared with: some tenths of a second."""
@@ -141,8 +146,9 @@ def far_field(
     if creased:
         far = creased_far_field(fan, r, k, boundary, order)
         return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
-    geometry = far_geometry(fan, r)
-    far = field_of(geometry, k, boundary, order)
+    within_budget(KEPT_BYTES * len(r), f"the field in {len(r)} directions", "ask for fewer", asked=len(r))
+    parts = blocks(len(r), RAY_BYTES + FAN_BYTES * k * size(fan.body))
+    far = FarField.joined([field_of(far_geometry(fan, r[some]), k, boundary, order) for some in parts])
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far

@@ -22,6 +22,7 @@ import numpy as np
 
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.storage.memory import within_budget
 
 LIGHT = 299_792_458.0
 """Speed of light in a vacuum, m/s."""
@@ -40,6 +41,8 @@ PADDING = 8
 """Samples for each one that the band resolves."""
 LEAST = 8
 """Wavenumbers of a band."""
+POINT_BYTES, VALUE_BYTES = 1600.0, 80.0 * PADDING
+"""Of a wavenumber, mostly for the width of the window's transform, and of a value at it, padded."""
 EQUAL = 1e-4
 """How far spacings of the wavenumbers may differ from their mean, as a share of it."""
 
@@ -210,6 +213,12 @@ def band_sum(
         raise InvalidInputError(
             f"{what} takes finite values; {int(bad.sum())} of {bad.size} are not: leave out those that are not resolved"
         )
+    within_budget(
+        len(k) * (POINT_BYTES + VALUE_BYTES * (values.size // len(k))),
+        f"{what} of {values.size} values",
+        "give fewer",
+        asked=values.size,
+    )
     steps = np.diff(k)
     step = float(np.mean(steps))
     if not (step > 0 and np.max(np.abs(steps - step)) <= EQUAL * step):

@@ -33,10 +33,12 @@ if TYPE_CHECKING:
 import re
 from array import array
 from dataclasses import dataclass, field
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TextIO
 
 from creeping.field.frequency import wavenumber
+from creeping.storage.reading import opened
 
 LIGHT = 299792458.0
 """Speed of light, m/s."""
@@ -266,10 +268,7 @@ def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
     """
     file = Path(path)
     try:
-        nbytes = file.stat().st_size
-        if nbytes > MOST_BYTES:
-            raise InvalidInputError(f"{file} has {nbytes / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} are the most")
-        with file.open(encoding="utf-8", errors="replace") as stream:
+        with TextIOWrapper(opened(file, MOST_BYTES), encoding="utf-8", errors="replace") as stream:
             found = tuple(_blocks(file, stream))
     except OSError as error:
         raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error

@@ -9,6 +9,7 @@ import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TextIO
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError
+from creeping.storage.reading import opened
 
 MOST_BYTES = 200_000_000
 """Largest file that is read."""
@@ -85,10 +87,7 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
     """
     file = Path(path)
     try:
-        nbytes = file.stat().st_size
-        if nbytes > MOST_BYTES:
-            raise InvalidInputError(f"{file} has {nbytes / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} are the most")
-        with file.open(encoding="utf-8-sig", errors="replace") as stream:
+        with TextIOWrapper(opened(file, MOST_BYTES), encoding="utf-8-sig", errors="replace") as stream:
             header, numbers = _table(file, stream)
     except OSError as error:
         raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error

@@ -21,6 +21,7 @@ from creeping.geometry.creased import checked_smooth
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import CHUNK, in_threads, pause
+from creeping.storage.memory import within_budget
 
 MAX_STEPS = 100_000
 """Steps between two outputs after which a block of rays is given up."""
@@ -161,6 +162,9 @@ def counted_states(
         step = 0.05 * size(body)
     from creeping.geodesics.kernels.integrator import integrate
 
+    # twice, for callers take points and directions out of the states
+    count = len(states) * len(times)
+    within_budget(16.0 * states.shape[1] * count, f"{count} points of rays", "ask for fewer", asked=count)
     out = np.empty((len(states), len(times), states.shape[1]))
     states = np.ascontiguousarray(states, dtype=float)
     scale = error_scale(body, states.shape[1])

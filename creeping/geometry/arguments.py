@@ -23,6 +23,8 @@ MOST_NUMBERS = 10**8
 """Of a list, a tuple or a range, before it is made an array."""
 MOST_COUNT = 10**15
 """Of anything."""
+NO_NUMBERS = (str, bytes, bytearray, complex, np.complexfloating, np.datetime64, np.timedelta64)
+"""Kinds of which numpy or Python make real numbers, or drop an imaginary part."""
 Progress = Callable[[str], None]
 
 
@@ -72,8 +74,8 @@ def real_array(values: ArrayLike, what: str) -> FloatArray:
     within_budget(8.0 * given.size, f"{given.size} numbers of the {what}", "give fewer")
     try:
         # of objects each must be a number by itself: a text that spells one is none
-        if given.dtype.kind == "O" and any(isinstance(value, (str, bytes, complex)) for value in given.flat):
-            raise TypeError("texts or complex numbers are among them")
+        if given.dtype.kind == "O" and any(isinstance(value, NO_NUMBERS) for value in given.flat):
+            raise TypeError("texts, dates or complex numbers are among them")
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(f"{what} are not an array of numbers: {error}") from error
@@ -89,7 +91,7 @@ def real_number(value: Any, name: str) -> float:
     """
     if isinstance(value, (complex, np.complexfloating)):
         raise InvalidInputError(f"{name} = {value!r} is complex; give a real number")
-    if isinstance(value, (bool, np.bool_, str, bytes, bytearray, np.datetime64, np.timedelta64)):
+    if isinstance(value, (bool, np.bool_, *NO_NUMBERS)):
         raise InvalidInputError(f"{name} = {shown(value)} is not a number")
     try:
         # an array of one number is that number to Python, though it may be one of many by mistake

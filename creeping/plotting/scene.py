@@ -29,8 +29,10 @@ from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
+from creeping.storage.reading import bytes_of
 
 DEPTH_UNITS = 40.0  # of 1/65000 of the depth of the scene
+
 
 REMEDY = "on Debian or Ubuntu install libegl1 libgl1-mesa-dri libx11-6"
 TIMEOUT = 60.0
@@ -346,7 +348,7 @@ def _cache_file() -> Path:
 def _read() -> dict[str, object]:
     """All stored verdicts; a damaged file counts as an empty one."""
     try:
-        content = json.loads(_cache_file().read_text(encoding="utf-8"))
+        content = json.loads(bytes_of(_cache_file(), 10**6))
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}

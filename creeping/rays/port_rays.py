@@ -28,6 +28,8 @@ WIDEST, MOST_RAYS = 0.2, 1536
 TURN = 0.2
 """Largest angle by which a ray turns in one step."""
 RTOL = 1e-9
+NODE_BYTES = 600.0
+"""Of a fan's node: two states with their Jacobi fields, and what is carried."""
 NODES = 400_000
 """Nodes of fans that are held at once: 60 MB."""
 PER_PAIR = 3
@@ -165,7 +167,9 @@ def rays_between(
     from creeping.rays.kernels.port_fans import GUARD, LANES, START
 
     normals = normal(body, ports)
-    steps = max(16, int(np.ceil(length * sharpest_curvature(body) / TURN)))
+    steps = np.maximum(16, np.ceil(length * sharpest_curvature(body) / TURN))
+    within_budget(NODE_BYTES * RAYS * steps, f"fans of length {length:g}", "give a shorter length", asked=length)
+    steps = int(steps)
     times = length / steps * np.arange(steps + GUARD + 1, dtype=float)
     boxes = _boxes(ports)
     senders = len(ports) if sources is None else sources

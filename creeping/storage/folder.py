@@ -14,6 +14,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError, StoredMapError
+from creeping.storage.reading import bytes_of
 
 SCHEMA = 4
 MANIFEST = "manifest.json"
@@ -67,9 +68,7 @@ def read_manifest(folder: Path, *, any_schema: bool = False) -> dict[str, Any]:
     """
     path = folder / MANIFEST
     try:
-        if path.stat().st_size > _MAX_MANIFEST:
-            raise StoredMapError(f"{path} is larger than a manifest can be; rebuild the map")
-        document = json.loads(path.read_text())
+        document = json.loads(bytes_of(path, _MAX_MANIFEST))
         content = document["content"]
         intact = document["blake2b"] == content_digest(content)
         if not isinstance(content, dict):

@@ -18,7 +18,7 @@ from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
 from creeping.geodesics.direct_flow import DirectFlow
-from creeping.geometry.arguments import checked_body, whole_number
+from creeping.geometry.arguments import checked_body, real_array, real_number, shown, whole_number
 from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.parts import why_no_rays
@@ -140,9 +140,11 @@ def bistatic(
     """
     azimuths, elevations = _angles(azimuth, elevation)
     observers = directions_from_azimuth_elevation(np.radians(azimuths), np.radians(elevations))
-    if len(np.shape(incidence)) != 1 or len(incidence) != 2:
-        raise InvalidInputError(f"incidence = {incidence!r} is not (azimuth, elevation) in degrees")
-    radar = directions_from_azimuth_elevation(*(float(np.radians(v[0])) for v in _angles(*incidence)))
+    try:
+        first, second = (real_number(angle, "incidence") for angle in incidence)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"incidence = {shown(incidence)} is not (azimuth, elevation) in degrees") from error
+    radar = directions_from_azimuth_elevation(*(float(np.radians(v[0])) for v in _angles(first, second)))
     asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "bistatic", "observation": observers}
     found = _swept(body, -radar[None], wavenumbers, asked, cache, progress)
     return _with_angles(found, "observer", azimuths, elevations)
@@ -174,8 +176,9 @@ def seconds_of_currents(
 
 def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, FloatArray]:
     try:
-        a, e = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in (azimuth, elevation)))
-    except (TypeError, ValueError) as error:
+        given = real_array(azimuth, "azimuths"), real_array(elevation, "elevations")
+        a, e = np.broadcast_arrays(*map(np.atleast_1d, given))
+    except ValueError as error:
         raise InvalidInputError(f"azimuth and elevation are no numbers of one shape: {error}") from None
     if a.ndim != 1 or not a.size or not (np.all(np.isfinite(a)) and np.all(np.isfinite(e))):
         raise InvalidInputError(

@@ -22,6 +22,7 @@ from creeping.geometry.surface import Surface
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
+from creeping.storage.memory import within_budget
 from creeping.sweeping.between.worth import with_paying_lattice
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request
@@ -187,10 +188,11 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray
         If the results do not fit into memory.
     """
     count = len(plan.incidences)
-    if bytes_of(plan.request) * count > IN_MEMORY:
-        raise InvalidInputError(
-            f"{count} incidences give {bytes_of(plan.request) * count / 1e9:.0f} GB of results; give store=, a folder"
-        )
+    size = float(bytes_of(plan.request) * count)
+    if size > IN_MEMORY:
+        raise InvalidInputError(f"{count} incidences give {size / 1e9:.0f} GB of results; give store=, a folder")
+    # they are put together of tasks
+    within_budget(2 * size, f"results of {count} incidences", "give store=, a folder, or ask for fewer", asked=count)
     started = time.perf_counter()
     sweeper = plan.make(plan.flow, plan.request)
     arrays: Arrays = plan.request.empty(count, filled=False)

@@ -13,14 +13,19 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from scatterers.expression.chosen import chosen, numeric_chosen
+from scatterers.expression.chosen import NUMERIC, choosing, largest
 from scatterers.kernels.compiled import Compiled, Kind
 
 FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
 MAX_LENGTH = 2000
 MAX_POWER = 64
 MAX_DEPTH = 120
-LARGEST = 1e12
+LARGEST, HUGEST = 1e12, 1e300
+"""Of numbers, and of what several multiplied become."""
+PLAIN = 2**20
+"""Whole numbers that stay such: those of their second derivatives still do for the compiler."""
+MOST_OPERATIONS = 20_000
+"""Of derivatives: about twenty seconds of differentiating and compiling."""
 LIBRARY = 100
 """Operations that a call of a function is worth."""
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -29,12 +34,6 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
-}
-_COMPARED: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
 }
 
 
@@ -65,9 +64,9 @@ def parse(text: str) -> Any:
     ------
     ValueError
         If the text is none, empty, too long, not an expression, or contains anything that is not on the whitelist.
+    ModuleNotFoundError
+        Without sympy.
     """
-    import sympy
-
     if not isinstance(text, str):
         raise ValueError(f"expression {shown(text)} is not text; write one in x, y, z such as '1 + x'")
     if not text.strip():
@@ -78,6 +77,11 @@ def parse(text: str) -> Any:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ValueError(f"expression {shown(text)} is not valid: {error}") from None
+    try:
+        import sympy
+    except ModuleNotFoundError as error:
+        words = f"an expression needs {error.name}: pip install 'creeping[expr]'"
+        raise ModuleNotFoundError(words, name=error.name) from error
     names = {name: sympy.Symbol(name, real=True) for name in "xyz"} | {"pi": sympy.pi}
 
     def refuse(what: str) -> ValueError:
@@ -117,11 +121,15 @@ def parse(text: str) -> Any:
                     if not (b.is_number and abs(float(b)) <= MAX_POWER):
                         raise refuse(f"a power that is not a number within +-{MAX_POWER}")
                     # before it is computed
-                    if a.is_number and abs(float(b)) * abs(math.log(abs(float(a)) or 1.0)) > math.log(LARGEST):
-                        raise refuse(f"a number beyond {LARGEST:g}")
+                    most = LARGEST if a.is_number else HUGEST
+                    factor = a if a.is_number else a.as_coeff_Mul()[0]
+                    if abs(float(b)) * abs(math.log(abs(float(factor)) or 1.0)) > math.log(most):
+                        raise refuse(f"a number beyond {most:g}")
                 result = _BINARY[type(op)](a, b)
                 if result.has(sympy.zoo, sympy.nan, sympy.oo, -sympy.oo):
                     raise refuse("a division by zero")
+                if abs(result.as_coeff_Mul()[0]) > HUGEST:
+                    raise refuse(f"a number beyond {HUGEST:g}")
                 return result
             case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
                 given = build(argument, depth + 1)
@@ -131,20 +139,28 @@ def parse(text: str) -> Any:
                 parts = [build(part, depth + 1) for part in given]
                 for part in parts:
                     require_moderate(part)
-                if all(part.is_number for part in parts):
-                    return sympy.Max(*parts) if name == "max" else sympy.Min(*parts)
-                return chosen()(*(part if name == "max" else -part for part in parts), *parts)
+                sign = 1 if name == "max" else -1
+                return sign * choosing().Largest(*(sign * part for part in parts))
             case ast.Call(
                 func=ast.Name(id="where"),
-                args=[ast.Compare(left=left, ops=[op], comparators=[right]), yes, no],
+                args=[
+                    ast.Compare(
+                        left=left, ops=[ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE() as op], comparators=[right]
+                    ),
+                    yes,
+                    no,
+                ],
                 keywords=[],
-            ) if type(op) in _COMPARED:
+            ):
                 low, high = build(left, depth + 1), build(right, depth + 1)
                 require_moderate(low)
                 require_moderate(high)
-                condition = _COMPARED[type(op)](low, high)
                 one, other = build(yes, depth + 1), build(no, depth + 1)
-                return sympy.Piecewise((one, condition), (other, True))
+                if isinstance(op, ast.Gt | ast.LtE):
+                    low, high = high, low
+                if isinstance(op, ast.Lt | ast.Gt):
+                    one, other = other, one
+                return choosing().Chosen(choosing().Which(low, high), one, other)
         raise refuse(f"{ast.unparse(node)[:40]!r}")
 
     expression = build(tree.body, 0)
@@ -165,10 +181,14 @@ def differentiate(text: str) -> Differentiated:
     Raises
     ------
     ValueError
-        As `parse`, and if there is an absolute value in it, the root of a square, which has no second derivative.
+        As `parse`; if there is an absolute value in it, the root of a square, which has no second derivative; or if
+        the derivatives are too large.
     """
-    # what is no text may not be hashable either
-    return _differentiated(text) if isinstance(text, str) else parse(text)
+    try:
+        # what is no text may not be hashable either
+        return _differentiated(text) if isinstance(text, str) else parse(text)
+    except RecursionError:
+        raise ValueError(f"expression {shown(text)} is nested too deeply; write it with fewer parentheses") from None
 
 
 def _shared(parts: Any) -> Any:
@@ -179,7 +199,10 @@ def _shared(parts: Any) -> Any:
     import sympy
     from sympy.simplify.cse_main import tree_cse
 
-    return tree_cse(parts, sympy.numbered_symbols("t"))
+    # twice, for they stand in every comparison of a choice
+    numbers = 2 * sorted(set().union(*(part.atoms(choosing().Which) for part in parts)), key=sympy.default_sort_key)
+    shared, reduced = tree_cse([*numbers, *parts], sympy.numbered_symbols("t"))
+    return shared, reduced[len(numbers) :]
 
 
 @lru_cache(maxsize=64)
@@ -201,11 +224,18 @@ def derivatives(expression: Any, text: str) -> Differentiated:
     Raises
     ------
     ValueError
-        If there is an absolute value in it.
+        If there is an absolute value in it, or its derivatives are too large.
     """
     import sympy
     from sympy.printing.pycode import PythonCodePrinter
 
+    if (size := _size(expression)) > MOST_OPERATIONS:
+        raise ValueError(
+            f"the derivatives of expression {shown(text)} take about {size} operations, more than {MOST_OPERATIONS}; "
+            "write it with fewer factors in a product and fewer functions of functions"
+        )
+    large = [one for one in expression.atoms(sympy.Rational) if max(abs(one.p), one.q) > PLAIN]
+    expression = expression.xreplace({one: sympy.Float(one) for one in large})
     x, y, z = (sympy.Symbol(name, real=True) for name in "xyz")
     gradient = [expression.diff(v) for v in (x, y, z)]
     pairs = [(x, x), (y, y), (z, z), (y, z), (x, z), (x, y)]
@@ -234,16 +264,34 @@ def derivatives(expression: Any, text: str) -> Differentiated:
         *(f"    {symbol} = {printer.doprint(part)}" for symbol, part in slopes),
         f"    return {', '.join(f'1.0 * ({printer.doprint(part)})' for part in of_slopes)}",
     ]
-    space: dict[str, Any] = {"math": math}
+    space: dict[str, Any] = {"math": math, "largest": largest}
     exec(compile("\n".join(lines), "<expression>", "exec"), space)  # printed by sympy, see the module's head
     space["block"].operations = operations
 
     def numeric(parts: list[Any]) -> Callable[..., Any]:
-        known = [{"Chosen": numeric_chosen}, "numpy"]
+        known = [NUMERIC, "numpy"]
         function: Callable[..., Any] = sympy.lambdify((x, y, z), parts, known, cse=_shared)
         return function
 
     return Differentiated(numeric([expression]), numeric(gradient), numeric(hessian), space["block"], space["first"])
+
+
+def _size(expression: Any) -> int:
+    """Operations of the slopes and the Hessian as sympy writes them, about."""
+
+    def orders(part: Any) -> tuple[int, int]:
+        """Those of a first and of a second derivative by one variable."""
+        chooses = isinstance(part, (choosing().Largest, choosing().Chosen))
+        below = [orders(one) for one in (part.values if chooses else part.args) if one.free_symbols]
+        first, second, count = sum(one for one, _ in below), sum(two for _, two in below), len(below)
+        if part.is_Add or chooses:
+            return first, second
+        # a function, or each factor and each two of them
+        return first + count**2, second + 2 * count * first + count**3
+
+    variables = len(expression.free_symbols)
+    first, second = orders(expression)
+    return variables * first + variables * (variables + 1) // 2 * second
 
 
 def _operations(lines: list[str]) -> float:

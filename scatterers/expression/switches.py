@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.expression.chosen import chosen, numeric_chosen
+from scatterers.expression.chosen import NUMERIC, choosing
 from scatterers.expression.parsing import Differentiated, derivatives, parse
 from scatterers.kernels.compiled import Compiled, Kind
 
@@ -35,9 +35,8 @@ class Switches:
         import sympy
 
         self._text, self._expression = text, parse(text)
-        self._switches = sorted(
-            self._expression.atoms(sympy.Piecewise) | self._expression.atoms(chosen()), key=sympy.default_sort_key
-        )
+        known = self._expression.atoms(choosing().Largest, choosing().Chosen)
+        self._switches = sorted(known, key=sympy.default_sort_key)
         self.pieces: list[Any] = []
         # number of the piece by the choices made
         self._known: dict[tuple[int, ...], int] = {}
@@ -52,15 +51,9 @@ class Switches:
         """Function of x, y, z to the number of the choice of each switch."""
         import sympy
 
-        found = []
-        for switch in self._switches:
-            if isinstance(switch, sympy.Piecewise):
-                pairs = [(sympy.Integer(k), condition) for k, (_, condition) in enumerate(switch.args)]
-                found.append(sympy.Piecewise(*pairs))
-            else:
-                found.append(chosen()(*switch.keys, *map(sympy.Integer, range(len(switch.keys)))))
         names = [sympy.Symbol(name, real=True) for name in "xyz"]
-        function: Callable[..., Any] = sympy.lambdify(names, found, [{"Chosen": numeric_chosen}, "numpy"])
+        numbers = [switch.which for switch in self._switches]
+        function: Callable[..., Any] = sympy.lambdify(names, numbers, [NUMERIC, "numpy"])
         return function
 
     def choices(self, points: FloatArray) -> IntArray:
@@ -94,19 +87,29 @@ class Switches:
 
     def _resolved(self, expression: Any, made: dict[Any, int]) -> Any:
         if expression in made:
-            switch, k = expression, made[expression]
-            branch = switch.values[k] if isinstance(switch, chosen()) else switch.args[k][0]
-            return self._resolved(branch, made)
+            return self._resolved(expression.values[made[expression]], made)
         if not any(expression.has(switch) for switch in made):
             return expression
         return expression.func(*(self._resolved(part, made) for part in expression.args))
 
     def functions(self, number: int) -> Differentiated:
         """Functions of a piece."""
-        found = derivatives(self.pieces[number], self._text)
+        return derivatives(self.pieces[number], self._text)
+
+    def compiled(self, number: int) -> Compiled:
+        """The compiled block evaluator of a piece."""
+        import sympy
+
+        piece = self.pieces[number]
+        slopes = [piece.diff(sympy.Symbol(name, real=True)) for name in "xyz"]
+        if all(slope.is_number for slope in slopes):
+            # the many planes of a polytope share their code
+            constant = piece.xreplace(dict.fromkeys(piece.free_symbols, sympy.S.Zero))
+            return Compiled(plane, "level", np.array([*slopes, constant], dtype=float))
+        block = self.functions(number).block
         made = next(made for made, k in self._known.items() if k == number)
-        found.block.again = compiled_piece, self._text, made  # type: ignore[attr-defined]
-        return found
+        block.again = compiled_piece, self._text, made  # type: ignore[attr-defined]
+        return Compiled(block, "level", np.zeros(1))
 
     def __reduce__(self) -> tuple[Callable[..., "Switches"], tuple[str, list[tuple[int, ...]]]]:
         return met_before, (self._text, list(self._known))
@@ -131,6 +134,16 @@ def met_before(text: str, choices: Iterable[Iterable[int]]) -> Switches:
     return found
 
 
+def plane(points: FloatArray, values: FloatArray, gradients: FloatArray, hessians: FloatArray, p: FloatArray) -> None:
+    """Level evaluator of a plane, p its three slopes and its value at the origin."""
+    for i in range(points.shape[1]):
+        values[i] = p[0] * points[0, i] + p[1] * points[1, i] + p[2] * points[2, i] + p[3]
+        for k in range(3):
+            gradients[k, i] = p[k]
+        for k in range(6):
+            hessians[k, i] = 0.0
+
+
 def compiled_piece(text: str, made: tuple[int, ...], kind: Kind, parameters: FloatArray) -> Compiled:
     """The compiled block evaluator of what an expression is by the choices made."""
-    return Compiled(met_before(text, [made]).functions(0).block, kind, parameters)
+    return met_before(text, [made]).compiled(0)

@@ -30,6 +30,8 @@ NUMBERS_THAT_ARE_NONE = {
     "texts": (["1", "2"], "not an array of numbers"),
     "flags": ([True, False], "not an array of numbers"),
     "masked": (np.ma.masked_array([1.0, 2.0], mask=[True, False]), "masked"),
+    "dates": ([np.datetime64("2020-01-01")], "not an array of numbers"),
+    "durations among others": (np.array([1.0, np.timedelta64(2)], dtype=object), "not an array of numbers"),
     "ragged": ([[1.0], [1.0, 2.0]], "not an array of numbers"),
     "too many": (range(10**12), "are more than"),
     "too large": (np.broadcast_to(1.0, (10**12,)), "GB of memory"),

@@ -63,6 +63,20 @@ def test_long_text():
     assert len(str(caught.value)) < 500
 
 
+@pytest.mark.parametrize(
+    "text, match",
+    [
+        ("sin(" * 110 + "x" + ")" * 110 + f" + {SPHERE}", "derivatives of .* about 7.... operations, more than 20000"),
+        ("x*sin(y*" * 55 + "z" + ")" * 55 + f" + {SPHERE}", "operations, more than|nested too deeply"),
+        ("*".join(["999999999999"] * 120) + f"*({SPHERE})", r"a number beyond 1e\+300"),
+        ("((((x*999999999999)**64)**64)**64)**64", r"a number beyond 1e\+300"),
+    ],
+)
+def test_what_would_take_long_or_cannot_be_held(text, match):
+    with pytest.raises(ValueError, match=match):
+        Implicit(text)
+
+
 def test_absolute_values_have_no_second_derivative():
     with pytest.raises(ValueError, match=r"\|.*\|.*smooth"):
         Implicit("sqrt(x**2) + sqrt(y**2) + z**2 - 1")

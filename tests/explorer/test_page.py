@@ -1,6 +1,7 @@
 """The page in a real browser: it loads, a slider moves the rays, nothing leaves the machine."""
 
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
@@ -169,6 +170,30 @@ def test_the_files_of_the_page_ask_for_the_token(guarded):
     assert token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
     with urlopen(Request(f"http://127.0.0.1:{port}/", headers={"Cookie": cookie.split(";")[0]})) as answer:
         assert answer.status == 200 and answer.headers["Set-Cookie"] is None
+
+
+def test_no_command_line_has_the_token(monkeypatch):
+    from creeping.commands import explore
+
+    seen, closed = [], []
+
+    class Page:
+        def __init__(self, *_, **__):
+            self.server, self.address = self, "http://127.0.0.1:8080/?token=secret&more"
+            self.get_port, self.close = lambda: 8080, lambda: closed.append(True)
+
+        def sleep_forever(self):
+            file = Path(urlsplit(seen[0]).path)
+            content = file.read_text()
+            assert 'content="0; url=http://127.0.0.1:8080/?token=secret&amp;more"' in content
+            assert (file.stat().st_mode & 0o777, file.parent.stat().st_mode & 0o777) == (0o600, 0o700)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("creeping.explorer.page.Explorer", Page)
+    monkeypatch.setattr("webbrowser.open", seen.append)
+    assert explore._serve(None, None, 8080, "a body", True, print) == 0 and closed
+    (asked,) = seen
+    assert asked.startswith("file://") and "secret" not in asked and not Path(urlsplit(asked).path).exists()
 
 
 def test_only_so_many_pages_are_let_in(page):

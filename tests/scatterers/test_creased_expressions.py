@@ -11,6 +11,8 @@ import scatterers as sc
 from creeping.geometry.surface import CreasedSurface
 from scatterers.expression.parsing import differentiate
 from scatterers.expression.switches import Switches
+from scatterers.kernels.compiled import Compiled
+from scatterers.spline.tensor import evaluated
 
 EDGE_AT = 1e-12
 """Points of an edge off both of its pieces."""
@@ -150,6 +152,29 @@ def test_max_and_min_are_those_of_numpy(rng):
         # a switch may lie between
         assert np.mean(np.abs(difference - block[1][k]) < 1e-8) > 0.99
         np.testing.assert_allclose(block[1][k], np.broadcast_to(functions.gradient(x, y, z)[k], 500), atol=1e-12)
+
+
+def test_many_planes_are_one_cheap_choice(rng):
+    normals = rng.normal(size=(30, 3)).round(3)
+    text = f"max({','.join('+'.join(f'({c})*{v}' for c, v in zip(n, 'xyz', strict=True)) + '-1' for n in normals)})"
+    functions = differentiate(text)
+    # the sums that are compared, and little else
+    assert functions.block.operations < 10 * len(normals)
+    points = rng.normal(size=(200, 3))
+    largest = np.argmax(points @ normals.T, axis=1)
+    np.testing.assert_allclose(np.stack(functions.gradient(*points.T), axis=-1), normals[largest])
+    cut = Switches(text)
+    cut.met(points)
+    one = cut.compiled(0)
+    assert len(cut.pieces) == len(np.unique(largest)) and len(one.parameters) == 4
+    # nested, they are no larger
+    assert differentiate("max(x," * 60 + "y" + ")" * 60).block.operations < 10
+
+
+def test_whole_numbers_beyond_the_compiler_are_taken():
+    compiled = Compiled(differentiate("(10000*x)**6").block, "level", np.zeros(1))
+    value, gradient, hessian = evaluated(compiled, np.ones(3))
+    np.testing.assert_allclose([value, gradient[0], hessian[0]], [1e24, 6e24, 30e24])
 
 
 def test_choices_that_make_no_difference_make_no_pieces():

@@ -1,5 +1,6 @@
 """Bodies given by an expression: F and its derivatives, the box found, rays."""
 
+import sys
 from functools import cache
 from types import SimpleNamespace
 
@@ -221,3 +222,10 @@ def test_charts_that_cannot_be_are_sought_once(monkeypatch):
         with pytest.raises(ValueError, match="too sharply curved"):
             _ = body.atlas
     assert len(asked) <= 2
+
+
+def test_without_sympy_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sympy", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'creeping\[expr\]'") as caught:
+        sc.Implicit("x**2 + y**2 + z**2 - 97")
+    assert caught.value.name == "sympy"

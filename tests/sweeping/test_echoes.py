@@ -72,6 +72,19 @@ def test_bistatic_is_the_far_field():
         echo_of(ds, "ts", ("hard",), "azimuth")
 
 
+@pytest.mark.parametrize("degrees", [10 + 5j, np.datetime64("2020-01-01"), np.timedelta64(9), [b"10"], "10", [True]])
+def test_what_is_no_degree(degrees):
+    asked = {"wavenumbers": 5.0, "cache": False}
+    for ask in (
+        lambda: cr.backscatter(sc.Sphere(), azimuth=degrees, **asked),
+        lambda: cr.backscatter(sc.Sphere(), elevation=degrees, **asked),
+        lambda: cr.bistatic(sc.Sphere(), azimuth=degrees, **asked),
+        lambda: cr.bistatic(sc.Sphere(), incidence=(degrees, 0.0), **asked),
+    ):
+        with pytest.raises(cr.InvalidInputError, match=r"azimuths|elevations|incidence"):
+            ask()
+
+
 def test_bad_requests():
     bad = [{"wavenumbers": [30.0, 30.0]}, {"wavenumbers": []}, {"elevation": 100.0}, {"azimuth": [np.nan]}]
     for one in (*bad, {"azimuth": "north"}, {"azimuth": np.zeros((2, 2))}, {"boundary": "rubber"}):

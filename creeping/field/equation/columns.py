@@ -190,7 +190,7 @@ class SplitProduct:
         for places, field, root in ((nodes, curl[:n], matrix.root), (inner, curl[n:], matrix.root[matrix.at])):
             turned = 2 * root[:, None, None] * np.cross(places.normals[:, :, None], field, axis=1)
             along = [np.einsum("mx,mxc->mc", t, turned) for t in (places.a, places.b)]
-            parts.append(np.stack(along, axis=1).reshape(2 * len(root), -1))
+            parts.append(np.stack(along, axis=1).reshape(2 * len(root), u.shape[-1]))
         return parts[0], parts[1]
 
 
@@ -198,7 +198,9 @@ def _correction(matrix: Matrix, places: Places, scale: FloatArray, kind: str) ->
     """The sparse matrix C of places (m,), times a scale (m,), for values u sqrt(w)."""
     from scipy.sparse import csr_array, vstack
 
-    c, m, n, parts = matrix.columns, len(places.points), len(matrix.root), []
+    c, m, n = matrix.columns, len(places.points), len(matrix.root)
+    # a thin body has no points beneath it
+    parts = [csr_array((0, c * n), dtype=np.complex64)]
     for first in range(0, m, ROWS):
         some = places.part(slice(first, first + ROWS))
         targets, columns, near = matrix.near(some, kind)

@@ -26,6 +26,7 @@ from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.geometry.checks import UNKNOWN
 from creeping.storage.folder import content_digest
+from creeping.storage.reading import bytes_of, opened
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.results import coordinates, require, sweep_attributes, variable_attributes
 
@@ -37,6 +38,8 @@ ERROR_BYTES = 256
 COORDINATE_CHUNK = 65_536
 
 ROOT, STUDY, STUDY_FILE = "zarr.json", "study", "study/zarr.json"
+MOST_DOCUMENT = 10**9
+"""Bytes."""
 SEAL = "attributes_blake2b"
 """Attribute of the root that holds the digest of the others."""
 
@@ -251,7 +254,7 @@ def read_document(file: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     OSError, ValueError
         If it cannot be read, or is something else.
     """
-    document = json.loads(file.read_bytes())
+    document = json.loads(bytes_of(file, MOST_DOCUMENT))
     if not isinstance(document, dict) or not isinstance(document.get("attributes"), dict):
         raise ValueError("no attributes are in it")
     return document.pop("attributes"), document
@@ -289,4 +292,5 @@ def is_whole(folder: Path, name: str, digest: str) -> bool:
 
 
 def _digest(path: Path) -> str:
-    return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
+    with opened(path) as stream:
+        return hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=16)).hexdigest()

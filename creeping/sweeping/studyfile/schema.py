@@ -26,6 +26,7 @@ from creeping.geometry.directions import (
     theta_phi_grid,
     unit_directions,
 )
+from creeping.storage.reading import text_of
 from creeping.sweeping.plan import short
 
 LEAST_WAVENUMBER, LARGEST_WAVENUMBER = 1e-12, 1e12
@@ -272,7 +273,7 @@ def _from_file(path: Path) -> FloatArray:
 
 def _table(path: Path) -> FloatArray:
     """Numbers of a .csv file (n, columns); a line ``x,y,z`` above them is left out."""
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    lines = text_of(path, MOST * LINE_BYTES, "utf-8-sig").splitlines()
     rows = [row for row in (line.partition("#")[0].strip() for line in lines) if row]
     if rows and [word.strip(" \t\"'").lower() for word in rows[0].split(",")] == ["x", "y", "z"]:
         rows = rows[1:]

@@ -14,6 +14,7 @@ from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, size
 from creeping.rays.reach import AUTO
 from creeping.storage.folder import content_digest
+from creeping.storage.reading import text_of
 from creeping.sweeping.plan import array_digest, too_large
 from creeping.sweeping.request import (
     METHODS,
@@ -26,6 +27,7 @@ from creeping.sweeping.request import (
 )
 from creeping.sweeping.studyfile.schema import Key, nearest, read_directions, read_table
 
+MOST_BYTES = 100_000_000
 EXAMPLE = """\
 [study]
 name = "monostatic, twisted ellipsoid"
@@ -156,7 +158,7 @@ def read_study(path: str | Path) -> Study:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = text_of(path, MOST_BYTES)
     except FileNotFoundError as error:
         raise InvalidInputError(
             f"cannot read the study {path}: there is no such file; name another, or write one to start from with "

@@ -127,3 +127,10 @@ def test_splitting_is_left_where_all_pairs_are_sooner_or_memory_is_short(rng, mo
     assert best_split(make, y, y, CURL, 100.0) is not None
     monkeypatch.setenv("CREEPING_MEMORY", "1M")
     assert best_split(make, y, y, ONE_LAYER, 100.0) is None
+
+
+def test_a_thin_body_has_nothing_beneath_its_nodes(rng):
+    matrix = Matrix(tiles_for(patches_of(sc.Sphere())[:1], 0.5), 0.5, CONDUCTOR)
+    matrix.at, matrix.inner = matrix.at[:0], matrix.inner.part(slice(0, 0))
+    values = rng.normal(size=(2 * len(matrix.root), 1)) + 0j
+    assert np.all(np.isfinite(SplitProduct(matrix)(values)))
