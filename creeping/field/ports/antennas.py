@@ -1,7 +1,7 @@
 """The field at each of many slots and monopoles of a perfect conductor of each other: all geodesics between them.
 
     slot to slot, monopole to monopole     as `creeping.field.ports.antennas` and `creeping.field.ports.antennas`
-    slot i to monopole j                   E_ij = sum over geodesics of `creeping.field.mixed_sources`, or beams
+    slot i to monopole j                   E_ij = sum over geodesics of `creeping.field.ports.mixed`, or beams
     monopole j to slot i                   H_ji = -E_ij
 
 The electric field at each of many monopoles on a perfect conductor of each other: all geodesics between them.
@@ -28,10 +28,10 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
-from creeping.field.mixed_sources import mixed_sources
 from creeping.field.port_beams import PortBeams
 from creeping.field.ports.antenna_waves import MonopoleTerms, monopole_waves, slot_sources
 from creeping.field.ports.coupling_result import Coupling, coupled, matrix_of, port_geodesics
+from creeping.field.ports.mixed import mixed_sources
 from creeping.field.ports.sources import PortSources, scalar_sources
 from creeping.field.ports.sums import PortSums, port_sums
 from creeping.field.ports.waves import path_terms

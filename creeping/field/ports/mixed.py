@@ -1,6 +1,6 @@
 """What slots bring to monopoles by each geodesic, with its error, and by beams where these merge.
 
-A beam carries E_n, its components as in `creeping.field.mixed_sources` without the term in J2'/J2: at the slot moments
+A beam carries E_n, its components as in `creeping.field.ports.mixed` without the term in J2'/J2: at the slot moments
 turn with the angle of the ray, and by stationary phase that term comes back. n does not turn.
 
 The field of each geodesic from a slot in a conductor to a monopole on it: E along n of moments along b and t.
