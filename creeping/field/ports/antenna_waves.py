@@ -53,7 +53,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
-from creeping.field.port_beams import PortBeams
+from creeping.field.ports.beams import PortBeams
 from creeping.field.ports.sources import PortSources, Sums, path_error
 from creeping.field.ports.waves import LIMIT, PathTerms, path_terms, second_order
 from creeping.field.shed_wave import limited

@@ -28,8 +28,8 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
-from creeping.field.port_beams import PortBeams
 from creeping.field.ports.antenna_waves import MonopoleTerms, monopole_waves, slot_sources
+from creeping.field.ports.beams import PortBeams
 from creeping.field.ports.coupling_result import Coupling, coupled, matrix_of, port_geodesics
 from creeping.field.ports.mixed import mixed_sources
 from creeping.field.ports.sources import PortSources, scalar_sources

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
-from creeping.field.port_beams import PortBeams
+from creeping.field.ports.beams import PortBeams
 from creeping.field.ports.waves import PathTerms, path_terms, port_waves
 from creeping.rays.port_rays import PortRays
 

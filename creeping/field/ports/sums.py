@@ -16,7 +16,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.point_result import FieldStatus, Words
-from creeping.field.port_beams import beam_width
+from creeping.field.ports.beams import beam_width
 from creeping.field.ports.sources import PortSources
 from creeping.field.ray_sums import LOST, MERGING, NARROW
 from creeping.field.special.airy import hard_modes
