@@ -182,8 +182,8 @@ def write_csv(
         elif far is not None:
             _write_table(
                 stream,
-                _far_table.far_table_notes(far, observed=observed is not None),
-                _far_table.far_table_rows(far, observed),
+                _far_table.far_field_notes(far, observed=observed is not None),
+                _far_table.far_field_rows(far, observed),
             )
         elif cut is not None:
             _write_table(stream, _cut_table.notes(cut), _cut_table.rows(cut))
@@ -273,7 +273,7 @@ def angles_of(directions: FloatArray) -> FloatArray:
     return np.stack([np.arctan2(across, z), np.where(phi >= 2 * np.pi, 0.0, phi)], axis=-1)
 
 
-def far_table_notes(far: "FarField", *, observed: bool = False) -> dict[str, str]:
+def far_field_notes(far: "FarField", *, observed: bool = False) -> dict[str, str]:
     """Columns and what they hold."""
     unit = far.unit
     of = f"k = {far.wavenumber!r} 1/{unit}, {far.boundary} boundary, order {far.order}, time factor exp(-i w t)"
@@ -303,10 +303,10 @@ def far_table_notes(far: "FarField", *, observed: bool = False) -> dict[str, str
     return columns
 
 
-def far_table_rows(
+def far_field_rows(
     far: "FarField", observed: "tuple[Sequence[str], FloatArray] | None" = None
 ) -> Iterable[tuple[Any, ...]]:
-    """One tuple for each direction, in the order of `far_table_notes`."""
+    """One tuple for each direction, in the order of `far_field_notes`."""
     columns: list[Any] = [*np.asarray(far.directions).T, *np.degrees(angles_of(far.directions)).T]
     for k in range(len(_suffixes(far))):
         total = _component(far.total, k)

@@ -64,7 +64,7 @@ SMALLER = 3.7
 LADDER, RUNGS = 1.1, 4
 """Ratio of the sides that are taken: neighbouring rates have one rule; and by how many they are shorter where the
 integral of n is too large."""
-PIECE_RULES_CLOSED, OPEN = 1e-4, 1e-3
+CLOSED_PIECES, OPEN = 1e-4, 1e-3
 """Integral of n, as a share of the area, that is small enough, and beyond which pieces do not make a closed body."""
 LESS = 0.5
 """Ratio by which it must become less with shorter sides to become less at all."""
@@ -263,7 +263,7 @@ class PieceRules:
             nodes = self.nodes(body, rung, points)
             self._tiles[rung] = len(nodes.points) // points**2
             error, same = nodes.error, nodes.error > LESS * self._left[points]
-            if error <= PIECE_RULES_CLOSED or (error <= OPEN and same):
+            if error <= CLOSED_PIECES or (error <= OPEN and same):
                 # more than their sides tell, where the body bends
                 self._counts[rung, points] = len(nodes.points)
             elif same:
@@ -278,17 +278,17 @@ class PieceRules:
         A body of many small pieces has more than its area asks for. Of shorter sides there are as many, of longer ones
         fewer by the square, or nearly.
         """
-        least = self._area / _piece_rules_sides(rungs) ** 2 * SMALLER
+        least = self._area / _sides_of_piece(rungs) ** 2 * SMALLER
         for rung, count in self._tiles.items():
             least = np.maximum(
-                least, NEARLY * count * np.minimum(1.0, (_piece_rules_sides(rung) / _piece_rules_sides(rungs)) ** 2)
+                least, NEARLY * count * np.minimum(1.0, (_sides_of_piece(rung) / _sides_of_piece(rungs)) ** 2)
             )
         return np.asarray(least)
 
     def nodes(self, body: Any, rung: int, points: int) -> Any:
         """Nodes of a rule, kept; the last one used stands last."""
         key = rung, points
-        side = float(_piece_rules_sides(rung)) * size(body)
+        side = float(_sides_of_piece(rung)) * size(body)
         made = self._rules.pop(key) if key in self._rules else self._make(body, side, points)
         self._rules[key] = made
         while len(self._rules) > KEPT:
@@ -301,7 +301,7 @@ def _rung(share: float) -> int:
     return int(np.floor(np.log(min(share, LONGEST)) / np.log(LADDER)))
 
 
-def _piece_rules_sides(rung: Any) -> FloatArray:
+def _sides_of_piece(rung: Any) -> FloatArray:
     """Sides, in body sizes."""
     return np.asarray(LADDER ** np.asarray(rung, dtype=float))
 

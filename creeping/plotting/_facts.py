@@ -244,7 +244,7 @@ def of_coupling(found: "Coupling") -> Facts:
     """Facts of a coupling matrix."""
     yield "body", brief(found.body, 200)
     yield "ports", str(len(found.ports))
-    yield from _response_facts_wave(found)
+    yield from _response_wave(found)
     yield "order", str(found.order)
     yield "geodesics up to", f"{found.length:.6g} {found.length_unit}"
     yield from _states(found)
@@ -255,7 +255,7 @@ def of_pattern(found: "SourcePattern") -> Facts:
     """Facts of far fields of sources."""
     yield "sources", str(len(found.sources))
     yield "directions", str(len(found.directions))
-    yield from _response_facts_wave(found)
+    yield from _response_wave(found)
     yield from _states(found)
     yield from _sizes(np.abs(found.values), found.error, found.ok)
 
@@ -295,7 +295,7 @@ def of_echo(found: "Echo") -> Facts:
     yield "served by currents", f"{told['by_currents']} of {told['values']}, else by {told['otherwise_by']}"
 
 
-def _response_facts_wave(found: Any) -> Facts:
+def _response_wave(found: Any) -> Facts:
     yield "wavenumber", wave_words(found.wavenumber, found.length_unit)
     yield "boundary", found.boundary
 

@@ -36,8 +36,8 @@ _to_rotation, _to_angles = _rotations.to_coordinates, _angles.angles_to_coordina
 _from_rotation, _from_angles = _rotations.from_coordinates, _angles.angles_from_coordinates
 _to_rotation_by_table = _surface_table.to_coordinates
 _from_rotation_by_table = _surface_table.from_coordinates
-_locate_rotation, _locate_angles, _locate_meridian = _rotations.locate, _angles.angles_locate, _meridian.locate
-_move_rotation, _move_angles, _unfold = _rotations.move, _angles.angles_move, _rotations.unfold
+_locate_rotation, _locate_angles, _locate_meridian = _rotations.locate, _angles.locate_angles, _meridian.locate
+_move_rotation, _move_angles, _unfold = _rotations.move, _angles.move_angles, _rotations.unfold
 
 _sum_3_4, _sum_5_4 = contraction(3, 4), contraction(5, 4)
 _sum_3_8, _sum_5_8 = contraction(3, 8), contraction(5, 8)

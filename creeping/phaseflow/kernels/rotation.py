@@ -221,7 +221,7 @@ def from_coordinates(forward, forward_par, r, work, x, p):
 
 
 @njit(**options)
-def angles_locate(r, chart, u, v, angle):
+def locate_angles(r, chart, u, v, angle):
     """Chart 0 and u, v and angle in [0, 1) of a block."""
     for i in range(BLOCK):
         chart[i] = 0
@@ -234,7 +234,7 @@ def angles_locate(r, chart, u, v, angle):
 
 
 @njit(**options)
-def angles_move(r, d, centre):
+def move_angles(r, d, centre):
     """Add displacements d (BLOCK, 4), flat, to the coordinates r (4, BLOCK), flat."""
     c0, c1, c2 = centre[0], centre[1], centre[2]
     for i in range(BLOCK):
