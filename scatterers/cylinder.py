@@ -1,13 +1,14 @@
 """Cylinder with flat ends: |z| < l/2, x^2 + y^2 < a^2, with an edge of 90 degrees at either end.
 
-Cone, pointed or truncated, on a flat base: r < a + (b - a) z/l for 0 < z < l, r the distance from the axis.
+Also here: cone, pointed or truncated, on a flat base: r < a + (b - a) z/l for 0 < z < l, r the distance from the axis.
 
-Cone that joins a sphere smoothly: the sphere of radius a about the origin and its tangents from (0, 0, l - a).
+Also here: cone that joins a sphere smoothly: the sphere of radius a about the origin and its tangents from (0, 0, l -
+a).
 
 With the half angle of the cone, sin alpha = a/(l - a), they touch at z = a sin alpha, r = a cos alpha: a joint, where
 the curvature along the profile jumps from 1/a to 0. The cone-sphere of the EMCC has a = 2.947 in and alpha = 7 degrees.
 
-Cylinder with hemispherical ends: all points within a distance a of the axis from -(l/2 - a) to l/2 - a.
+Also here: cylinder with hemispherical ends: all points within a distance a of the axis from -(l/2 - a) to l/2 - a.
 
 The curvature along z jumps from 0 to 1/a where the hemispheres begin: two joints.
 

@@ -1,8 +1,8 @@
 """Ellipsoid of any three semi-axes: F = x^2/a^2 + y^2/b^2 + z^2/c^2 - 1, x = psi(s) = (a s_1, b s_2, c s_3).
 
-Sphere about the origin: F = |x|^2/radius^2 - 1, x = psi(s) = radius s.
+Also here: sphere about the origin: F = |x|^2/radius^2 - 1, x = psi(s) = radius s.
 
-Twisted ellipsoid: F = x^2/a^2 + (y - d cos(pi z))^2/b^2 + z^2/c^2 - 1.
+Also here: twisted ellipsoid: F = x^2/a^2 + (y - d cos(pi z))^2/b^2 + z^2/c^2 - 1.
 
 psi(s) = (a s_1, b s_2 + d cos(pi c s_3), c s_3). Not convex: near z = 0, y < 0 the profile has
 y'' = -pi^2 d + b/c^2 on the default body, negative, so kappa_n < 0 along z there.

@@ -12,7 +12,7 @@ alpha is then the half angle at the tip. The ogive of the EMCC has a = 1 in, l =
 double ogive has l = 2.5 in below with alpha = 46.4 degrees, an arc of an ellipse (43.6 degrees would make a circle),
 and l = 5 in above.
 
-The NASA almond: half an ellipsoid, and half an ogive with elliptic cross-sections that ends in a tip.
+Also here: the NASA almond: half an ellipsoid, and half an ogive with elliptic cross-sections that ends in a tip.
 
 With the length d, t = x/d, the points are (d t, y(t) cos psi, y(t) sin psi/3), -pi < psi < pi,
 

@@ -2,7 +2,7 @@
 
 Expressions are differentiated symbolically (sympy) and compiled; they never pass through ``eval`` as written.
 
-Admittance of a coating that varies over a body, from expressions in x, y, z.
+Also here: admittance of a coating that varies over a body, from expressions in x, y, z.
 
 Expressions are parsed by a whitelist; they never pass through ``eval`` as written.
 """

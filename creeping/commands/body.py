@@ -1,8 +1,8 @@
 """The BODY of a command: a name with parameters, a file, or an expression. Part of the command line.
 
-Kinds of tables that a command writes, ``--format``, and the writing of them.
+Also here: kinds of tables that a command writes, ``--format``, and the writing of them.
 
-The wave of a command: its wavenumber, or the frequency or wavelength it comes from.
+Also here: the wave of a command: its wavenumber, or the frequency or wavelength it comes from.
 """
 
 import inspect

@@ -1,6 +1,7 @@
 """What ``creeping rcs`` and ``creeping ts`` compute, write and say.
 
-What ``creeping rcs`` and ``creeping ts`` ask for: angles, frequencies, polarisations. Degrees, hertz, metres.
+Also here: what ``creeping rcs`` and ``creeping ts`` ask for: angles, frequencies, polarisations. Degrees, hertz,
+metres.
 """
 
 from collections.abc import Callable

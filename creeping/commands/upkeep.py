@@ -1,6 +1,7 @@
 """Commands that look after an installation: stored maps and fitted bodies, and what the machine offers.
 
-The process that `creeping.kernels.first_use` starts: a small job compiles the kernels that its parent needs later.
+Also here: the process that `creeping.kernels.first_use` starts: a small job compiles the kernels that its parent needs
+later.
 
 Which these are is nowhere written down: the job is that of most users, on a sphere.
 """

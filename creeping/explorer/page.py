@@ -3,9 +3,10 @@
 One worker follows the hand, from the latest request to the preview; another follows up when no newer request has come.
 The server listens on the loopback address, behind `creeping.explorer.door`.
 
-The latest request and nothing else: a queue of one place, so that work does not pile up behind a hand that drags.
+Also here: the latest request and nothing else: a queue of one place, so that work does not pile up behind a hand that
+drags.
 
-Controls of what the colours show, the field's level or its wave, and the thread that lets the wave run.
+Also here: controls of what the colours show, the field's level or its wave, and the thread that lets the wave run.
 
 The phase is omega t of Re(u e^{-i omega t}), as in the pictures of `creeping.plotting`.
 """

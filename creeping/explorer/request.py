@@ -2,7 +2,8 @@
 
 d = (sin θ cos φ, sin θ sin φ, cos θ)
 
-What lengths, wavenumbers and echoes of the page are in: L, or metres with hertz and decibels of a square metre.
+Also here: what lengths, wavenumbers and echoes of the page are in: L, or metres with hertz and decibels of a square
+metre.
 """
 
 from dataclasses import dataclass, replace

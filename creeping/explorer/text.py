@@ -1,6 +1,6 @@
 """The numbers beside the picture, as short Markdown.
 
-The title of the page: that of the body instead of the library's.
+Also here: the title of the page: that of the body instead of the library's.
 """
 
 import html

@@ -6,7 +6,7 @@ so that waves are seen through the whole range of the colours, deep in the shado
 eikonal is linear, as it is along any ray, and the rest of the wave, which is slow to vary, is taken as linear; the
 quarter of a turn of a caustic is spread over the step that passes it.
 
-Colours of levels as bytes, from tables made once: a frame has ten thousand of them.
+Also here: colours of levels as bytes, from tables made once: a frame has ten thousand of them.
 
 Sources: Derivations, F3.
 """

@@ -1,6 +1,6 @@
 """Arguments that fields have in common.
 
-Scales of a creeping ray at a wavenumber: Fock's ξ and m, and the ratio of curvatures.
+Also here: scales of a creeping ray at a wavenumber: Fock's ξ and m, and the ratio of curvatures.
 
     ξ = (k/2)^(1/3) ∫ κₙ^(2/3) ds,   m = (kρ/2)^(1/3),   r = ρ κ_t
 

@@ -12,7 +12,7 @@ eps = WIDTH/a is free; what it changes is an error. Beams are cut off at the sha
 within 2 of their widths w = (a/(WIDTH k))^(1/2) of it: there rays have not merged yet, and each that has come less far
 than 4 w stands by itself, others by beams.
 
-Rays that pass through points of the body, and beams where those merge: which of the two, and how far off.
+Also here: rays that pass through points of the body, and beams where those merge: which of the two, and how far off.
 
     u = (u_r e_b^2 + u_b e_r^2)/(e_r^2 + e_b^2)
 

@@ -3,7 +3,7 @@
     residual = s - s_ref, dB, at the reference's places, which may repeat after a period
     austin   = mean |max(s, T) - max(s_ref, T)|,   T = max s_ref - 80 dB
 
-Decibels: of amplitudes, of cross sections, and the range of them that a picture shows.
+Also here: Decibels: of amplitudes, of cross sections, and the range of them that a picture shows.
 
 Sources: [KCY20] for the measure.
 """

@@ -20,7 +20,8 @@ of the penumbra, ahead. That of a conductor starts with a jump, of a current alo
 Between the faces of a concave edge the wave is reflected more than once: that is left out, and so is everything shed by
 an edge and scattered again.
 
-Physical optics of the lit tiles of a body: what its facets and curved pieces reflect, and the shadow they cast.
+Also here: physical optics of the lit tiles of a body: what its facets and curved pieces reflect, and the shadow they
+cast.
 
     f = -(ik/4π) ∫ [(1 + R) n.r + (1 - R) n.d] e^{ik(d - r).x} dS     over lit ground, R of a plane at its cos θᵢ = -n.d
     f = (ik/2π) [V - (V.r) r],  V = ∫ n e^{ik(d - r).x} dS x (d x E)   of a conductor
@@ -35,7 +36,7 @@ Each tile is a flat triangle, over which the phase is linear: with phases u and 
 The same integral serves a specular point, a flat facet as a whole, the rim of a facet and the forward lobe. Its error
 on curved ground is of the next order, κ/(k cos³θᵢ) of each tile's contribution.
 
-Sources: [LK59], [KLS56]; Derivations, F3 and F13; [KLS56]; Derivations, F13.
+Sources: [LK59], [KLS56]; [KLS56]; Derivations, F3 and F13.
 """
 
 from itertools import pairwise

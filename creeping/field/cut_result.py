@@ -2,7 +2,8 @@
 
 x = point + a e_1 + b e_2,   a along ``across``, b along ``up``
 
-The total field on a plane cut through a body: a rectangle of points, those outside the body with their field.
+Also here: the total field on a plane cut through a body: a rectangle of points, those outside the body with their
+field.
 
     x = point + a e_1 + b e_2,   a along ``across``, b along ``up``
 

@@ -5,7 +5,7 @@ grows like k^2 with every direction. Rays (`creeping.field.far_rays`) cost the s
 gives; where the reflected field has a caustic they err. Their error is an estimate, whose level is measured against
 currents at a lower wavenumber (`creeping.field.far`) where the method was left to the program.
 
-The error of a far field by rays where currents cost too much: measured at a lower wavenumber, carried up.
+Also here: the error of a far field by rays where currents cost too much: measured at a lower wavenumber, carried up.
 
 At the highest wavenumber k0 whose currents cost little, rays are compared with currents, which measure their own error
 epsilon, in directions spread over the sphere. With e the error that rays state (`creeping.field.far_rays`),
@@ -16,7 +16,7 @@ epsilon, in directions spread over the sphere. With e the error that rays state 
 e falls as fast as the order that it is of; of a conductor, whose second order is a rule away from the sphere, a level
 above 1 tells of a term of first order, and grows like k. The second term is what rays and currents both lack.
 
-Sources: [LK59], [CK13]; Derivations, F10 to F17; Derivations, F17.
+Sources: [LK59], [CK13]; Derivations, F10 to F17 and F17.
 """
 
 # help() shows names of types instead of what they stand for

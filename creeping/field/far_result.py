@@ -1,6 +1,6 @@
 """What a far field is: complex amplitudes by direction, their parts, and what is to be thought of them.
 
-Polarisation of a perfect conductor's far field: each contribution is a sum of two dyads.
+Also here: polarisation of a perfect conductor's far field: each contribution is a sum of two dyads.
 
     across   s = n × d/|n × d| of the incident, n' × r/|n' × r| of the scattered wave      soft
     along    h = s × d,  s' × r                                                            electric hard

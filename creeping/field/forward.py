@@ -8,7 +8,7 @@
 By stationary phase I_S is the isolated ray and I_L the reflected field. The fan integral is I_S with g = e^{-iπ/4} P
 over every crossing, tapered in p.r; it replaces isolated rays where they merge.
 
-The step of a cut that fits the lobes of its pattern: lambda/D wide if bistatic, half of that in backscatter.
+Also here: the step of a cut that fits the lobes of its pattern: lambda/D wide if bistatic, half of that in backscatter.
 
 Sources: Derivations, F10 to F12.
 """

@@ -2,7 +2,7 @@
 
 c is the speed of light in a vacuum, or a given speed of sound.
 
-The inverse transform of values over a band of wavenumbers: what came by paths of which length.
+Also here: the inverse transform of values over a band of wavenumbers: what came by paths of which length.
 
     h(t) = sum_n w_n u(k_n) e^{-i k_n t} / sum_n w_n,   k_n = k_1 + n dk
 

@@ -6,7 +6,8 @@
 with e_n the errors of the values. What the wave does on the way shows as the delay of its group: a creeping wave, whose
 phase has a term in k^{1/3}, comes later than its path is long by that of the mode, some 0.01 of the arc at ka = 40.
 
-Where along the line of sight the echo comes from: the inverse transform of the field over a band of frequencies.
+Also here: where along the line of sight the echo comes from: the inverse transform of the field over a band of
+frequencies.
 
     h(R) = sum_n w_n f(k_n) e^{-2 i k_n R} / sum_n w_n,   k_n equally spaced by dk
 

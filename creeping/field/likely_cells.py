@@ -13,7 +13,8 @@ and a neighbour that goes on. Elsewhere r is no farther from the nearest p of th
 from each other. Where the place tells nothing, next to a tip and where both heights are as good as parallel, a cell is
 likely if r is nearer than FARTHEST to a corner's p, and where r is nearer than BESIDE in any case.
 
-What rays would still give that end too early: they are traced on, and their waves counted where they would leave.
+Also here: what rays would still give that end too early: they are traced on, and their waves counted where they would
+leave.
 
     T(r) = 2 max |√(2 m1 m2/k) P |J'|^(-1/2)|   over s beyond the end and p within 0.3 of r,  |J'| >= |J| κₙ²/k
 
@@ -21,7 +22,7 @@ P is of first order, |J'| is held where rays merge at a caustic of the far field
 direction. Only rays with ξ Im τ < 7.5 at their ends are traced: of those with the length "auto" a tenth
 at most.
 
-Sources: Derivations, R12; [LK59]; Derivations, F3 and F4.
+Sources: [LK59]; Derivations, R12, F3 and F4.
 """
 
 from typing import TYPE_CHECKING, NamedTuple

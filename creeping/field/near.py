@@ -8,7 +8,7 @@ wave, and must be a quarter of a wavelength away; nearer, the field is between t
 (`creeping.field.near`). Rays err by a share of what they bring, which in the deep shadow is
 far less. So rays serve in the shadow where nothing is the matter with them and their error is the smaller one.
 
-The total field nearer to the body than currents serve: between the field on it and that of currents above.
+Also here: the total field nearer to the body than currents serve: between the field on it and that of currents above.
 
 Along the normal at x, h above the body, t = kh and c = -n.d, at least 0.15,
 
@@ -19,7 +19,7 @@ reflected wave of a plane are a and b; where the wave grazes the four are 1, t, 
 at most; what four terms leave out is about 0.1 |kappa_1 + kappa_2|/k of the incident wave, 0.03 on an impedance; on a
 saddle the root of kappa_1^2 + kappa_2^2 stands for the sum.
 
-Sources: [LK59], [CK13]; Derivations, F8, F17 and F20; Derivations, F20.
+Sources: [LK59], [CK13]; Derivations, F8, F17 and F20.
 """
 
 # help() shows names of types instead of what they stand for

@@ -7,7 +7,8 @@ w_i of rays that come from afar. `creeping.field.lit_ground` says how far it is 
 itself, hides part of its line, or has edges, joints or tips, or if it is asked for, the solution of the integral
 equation stands for both, where it is affordable (`creeping.field.equation`).
 
-Each ray's own wave on the body, along the whole of a fan: by creeping modes, and by marching where these have none.
+Also here: each ray's own wave on the body, along the whole of a fan: by creeping modes, and by marching where these
+have none.
 
 Modes end where a ray detaches, at joints, and where an admittance varies; the marched wave, of a plane wave alone,
 
@@ -15,14 +16,14 @@ Modes end where a ray detaches, at joints, and where an admittance varies; the m
 
 goes on (`creeping.field.marching.fan_waves`). On a caustic either is infinite.
 
-Each ray's own field from what the fan carries already; for pictures that follow a hand.
+Also here: each ray's own field from what the fan carries already; for pictures that follow a hand.
 
 First order of `creeping.field.surface`, with ξ = (k/2)^(1/3) A and A the fan's attenuation integral:
 
     u e^{-ik(d.x0 + s)} = (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} g(ξ)          hard, impedance
     du/dn/k: the same with F(ξ)/m2                                          soft
 
-Sources: [F46], [LK59]; Derivations, F9, F16 and F20; Derivations, F9 and F22; Derivations, F3.
+Sources: [F46], [LK59]; Derivations, F9, F16, F20, F22 and F3.
 """
 
 # help() shows names of types instead of what they stand for

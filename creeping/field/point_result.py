@@ -2,7 +2,7 @@
 
 Results act as arrays of their values (`creeping.field.labelled`).
 
-What serves at points: a field in two parts with its error, and the rule by which another takes its place.
+Also here: what serves at points: a field in two parts with its error, and the rule by which another takes its place.
 
 Sources: Derivations, F20.
 """

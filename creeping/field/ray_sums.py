@@ -15,7 +15,7 @@ is of its root's size. Two waves of which one has touched a caustic that the oth
 Airy or Bessel function, whose next terms fall with their difference in phase. A ray beyond the end of the fan is weaker
 than one found by the decay a of the first mode, g.
 
-What the polarisations of a conductor's creeping rays do to each other.
+Also here: what the polarisations of a conductor's creeping rays do to each other.
 
     c = i κ_t1 κ_t2/(k J')                                 of the other's wave comes with each, exact on the sphere
     ξ √((VARIES B)² + (LEANS (r - 1))²)/m²                 may pass on the way: an error, 0 on the sphere

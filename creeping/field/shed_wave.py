@@ -8,7 +8,8 @@ a derivative of P, and M0 = dτ/dq as a change of q; both forms are the same ser
 ray: τ_p is taken at the mean of q weighted by κₙ^(2/3), so that its first-order variation is exact, and R_p at the
 geometric mean of both ends.
 
-The wave that rays shed in both orders at once: what the far field asks of each, at every frequency and boundary.
+Also here: the wave that rays shed in both orders at once: what the far field asks of each, at every frequency and
+boundary.
 
 Beyond the passage to the series of `creeping.field.shed_wave` a compiled sum over modes serves, beyond SERIES alone;
 before, and for modes that differ from ray to ray or a point source, that module itself.

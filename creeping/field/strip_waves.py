@@ -4,14 +4,14 @@
 
 y varies slowly and has no poles on caustics: cubic splines between rays and steps.
 
-The far field of many incidences as sums over sheets: rays and specular points that move with the incidence.
+Also here: the far field of many incidences as sums over sheets: rays and specular points that move with the incidence.
 
     f_c = sum over sheets of a_c exp(i k_c L)
 
 A sheet is a ray shed towards an observer, or a specular point; its path L and its amplitudes a_c, one of each problem c
 (a boundary, its component and a wavenumber), are smooth functions of the incidence where the field itself oscillates.
 
-Sources: Derivations, F22; [LK59]; Derivations, F3 and F23.
+Sources: [LK59]; Derivations, F22, F3 and F23.
 """
 
 from dataclasses import dataclass

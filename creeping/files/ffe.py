@@ -6,7 +6,7 @@ Its time factor is e^{+jωt} and ours e^{-iωt}, so every number is written conj
 
 Rows run over θ first, then φ, in degrees.
 
-Far fields from FEKO text (.ffe), those of `write_ffe` and of others.
+Also here: far fields from FEKO text (.ffe), those of `write_ffe` and of others.
 
 The file's time factor is e^{+jωt} and ours e^{-iωt}: numbers are conjugated, and come back as they were written.
 """

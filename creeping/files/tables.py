@@ -2,11 +2,12 @@
 
 Numbers keep all 17 digits, so that what is read back is what was written.
 
-A field on a plane as a table: one row for each point outside the body.
+Also here: a field on a plane as a table: one row for each point outside the body.
 
-A far field as a table: one row per direction, the total and its parts, for a vector field each component.
+Also here: a far field as a table: one row per direction, the total and its parts, for a vector field each component.
 
-An echo as a table: a row for each channel, angle and frequency, columns explained in lines that begin with #.
+Also here: an echo as a table: a row for each channel, angle and frequency, columns explained in lines that begin with
+#.
 """
 
 import os

@@ -6,7 +6,8 @@ the field at port i of a source at port j, in units of what that source gives at
 is 1/(2 pi r0). It is written as S_ij: a transfer ratio without unit, not a scattering parameter: nothing is known
 of what ports reflect, S_ii is 0, and columns are not bounded by 1. Numbers are conjugated, for e^{+jwt}.
 
-Radar cross sections for STK (.rcs), pattern type MonostaticRealSparse: rho, theta and dBsm, one row a direction.
+Also here: radar cross sections for STK (.rcs), pattern type MonostaticRealSparse: rho, theta and dBsm, one row a
+direction.
 
 Rho is counted from z, 90 degrees less the elevation; theta is the azimuth, about z from x to y, within 180 degrees.
 The format's pages do not say from which axis theta starts where rho is from z; x is taken here.

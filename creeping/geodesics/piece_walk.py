@@ -9,7 +9,7 @@ What a ray does is bounded: after CROSSINGS it stays on its piece up to the end 
 where no step however short is left to it, it ends as data, at the nearest edge or tip, without a crease if none is
 near; without one it ends, too, where a window begins on ground that the body does not trust.
 
-Where rays leave the pieces of a body: to others, or within REACH of a tip.
+Also here: where rays leave the pieces of a body: to others, or within REACH of a tip.
 
 Between its states a ray is the cubic of both ends; SAMPLE by SAMPLE it is asked which piece it is on.
 

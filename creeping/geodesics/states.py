@@ -7,7 +7,8 @@ M is the Jacobi matrix of the metric ds/c, A the attenuation integral, t1 the ti
 body with creases all 14, the last two the time at which the ray ended at a crease and the number of that (inf and -1
 before); see `creeping.geodesics.pieces`.
 
-Rays between the states to which they are traced, coarsely: cubics with the directions at both ends, and chords.
+Also here: rays between the states to which they are traced, coarsely: cubics with the directions at both ends, and
+chords.
 
 Enough to ask on which piece of a body a ray is, SAMPLE by SAMPLE; `hermite` is what integrals are taken along.
 """

@@ -1,6 +1,6 @@
 """Numerical verification of a body: derivatives, closedness, orientation, cover and overlap of its charts.
 
-The unit of a body's lengths: bodies made from files know theirs, the metre; of others it is the user's, L.
+Also here: the unit of a body's lengths: bodies made from files know theirs, the metre; of others it is the user's, L.
 """
 
 from collections import Counter

@@ -10,7 +10,8 @@ So surfaces of neighbours meet without a gap. A triangle is a square whose side 
 has one. A smooth body's squares are those of its charts, where these cover it once (``tiling``). A square that is not
 the body to POSITION and NORMAL is halved.
 
-A coarse mesh of a body, of quadrilaterals and triangles: where its squares begin (`creeping.geometry.covering`).
+Also here: a coarse mesh of a body, of quadrilaterals and triangles: where its squares begin
+(`creeping.geometry.covering`).
 
 Of a smooth body the quadrilaterals around the grid edges that it crosses; of one of pieces its triangles, joined by two
 where they make a good quadrilateral: convex, its corners no sharper than SQUARE, and no two sides in a row along one

@@ -5,7 +5,7 @@ With g = grad F, H the Hessian of F and p, b unit tangents:
     kappa_n = p.Hp/|g|          normal curvature along p, positive where the body is convex along p
     K = (g.adj(H) g)/|g|^4      Gaussian curvature
 
-Parabolic points of a body, K = 0, where its normals fold over.
+Also here: parabolic points of a body, K = 0, where its normals fold over.
 
 With u the principal direction in which kappa_1 = 0 and g = u.grad kappa_1, a step s along u turns the normal by
 
@@ -14,7 +14,7 @@ With u the principal direction in which kappa_1 = 0 and g = u.grad kappa_1, a st
 so that near the image of the parabolic curve on the sphere of normals each normal is taken twice on one side,
 sign(g) u, and not at all on the other.
 
-Sources: [G05]; Derivations, R1; Derivations, B12.
+Sources: [G05]; Derivations, R1 and B12.
 """
 
 from dataclasses import dataclass

@@ -3,7 +3,7 @@
 A direction is where the wave travels. theta is measured from z, phi and the azimuth from x towards y, the elevation
 from the plane of x and y; all in radians.
 
-Solutions found more than once: the first of each.
+Also here: solutions found more than once: the first of each.
 
 Sources: [G10], [LL99], [W06]; Derivations, B9.
 """

@@ -6,14 +6,14 @@
 
 A body with numpy methods only goes through the same kernels as a compiled one, a hundred times slower.
 
-Orthonormal frames of tangent planes.
+Also here: orthonormal frames of tangent planes.
 
 The polar frame of a chart with tangents T = [x_u, x_v] (3 x 2) is the orthogonal polar factor
 E = T (T^T T)^(-1/2): orthonormal, tangent, and nearest to T.
 
-Speed c of a body's weighted flow.
+Also here: speed c of a body's weighted flow.
 
-Sources: Derivations, R1; [H86]; Derivations, B2.
+Sources: [H86]; Derivations, R1 and B2.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,13 +1,13 @@
 """Squares that cover a body: surfaces that polynomials of degree DEGREE make on 0 <= u, v <= 1.
 
-Polynomials on the unit square by their values at Lobatto's points, and surfaces that such polynomials make.
+Also here: polynomials on the unit square by their values at Lobatto's points, and surfaces that such polynomials make.
 
     u_j = (1 - cos(pi j/q))/2,   f(u, v) = sum_ij l_i(u) l_j(v) f_ij,   l_i(u) = [b_i/(u - u_i)]/sum_j b_j/(u - u_j)
 
 b_j = prod_{i != j} 1/(u_j - u_i). The sides of the square hold points, so that two surfaces that share those of a side
 meet there without a gap.
 
-Triangles of a body on flat facets, and squares that cover it.
+Also here: triangles of a body on flat facets, and squares that cover it.
 
 Two triangles that share a side and lie in one plane are a quadrilateral, if it is convex; the longest shared sides go
 first, so that rectangles come back. A triangle that stays alone is three quadrilaterals about its middle, each with a

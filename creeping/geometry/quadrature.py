@@ -10,7 +10,7 @@ its error. Which mesh and rule are taken: `creeping.geometry.tile_rules`.
 
 A body of smooth pieces is tiled by triangles, each mapped onto its own piece, with conical products of Gauss's rules.
 
-Points inside a body, by their depth under its surface.
+Also here: points inside a body, by their depth under its surface.
 
 A point is as deep as the nearest of many nodes of the body is far, less what the nodes are apart.
 

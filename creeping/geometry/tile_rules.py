@@ -7,13 +7,14 @@ For integrands as fast as e^{i a u} on a tile of -1 < u < 1 Gauss's rule of p po
 Few large tiles with many points cost less than many small ones with few, as far as the map onto the body is smooth on
 them, which the integral of n tells: it is 0 over a closed surface.
 
-Which triangles a body of smooth pieces is tiled by and how many points they have: the cheapest that resolve a rate.
+Also here: which triangles a body of smooth pieces is tiled by and how many points they have: the cheapest that resolve
+a rate.
 
 As `creeping.geometry.tile_rules` of smooth bodies: many points on few triangles cost least where the rate asks for
 them, few points where triangles must be small for the body's sake. The integral of n, 0 over a closed surface, tells
 how small: it is made less until it is CLOSED, or, where the pieces do not meet any better, until it does not get less.
 
-Triangles of a body of smooth pieces, smaller where the body bends and towards its tips.
+Also here: triangles of a body of smooth pieces, smaller where the body bends and towards its tips.
 
 An edge between whose ends the normal turns by more than BEND, or that ends in a tip, is split in the middle, which is
 put onto its piece, and the triangles on both sides of it with it, so that no gap opens between them:

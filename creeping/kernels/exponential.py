@@ -4,13 +4,14 @@
 
 with Taylor's polynomial of e^r, which ends below rounding; 2^n is put together from its bits.
 
-The cube root by Newton's method without a division, which compilers vectorise: a library's power they only call.
+Also here: the cube root by Newton's method without a division, which compilers vectorise: a library's power they only
+call.
 
     r <- r (4 - x r^3)/3 tends to x^(-1/3),   x^(1/3) = x r^2
 
 from a guess whose bits are about those of x over -3.
 
-What kernels need of the gradient g and the Hessian H of F at a point; see `creeping.geometry.curvature`.
+Also here: what kernels need of the gradient g and the Hessian H of F at a point; see `creeping.geometry.curvature`.
 
     p.Hp       = p_i p_j H_ij        kappa_n = p.Hp/|g|
     g.adj(H)g  = g_i g_j adj(H)_ij   K = (g.adj(H)g)/|g|^4
@@ -19,7 +20,7 @@ What kernels need of the gradient g and the Hessian H of F at a point; see `cree
 Scalars in, scalars out: they are inlined, and the loops over a block around them vectorise. The first two take
 `creeping.kernels.vectors` as well, which know no constants.
 
-Angles in turns by polynomials, which compilers vectorise where they only call a library's functions.
+Also here: angles in turns by polynomials, which compilers vectorise where they only call a library's functions.
 
 With t reduced to -1/2..1/2, s = sin(pi t) and c = cos(pi t) by their Taylor polynomials, which end below rounding,
 cos 2 pi t = 1 - 2 s^2 and sin 2 pi t = 2 s c. The angle of a vector by arctan z = z + z^3 P(z^2), |z| <= tan(pi/8);

@@ -4,7 +4,7 @@ A compiler that vectorises loops has to prove first that their arrays do not ove
 does not succeed. Here the vector is explicit, and a recurrence keeps its state in registers. On machines with shorter
 registers the compiler splits a vector into several.
 
-Sums over the stages of a Runge-Kutta method with constant weights, in explicit vector instructions.
+Also here: sums over the stages of a Runge-Kutta method with constant weights, in explicit vector instructions.
 
     z = y + h sum_j w_j k_j,   sum_j w_j k_j at one vector
 

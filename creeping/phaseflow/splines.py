@@ -4,7 +4,7 @@ Along an axis with nodes 0..n-1 the spline is sum_j c_j N_p(t - j) with the unif
 ends where the axis is a chart variable (n + p - 1 coefficients), period n where it is periodic (n, continued by p).
 A not-a-knot spline has fewer knots than the uniform basis, so it is contained in it and nothing is lost.
 
-The grid of a map, and the splines on it for one time.
+Also here: the grid of a map, and the splines on it for one time.
 
 Sources: [B78]; Derivations, B7.
 """

@@ -3,7 +3,7 @@
 A point source within two body sizes is the foot of its arrow, which points to the body; of one farther away the arrow
 stands beside the body, as that of a plane wave does.
 
-The camera of the 3-D pictures: parallel projection, from the shadow side, and what it can see.
+Also here: the camera of the 3-D pictures: parallel projection, from the shadow side, and what it can see.
 
 toward = (cos e cos a, cos e sin a, sin e) points from the body to the camera (azimuth a, elevation e), and
 (right, up, toward) is a right-handed frame, up the picture of z.

@@ -1,6 +1,6 @@
 """What the table of a result says, type by type: what it is, how large, how accurate, what is wrong.
 
-What the tables of couplings, patterns of sources, responses and echoes say.
+Also here: what the tables of couplings, patterns of sources, responses and echoes say.
 """
 
 from collections import Counter

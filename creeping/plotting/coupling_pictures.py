@@ -2,7 +2,7 @@
 
 Shown is |u| of a unit point source e^{ikr}/(4 pi r) at the port, as `creeping.field.ports.port_map` has it.
 
-Wave fronts on a body: where Re(u e^{-i phase}) = 0 on the triangles of its mesh, joined to polylines.
+Also here: wave fronts on a body: where Re(u e^{-i phase}) = 0 on the triangles of its mesh, joined to polylines.
 
 On an edge of a triangle the real part is taken as linear; fronts are half a wavelength of the wave on the body apart.
 

@@ -1,6 +1,7 @@
 """Pictures of the far field in one plane: decibels against the angle, over straight axes or round a circle.
 
-Pictures that results draw of their levels: a far field against the angle, a map's error against the ray's length.
+Also here: pictures that results draw of their levels: a far field against the angle, a map's error against the ray's
+length.
 """
 
 # help() shows names of types instead of what they stand for

@@ -3,7 +3,7 @@
 Any two colours differ by 12 or more (CIEDE2000), also as seen in deuteranopia and protanopia, and each stands on white
 with a contrast of 3 to 1; `tests/plotting/test_palette.py` holds them to it.
 
-Bars of colours: their look, and the arrows at their ends for what lies beyond.
+Also here: bars of colours: their look, and the arrows at their ends for what lies beyond.
 
 Sources: [MOF09] for the simulation.
 """

@@ -1,6 +1,6 @@
 """Whole figures as PNG files: the body in space, by pyvista or matplotlib, and the parameter plane.
 
-Figures outside pyplot that notebooks show: no window, no global state, and their axes answer as pictures.
+Also here: figures outside pyplot that notebooks show: no window, no global state, and their axes answer as pictures.
 
 A notebook asks the last value of a cell for ``_repr_png_``, whichever backend is on.
 """

@@ -2,7 +2,8 @@
 
 Wave fronts are where Re(u e^{-i phase}) = 0, half a wavelength apart; ``phase`` is omega t.
 
-What stands on pictures of the field on a plane: the body's section, the shadow line, axes, what is not known.
+Also here: what stands on pictures of the field on a plane: the body's section, the shadow line, axes, what is not
+known.
 
 Hatched is what is not OK, dotted where the field is less than its error.
 """

@@ -1,6 +1,6 @@
 """Pictures that responses to a pulse draw of themselves: level against delay or range.
 
-Pictures that fields between ports, and far fields of sources, draw of themselves: levels in decibels.
+Also here: pictures that fields between ports, and far fields of sources, draw of themselves: levels in decibels.
 """
 
 from typing import TYPE_CHECKING

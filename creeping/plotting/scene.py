@@ -1,6 +1,6 @@
 """The 3-D picture with pyvista: a true depth buffer hides what is behind the body.
 
-Can this machine draw with OpenGL? Asked once, in a process of its own.
+Also here: can this machine draw with OpenGL? Asked once, in a process of its own.
 
 A missing libX11, libEGL or Mesa vendor file does not raise in VTK, it ends the process with a segmentation fault.
 Hence the question is put to a subprocess, and VTK is imported here only after it has come back with a picture.

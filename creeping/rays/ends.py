@@ -1,10 +1,10 @@
 """Where rays end before the fan does: detached, at what a body calls not smooth, at its edges and tips.
 
-Where the rays of one fan start: the launch points of the line, and further ones between them.
+Also here: where the rays of one fan start: the launch points of the line, and further ones between them.
 
 A position is an arclength that grows along its arc, beyond the curve's length where the arc comes round.
 
-How much of a body with edges and tips the creeping rays of an incidence do not serve.
+Also here: how much of a body with edges and tips the creeping rays of an incidence do not serve.
 
     line        (l_e + l_t)/(l + l_e + l_t)               l of the curves, l_e on edges, l_t next to tips
     rays        sum' h e^(-ξ Im τ)/sum h                  h the spacing of rays, sum' over those that ended there
@@ -13,9 +13,9 @@ How much of a body with edges and tips the creeping rays of an incidence do not 
 ξ = (k/2)^(1/3) A with the attenuation integral A up to the end; Im τ is that of the slowest mode of any boundary, so
 the share is one of amplitudes and rather too large.
 
-Where rays come to a place at which the body (`Surface.non_smooth`) is not smooth enough for them.
+Also here: where rays come to a place at which the body (`Surface.non_smooth`) is not smooth enough for them.
 
-Sources: Derivations, R4; Derivations, R6 and F3.
+Sources: Derivations, R4, R6 and F3.
 """
 
 from typing import NamedTuple

@@ -4,7 +4,7 @@ Ray sigma meets the level at t(sigma) = level, or level - d.x0(sigma); of a poin
 Between two steps the ray is the quintic polynomial with the positions, velocities x' and accelerations x'' of both
 ends, put back on the body.
 
-Curves in the plane of two angles, cut where an angle jumps.
+Also here: curves in the plane of two angles, cut where an angle jumps.
 
 An angle jumps by 2 pi across its seam at +-pi: both ends are carried on to the seam. An azimuth jumps by about pi where
 a curve passes a pole: no line in the plane belongs there, and the ends stay as they are.

@@ -6,7 +6,7 @@ The length "auto" is that at which this has fallen by e^-7.5 on all but the tent
 most four body sizes. It comes of trial rays of its own: it depends on body, incidence and wavenumber alone. A weighted
 body has no field: its rays take the time that 1.5 body sizes take at its median speed.
 
-Rays traced one by one, each with its incidence, start and end.
+Also here: rays traced one by one, each with its incidence, start and end.
 
 Sources: [LK59], [AS64, sec. 10.4]; Derivations, F4.
 """

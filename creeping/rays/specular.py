@@ -5,7 +5,8 @@
 The shape operator S = dn/dx turns a step on the body into one of its normal. Seeds are the triangles of a mesh whose
 normals surround the one that is wanted.
 
-Specular points of a body with creases: those of each smooth piece that lie on it, and which of them stand clear.
+Also here: specular points of a body with creases: those of each smooth piece that lie on it, and which of them stand
+clear.
 
 A reflected ray forms over the Fresnel zone of its specular point, √(π/(k|κ| cos θᵢ)) along a principal direction of
 curvature κ. Nearer than that to an edge or tip, and half as near to a joint, the point alone does not tell what the

@@ -3,7 +3,7 @@
 Rays of an incidence start in blocks of their own, the last one filled up: a tracer that adapts its step to a block
 then gives the same, bit for bit, in whatever company an incidence is computed.
 
-Spreading of rays launched from a shadow line: J, J' and the caustics passed.
+Also here: spreading of rays launched from a shadow line: J, J' and the caustics passed.
 
     J = c I,  I(t) = I(0) M11(t) + I'(0) M12(t),  I(0) = 1/c,  I'(0) = (J'(0) - (p.grad c))/c,
 

@@ -3,7 +3,7 @@
 A position is (arc, arclength) with the arclength unwrapped, so that it grows along an arc that crosses the start of its
 closed curve; the point is that of the arclength modulo the curve's length.
 
-Whether the body stands before a point: F along the backward ray x - t d, t > 0.
+Also here: whether the body stands before a point: F along the backward ray x - t d, t > 0.
 
 F starts there with F = 0, F' = 0, F'' = d.Hd at a point of the shadow line, so behind a convex point it first rises;
 the ray enters the body where F is negative at a sample, or at a minimum between samples.

@@ -3,7 +3,7 @@
 Each line is sought on the coarsest mesh, and again on the next where a step was not certain of it; what the finest does
 not resolve is followed by itself. `creeping.shadow.line` gives one of them with its points.
 
-Points next to shadow lines, moved onto them: many points, each with its own wave.
+Also here: points next to shadow lines, moved onto them: many points, each with its own wave.
 
 Sources: Derivations, R7.
 """

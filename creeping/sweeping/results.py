@@ -2,7 +2,8 @@
 
 Attributes are text, numbers or lists of numbers, which zarr and netCDF both keep.
 
-What one wants of the fields of a sweep, as ``dataset.field``: totals, cross sections, decibels, polarisations.
+Also here: what one wants of the fields of a sweep, as ``dataset.field``: totals, cross sections, decibels,
+polarisations.
 
 The dataset holds amplitudes; sizes and logarithms are made when they are asked for.
 """

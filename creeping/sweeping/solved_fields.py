@@ -1,8 +1,10 @@
 """Fields of many incidences on a body without rays: its integral equation, solved for all of them together.
 
-Fields of many incidences on a body with edges, joints or tips: of each alone, as `creeping.far_field` has them.
+Also here: fields of many incidences on a body with edges, joints or tips: of each alone, as `creeping.far_field` has
+them.
 
-Far fields of n incidences with m observers each, as a sweep stores them; those of one incidence may be replaced.
+Also here: far fields of n incidences with m observers each, as a sweep stores them; those of one incidence may be
+replaced.
 """
 
 from collections.abc import Callable

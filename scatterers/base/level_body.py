@@ -3,7 +3,7 @@
 A star-shaped body, upright or along a bent spine, has the sphere map of `scatterers.sphere_map.radial` and by it six
 charts; any other body has the Monge charts of `scatterers.atlas.monge.atlas`.
 
-What all bodies share: checked parameters, the speed, the fingerprint.
+Also here: what all bodies share: checked parameters, the speed, the fingerprint.
 """
 
 from collections.abc import Mapping, Sequence

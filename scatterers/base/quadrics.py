@@ -3,7 +3,7 @@
 The sphere map is psi(s) = (a s_1, b s_2 + d cos(pi c s_3), c s_3); the bodies of the package that have it
 differ in their parameters only, so they share one evaluator and one chart locator.
 
-What bodies are fitted to: points and normals of a smooth body, or a mesh with its smooth regions.
+Also here: what bodies are fitted to: points and normals of a smooth body, or a mesh with its smooth regions.
 """
 
 import math

@@ -1,12 +1,13 @@
 """Points and exact normals of a CAD file's faces, and where faces do not join smoothly.
 
-Solids of a CAD file taken apart: bodies that touch share points, edges or whole faces, and each is closed by itself.
+Also here: solids of a CAD file taken apart: bodies that touch share points, edges or whole faces, and each is closed by
+itself.
 
 A face between two solids bounds both. Its triangles are taken twice, once with the other triangles of each solid, and
 vertices are merged within a solid only; so parts are what they are in the file, and the outer surface of all is that of
 their union. Faces of no solid stay together.
 
-Where faces of a CAD file join smoothly while the curvature jumps, from the normals that the faces have.
+Also here: where faces of a CAD file join smoothly while the curvature jumps, from the normals that the faces have.
 
 Across an edge of the mesh that lies on the joint of two faces, each face bends by
 

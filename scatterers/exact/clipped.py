@@ -7,7 +7,7 @@ least length where the normals differ,
 
 and by halving on the body where they do not. A triangle on three pieces is cut from the point that is on all of them.
 
-Closed triangulation of F = 0 by tetrahedra: each cube of a grid is cut into six along its diagonal.
+Also here: closed triangulation of F = 0 by tetrahedra: each cube of a grid is cut into six along its diagonal.
 
 Where F changes its sign along an edge of a tetrahedron the place is found by halving, so that F needs to be continuous
 only. A tetrahedron with one node of its own sign gives a triangle, one with two gives two.

@@ -7,7 +7,8 @@ t = (t_z, t_r). A line is n.(q - q_0) = 0; an arc about (z_c, r_c) with semi-axe
 
 convex (+) where t grows, and |grad G| = 1 on a circle. Both are A r^2/2 + B r + C zeta^2/2 + D zeta + E.
 
-Smooth part of a profile through points: a quintic spline (z(t), r(t)) of the length t of the polygon through them.
+Also here: smooth part of a profile through points: a quintic spline (z(t), r(t)) of the length t of the polygon through
+them.
 
 An end on the axis that is a smooth pole is mirrored there, r(-t) = -r(t), z(-t) = z(t): the coefficients that are then
 0 are set to it, so that derivatives of the body are exact on the axis. Other ends are not-a-knot.

@@ -5,18 +5,18 @@ With (u, v, w) = M x, r = sqrt(u^2 + v^2), each segment is a piece F(x) = G(r, w
 else a joint, or a seam between parts of one line or arc. Where the profile meets the axis at another than a right angle
 there is a tip.
 
-Triangles between rings of points: the tiles of bodies of revolution and of their affine images.
+Also here: triangles between rings of points: the tiles of bodies of revolution and of their affine images.
 
 A ring at the radius r has n points at equal parts of its length, (r cos phi, r sin phi/stretch). Between two rings the
 fractions (i + 1/2)/n of both are put in order; where one passes, its ring advances by a point and a triangle is closed.
 
-Few squares that cover a body of revolution: parts of its profile turned about the axis by parts of a turn.
+Also here: few squares that cover a body of revolution: parts of its profile turned about the axis by parts of a turn.
 
     x(u, v) = (r cos phi, r sin phi, w),   (w, r) along the profile by u,   phi by v,   x_u x x_v out of the body
 
 From the axis u goes outwards, and else upwards; where u goes up, phi goes back.
 
-Charts of a body of pieces that has no edges: six over its radial map from the middle of its box.
+Also here: charts of a body of pieces that has no edges: six over its radial map from the middle of its box.
 
 Sources: [C76, sec. 3-3]; Derivations, B14.
 """

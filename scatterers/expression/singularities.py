@@ -3,7 +3,8 @@
 Such a place is a tip if close by it looks like one end of a cone: on a small sphere about it F < 0 in one region, and
 F > 0 in one, and their shares are those on a smaller one.
 
-Where the body of an expression lies: the smallest cube about the origin that holds one body, and nothing beyond.
+Also here: where the body of an expression lies: the smallest cube about the origin that holds one body, and nothing
+beyond.
 """
 
 import numpy as np

@@ -8,7 +8,7 @@ of unit length.
 Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.
 numba is imported at the first use, for a quick start: plain Python that several of them call is marked by `helper`.
 
-Compiled block functions as kernels take them, with their numba type known beforehand.
+Also here: compiled block functions as kernels take them, with their numba type known beforehand.
 
 numba finds the type of a function that is an argument anew at each call, by its signature: half of the time of a call
 for few points.

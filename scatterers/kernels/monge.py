@@ -4,7 +4,7 @@ A chart grows over a graph of points of the body from its centre, in the order o
 q = x - x0, so that it never leaps to another sheet over the same square. It ends before the first point with
 n.N < ``least``, or rho > ``longest``, or rho max|kappa| > ``most`` with the largest curvature of the points passed.
 
-Where values stand in the flat parameters of an atlas of Monge charts, which its compiled locator shares.
+Also here: where values stand in the flat parameters of an atlas of Monge charts, which its compiled locator shares.
 
 Origin of the voxels, 1/side, their numbers along the axes, where the table of voxels begins, the least n.N and the
 largest |2u - 1|; then `CHART` values a chart: x0, E1, E2, N, 1/w, bounds of the height. The table gives for each voxel

@@ -8,7 +8,8 @@ Parameters: origin of the voxels (3), 1/side, their numbers along the axes (3), 
 that of the pieces does; the table gives for each voxel the place of its program, which stands behind its length; that
 of the pieces gives the place of the parameters of each spline.
 
-What stands in programs of bodies of pieces, which `scatterers.pieces.selection` shares with the compiled level.
+Also here: what stands in programs of bodies of pieces, which `scatterers.pieces.selection` shares with the compiled
+level.
 """
 
 import numpy as np

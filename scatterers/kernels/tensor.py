@@ -5,7 +5,7 @@ derivatives are T_op . w^(q), q = order - o - p at most. Weights are Horner sums
 point costs 36 loads and, for order 2, 144 multiply-adds before the ten dot products. Importing this module imports
 numba.
 
-Constants that the quintic spline and the radial map over it share with their compiled twins.
+Also here: constants that the quintic spline and the radial map over it share with their compiled twins.
 
 Compiled S D S of a grid, S from values at nodes to coefficients of B-splines; see `scatterers.spline.tensor`.
 
@@ -15,7 +15,7 @@ three passes over the grid, of slabs that stay in the cache: the last two axes; 
 last two. In between the last two axes are exchanged, so that every sweep takes whole rows at a time.
 Factors are (3, n): l, m and 1/d. Importing this module imports numba.
 
-Sources: [B78]; Derivations, B7; Derivations, B6.
+Sources: [B78]; Derivations, B7 and B6.
 """
 
 from typing import Any

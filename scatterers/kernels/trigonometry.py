@@ -8,7 +8,7 @@ arctan(a/b) = pi/4 + arctan((a - b)/(a + b)) for larger ones.
 
 The series are those of [AS64, sec. 4.3].
 
-Parts of compiled locators: chart variables and tangents of the cube sphere, and the polar frame.
+Also here: parts of compiled locators: chart variables and tangents of the cube sphere, and the polar frame.
 
 With t = tan xi, t' = tan eta of the face (see `scatterers.sphere_map.star`) and a common factor left out, which no
 frame sees,

@@ -5,12 +5,14 @@ their normals oppose each other, as the two sides of a wing whose nose is round:
 parted by the axis nearest to the normals of its triangles. Pieces of one region are fitted to some triangles beyond
 their borders as well, so that both know the seam.
 
-What of a body of fitted pieces is not trusted: pieces, and points about which a piece does not follow the body.
+Also here: what of a body of fitted pieces is not trusted: pieces, and points about which a piece does not follow the
+body.
 
 A piece is trusted if its F is nearly a distance at its points and meets them; a point, if the piece that stands for the
 body there meets it, and a fit has about the normal of the triangles or faces that it was made from.
 
-Regions of a mesh that one quadric goes through are one: next to the tip of a cone triangles turn as at an edge.
+Also here: regions of a mesh that one quadric goes through are one: next to the tip of a cone triangles turn as at an
+edge.
 
 Of a region on a quadric Q = 0 creases are none where it meets itself, and small regions next to it belong to it if all
 their vertices lie on Q = 0 and their triangles face along grad Q, but at the tip.

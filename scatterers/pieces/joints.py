@@ -9,9 +9,9 @@ and j, s across it,
 t across: the normals, not the values, change sign. Of an edge of the mesh that goes across, (n_i - n_j).t = 0 gives the
 point of the joint on it; the mesh is cut there, so that each triangle is one quadric's and joints are edges.
 
-A mesh cut at points of its edges: triangles with such edges fall into two, three or four.
+Also here: a mesh cut at points of its edges: triangles with such edges fall into two, three or four.
 
-Planes and quadrics that a mesh is made of, and which of its vertices each holds.
+Also here: planes and quadrics that a mesh is made of, and which of its vertices each holds.
 
 Where curvature jumps, jets of degree 4 and 6 disagree (`scatterers.triangles.quality`); what lies between is taken in
 connected parts, and each must lie on one plane or quadric Q_k = 0, which then holds all vertices joined to it that lie

@@ -8,7 +8,7 @@ degree 2 both kinds are splines of one cell, which go on as they are far beyond 
 whole bodies are (`scatterers.spline.fitting`), from their own points only, so that nothing is rounded off at their
 borders; a coarser fit tells how far they are known.
 
-Curved triangles: points between the corners of a mesh that has normals there, and a mesh made of them.
+Also here: curved triangles: points between the corners of a mesh that has normals there, and a mesh made of them.
 
 With corners x_i, normals n_i and barycentric coordinates b_i, the cubic triangle of [VPBM01],
 
@@ -17,7 +17,7 @@ With corners x_i, normals n_i and barycentric coordinates b_i, the cubic triangl
 and quadratic normals, which mirror the mean of two normals in the middle of a side. Neighbours with common normals meet
 without gaps.
 
-Where smooth pieces of a body meet or end.
+Also here: where smooth pieces of a body meet or end.
 
 Sources: Derivations, B13; [VPBM01] Vlachos, Peters, Boyd, Mitchell, Curved PN triangles, I3D 2001, eqs. 1 to 6.
 """

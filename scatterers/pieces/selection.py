@@ -10,7 +10,7 @@ they have none the nearer one stands for both. Of three and more the pairs make 
 are all joined by "the larger", that comes last, and so on within the groups. Voxels far off follow the next ones with
 points.
 
-Which pieces make one smooth surface near a point, and the planes through their joints that part them.
+Also here: which pieces make one smooth surface near a point, and the planes through their joints that part them.
 
 Sources: Derivations, B13.
 """

@@ -1,6 +1,6 @@
 """Whether a body is star-shaped, upright or along a bent spine, and the sphere map that follows.
 
-Atlases of the analytic bodies: six charts for genus 0, one doubly periodic chart for the torus.
+Also here: atlases of the analytic bodies: six charts for genus 0, one doubly periodic chart for the torus.
 
 Genus 0: the body is x = psi(s), s on the unit sphere. Face f = 2 a + (0 if s_a > 0 else 1) holds the s whose
 largest component is s_a; with (a, b, c) cyclic and sign = +-1,

@@ -4,11 +4,11 @@ An edge from node a to node b with F of both signs gives x = a + F(a)/(F(a) - F(
 x <- x - F grad F/|grad F|^2, none longer than a cell. Edges that meet near one node give points close together, of
 which one a voxel of half a cell is kept. Their number goes with 1/spacing^2: a first grid tells which one to take.
 
-F at the nodes of a Cartesian grid: where the body lies, and that it is one closed body.
+Also here: f at the nodes of a Cartesian grid: where the body lies, and that it is one closed body.
 
-What is known of a body fitted to points: how well it meets them, and how its curvatures depend on the grid.
+Also here: what is known of a body fitted to points: how well it meets them, and how its curvatures depend on the grid.
 
-What a spline makes of points of its body: two fits of one body differ there by about the error of the worse.
+Also here: what a spline makes of points of its body: two fits of one body differ there by about the error of the worse.
 
 Sources: Derivations, B8.
 """

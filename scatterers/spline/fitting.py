@@ -18,7 +18,7 @@ hardly see.
 
 Weights are set by trial; Derivations, B6.
 
-Fourth differences along the axes of a grid, as the bands of D^T D, and where their sum is wanted.
+Also here: fourth differences along the axes of a grid, as the bands of D^T D, and where their sum is wanted.
 
 D takes c to c_k - 4 c_(k+1) + 6 c_(k+2) - 4 c_(k+3) + c_(k+4); near the ends of an axis D^T D has rows of its own.
 

@@ -8,11 +8,11 @@ n nodes carrying n + 4 coefficients. Ends are not-a-knot, so quintics are reprod
 the grid the outermost cell's polynomial goes on for one cell; from there on t is held. A NaN stays one.
 `scatterers.kernels.tensor` is the compiled twin.
 
-From values at the nodes of a grid to coefficients of quintic B-splines there: S = B^-1 along each axis.
+Also here: from values at the nodes of a grid to coefficients of quintic B-splines there: S = B^-1 along each axis.
 
 B has the bands (1, 26, 66, 26, 1)/120, and is factored once for each axis.
 
-Sources: [B78]; Derivations, B7; Derivations, B6.
+Sources: [B78]; Derivations, B7 and B6.
 """
 
 from collections.abc import Callable

@@ -2,7 +2,7 @@ r"""Triangles of a mesh of finite elements: Gmsh's MSH (text, 2 and 4.1) and the
 
 Quadrangles are two triangles each. Points, lines and volumes are no surface, and left out.
 
-What a file holds, whatever its name says: packed, in another encoding, of another kind, or no mesh at all.
+Also here: what a file holds, whatever its name says: packed, in another encoding, of another kind, or no mesh at all.
 
 Texts get UTF-8, "\n" at the ends of lines and numbers with E for the D of Fortran, as loaders take them.
 """

@@ -2,7 +2,8 @@
 
 They drop bytes that are no characters, from within numbers too, and numbers beyond those that a row should have.
 
-Small crossings of a mesh cut out: triangles that cross others go with their neighbours, and the holes are closed.
+Also here: small crossings of a mesh cut out: triangles that cross others go with their neighbours, and the holes are
+closed.
 
 Lids go from the border of a hole to its middle (`scatterers.triangles.parts`), and may cross something themselves: then
 they are cut out again with what is around them, so that the hole grows, for a few rounds. What was cut stays a small

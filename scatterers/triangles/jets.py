@@ -8,7 +8,7 @@ kappa > 0,
     n = (-h_u, -h_v, 1) / W,    K = (h_uu h_vv - h_uv^2) / W^4,
     H = -((1 + h_v^2) h_uu - 2 h_u h_v h_uv + (1 + h_u^2) h_vv) / (2 W^3),    kappa = H +- sqrt(H^2 - K).
 
-Points between the vertices of a mesh and distances from it, from the jets at its vertices.
+Also here: points between the vertices of a mesh and distances from it, from the jets at its vertices.
 
 Of the three jets w = h_i(u, v) the mean of (w_i - h_i(u_i, v_i))/W_i is nearly the distance from the body; its zero
 nearest to a triangle's centroid is found by Newton steps. By degree 6 these points are off by O(e^7). The distance of a

@@ -3,7 +3,7 @@
 Parts are connected through edges, and numbered from 1 by area, the largest first. Holes are closed by triangles from
 their border to its middle. The outer surface of parts that cross is that of their union, by the library manifold3d.
 
-Sheets of a mesh that touch along an edge or in a vertex, taken apart so that each vertex has one umbrella.
+Also here: sheets of a mesh that touch along an edge or in a vertex, taken apart so that each vertex has one umbrella.
 
 About an edge from a to b a triangle stands at an angle θ, in the direction d across the edge. One that runs from a to b
 has its outward normal along e x d, towards larger θ: the body is on the side of smaller θ; of one that runs from b to

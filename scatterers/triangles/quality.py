@@ -17,7 +17,7 @@ Noise of s edges leaves res_4 = 0.95 s e and res_6 = 0.81 s e, a smooth surface 
 tells them apart. The thresholds are measured on ellipsoid, torus, twisted and bumpy bodies
 of 2000 to 40000 vertices, even and as slivers, with noise of 0.001 to 0.05 e, and on bodies with edges and rims.
 
-What of a file is the body, and what is done to make it one closed surface.
+Also here: what of a file is the body, and what is done to make it one closed surface.
 
 Sources: Derivations, B5.
 """

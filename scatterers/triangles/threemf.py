@@ -4,7 +4,7 @@ A build item or component places an object by x' = x A + t, twelve numbers by ro
 the unit is an attribute of the model, millimetre if left out. trimesh reads 3MF only with two further packages, hence
 this reader. Document types, and with them all entities, are refused, and so are parts beyond the limit of bytes.
 
-Faces of OFF files as triangles: trimesh reads those of three and four corners alone.
+Also here: faces of OFF files as triangles: trimesh reads those of three and four corners alone.
 
 A face of n corners becomes n - 2 triangles about one of them from which all of it is seen.
 """

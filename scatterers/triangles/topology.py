@@ -4,7 +4,7 @@ Every edge of a closed surface has two triangles, and an oriented one runs along
 a mesh can be oriented is read off its double cover: triangle t twice, as it is and turned; neighbours that agree join
 like with like, others like with turned; it can be unless some t is joined with its own turned copy.
 
-Pairs of triangles of a mesh that cross each other.
+Also here: pairs of triangles of a mesh that cross each other.
 
 A segment pq crosses the triangle abc where the volumes [a b c p] and [a b c q] differ in sign and [p q a b],
 [p q b c], [p q c a] do not; triangles cross if an edge of one crosses the other. Pairs that share a vertex are tried

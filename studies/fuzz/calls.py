@@ -10,7 +10,7 @@ Records that functions return are not made by hand, and pictures are not drawn. 
 
 A complex argument whose imaginary part is dropped is "silent".
 
-What an attack is: a kind of cases, each known by the seed and its number.
+Also here: what an attack is: a kind of cases, each known by the seed and its number.
 """
 
 import dataclasses

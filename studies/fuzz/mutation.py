@@ -2,7 +2,7 @@
 
 All chance comes from the generator that is given, so that a case is known by its numbers.
 
-Values that no caller means: of another kind, size, shape or type than was asked for.
+Also here: values that no caller means: of another kind, size, shape or type than was asked for.
 """
 
 import datetime

@@ -4,7 +4,7 @@ Bytes of a file are changed as they may rot, and what is then accepted must be e
 fits, in as many cases, content is changed and signed anew, as by somebody who means harm: then nothing says what
 it ought to be, but kernels must not leave their arrays.
 
-Mutated files of fields: FEKO text.
+Also here: mutated files of fields: FEKO text.
 
 What is accepted is read a second time, by code of its own, strictly. The same numbers must come of both, else it is
 "silent".

@@ -2,7 +2,7 @@
 
 HTML loads nothing from a network: a built-in theme, fonts of the reader's machine, equations as text.
 
-Markdown of the gallery: a page of each figure from its study and sidecar, and the page that shows them all.
+Also here: markdown of the gallery: a page of each figure from its study and sidecar, and the page that shows them all.
 """
 
 import inspect

@@ -8,7 +8,7 @@ Two dipoles p, across the normal, stand at each y = x - depth n; with R = |x - y
 and n x (E + E_inc) = 0 is met in least squares, as in `studies.reference.fundamental`: with m mirrors g there are 2^m
 parity classes, whose dipoles at g y have the moments chi(g) g p. The residual, on points of its own, bounds the error.
 
-The field at points of a hard body of a unit point source e^{ikr}/(4πr) on the body.
+Also here: the field at points of a hard body of a unit point source e^{ikr}/(4πr) on the body.
 
 On a sphere of radius a, at angle s from the source, by partial waves
 

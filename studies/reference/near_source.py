@@ -4,7 +4,7 @@
 
 A direct solution without symmetries: for a few thousand fundamental solutions.
 
-Sphere whose admittance varies with the angle theta from z, by spherical harmonics that it couples.
+Also here: sphere whose admittance varies with the angle theta from z, by spherical harmonics that it couples.
 
     u = sum_nm [a_nm j_n(kr) + b_nm h_n(kr)] Y_nm,   a_nm = 4 pi i^n conj Y_nm(d),   u_r + ik (a + b cos theta) u = 0
     cos theta Y_nm = A_{n+1,m} Y_{n+1,m} + A_nm Y_{n-1,m},   A_nm = [(n^2 - m^2)/(4 n^2 - 1)]^(1/2)

@@ -15,7 +15,7 @@ The time factor is e^{-iωt}, n the outward normal; far away, as for the circula
 
     u_s ~ F e^{ikr}/√r,   F = √(2/πk) e^{-iπ/4} (i/4) int [u (-ik r.n) - ∂u/∂n] e^{-ikr.y} ds
 
-A circular cylinder of radius a in a plane wave across its axis: the series.
+Also here: a circular cylinder of radius a in a plane wave across its axis: the series.
 
 With x = ka, phi from the forward direction, alpha u + (beta/k) ∂u/∂n = 0, ε₀ = 1 and εₙ = 2,
 

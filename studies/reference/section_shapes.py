@@ -5,7 +5,7 @@
 Smooth ones are given by x(t), t of 0..2 pi, and its derivatives; a capsule by arcs and lines, whose curvature jumps at
 its joints.
 
-The boundary conditions of the references, in one form.
+Also here: the boundary conditions of the references, in one form.
 
     alpha u + (beta/k) ∂u/∂n = 0
 

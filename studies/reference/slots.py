@@ -13,7 +13,8 @@ smoothly to all orders they sum to Abel's limit.
 On other bodies by electric dipoles inside (`studies.reference.dipoles`), with magnetic dipoles at some heights h above
 their ports, and their images: the field is H(0) + H₁ h + H₂ h² + ....
 
-What slots in a conductor and monopoles on it give each other: H along a slot of a monopole, E_n there of a slot.
+Also here: what slots in a conductor and monopoles on it give each other: H along a slot of a monopole, E_n there of a
+slot.
 
 On a sphere of radius a a monopole, an electric moment along n, has the Debye potential of `studies.reference.slots`
 alone, and at angle s from it, per unit of the moment,
@@ -24,7 +25,7 @@ alone, and at angle s from it, per unit of the moment,
 reciprocity E_n of a slot, a magnetic moment p, is minus the H along p of the monopole. On other bodies either of them
 by electric dipoles inside, as slots (`studies.reference.slots`).
 
-The electric field on a conductor of a monopole on it: an electric dipole along the normal.
+Also here: the electric field on a conductor of a monopole on it: an electric dipole along the normal.
 
 On a sphere of radius a the field is that of a Debye potential, E = ∇×∇×(x v)/k with v = Σ vₙ ξₙ(kr) Pₙ(cos s)/r, and
 at angle s it is, per unit of the moment, a current times a length, times the admittance of free space,

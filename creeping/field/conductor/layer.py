@@ -11,14 +11,14 @@ The slopes are div E = 0, (curl H)_t = 0 and div H = 0 on the body, where E_t = 
 is about A |kappa_1 + kappa_2|/k of the incident wave, A = 0.1, and 0.3 of E_t, on a saddle with the root of the sum of
 squares; curl E = ikH gives a slope of E_t by the gradient of the charge, which is not known well enough.
 
-E and H at points off a conductor by the currents of its whole body, with their error.
+Also here: e and H at points off a conductor by the currents of its whole body, with their error.
 
     E_s(y) = ik int [J + grad_y grad_y.J/k^2] G dS,   H_s(y) = int grad_y G x J dS
 
 Errors are those of `creeping.field.currents.whole_body`, with what currents leave of E and of H inside for epsilon, and
 with the second order's E and H for u'; the larger of the two counts for both.
 
-Sources: [CK13, sec. 6.2]; Derivations, F20 and F26; Derivations, F17, F20 and F26.
+Sources: [CK13, sec. 6.2]; Derivations, F20, F26 and F17.
 """
 
 import numpy as np

@@ -6,7 +6,7 @@
     anywhere, solved         tiles of the integral equation                       `creeping.field.equation.currents`
     in the shadow            creeping rays, where they state the smaller error    `creeping.field.conductor.near`
 
-E and H of the creeping rays whose tangents pass through points off a conductor.
+Also here: e and H of the creeping rays whose tangents pass through points off a conductor.
 
     H = h u b - e (i kappa_t1/(kT)) u p,   E = -h u n        electric hard
     E = e v b,                             H = e v n         electric soft
@@ -16,7 +16,7 @@ p, n and b = n x p are those where the ray leaves, h = H0.b and e = E0.b those w
 by across rays gives H along them, (i/k) dh/db, as in the current on the body. E and H along rays that come from what u
 and v vary by along n, of the order m/(k l) at the distance l, are left out; the error counts them.
 
-Sources: [CK13, sec. 6.2]; Derivations, F18, F20 and F26; [LK59], [PBM80]; Derivations, F8, F14 and F26.
+Sources: [CK13, sec. 6.2]; [LK59], [PBM80]; Derivations, F18, F20, F26, F8 and F14.
 """
 
 # help() shows names of types instead of what they stand for

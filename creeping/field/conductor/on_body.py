@@ -10,15 +10,15 @@ n.E is that of `creeping.field.equation.currents`. Divergences are by `creeping.
 Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
 ground BEYOND |J_thrown| stands besides, for what comes to it later. The charge of expansions has the error of J.
 
-The current of creeping waves where their rays merge, by Gaussian beams that carry vectors.
+Also here: the current of creeping waves where their rays merge, by Gaussian beams that carry vectors.
 
 Beams of `creeping.field.conductor.vector_waves`, whose waves are creeping modes of second order.
 
-Surface divergence of a tangential field on a body, by its differences between points to either side.
+Also here: surface divergence of a tangential field on a body, by its differences between points to either side.
 
     div v = Σ_t t.[v(x + h t) - v(x - h t)]/2h,   t two tangents at x, kh = CLOSE
 
-Sources: [CK13, sec. 6.2]; Derivations, F18 and F26; [P82]; Derivations, F24 and F26; Derivations, F26.
+Sources: [CK13, sec. 6.2]; [P82]; Derivations, F18, F26 and F24.
 """
 
 from dataclasses import dataclass, replace

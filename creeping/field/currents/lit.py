@@ -28,7 +28,7 @@ of Dg and g_q that the shadow leaves open; the term in T is what the circular cy
 what the layer under an admittance that varies remembers of what it has passed. So it holds wherever kappa_a > 0; optics
 alone stands elsewhere. Of an impedance the terms in rho'', rho'^2 and T are left out.
 
-Currents J = n x H of a plane wave on the lit side of a perfect conductor, uniform up to the shadow line.
+Also here: currents J = n x H of a plane wave on the lit side of a perfect conductor, uniform up to the shadow line.
 
 At each point a lies along the tangential part of d, b = n x a, c = -n.d; e = E0.b and h = H0.b are the incident wave's
 amplitudes, kappa_a, kappa_b and t the entries of the shape operator in (a, b), m, xi and r as in
@@ -45,7 +45,7 @@ the integral equation of the magnetic field iterated once, its integral taken ov
 in t are those of the circular cylinder met obliquely, which is exact, and where T = r; those in r of the sphere. Both
 pass into optics.
 
-Sources: [KLS56], [F46]; Derivations, F16; [CK13, sec. 6.2], [F46]; Derivations, F18.
+Sources: [KLS56], [F46]; [CK13, sec. 6.2], [F46]; Derivations, F16 and F18.
 """
 
 from typing import NamedTuple

@@ -6,7 +6,7 @@
 A current goes like |J|^(-1/2), so that its caustics on the body cost nothing in ray coordinates. From xi = 0 to 0.6
 behind the line both parts have a share, W(xi; 0, 0.6) that of the rays, W a smooth step.
 
-The wave of a scalar boundary at nodes of the lit side and of creeping rays.
+Also here: the wave of a scalar boundary at nodes of the lit side and of creeping rays.
 
 On rays it is the sum of creeping modes, or, where the admittance varies and there are none, the marched wave
 
@@ -14,7 +14,7 @@ On rays it is the sum of creeping modes, or, where the admittance varies and the
 
 of `creeping.field.marching.fan_waves`; then what is of second order has u's phase and the size of its error.
 
-Sources: [LK59]; Derivations, F16; Derivations, F16 and F22.
+Sources: [LK59]; Derivations, F16 and F22.
 """
 
 from dataclasses import dataclass

@@ -19,7 +19,7 @@ relative error of all currents gives.
 It is meant to hold in 95 of 100 directions; both factors were set so on four bodies. A conductor has 2.8 and 2.3 in
 their place, since epsilon is smaller beside the true error there.
 
-The total field at points off the body by currents, with its error.
+Also here: the total field at points off the body by currents, with its error.
 
 With epsilon what currents leave of the incident wave inside the body, epsilon' what u', of second order, leaves there,
 R the distance from the body's middle and f_rms the rms of the far field,

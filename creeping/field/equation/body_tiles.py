@@ -1,6 +1,6 @@
 """Tiles of a body of any kind: of its squares, of its facets, or of all its parts together.
 
-Tiles of a body on its facets, which are flat: squares of large ones, or small triangles as they are.
+Also here: tiles of a body on its facets, which are flat: squares of large ones, or small triangles as they are.
 
 Large triangles are covered by squares (`creeping.geometry.patches`), cut into tiles as those of any body. A small
 triangle with corners c, a, b is the square x = c + u [(1 - v)(a - c) + v (b - c)], whose side u = 0 is the corner c,

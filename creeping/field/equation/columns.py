@@ -1,8 +1,9 @@
 """The equation of a matrix solved for many right sides: all that memory allows share each product with it.
 
-GMRES of several right sides at once: each has its own Krylov space, and all share the products with the matrix.
+Also here: GMRES of several right sides at once: each has its own Krylov space, and all share the products with the
+matrix.
 
-Products with the matrix of the equation where it has too many entries to be kept.
+Also here: products with the matrix of the equation where it has too many entries to be kept.
 
     M v = plain sums over all nodes, split (`creeping.field.equation.split_sums`) + C v
     C   = integrals over tiles near to points less what plain sums have of their nodes, a sparse matrix

@@ -6,7 +6,7 @@
 with the integrals over tiles of `creeping.field.equation.matrix`. Farther off than APART wavelengths fields are sums
 over the fine nodes of each tile, where a current is what the polynomial through its own p x p nodes says.
 
-The charge q = n.E on a conductor whose current is known, and the electric field at any distance from it.
+Also here: the charge q = n.E on a conductor whose current is known, and the electric field at any distance from it.
 
     (1 + M*) q = 2 n.E_inc + 2ik n.int J G dS                             on the body, M* as of soft bodies
     E(x) = E_inc + ik int J G dS - int q grad_x G dS                      off it

@@ -12,7 +12,7 @@ one of them lets waves stand inside at resonances, the two together see what goe
 In the unknowns u sqrt(w) the transpose in the weights is that of the matrix. What a tile sends to points near it is
 integrated with the polynomials through its nodes, of J by Cartesian components less their part along the normal.
 
-What a current along an edge that the equation does not see may add to the far field: a part of its error.
+Also here: what a current along an edge that the equation does not see may add to the far field: a part of its error.
 
 Across an edge of exterior angle N pi, with nu = 1/N and rho the distance from it, on the faces + and -,
 
@@ -29,7 +29,7 @@ edge radiates
 C is read off the nodes of the tiles along the edge, where there are three or more away from it. Of flat triangles it
 is known beforehand as well: of B rho^nu they lack about C = lacks B w^(2 nu), w their width (`Tiles.lacks`).
 
-Sources: [WY94], [SS86]; Derivations, F32 and F36; [M72]; Derivations, F36.
+Sources: [WY94], [SS86]; [M72]; Derivations, F32 and F36.
 """
 
 from functools import cached_property

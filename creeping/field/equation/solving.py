@@ -4,7 +4,8 @@ Tiles of the body (`creeping.field.equation.tiles`), the matrix of the equation 
 (`creeping.field.equation.matrix`), GMRES for all incidences together, and what the currents radiate
 (`creeping.field.equation.solution`).
 
-Solutions of a body's equation, kept for the fields that are asked for next, and whether they cost little enough.
+Also here: solutions of a body's equation, kept for the fields that are asked for next, and whether they cost little
+enough.
 
 Many incidences are solved together by `solve_together`; `solution_for` then finds each of them.
 

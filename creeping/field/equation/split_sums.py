@@ -6,7 +6,8 @@ G = S + D: D ends within a reach, and its pairs make a sparse matrix; S is a Fou
 nonuniform transforms, from the nodes to the series and from there to the points [BMK19], with a derivative for each
 is. Between them the sums are within 3e-5, rms, of those over all pairs.
 
-What of G = e^{ikR}/R is smooth everywhere, as a Fourier series, and the rest, which is real and ends within a reach.
+Also here: what of G = e^{ikR}/R is smooth everywhere, as a Fourier series, and the rest, which is real and ends within
+a reach.
 
     G = S + D,   D = E/R,   E = Re[e^{ikR} erfc(aR + ib)],   b = k/2a
     E' = -k Im[e^{ikR} erfc(aR + ib)] - (2a/sqrt(pi)) e^{b^2 - (aR)^2}

@@ -7,7 +7,7 @@
 W rises from 0 at the horizon to 1 at t = low; r is 2, what a mirror makes of a wave, or for du/dn of a soft one -2ikt.
 Blocks of nodes, in balls, are left out where none is above the horizon: first for a block of points, then for each.
 
-Compiled sums over flat triangles of weights w times ∫ e^{ik q.x} dS, q one vector or another.
+Also here: compiled sums over flat triangles of weights w times ∫ e^{ik q.x} dS, q one vector or another.
 
 The phase is linear on a triangle: with u and v those of two corners relative to the third, φ0,
 
@@ -18,7 +18,7 @@ The phase is linear on a triangle: with u and v those of two corners relative to
 
     I = Σ_j i^j h_j/(j + 2)!,   j < TERMS
 
-Sources: Derivations, F29; Derivations, F13.
+Sources: Derivations, F29 and F13.
 """
 
 import math

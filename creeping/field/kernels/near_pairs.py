@@ -5,7 +5,7 @@
 
 A node that is x itself has no D: its value takes S off but for ik, what (e^{ikR} - 1)/R is there.
 
-Compiled matrices of the sums over nodes y at points x, by all pairs.
+Also here: compiled matrices of the sums over nodes y at points x, by all pairs.
 
 f_x g_y times one of
 
@@ -13,7 +13,7 @@ f_x g_y times one of
 
 G = e^{ikR}/R, R = |x - y|; p is one of two tangents at x, q one of two at y. A node that is x itself gives nothing.
 
-Compiled sums over currents at nodes x_n of a body: phases of distant observers, and point sources.
+Also here: compiled sums over currents at nodes x_n of a body: phases of distant observers, and point sources.
 
     distant   S_c(r) = sum_n w_cn e^{-ik r.x_n}
     near      u(y) = sum_n [a_n + b_n n_n.(y - x_n) (1/R - ik)/R] e^{ikR}/R,   R = |y - x_n|
@@ -23,7 +23,7 @@ Compiled sums over currents at nodes x_n of a body: phases of distant observers,
 
 Phases are taken in turns, for polynomials vectorise (`creeping.kernels.exponential`).
 
-Sources: Derivations, F35; [CK13, sec. 3.1 and 6.2]; Derivations, F36; [CK13, sec. 2.2 and 6.2]; Derivations, F16.
+Sources: [CK13, sec. 3.1 and 6.2]; [CK13, sec. 2.2 and 6.2]; Derivations, F35, F36 and F16.
 """
 
 import math

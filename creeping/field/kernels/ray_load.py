@@ -8,7 +8,7 @@
 The reflected wave is that of the plane across the line, where wavenumber and lengths along the ray are shorter by
 cos = 1/sqrt(1 + Lambda^2); on the plane curve of the profile, as long as the ray, heights are longer by 1/cos.
 
-Compiled geometrical optics of the reflected wave on the line normal to a ray's start.
+Also here: compiled geometrical optics of the reflected wave on the line normal to a ray's start.
 
 The reflected ray from a place s' before the start s_a, r = d - 2 (d.n) n, meets the line at a height n and a length l:
 
@@ -20,7 +20,7 @@ Places s' go back from s_a by steps whose heights are an element apart: towards 
 fast. The phase between them is Hermite's cubic, its slope r.n being known; the amplitude is linear, for it jumps where
 the curvature does. Above the last ray that meets the line there is nothing.
 
-Compiled traces on the surface of a plane wave that passes through each pole of a rational step.
+Also here: compiled traces on the surface of a plane wave that passes through each pole of a rational step.
 
 The step acts on the plane wave r_0 e^{ikqn}, r_0 = sqrt(1 + kappa_a n), q = d.n, as on any other; its part at a pole is
 again a slowly varying amplitude r times e^{ikqn}, in powers of n:

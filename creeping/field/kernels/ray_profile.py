@@ -7,7 +7,7 @@ tangent (cos psi, sin psi), normal (sin psi, -cos psi) and the wave along the fi
 
 Between two nodes kappa is the cubic through four nodes of the same piece; nodes that stand twice part the pieces.
 
-Compiled twin of `creeping.field.shed_wave.mode_sum` for constant modes and plane waves: both orders at once.
+Also here: compiled twin of `creeping.field.shed_wave.mode_sum` for constant modes and plane waves: both orders at once.
 
     P_1 e^{-iπ/4} = 2i√π Σ_p R_p e^{iξτ_p},   P_2 e^{-iπ/4} = 2i√π Σ_p R_p A_p e^{i(ξτ_p + δ_p)}
     δ = (2/k)^(1/3) (c_0 I_2 + c_r I_3 + c_v I_4) + a (ρ2'/m2 - ρ1'/m1)/12,   held below ξ|τ|/2
@@ -15,7 +15,7 @@ Compiled twin of `creeping.field.shed_wave.mode_sum` for constant modes and plan
 
 Each mode brings its complex constants, each ray real numbers, so that loops over a block of rays vectorise.
 
-Compiled sums of Gaussian beams at points of the body.
+Also here: compiled sums of Gaussian beams at points of the body.
 
 A point belongs to a ray's beam at each foot of it: there g = (y - x).p falls through 0. The foot is found between two
 steps, n = (y - x).b with the arc for its chord, and
@@ -25,7 +25,7 @@ steps, n = (y - x).b with the arc for its chord, and
 is added to each component, log B, S, M, V and V' linear between the steps. Points are reached from blocks of SPAN
 steps only if those are near.
 
-Sources: Derivations, F22; Derivations, F4 to F7.
+Sources: Derivations, F22 and F4 to F7.
 """
 
 import math

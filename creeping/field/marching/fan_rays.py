@@ -12,13 +12,14 @@ Both are tau/kappa_n on the line. It fades out where kappa_n falls below FLAT of
 single xi tells the wave; and it levels off at 1, where J falls to 0. Rays are traced both ways from the shadow line,
 beyond detachment and across joints too: marching goes on where creeping modes end.
 
-Rays of a body with joints at nodes of their own: evenly spread between joints, at each of which two nodes stand.
+Also here: rays of a body with joints at nodes of their own: evenly spread between joints, at each of which two nodes
+stand.
 
 Between the states of a common lattice and those at joints a ray is the cubic of both ends, x with p and J with J'; each
 stretch is on one piece, whose curvatures hold up to both its ends. A ray that has ended at an edge or a tip stays
 where it is.
 
-Sources: Derivations, R1, R3 and F22; Derivations, R1, F22 and F30.
+Sources: Derivations, R1, R3, F22 and F30.
 """
 
 from itertools import pairwise

@@ -7,11 +7,12 @@ steps. It is that of the march and that of creeping modes of second order, in in
 errors: the march takes over where curvature varies, twists or changes its sign, and hands back to modes where they have
 decayed below what the top of its layer lets through. k_c is the wavenumber that the wave has along the surface.
 
-The waves of a whole fan at points of the body, by marching: rays that pass through, and beams where those merge.
+Also here: the waves of a whole fan at points of the body, by marching: rays that pass through, and beams where those
+merge.
 
 Both go together as `creeping.field.beams` says.
 
-Sources: Derivations, F22; [P82]; Derivations, F22 and F24.
+Sources: [P82]; Derivations, F22 and F24.
 """
 
 from dataclasses import dataclass

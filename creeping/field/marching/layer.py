@@ -11,7 +11,7 @@ Nothing here asks for convex or smooth ground, and amplitudes of any order come 
 ground as that of optics and is driven by the incident one on the surface; where the ray has turned away the incident
 wave is added, and the total goes on by itself. Waves that come back along the ray are left out.
 
-How far a marched wave may be off: what the one-way equation, its start and its arithmetic leave out.
+Also here: how far a marched wave may be off: what the one-way equation, its start and its arithmetic leave out.
 
     error^2 = [0.4 kappa*/k + 1.5 z (1 - r/0.6)^2 + 0.08 sqrt(V)]^2 |y|^2 + [1e-4 max |y|]^2
     kappa* = 0.4 max |kappa_n| + 0.6 (max kappa_n - min kappa_n) since the start,   V = int |d eta/ds| ds
@@ -22,7 +22,7 @@ the third for an admittance that varies, the last for what the top of the layer 
 sections of cylinders, k rho of 3 to 300: there 98 of 100 places are covered, and most errors are a tenth of it. What
 varies across rays in space is not in it.
 
-Rational steps of the one-way equation: poles and weights of its Pade approximants.
+Also here: rational steps of the one-way equation: poles and weights of its Pade approximants.
 
     exp{i delta (sqrt(1 + X) - 1)} = sum_j c_j/(1 + b_j X),   delta = k ds,   j = 1..p
 

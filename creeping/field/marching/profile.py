@@ -10,7 +10,7 @@ Where the ray leaves the line Lambda = tau/kappa_n; on a cylinder that the wave 
 cos^2 = 1/(1 + Lambda^2) is that of the ray's angle to the circle. Waves are traced on the plane curve with that
 circle's curvature, kappa_n sqrt(1 + Lambda^2) by the ray's length.
 
-Cubic Hermite elements across the layer, and their matrices.
+Also here: cubic Hermite elements across the layer, and their matrices.
 
 Unknowns are the value and the slope (times a scale) at each height 0 = n_0 < n_1 < ... < N. With S = 1 beneath T,
 

@@ -20,7 +20,7 @@ K the Gaussian curvature, and U, under its integral and in its modes, with
 
 and, third order, the exponent i xi (-tau^3/1400 - 1/140)/M^2. On a plane, with 2 xi M = ks, this is exact.
 
-What slots at ports bring by each geodesic, with its error, and by beams where these merge.
+Also here: what slots at ports bring by each geodesic, with its error, and by beams where these merge.
 
 A beam carries H = A b + B p, its components as in `creeping.field.ports.antenna_waves` without the terms in J2'/J2 and
 1/J2: off its ray H turns with its front, to b - (q'/q) n p and p + (q'/q) n b, and by stationary phase those terms come
@@ -28,7 +28,7 @@ back.
 
 Error: that of a point source's wave, of all components, and what was not derived.
 
-The field of each geodesic between two monopoles on a conductor, E along n of an electric moment along n.
+Also here: the field of each geodesic between two monopoles on a conductor, E along n of an electric moment along n.
 
 Per unit of the moment and times the admittance of free space, with the letters of `creeping.field.ports.antenna_waves`,
 
@@ -44,7 +44,7 @@ E_n = (i/k) (curl H)_n. The bracket stands under the integral of V, with all tha
 and in modes as a factor g = 1 + p τ/M + a τ²/M² of [1 + L τ + (H/ξ)/τ² + iP/ξ], less (H/ξ) g'/τ, since R² has a double
 pole: t R² = 1 - R', so that under the integral it is iξ V.
 
-Sources: [PW81] for leading order; Derivations, F28; [P82]; Derivations, F24 and F28; Derivations, F33.
+Sources: [PW81] for leading order; [P82]; Derivations, F28, F24 and F33.
 """
 
 from collections.abc import Callable

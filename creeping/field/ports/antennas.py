@@ -4,17 +4,18 @@
     slot i to monopole j                   E_ij = sum over geodesics of `creeping.field.ports.mixed`, or beams
     monopole j to slot i                   H_ji = -E_ij
 
-The electric field at each of many monopoles on a perfect conductor of each other: all geodesics between them.
+Also here: the electric field at each of many monopoles on a perfect conductor of each other: all geodesics between
+them.
 
     E_ij = sum over geodesics of the waves of `creeping.field.ports.antenna_waves`, or beams where these merge
 
 Their error is that of a point source's waves.
 
-The magnetic field at each of many slots in a perfect conductor of each other: all geodesics between them.
+Also here: the magnetic field at each of many slots in a perfect conductor of each other: all geodesics between them.
 
     H_ij = sum over geodesics of the waves of `creeping.field.ports.antenna_waves`, or beams where these merge
 
-Sources: [PW81]; Derivations, F34; Derivations, F33; Derivations, F28.
+Sources: [PW81]; Derivations, F34, F33 and F28.
 """
 
 # help() shows names of types instead of what they stand for

@@ -1,10 +1,11 @@
 """What the coupling of ports is: a matrix of complex values with their error, and the geodesics that gave them.
 
-The field at each of many ports on a hard body of a unit point source at each other: all geodesics between them.
+Also here: the field at each of many ports on a hard body of a unit point source at each other: all geodesics between
+them.
 
     u_ij = sum over geodesics of the waves of `creeping.field.ports.waves`, or beams where these merge
 
-Sources: Derivations, F25, F28 and F34; [PW81], [P82]; Derivations, F25.
+Sources: [PW81], [P82]; Derivations, F25, F28 and F34.
 """
 
 # help() shows names of types instead of what they stand for

@@ -3,7 +3,8 @@
 A beam carries E_n, its components as in `creeping.field.ports.mixed` without the term in J2'/J2: at the slot moments
 turn with the angle of the ray, and by stationary phase that term comes back. n does not turn.
 
-The field of each geodesic from a slot in a conductor to a monopole on it: E along n of moments along b and t.
+Also here: the field of each geodesic from a slot in a conductor to a monopole on it: E along n of moments along b and
+t.
 
 Per unit of the moment, with the letters of `creeping.field.ports.antenna_waves`, m1 and T0s of the slot's end, m2 and
 T0m of the monopole's, and c the J2'/J2 of the slot's end,

@@ -7,7 +7,7 @@ Roots of the soft and hard problem lie on the ray of angle π/3 at the zeros of 
 continued from the hard ones, q growing from 0 along its ray, so that root p stays root p while q varies. All arguments
 and values are without unit.
 
-Coupling functions, hard and soft: the wave along one geodesic from a source on the body to a receiver on it.
+Also here: coupling functions, hard and soft: the wave along one geodesic from a source on the body to a receiver on it.
 
     V(ξ) = (1/2) e^{-iπ/4} √(ξ/π) ∫ R e^{iξt} dt = e^{iπ/4} √(πξ) Σ_p e^{iξτ_p}/τ_p,   R = w₁/w₁',   V(0) = 1
     U(ξ) = -iξ e^{-iπ/4} √(ξ/π) ∫ S e^{iξt} dt = 2 e^{-iπ/4} √π ξ^(3/2) Σ_p e^{iξτ_p},     S = w₁'/w₁ = 1/R,   U(0) = 1
@@ -21,7 +21,7 @@ Hankel's integral for 1/Γ,
 
 The a_j grow like Γ(j), 1/Γ(μ) falls faster: the series converges everywhere. It is used up to SERIES, modes beyond.
 
-Sources: [F65], [L59]; Derivations, F1; [F65], [L59], [PW81]; Derivations, F25.
+Sources: [F65], [L59]; [F65], [L59], [PW81]; Derivations, F1 and F25.
 """
 
 from dataclasses import dataclass

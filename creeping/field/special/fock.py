@@ -12,11 +12,11 @@ these integrals lose digits; there, in one, over the line of steepest descent th
 S the reflection coefficient, which tends to that of a plane boundary. A ``power`` n stands for t^n under each integral,
 which is (-i d/dξ)^n of the function and τ^n in its residue series. All arguments and values are without unit.
 
-Height gains: modes of a creeping wave, and their sum, at a height above the body.
+Also here: height gains: modes of a creeping wave, and their sum, at a height above the body.
 
     H(τ, Y) = w₁(τ - Y)/[Y^(-1/4) exp(i (2/3) Y^(3/2) - i τ √Y + iπ/4)],   Y = (m l/ρ)²
 
-Sources: [F65], [P79], [PBM80], [KP74] for F_t; Derivations, F2 and F8; [F65], [AS64, sec. 10.4]; Derivations, F8.
+Sources: [F65], [P79], [PBM80], [KP74] for F_t; [F65], [AS64, sec. 10.4]; Derivations, F2 and F8.
 """
 
 from functools import cache

@@ -12,7 +12,7 @@ what it may be, has three stages less, and errs less. Other outputs are read fro
 put onto T1Q. Where A is carried all outputs end steps: A' has a kink where kappa_n passes 0, and errors of the
 polynomial there are a hundred times those of the steps.
 
-Compiled tracer of rays each to a time of its own; arithmetic as in `creeping.geodesics.kernels.integrator`.
+Also here: compiled tracer of rays each to a time of its own; arithmetic as in `creeping.geodesics.kernels.integrator`.
 
 Rays of a block go side by side, y' = h_i f(y), each with its own step h_i: what stops one of them does not stop others.
 

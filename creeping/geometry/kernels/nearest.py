@@ -7,11 +7,11 @@ operator,
 
 2 M = kappa_1 + kappa_2, the closed form being that of 2 x 2 matrices.
 
-Compiled curvatures of the body along a tangent and across it.
+Also here: compiled curvatures of the body along a tangent and across it.
 
     kappa_n = p.Hp/|g|,   kappa_t = b.Hb/|g|,   b = g x p/|g|,   g = grad F
 
-Sources: [G05]; Derivations, B11; Derivations, R1.
+Sources: [G05]; Derivations, B11 and R1.
 """
 
 import math

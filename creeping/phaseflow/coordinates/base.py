@@ -10,13 +10,13 @@ A model says where a ray lies on the grid, what displacement is stored there, an
 
 All but the first stay on T1Q whatever the error of the map, need no evaluation of F, and have four lanes.
 
-Maps of bodies of revolution: tables without the azimuth.
+Also here: maps of bodies of revolution: tables without the azimuth.
 
 The flow commutes with turns about the axis (`creeping.geometry.revolution`), so a displacement of rotations or of
 angles depends on where a ray is along the meridian and on its angle from it: two axes of a table instead of three. The
 first axis of the grid, u, has one node.
 
-Sources: Derivations, R15; Derivations, R18.
+Sources: Derivations, R15 and R18.
 """
 
 from functools import cached_property

@@ -2,9 +2,9 @@
 
 Formulas are those of `phaseflow.kernels.rotation` and `phaseflow.kernels.angles`.
 
-Unit quaternions (w, x, y, z) of rotations, arrays (n, 4).
+Also here: unit quaternions (w, x, y, z) of rotations, arrays (n, 4).
 
-Packed tables: displacement, Jacobi matrix and attenuation of a leap in eight lanes, read by one contraction.
+Also here: packed tables: displacement, Jacobi matrix and attenuation of a leap in eight lanes, read by one contraction.
 
     (q1, q2, q3, M11, M21, M12, M22, A),   q0 = (1 - |q|^2)^(1/2),   A = int_0^T0 g(c^(3/2) kappa_n)^(2/3) dt
 
@@ -16,7 +16,7 @@ detaches, the cell is flagged and the kernel takes the curvature.
 With S the regularised incomplete beta function of (7, 4) and I its integral, g(k) = t [1 - 2 I(1) + 2 I((k + t)/2t)],
 whose first four derivatives are those of k at the threshold t, and whose first seven are 0 at -t.
 
-Sources: Derivations, R15; Derivations, R17.
+Sources: Derivations, R15 and R17.
 """
 
 from dataclasses import replace

@@ -5,7 +5,7 @@ is a table of their displacement; a ray is converted to the model once, is compo
 output. FOLDED are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes, MERIDIAN
 those of bodies of revolution (`meridian`). The table of a body of revolution has one plane: no axis u.
 
-What all compositions of maps share: stencil sums for a block of rays in explicit vector code.
+Also here: what all compositions of maps share: stencil sums for a block of rays in explicit vector code.
 
 Sources: [B78]; Derivations, B7.
 """

@@ -1,6 +1,6 @@
 """Compiled work on the nodes of a map while it is built; the kinds of coordinates are those of `composition`.
 
-Compiled composition of many rays in the order of their cells.
+Also here: compiled composition of many rays in the order of their cells.
 
 Rays anywhere on the body read stencils anywhere in the table, and a table beyond the nearest cache makes each of its 16
 to 36 rows wait. Where there are many rays, they are sorted by (chart, cell of u, cell of v) before each leap, by

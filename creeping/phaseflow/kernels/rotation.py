@@ -9,12 +9,12 @@ six stereographic charts: with (a, b, c) cyclic, a the largest component of s, (
 
     u = s_b/(1 + s_a),  v = s_c/(1 + s_a),   angle = atan2(q_c - v q_a, q_b - u q_a),   |u|, |v| <= sqrt(2) - 1.
 
-Block functions of maps on bodies with one doubly periodic chart (the torus).
+Also here: block functions of maps on bodies with one doubly periodic chart (the torus).
 
 The tangent frames of the chart cover the body, so (u, v, angle), all in turns and none of them cut, are coordinates of
 the whole bundle, and a map stores their displacement. The frame is the orthogonal polar factor of (x_u, x_v).
 
-Sources: Derivations, R15; Derivations, B2.
+Sources: Derivations, R15 and B2.
 """
 
 import math

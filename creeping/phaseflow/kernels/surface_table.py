@@ -6,12 +6,13 @@ With T = [x_u, x_v] and G = T^T T, and the stereographic charts being conformal,
 
     p = T G^(-1/2) (along, across),   (along, across) = G^(-1/2) T^T p,   q = along e_u + across e_v.
 
-Compiled look-up of x(u, v) and its tangents on a chart, for bodies whose own map psi is expensive to evaluate.
+Also here: compiled look-up of x(u, v) and its tangents on a chart, for bodies whose own map psi is expensive to
+evaluate.
 
 x, x_u and x_v are sums over one stencil of a quintic spline: for each row i, S = sum_j wv_j c_ij and
 S' = sum_j wv'_j c_ij; then x = sum_i wu_i S, x_u = sum_i wu'_i S, x_v = sum_i wu_i S'.
 
-Where rotations lie on a table without azimuth, of a body of revolution x = psi(s); see `rotation`.
+Also here: where rotations lie on a table without azimuth, of a body of revolution x = psi(s); see `rotation`.
 
 With S a turn about the axis a, psi(S s) = S psi(s) gives S R for R = [s, q, s x q], and the displacement R^-1 R' is one
 for all turns: it is a function of
@@ -21,7 +22,7 @@ for all turns: it is a function of
 theta the angle of s from the axis, angle that of q from the direction in which theta grows. At a pole, angle is any:
 there the function does not depend on it. Beyond a pole theta goes on, so that its splines see a smooth function.
 
-Sources: Derivations, R15; Derivations, B7; Derivations, R18.
+Sources: Derivations, R15, B7 and R18.
 """
 
 import math

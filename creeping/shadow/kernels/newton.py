@@ -1,6 +1,6 @@
 """Compiled nodes of a shadow line: Newton steps onto it, equal arclength, and its length.
 
-Compiled Newton steps of least norm of many points, each onto the shadow line of its own wave.
+Also here: compiled Newton steps of least norm of many points, each onto the shadow line of its own wave.
 
     F = 0,  G = grad F.q - w F = 0;   dx = -[F (Hq x W) + G (W x grad F)]/|W|^2,   W = grad F x Hq,   q = d + w x
 

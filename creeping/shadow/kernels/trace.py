@@ -3,13 +3,13 @@
 A line is sought on one mesh; a step that is not certain of it says so, and so does its length if it is not certain to
 SETTLED. `creeping.shadow.many` goes on to finer meshes.
 
-Compiled first steps of a shadow line: mixed triangles of a mesh, and the walk around them.
+Also here: compiled first steps of a shadow line: mixed triangles of a mesh, and the walk around them.
 
 s = n.q at the vertices, q = d + w x (`creeping.geometry.incident`). A triangle with vertices of both signs has one edge
 that goes from + to - counter-clockwise: leaving by it keeps the lit side on the left, and ends where it began, so
 components come out closed and oriented.
 
-Sources: Derivations, R11; Derivations, R6.
+Sources: Derivations, R11 and R6.
 """
 
 import numpy as np

@@ -11,9 +11,10 @@ other node of the stencil, and its corners have no others: none begins or ends. 
 Errors are the largest of the corners, and in squares with them the stated one of interpolation, SAFE times the sum of
 |da| + k |dL| |a| and NOISE times (sum |a|^2)^(1/2).
 
-Nodes of a lattice: their results and their sheets, and the sheets of neighbours that go over into each other.
+Also here: nodes of a lattice: their results and their sheets, and the sheets of neighbours that go over into each
+other.
 
-Which sheet of a node is which of its neighbour: sheets that are nearest to each other, both ways.
+Also here: which sheet of a node is which of its neighbour: sheets that are nearest to each other, both ways.
 
 A sheet has a chain if it can be followed over all nodes of a stencil; in two dimensions along the first axis and then
 the second, and to the same sheet the other way round.

@@ -10,7 +10,7 @@ The least mean over those tried decides: levels before l
 are left out, and all of them if it is no less than PAYS. It follows from the whole set of incidences and from what is
 asked of them, never from a clock, so that every task of a study, wherever it runs, has the same nodes.
 
-What computes a sweep: each incidence by itself, or some between others.
+Also here: what computes a sweep: each incidence by itself, or some between others.
 
 Sources: Derivations, F23.
 """

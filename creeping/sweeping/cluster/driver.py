@@ -4,7 +4,7 @@ Workers get the recipe of the sweep once, by a plugin that restarted workers get
 store, mapped from its files. They return a record; the driver marks the task. A task whose worker dies again and again
 is put aside until all others are done, and is then done one incidence after the other, alone.
 
-What runs on the workers of a cluster: the recipe of a sweep, and the computation of its tasks.
+Also here: what runs on the workers of a cluster: the recipe of a sweep, and the computation of its tasks.
 """
 
 import os

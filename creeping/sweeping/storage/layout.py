@@ -2,9 +2,9 @@
 
 All of it follows from the plan, and is written anew from it where it is damaged, if that gives the same bytes.
 
-The arrays of a store on disk, read and written a task at a time; what goes wrong there is a `CreepingError`.
+Also here: the arrays of a store on disk, read and written a task at a time; what goes wrong there is a `CreepingError`.
 
-What is cheap to know of the damage to a store: its small files by their digests.
+Also here: what is cheap to know of the damage to a store: its small files by their digests.
 
 The study of a store lists the digests of all files that are the same from its beginning to its end: what describes
 each array, and the coordinates. What describes the root changes with the counts of incidences; its attributes have a

@@ -7,7 +7,7 @@ a digest, the digests of what describes arrays and coordinates, and the flow. A 
 chunks of done tasks are there; `SweepStore.verify` reads them. CRCs and digests have no key: they tell of accidents,
 not of forgery.
 
-Mending a store before it is filled further: files written anew from the plan, tasks computed anew.
+Also here: mending a store before it is filled further: files written anew from the plan, tasks computed anew.
 """
 
 import shutil

@@ -1,6 +1,6 @@
 """Keys of study files: what a table may hold, and the mistakes of one that holds something else.
 
-Tables of directions in study files: kinds of sets, and files that hold them.
+Also here: tables of directions in study files: kinds of sets, and files that hold them.
 """
 
 import difflib
