@@ -15,7 +15,7 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import HARD, SOFT, Boundary
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.profile import RayProfiles
-from studies.reference.section import SectionField, SectionSolver
+from studies.reference.section import SectionField
 from studies.reference.section_shapes import Section
 
 BLEND = (1.0, 0.8)
@@ -240,8 +240,3 @@ def far_errors(
     error = np.abs(found - true)
     back = np.cos(turn) < 0
     return 100 * float(np.max(error) / np.max(np.abs(true))), 100 * float(np.median((error / np.abs(true))[back]))
-
-
-def exact_field(section: Section, wavenumber: float, angle: float, boundary: str) -> SectionField:
-    """Exact wave on a section."""
-    return SectionSolver(section, wavenumber).solve(angle, boundary)

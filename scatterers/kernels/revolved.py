@@ -36,8 +36,6 @@ PLACE, STRETCH, WHOLE, COUNT, ROWS = HEADER, HEADER + 3, HEADER + 4, HEADER + 5,
 # of a row: points and unit tangents (w, r) at both ends, piece, kind, where its shape begins, sign of the corner before
 START, START_TANGENT, END, END_TANGENT, PIECE, KIND, SHAPE, CORNER, WIDTH = 0, 2, 4, 6, 8, 9, 10, 11, 12
 CONIC, SPLINE = 0.0, 1.0
-# of a spline's interval: its ends from the point it is expanded about, six coefficients of w and six of r
-SPLINE_WIDTH = 14
 TINY = 1e-300
 NEWTON = 12
 

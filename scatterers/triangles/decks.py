@@ -24,8 +24,7 @@ CURVED = (9, 10, 16, 20, 21, 23, 25)
 CARDS = {"CTRIA3": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUADR": 4}
 CURVED_CARDS = ("CTRIA6", "CQUAD8", "CQUAD")
 SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf")
-KNOWN = (*SUFFIXES, ".nas", ".gz")
-"""Endings of names of files that are read; .nas is .bdf, .gz is packed."""
+"""Endings of names of files that are read, beside .nas, which is .bdf, and .gz."""
 MESHES = {
     ".ply": rb"ply[ \t]*[\r\n]",
     ".glb": rb"glTF",
